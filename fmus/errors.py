@@ -1,0 +1,90 @@
+"""The errors that vibroimpact raises on purpose; each is one clear message for a person.
+
+Only misuse and broken components raise. What the physics does (chatter, sticking, no contact) is an
+outcome in the dataset, never an exception.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class VibroimpactError(Exception):
+    """Base of all errors of this package; `exit_code` is what the command line returns."""
+
+    exit_code = 1
+
+
+class UsageError(VibroimpactError):
+    """A command was given something it cannot use (a folder that cannot be written, an address without a scheduler)."""
+
+    exit_code = 2
+
+
+class SceneError(VibroimpactError):
+    """A scene file is wrong; all of its problems are reported at once.
+
+    Attributes
+    ----------
+    problems : tuple of str
+        One line for each problem, `file: key: expected ..., got .... hint`.
+    """
+
+    exit_code = 2
+
+    def __init__(self, problems: Sequence[str]) -> None:
+        self.problems = tuple(problems)
+        super().__init__("\n".join(self.problems))
+
+
+class ComponentError(VibroimpactError):
+    """A component (an FMU) failed while it ran.
+
+    Attributes
+    ----------
+    instance, function : str
+        The instance and the FMI function that failed; empty where there was none.
+    time : float or None
+        Simulation time of the failing call, s.
+    log : tuple of str
+        The last lines the component logged.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        instance: str = "",
+        function: str = "",
+        time: float | None = None,
+        log: Sequence[str] = (),
+    ) -> None:
+        self.instance = instance
+        self.function = function
+        self.time = time
+        self.log = tuple(log)
+        super().__init__(message)
+
+
+class ComponentFileError(ComponentError):
+    """An FMU file itself is bad: corrupt, unsafe, or without a binary for this platform."""
+
+    exit_code = 2
+
+
+class DatasetError(VibroimpactError):
+    """A dataset does not follow the schema of `vibroimpact.analysis.dataset`, or cannot be read."""
+
+    exit_code = 2
+
+
+class CampaignError(VibroimpactError):
+    """A campaign could not finish; what is complete stays and the same command resumes it."""
+
+
+class EstimationError(VibroimpactError):
+    """An estimation has no admissible answer for its data."""
+
+
+class RigError(VibroimpactError):
+    """The hardware, or its virtual stand-in, failed."""

@@ -1,0 +1,63 @@
+/* What a component (Oscillator, ImpactStop, ...) gives to the FMI adapters.
+ *
+ * All variables of a component live in one flat struct; the generated table `<folder>_variables`
+ * says where. So get and set are table look-ups, and saving a state is a memcpy. The adapters
+ * fmi2.c and fmi3.c are compiled once for each component and know nothing of its physics.
+ */
+#ifndef VIBROIMPACT_COMPONENT_H
+#define VIBROIMPACT_COMPONENT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "step.h"
+
+enum { VI_FLOAT64 = 0, VI_INT64 = 1, VI_BOOLEAN = 2 };
+
+enum { VI_READ_ONLY = 0, VI_SET_INITIAL = 1, VI_SET_TUNABLE = 2, VI_SET_INPUT = 3 };
+
+/* One variable; its value reference is its index in the table. */
+typedef struct {
+    uint8_t type;   /* VI_FLOAT64, VI_INT64 (enumerations too) or VI_BOOLEAN (stored as int32_t) */
+    uint8_t access; /* when it may be set */
+    uint32_t count; /* number of elements: 1, or the product of the dimensions */
+    uint32_t offset; /* in the component's struct, bytes */
+} vi_variable;
+
+enum { VI_MESSAGE_LENGTH = 1024 };
+
+/* A component. Each of its functions works on the flat struct `self` and never allocates. */
+typedef struct {
+    const char *name;
+    const char *token;
+    const vi_variable *variables;
+    size_t variable_count;
+    size_t struct_size;
+
+    /* Fill `self` (zeroed) with the default values. */
+    void (*defaults)(void *self);
+    /* Check all parameters and start; on failure write every problem into `message`, return false. */
+    bool (*initialize)(void *self, double start_time, char message[VI_MESSAGE_LENGTH]);
+    /* The variable with this value reference was set. */
+    void (*was_set)(void *self, uint32_t value_reference);
+    /* Recompute the outputs that depend on inputs directly. */
+    void (*update_outputs)(void *self);
+    /* Advance to the end of the step; see step.h. */
+    vi_step_result (*step)(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH]);
+    /* Resolve what is pending in event mode (FMI 3.0) or at the start of a step (FMI 2.0). */
+    bool (*resolve)(void *self, char message[VI_MESSAGE_LENGTH]);
+    /* Is the component asking for an event at its present instant? */
+    bool (*event_pending)(const void *self);
+    /* Does this set-up need event mode (an external contact law)? */
+    bool (*needs_events)(const void *self);
+    /* Present time, s. */
+    double (*time)(const void *self);
+    /* Bytes of `self` in use, so that a saved state holds no unused rows of the record. */
+    size_t (*used_size)(const void *self);
+} vi_component;
+
+/* The one component that this shared library holds. */
+extern const vi_component vi_this_component;
+
+#endif

@@ -1,0 +1,464 @@
+/* FMI 2.0 co-simulation over vi_this_component. FMI 2.0 has no event mode: see event_time in the model description.
+ *
+ * A step that ends early (a full record, impact_limit) cannot be said without fmi2Discard, after which no stock
+ * importer continues; so steps never end early here, rows beyond the record are counted as dropped, and reaching
+ * impact_limit is an error.
+ */
+#include "fmi2Functions.h"
+
+#include <limits.h>
+#include <string.h>
+
+#include "instance.h"
+
+#define UNUSED(argument) (void)(argument)
+
+static fmi2Status status(bool good)
+{
+    return good ? fmi2OK : fmi2Error;
+}
+
+static fmi2Status unavailable(fmi2Component c, const char *function)
+{
+    if (c != NULL) {
+        vi_instance_fail(c, function, "not available in this component");
+    }
+    return fmi2Error;
+}
+
+static void log_message(const vi_instance *instance, int level, const char *category, const char *text)
+{
+    if (instance->callback != NULL) {
+        const fmi2CallbackLogger callback = (fmi2CallbackLogger)instance->callback;
+        callback(instance->environment, instance->name, (fmi2Status)level, category, "%s", text);
+    }
+}
+
+/* ---- life ---- */
+
+const char *fmi2GetTypesPlatform(void)
+{
+    return fmi2TypesPlatform;
+}
+
+const char *fmi2GetVersion(void)
+{
+    return fmi2Version;
+}
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
+                               const fmi2String categories[])
+{
+    UNUSED(nCategories);
+    UNUSED(categories);
+    if (c == NULL) {
+        return fmi2Error;
+    }
+    ((vi_instance *)c)->logging = loggingOn != fmi2False;
+    return fmi2OK;
+}
+
+static fmi2Component refuse(const fmi2CallbackFunctions *functions, const char *name, const char *text)
+{
+    if (functions != NULL && functions->logger != NULL) {
+        functions->logger(functions->componentEnvironment, name != NULL ? name : "", fmi2Error, "logStatusError", "%s",
+                          text);
+    }
+    return NULL;
+}
+
+fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
+                              fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
+                              fmi2Boolean visible, fmi2Boolean loggingOn)
+{
+    UNUSED(fmuResourceLocation);
+    UNUSED(visible);
+    if (instanceName == NULL || instanceName[0] == '\0') {
+        return refuse(functions, instanceName, "fmi2Instantiate: expected an instance name, got none");
+    }
+    if (fmuType != fmi2CoSimulation) {
+        return refuse(functions, instanceName, "fmi2Instantiate: only co-simulation is available");
+    }
+    if (fmuGUID == NULL || strcmp(fmuGUID, vi_this_component.token) != 0) {
+        return refuse(functions, instanceName,
+                      "fmi2Instantiate: the guid is not this component's: the binary and the model description are of "
+                      "different versions");
+    }
+    vi_instance *instance = vi_instance_new(instanceName);
+    if (instance != NULL) {
+        instance->log = log_message;
+        instance->callback = functions != NULL ? (void (*)(void))functions->logger : NULL;
+        instance->environment = functions != NULL ? functions->componentEnvironment : NULL;
+        instance->logging = loggingOn != fmi2False;
+    }
+    return instance;
+}
+
+void fmi2FreeInstance(fmi2Component c)
+{
+    vi_instance_free(c);
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
+                               fmi2Boolean stopTimeDefined, fmi2Real stopTime)
+{
+    UNUSED(toleranceDefined);
+    UNUSED(tolerance);
+    UNUSED(stopTimeDefined);
+    UNUSED(stopTime);
+    vi_instance *it = c;
+    if (it == NULL || !vi_instance_expect(it, "fmi2SetupExperiment", VI_MODE_INSTANTIATED)) {
+        return fmi2Error;
+    }
+    it->start_time = startTime;
+    return fmi2OK;
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+{
+    vi_instance *it = c;
+    if (it == NULL || !vi_instance_expect(it, "fmi2EnterInitializationMode", VI_MODE_INSTANTIATED)) {
+        return fmi2Error;
+    }
+    it->mode = VI_MODE_INITIALIZATION;
+    it->outputs_stale = true;
+    return fmi2OK;
+}
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component c)
+{
+    static const char function[] = "fmi2ExitInitializationMode";
+    vi_instance *it = c;
+    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_INITIALIZATION)
+        || !vi_instance_initialize(it, function)) {
+        return fmi2Error;
+    }
+    it->mode = VI_MODE_STEP;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Terminate(fmi2Component c)
+{
+    vi_instance *it = c;
+    if (it == NULL || !vi_instance_expect(it, "fmi2Terminate", VI_RUNNING)) {
+        return fmi2Error;
+    }
+    it->mode = VI_MODE_TERMINATED;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Reset(fmi2Component c)
+{
+    if (c == NULL) {
+        return fmi2Error;
+    }
+    vi_instance_reset(c);
+    return fmi2OK;
+}
+
+/* ---- steps ---- */
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2Real communicationStepSize,
+                      fmi2Boolean noSetFMUStatePriorToCurrentPoint)
+{
+    static const char function[] = "fmi2DoStep";
+    UNUSED(noSetFMUStatePriorToCurrentPoint);
+    vi_instance *it = c;
+    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_STEP)) {
+        return fmi2Error;
+    }
+    const vi_step_request request = {currentCommunicationPoint, communicationStepSize, false, false};
+    const vi_step_result result = vi_this_component.step(it->self, &request, it->message);
+    if (result == VI_STEP_ERROR) {
+        return status(vi_instance_fail(it, function, "%s", it->message));
+    }
+    it->outputs_stale = false;
+    if (result == VI_STEP_IMPACT_LIMIT) {
+        return status(vi_instance_fail(it, function, "impact_limit reached at %.17g s; expected fewer impacts in one step",
+                                       vi_this_component.time(it->self)));
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2CancelStep(fmi2Component c)
+{
+    return unavailable(c, "fmi2CancelStep");
+}
+
+/* doStep is never asynchronous and never discarded: there is no status to ask for but the time and the end. */
+fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value)
+{
+    if (c == NULL || value == NULL || s != fmi2DoStepStatus) {
+        return unavailable(c, "fmi2GetStatus");
+    }
+    *value = fmi2OK;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
+{
+    vi_instance *it = c;
+    if (it == NULL || value == NULL || s != fmi2LastSuccessfulTime || ((int)it->mode & VI_RUNNING) == 0) {
+        return unavailable(c, "fmi2GetRealStatus");
+    }
+    *value = vi_this_component.time(it->self);
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value)
+{
+    UNUSED(s);
+    UNUSED(value);
+    return unavailable(c, "fmi2GetIntegerStatus");
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
+{
+    if (c == NULL || value == NULL || s != fmi2Terminated) {
+        return unavailable(c, "fmi2GetBooleanStatus");
+    }
+    *value = fmi2False;
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value)
+{
+    UNUSED(s);
+    UNUSED(value);
+    return unavailable(c, "fmi2GetStringStatus");
+}
+
+/* ---- variables ---- */
+
+static void read_real(void *field, void *values, size_t first, size_t count)
+{
+    memcpy((double *)values + first, field, count * sizeof(double));
+}
+
+static void write_real(void *field, void *values, size_t first, size_t count)
+{
+    memcpy(field, (const double *)values + first, count * sizeof(double));
+}
+
+/* FMI 2.0 integers have 32 bits: larger counts are shown as the largest. */
+static void read_integer(void *field, void *values, size_t first, size_t count)
+{
+    for (size_t i = 0; i < count; ++i) {
+        const int64_t wide = ((const int64_t *)field)[i];
+        ((fmi2Integer *)values)[first + i] = wide > INT_MAX ? INT_MAX : wide < INT_MIN ? INT_MIN : (fmi2Integer)wide;
+    }
+}
+
+static void write_integer(void *field, void *values, size_t first, size_t count)
+{
+    for (size_t i = 0; i < count; ++i) {
+        ((int64_t *)field)[i] = ((const fmi2Integer *)values)[first + i];
+    }
+}
+
+static void read_boolean(void *field, void *values, size_t first, size_t count)
+{
+    for (size_t i = 0; i < count; ++i) {
+        ((fmi2Boolean *)values)[first + i] = ((const int32_t *)field)[i] != 0 ? fmi2True : fmi2False;
+    }
+}
+
+static void write_boolean(void *field, void *values, size_t first, size_t count)
+{
+    for (size_t i = 0; i < count; ++i) {
+        ((int32_t *)field)[i] = ((const fmi2Boolean *)values)[first + i] != fmi2False ? 1 : 0;
+    }
+}
+
+#define GETTER(NAME, TYPE, CONVERT)                                                                                 \
+    fmi2Status fmi2Get##NAME(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2##NAME value[])         \
+    {                                                                                                                \
+        return status(c != NULL && (nvr == 0 || (vr != NULL && value != NULL                                         \
+                      && vi_instance_get(c, "fmi2Get" #NAME, TYPE, vr, nvr, value, nvr, CONVERT))));                 \
+    }
+#define SETTER(NAME, TYPE, CONVERT)                                                                                 \
+    fmi2Status fmi2Set##NAME(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2##NAME value[])   \
+    {                                                                                                                \
+        return status(c != NULL && (nvr == 0 || (vr != NULL && value != NULL                                         \
+                      && vi_instance_set(c, "fmi2Set" #NAME, TYPE, vr, nvr, value, nvr, CONVERT))));                 \
+    }
+
+GETTER(Real, VI_FLOAT64, read_real)
+SETTER(Real, VI_FLOAT64, write_real)
+GETTER(Integer, VI_INT64, read_integer)
+SETTER(Integer, VI_INT64, write_integer)
+GETTER(Boolean, VI_BOOLEAN, read_boolean)
+SETTER(Boolean, VI_BOOLEAN, write_boolean)
+
+fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[])
+{
+    UNUSED(vr);
+    UNUSED(value);
+    return nvr == 0 ? fmi2OK : unavailable(c, "fmi2GetString");
+}
+
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, const fmi2String value[])
+{
+    UNUSED(vr);
+    UNUSED(value);
+    return nvr == 0 ? fmi2OK : unavailable(c, "fmi2SetString");
+}
+
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                       const fmi2Integer order[], const fmi2Real value[])
+{
+    UNUSED(vr);
+    UNUSED(order);
+    UNUSED(value);
+    return nvr == 0 ? fmi2OK : unavailable(c, "fmi2SetRealInputDerivatives");
+}
+
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                        const fmi2Integer order[], fmi2Real value[])
+{
+    UNUSED(vr);
+    UNUSED(order);
+    UNUSED(value);
+    return nvr == 0 ? fmi2OK : unavailable(c, "fmi2GetRealOutputDerivatives");
+}
+
+fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[], size_t nUnknown,
+                                        const fmi2ValueReference vKnown_ref[], size_t nKnown,
+                                        const fmi2Real dvKnown[], fmi2Real dvUnknown[])
+{
+    UNUSED(vUnknown_ref);
+    UNUSED(nUnknown);
+    UNUSED(vKnown_ref);
+    UNUSED(nKnown);
+    UNUSED(dvKnown);
+    UNUSED(dvUnknown);
+    return unavailable(c, "fmi2GetDirectionalDerivative");
+}
+
+/* ---- saved states ---- */
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
+{
+    vi_saved *saved = FMUstate != NULL ? *FMUstate : NULL;
+    if (c == NULL || FMUstate == NULL || !vi_instance_save(c, "fmi2GetFMUstate", &saved)) {
+        return fmi2Error;
+    }
+    *FMUstate = saved;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate)
+{
+    return status(c != NULL && vi_instance_restore(c, "fmi2SetFMUstate", FMUstate));
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
+{
+    UNUSED(c);
+    if (FMUstate != NULL) {
+        vi_saved_free(*FMUstate);
+        *FMUstate = NULL;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
+{
+    if (c == NULL || FMUstate == NULL || size == NULL) {
+        return fmi2Error;
+    }
+    *size = vi_saved_size(FMUstate);
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size)
+{
+    if (c == NULL || FMUstate == NULL || serializedState == NULL || size < vi_saved_size(FMUstate)) {
+        return fmi2Error;
+    }
+    vi_saved_write(FMUstate, (unsigned char *)serializedState);
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
+                                   fmi2FMUstate *FMUstate)
+{
+    if (c == NULL || serializedState == NULL || FMUstate == NULL) {
+        return fmi2Error;
+    }
+    vi_saved *saved =
+        vi_saved_read(c, "fmi2DeSerializeFMUstate", (const unsigned char *)serializedState, size);
+    if (saved == NULL) {
+        return fmi2Error;
+    }
+    *FMUstate = saved;
+    return fmi2OK;
+}
+
+/* ---- model exchange: importers look these up; each says that it is not available ---- */
+
+fmi2Status fmi2EnterEventMode(fmi2Component c)
+{
+    return unavailable(c, "fmi2EnterEventMode");
+}
+
+fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
+{
+    UNUSED(eventInfo);
+    return unavailable(c, "fmi2NewDiscreteStates");
+}
+
+fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
+{
+    return unavailable(c, "fmi2EnterContinuousTimeMode");
+}
+
+fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
+{
+    UNUSED(noSetFMUStatePriorToCurrentPoint);
+    UNUSED(enterEventMode);
+    UNUSED(terminateSimulation);
+    return unavailable(c, "fmi2CompletedIntegratorStep");
+}
+
+fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
+{
+    UNUSED(time);
+    return unavailable(c, "fmi2SetTime");
+}
+
+fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)
+{
+    UNUSED(x);
+    UNUSED(nx);
+    return unavailable(c, "fmi2SetContinuousStates");
+}
+
+fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx)
+{
+    UNUSED(derivatives);
+    UNUSED(nx);
+    return unavailable(c, "fmi2GetDerivatives");
+}
+
+fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni)
+{
+    UNUSED(eventIndicators);
+    UNUSED(ni);
+    return unavailable(c, "fmi2GetEventIndicators");
+}
+
+fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
+{
+    UNUSED(x);
+    UNUSED(nx);
+    return unavailable(c, "fmi2GetContinuousStates");
+}
+
+fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx)
+{
+    UNUSED(x_nominal);
+    UNUSED(nx);
+    return unavailable(c, "fmi2GetNominalsOfContinuousStates");
+}

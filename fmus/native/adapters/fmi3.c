@@ -1,0 +1,536 @@
+/* FMI 3.0 co-simulation over vi_this_component: event mode with early return, get/set/serialize state.
+ *
+ * Every function of the standard is exported, as importers look all of them up; those of model exchange, scheduled
+ * execution and clocks say that they are not available.
+ */
+#include "fmi3Functions.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "instance.h"
+
+#define UNUSED(argument) (void)(argument)
+
+static fmi3Status status(bool good)
+{
+    return good ? fmi3OK : fmi3Error;
+}
+
+static fmi3Status unavailable(fmi3Instance instance, const char *function)
+{
+    if (instance != NULL) {
+        vi_instance_fail(instance, function, "not available in this component");
+    }
+    return fmi3Error;
+}
+
+static void log_message(const vi_instance *instance, int level, const char *category, const char *text)
+{
+    if (instance->callback != NULL) {
+        const fmi3LogMessageCallback callback = (fmi3LogMessageCallback)instance->callback;
+        callback(instance->environment, (fmi3Status)level, category, text);
+    }
+}
+
+/* ---- life ---- */
+
+const char *fmi3GetVersion(void)
+{
+    return fmi3Version;
+}
+
+fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
+                               const fmi3String categories[])
+{
+    UNUSED(nCategories);
+    UNUSED(categories);
+    if (instance == NULL) {
+        return fmi3Error;
+    }
+    ((vi_instance *)instance)->logging = loggingOn;
+    return fmi3OK;
+}
+
+static void refuse(fmi3LogMessageCallback log, fmi3InstanceEnvironment environment, const char *text)
+{
+    if (log != NULL) {
+        log(environment, fmi3Error, "logStatusError", text);
+    }
+}
+
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
+                                         fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                         fmi3Boolean eventModeUsed, fmi3Boolean earlyReturnAllowed,
+                                         const fmi3ValueReference requiredIntermediateVariables[],
+                                         size_t nRequiredIntermediateVariables,
+                                         fmi3InstanceEnvironment instanceEnvironment,
+                                         fmi3LogMessageCallback logMessage,
+                                         fmi3IntermediateUpdateCallback intermediateUpdate)
+{
+    UNUSED(resourcePath);
+    UNUSED(visible);
+    UNUSED(requiredIntermediateVariables);
+    UNUSED(intermediateUpdate);
+    if (instanceName == NULL || instanceName[0] == '\0') {
+        refuse(logMessage, instanceEnvironment, "fmi3InstantiateCoSimulation: expected an instance name, got none");
+        return NULL;
+    }
+    if (instantiationToken == NULL || strcmp(instantiationToken, vi_this_component.token) != 0) {
+        refuse(logMessage, instanceEnvironment,
+               "fmi3InstantiateCoSimulation: the instantiation token is not this component's: the binary and the "
+               "model description are of different versions");
+        return NULL;
+    }
+    if (nRequiredIntermediateVariables > 0) {
+        refuse(logMessage, instanceEnvironment,
+               "fmi3InstantiateCoSimulation: intermediate variables are not available in this component");
+        return NULL;
+    }
+    vi_instance *instance = vi_instance_new(instanceName);
+    if (instance != NULL) {
+        instance->log = log_message;
+        instance->callback = (void (*)(void))logMessage;
+        instance->environment = instanceEnvironment;
+        instance->logging = loggingOn;
+        instance->event_mode_used = eventModeUsed;
+        instance->early_return_allowed = earlyReturnAllowed;
+    }
+    return instance;
+}
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
+                                          fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                          fmi3InstanceEnvironment instanceEnvironment,
+                                          fmi3LogMessageCallback logMessage)
+{
+    UNUSED(instanceName);
+    UNUSED(instantiationToken);
+    UNUSED(resourcePath);
+    UNUSED(visible);
+    UNUSED(loggingOn);
+    refuse(logMessage, instanceEnvironment, "fmi3InstantiateModelExchange: only co-simulation is available");
+    return NULL;
+}
+
+fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
+                                               fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                               fmi3InstanceEnvironment instanceEnvironment,
+                                               fmi3LogMessageCallback logMessage,
+                                               fmi3ClockUpdateCallback clockUpdate,
+                                               fmi3LockPreemptionCallback lockPreemption,
+                                               fmi3UnlockPreemptionCallback unlockPreemption)
+{
+    UNUSED(instanceName);
+    UNUSED(instantiationToken);
+    UNUSED(resourcePath);
+    UNUSED(visible);
+    UNUSED(loggingOn);
+    UNUSED(clockUpdate);
+    UNUSED(lockPreemption);
+    UNUSED(unlockPreemption);
+    refuse(logMessage, instanceEnvironment, "fmi3InstantiateScheduledExecution: only co-simulation is available");
+    return NULL;
+}
+
+void fmi3FreeInstance(fmi3Instance instance)
+{
+    vi_instance_free(instance);
+}
+
+fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
+                                       fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
+{
+    UNUSED(toleranceDefined);
+    UNUSED(tolerance);
+    UNUSED(stopTimeDefined);
+    UNUSED(stopTime);
+    vi_instance *it = instance;
+    if (it == NULL || !vi_instance_expect(it, "fmi3EnterInitializationMode", VI_MODE_INSTANTIATED)) {
+        return fmi3Error;
+    }
+    it->mode = VI_MODE_INITIALIZATION;
+    it->start_time = startTime;
+    it->outputs_stale = true;
+    return fmi3OK;
+}
+
+/* A law that another FMU answers needs an importer that stops at events. */
+static bool events_are_handled(vi_instance *it, const char *function)
+{
+    if (!vi_this_component.needs_events(it->self) || (it->event_mode_used && it->early_return_allowed)) {
+        return true;
+    }
+    return vi_instance_fail(it, function,
+                            "contact law external: expected an importer with event mode and early return, got "
+                            "eventModeUsed = %s, earlyReturnAllowed = %s. Use law restitution (1), or an importer that "
+                            "handles events",
+                            it->event_mode_used ? "true" : "false", it->early_return_allowed ? "true" : "false");
+}
+
+fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
+{
+    static const char function[] = "fmi3ExitInitializationMode";
+    vi_instance *it = instance;
+    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_INITIALIZATION) || !events_are_handled(it, function)
+        || !vi_instance_initialize(it, function)) {
+        return fmi3Error;
+    }
+    it->mode = it->event_mode_used ? VI_MODE_EVENT : VI_MODE_STEP;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EnterEventMode(fmi3Instance instance)
+{
+    vi_instance *it = instance;
+    if (it == NULL || !vi_instance_expect(it, "fmi3EnterEventMode", VI_MODE_STEP)) {
+        return fmi3Error;
+    }
+    if (!it->event_mode_used) {
+        return status(vi_instance_fail(it, "fmi3EnterEventMode", "the instance was made with eventModeUsed = false"));
+    }
+    it->mode = VI_MODE_EVENT;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EnterStepMode(fmi3Instance instance)
+{
+    vi_instance *it = instance;
+    if (it == NULL || !vi_instance_expect(it, "fmi3EnterStepMode", VI_MODE_EVENT)) {
+        return fmi3Error;
+    }
+    it->mode = VI_MODE_STEP;
+    return fmi3OK;
+}
+
+fmi3Status fmi3Terminate(fmi3Instance instance)
+{
+    vi_instance *it = instance;
+    if (it == NULL || !vi_instance_expect(it, "fmi3Terminate", VI_RUNNING)) {
+        return fmi3Error;
+    }
+    it->mode = VI_MODE_TERMINATED;
+    return fmi3OK;
+}
+
+fmi3Status fmi3Reset(fmi3Instance instance)
+{
+    if (instance == NULL) {
+        return fmi3Error;
+    }
+    vi_instance_reset(instance);
+    return fmi3OK;
+}
+
+/* ---- steps and events ---- */
+
+fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
+                      fmi3Float64 communicationStepSize, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                      fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn,
+                      fmi3Float64 *lastSuccessfulTime)
+{
+    UNUSED(noSetFMUStatePriorToCurrentPoint);
+    vi_instance *it = instance;
+    if (it == NULL || eventHandlingNeeded == NULL || terminateSimulation == NULL || earlyReturn == NULL
+        || lastSuccessfulTime == NULL || !vi_instance_expect(it, "fmi3DoStep", VI_MODE_STEP)) {
+        return fmi3Error;
+    }
+    const vi_step_request request = {currentCommunicationPoint, communicationStepSize, it->event_mode_used,
+                                     it->early_return_allowed};
+    *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
+    *lastSuccessfulTime = currentCommunicationPoint;
+    const vi_step_result result = vi_this_component.step(it->self, &request, it->message);
+    if (result == VI_STEP_ERROR) {
+        return status(vi_instance_fail(it, "fmi3DoStep", "%s", it->message));
+    }
+    it->outputs_stale = false;
+    const double end = currentCommunicationPoint + communicationStepSize;
+    *lastSuccessfulTime = result == VI_STEP_DONE ? end : vi_this_component.time(it->self);
+    if (result == VI_STEP_IMPACT_LIMIT) {
+        log_message(it, fmi3Discard, "logStatusWarning", "fmi3DoStep: impact_limit reached");
+        return fmi3Discard;
+    }
+    *eventHandlingNeeded = result == VI_STEP_CONTACT;
+    *earlyReturn = result != VI_STEP_DONE && *lastSuccessfulTime < end;
+    return fmi3OK;
+}
+
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
+                                    fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
+                                    fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined,
+                                    fmi3Float64 *nextEventTime)
+{
+    static const char function[] = "fmi3UpdateDiscreteStates";
+    vi_instance *it = instance;
+    if (it == NULL || discreteStatesNeedUpdate == NULL || terminateSimulation == NULL
+        || nominalsOfContinuousStatesChanged == NULL || valuesOfContinuousStatesChanged == NULL
+        || nextEventTimeDefined == NULL || nextEventTime == NULL
+        || !vi_instance_expect(it, function, VI_MODE_EVENT)) {
+        return fmi3Error;
+    }
+    *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = false;
+    *valuesOfContinuousStatesChanged = vi_this_component.event_pending(it->self);
+    *nextEventTimeDefined = false;
+    *nextEventTime = 0.0;
+    if (!vi_this_component.resolve(it->self, it->message)) {
+        return status(vi_instance_fail(it, function, "%s", it->message));
+    }
+    it->outputs_stale = true;
+    return fmi3OK;
+}
+
+fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
+{
+    vi_instance *it = instance;
+    return status(it != NULL && vi_instance_expect(it, "fmi3EvaluateDiscreteStates", VI_MODE_EVENT));
+}
+
+/* ---- variables ---- */
+
+static void read_float64(void *field, void *values, size_t first, size_t count)
+{
+    memcpy((double *)values + first, field, count * sizeof(double));
+}
+
+static void write_float64(void *field, void *values, size_t first, size_t count)
+{
+    memcpy(field, (const double *)values + first, count * sizeof(double));
+}
+
+static void read_int64(void *field, void *values, size_t first, size_t count)
+{
+    memcpy((int64_t *)values + first, field, count * sizeof(int64_t));
+}
+
+static void write_int64(void *field, void *values, size_t first, size_t count)
+{
+    memcpy(field, (const int64_t *)values + first, count * sizeof(int64_t));
+}
+
+static void read_boolean(void *field, void *values, size_t first, size_t count)
+{
+    for (size_t i = 0; i < count; ++i) {
+        ((fmi3Boolean *)values)[first + i] = ((const int32_t *)field)[i] != 0;
+    }
+}
+
+static void write_boolean(void *field, void *values, size_t first, size_t count)
+{
+    for (size_t i = 0; i < count; ++i) {
+        ((int32_t *)field)[i] = ((const fmi3Boolean *)values)[first + i] ? 1 : 0;
+    }
+}
+
+#define GETTER(NAME, CTYPE, TYPE, CONVERT)                                                                          \
+    fmi3Status fmi3Get##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
+                             size_t nValueReferences, CTYPE values[], size_t nValues)                                \
+    {                                                                                                                \
+        return status(instance != NULL && valueReferences != NULL && values != NULL                                  \
+                      && vi_instance_get(instance, "fmi3Get" #NAME, TYPE, valueReferences, nValueReferences, values, \
+                                         nValues, CONVERT));                                                         \
+    }
+#define SETTER(NAME, CTYPE, TYPE, CONVERT)                                                                          \
+    fmi3Status fmi3Set##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
+                             size_t nValueReferences, const CTYPE values[], size_t nValues)                          \
+    {                                                                                                                \
+        return status(instance != NULL && valueReferences != NULL && values != NULL                                  \
+                      && vi_instance_set(instance, "fmi3Set" #NAME, TYPE, valueReferences, nValueReferences, values, \
+                                         nValues, CONVERT));                                                         \
+    }
+/* A type that no variable of ours has: every reference is refused, asking for none is fine. */
+#define EMPTY_TYPE(NAME, CTYPE)                                                                                     \
+    fmi3Status fmi3Get##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
+                             size_t nValueReferences, CTYPE values[], size_t nValues)                                \
+    {                                                                                                                \
+        UNUSED(valueReferences);                                                                                     \
+        UNUSED(values);                                                                                              \
+        UNUSED(nValues);                                                                                             \
+        return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3Get" #NAME);                              \
+    }                                                                                                                \
+    fmi3Status fmi3Set##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
+                             size_t nValueReferences, const CTYPE values[], size_t nValues)                          \
+    {                                                                                                                \
+        UNUSED(valueReferences);                                                                                     \
+        UNUSED(values);                                                                                              \
+        UNUSED(nValues);                                                                                             \
+        return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3Set" #NAME);                              \
+    }
+
+GETTER(Float64, fmi3Float64, VI_FLOAT64, read_float64)
+SETTER(Float64, fmi3Float64, VI_FLOAT64, write_float64)
+GETTER(Int64, fmi3Int64, VI_INT64, read_int64)
+SETTER(Int64, fmi3Int64, VI_INT64, write_int64)
+GETTER(Boolean, fmi3Boolean, VI_BOOLEAN, read_boolean)
+SETTER(Boolean, fmi3Boolean, VI_BOOLEAN, write_boolean)
+EMPTY_TYPE(Float32, fmi3Float32)
+EMPTY_TYPE(Int8, fmi3Int8)
+EMPTY_TYPE(UInt8, fmi3UInt8)
+EMPTY_TYPE(Int16, fmi3Int16)
+EMPTY_TYPE(UInt16, fmi3UInt16)
+EMPTY_TYPE(Int32, fmi3Int32)
+EMPTY_TYPE(UInt32, fmi3UInt32)
+EMPTY_TYPE(UInt64, fmi3UInt64)
+EMPTY_TYPE(String, fmi3String)
+
+fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                         size_t valueSizes[], fmi3Binary values[], size_t nValues)
+{
+    UNUSED(valueReferences);
+    UNUSED(valueSizes);
+    UNUSED(values);
+    UNUSED(nValues);
+    return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3GetBinary");
+}
+
+fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                         const size_t valueSizes[], const fmi3Binary values[], size_t nValues)
+{
+    UNUSED(valueReferences);
+    UNUSED(valueSizes);
+    UNUSED(values);
+    UNUSED(nValues);
+    return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetBinary");
+}
+
+fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        fmi3Clock values[])
+{
+    UNUSED(valueReferences);
+    UNUSED(values);
+    return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3GetClock");
+}
+
+fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        const fmi3Clock values[])
+{
+    UNUSED(valueReferences);
+    UNUSED(values);
+    return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetClock");
+}
+
+/* ---- saved states ---- */
+
+fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    vi_saved *saved = FMUState != NULL ? *FMUState : NULL;
+    if (instance == NULL || FMUState == NULL || !vi_instance_save(instance, "fmi3GetFMUState", &saved)) {
+        return fmi3Error;
+    }
+    *FMUState = saved;
+    return fmi3OK;
+}
+
+fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
+{
+    return status(instance != NULL && vi_instance_restore(instance, "fmi3SetFMUState", FMUState));
+}
+
+fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
+{
+    UNUSED(instance);
+    if (FMUState != NULL) {
+        vi_saved_free(*FMUState);
+        *FMUState = NULL;
+    }
+    return fmi3OK;
+}
+
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
+{
+    if (instance == NULL || FMUState == NULL || size == NULL) {
+        return fmi3Error;
+    }
+    *size = vi_saved_size(FMUState);
+    return fmi3OK;
+}
+
+fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[],
+                                 size_t size)
+{
+    if (instance == NULL || FMUState == NULL || serializedState == NULL || size < vi_saved_size(FMUState)) {
+        return fmi3Error;
+    }
+    vi_saved_write(FMUState, serializedState);
+    return fmi3OK;
+}
+
+fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
+                                   fmi3FMUState *FMUState)
+{
+    if (instance == NULL || serializedState == NULL || FMUState == NULL) {
+        return fmi3Error;
+    }
+    vi_saved *saved = vi_saved_read(instance, "fmi3DeserializeFMUState", serializedState, size);
+    if (saved == NULL) {
+        return fmi3Error;
+    }
+    *FMUState = saved;
+    return fmi3OK;
+}
+
+/* ---- not available: each says so ---- */
+
+#define UNAVAILABLE(NAME, ...)               \
+    fmi3Status NAME(__VA_ARGS__)             \
+    {                                        \
+        return unavailable(instance, #NAME); \
+    }
+
+#if defined(__GNUC__) || defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+
+UNAVAILABLE(fmi3GetNumberOfVariableDependencies, fmi3Instance instance, fmi3ValueReference valueReference,
+            size_t *nDependencies)
+UNAVAILABLE(fmi3GetVariableDependencies, fmi3Instance instance, fmi3ValueReference dependent,
+            size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
+            size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[], size_t nDependencies)
+UNAVAILABLE(fmi3GetDirectionalDerivative, fmi3Instance instance, const fmi3ValueReference unknowns[],
+            size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+            size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+UNAVAILABLE(fmi3GetAdjointDerivative, fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+            const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
+            fmi3Float64 sensitivity[], size_t nSensitivity)
+UNAVAILABLE(fmi3EnterConfigurationMode, fmi3Instance instance)
+UNAVAILABLE(fmi3ExitConfigurationMode, fmi3Instance instance)
+UNAVAILABLE(fmi3GetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+UNAVAILABLE(fmi3GetIntervalFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+            fmi3IntervalQualifier qualifiers[])
+UNAVAILABLE(fmi3GetShiftDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3Float64 shifts[])
+UNAVAILABLE(fmi3GetShiftFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+UNAVAILABLE(fmi3SetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3Float64 intervals[])
+UNAVAILABLE(fmi3SetIntervalFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+UNAVAILABLE(fmi3SetShiftDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3Float64 shifts[])
+UNAVAILABLE(fmi3SetShiftFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+UNAVAILABLE(fmi3EnterContinuousTimeMode, fmi3Instance instance)
+UNAVAILABLE(fmi3CompletedIntegratorStep, fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+            fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
+UNAVAILABLE(fmi3SetTime, fmi3Instance instance, fmi3Float64 time)
+UNAVAILABLE(fmi3SetContinuousStates, fmi3Instance instance, const fmi3Float64 continuousStates[],
+            size_t nContinuousStates)
+UNAVAILABLE(fmi3GetContinuousStateDerivatives, fmi3Instance instance, fmi3Float64 derivatives[],
+            size_t nContinuousStates)
+UNAVAILABLE(fmi3GetEventIndicators, fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
+UNAVAILABLE(fmi3GetContinuousStates, fmi3Instance instance, fmi3Float64 continuousStates[],
+            size_t nContinuousStates)
+UNAVAILABLE(fmi3GetNominalsOfContinuousStates, fmi3Instance instance, fmi3Float64 nominals[],
+            size_t nContinuousStates)
+UNAVAILABLE(fmi3GetNumberOfEventIndicators, fmi3Instance instance, size_t *nEventIndicators)
+UNAVAILABLE(fmi3GetNumberOfContinuousStates, fmi3Instance instance, size_t *nContinuousStates)
+UNAVAILABLE(fmi3GetOutputDerivatives, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
+UNAVAILABLE(fmi3ActivateModelPartition, fmi3Instance instance, fmi3ValueReference clockReference,
+            fmi3Float64 activationTime)
+
+#if defined(__GNUC__) || defined(__clang__)
+#pragma GCC diagnostic pop
+#endif

@@ -1,0 +1,278 @@
+#include "instance.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const vi_component *const component = &vi_this_component;
+
+/* ---- life ---- */
+
+vi_instance *vi_instance_new(const char *name)
+{
+    vi_instance *instance = calloc(1, sizeof(vi_instance));
+    void *self = calloc(1, component->struct_size);
+    const size_t length = strlen(name) + 1;
+    char *copy = malloc(length);
+    if (instance == NULL || self == NULL || copy == NULL) {
+        free(instance);
+        free(self);
+        free(copy);
+        return NULL;
+    }
+    memcpy(copy, name, length);
+    instance->name = copy;
+    instance->self = self;
+    vi_instance_reset(instance);
+    return instance;
+}
+
+void vi_instance_free(vi_instance *instance)
+{
+    if (instance != NULL) {
+        free(instance->self);
+        free(instance->name);
+        free(instance);
+    }
+}
+
+void vi_instance_reset(vi_instance *instance)
+{
+    memset(instance->self, 0, component->struct_size);
+    component->defaults(instance->self);
+    instance->mode = VI_MODE_INSTANTIATED;
+    instance->outputs_stale = false;
+    instance->start_time = 0.0;
+}
+
+bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...)
+{
+    char text[VI_MESSAGE_LENGTH + 128];
+    const int used = snprintf(text, sizeof text, "%s: %s: ", instance->name, function);
+    const size_t start = used > 0 && (size_t)used < sizeof text ? (size_t)used : 0;
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(text + start, sizeof text - start, format, arguments);
+    va_end(arguments);
+    if (instance->log != NULL) {
+        instance->log(instance, 3, "logStatusError", text);
+    }
+    return false;
+}
+
+static const char *mode_name(vi_mode_of_use mode)
+{
+    switch (mode) {
+    case VI_MODE_INSTANTIATED: return "instantiated";
+    case VI_MODE_INITIALIZATION: return "initialization mode";
+    case VI_MODE_STEP: return "step mode";
+    case VI_MODE_EVENT: return "event mode";
+    case VI_MODE_TERMINATED: return "terminated";
+    case VI_MODE_FAILED: return "failed";
+    }
+    return "unknown";
+}
+
+bool vi_instance_expect(vi_instance *instance, const char *function, int modes)
+{
+    if (((int)instance->mode & modes) != 0) {
+        return true;
+    }
+    return vi_instance_fail(instance, function, "not allowed now: the instance is %s", mode_name(instance->mode));
+}
+
+bool vi_instance_initialize(vi_instance *instance, const char *function)
+{
+    if (!component->initialize(instance->self, instance->start_time, instance->message)) {
+        return vi_instance_fail(instance, function, "%s", instance->message);
+    }
+    instance->outputs_stale = false;
+    return true;
+}
+
+/* ---- variables ---- */
+
+static const vi_variable *find(vi_instance *instance, const char *function, int type, uint32_t reference)
+{
+    if (reference >= component->variable_count || component->variables[reference].type != type) {
+        vi_instance_fail(instance, function, "value reference %lu is not a variable of this type",
+                         (unsigned long)reference);
+        return NULL;
+    }
+    return &component->variables[reference];
+}
+
+static void refresh_outputs(vi_instance *instance)
+{
+    if (instance->mode == VI_MODE_INITIALIZATION) {
+        /* outputs follow the start values; a bad parameter is reported when initialization ends */
+        (void)component->initialize(instance->self, instance->start_time, instance->message);
+    } else if (((int)instance->mode & VI_RUNNING) != 0) {
+        component->update_outputs(instance->self);
+    }
+    instance->outputs_stale = false;
+}
+
+bool vi_instance_get(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
+                     void *values, size_t value_count, vi_convert convert)
+{
+    if (instance->outputs_stale) {
+        refresh_outputs(instance);
+    }
+    size_t first = 0;
+    for (size_t i = 0; i < n; ++i) {
+        const vi_variable *variable = find(instance, function, type, references[i]);
+        if (variable == NULL) {
+            return false;
+        }
+        if (variable->count > value_count - first) {
+            return vi_instance_fail(instance, function, "expected room for more than %lu values",
+                                    (unsigned long)value_count);
+        }
+        convert((char *)instance->self + variable->offset, values, first, variable->count);
+        first += variable->count;
+    }
+    return true;
+}
+
+static bool may_set(vi_instance *instance, const char *function, const vi_variable *variable, uint32_t reference)
+{
+    if (variable->access == VI_READ_ONLY) {
+        return vi_instance_fail(instance, function, "value reference %lu cannot be set", (unsigned long)reference);
+    }
+    const int modes = variable->access == VI_SET_INITIAL ? VI_BEFORE_START : VI_BEFORE_START | VI_RUNNING;
+    if (((int)instance->mode & modes) == 0) {
+        return vi_instance_fail(instance, function, "value reference %lu cannot be set: the instance is %s",
+                                (unsigned long)reference, mode_name(instance->mode));
+    }
+    return true;
+}
+
+bool vi_instance_set(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
+                     const void *values, size_t value_count, vi_convert convert)
+{
+    size_t first = 0;
+    for (size_t i = 0; i < n; ++i) {
+        const vi_variable *variable = find(instance, function, type, references[i]);
+        if (variable == NULL || !may_set(instance, function, variable, references[i])) {
+            return false;
+        }
+        if (variable->count > value_count - first) {
+            return vi_instance_fail(instance, function, "expected more than %lu values", (unsigned long)value_count);
+        }
+        convert((char *)instance->self + variable->offset, (void *)(uintptr_t)values, first, variable->count);
+        component->was_set(instance->self, references[i]);
+        first += variable->count;
+    }
+    instance->outputs_stale = true;
+    return true;
+}
+
+/* ---- saved states: a header, then the used part of the component's struct ---- */
+
+struct vi_saved {
+    char magic[8];
+    uint64_t token_hash, data_hash;
+    uint64_t size, capacity; /* of the data, bytes */
+    int64_t mode;
+    double start_time;
+    int64_t outputs_stale;
+    unsigned char data[];
+};
+
+static const char MAGIC[8] = "vibstat1";
+
+/* FNV-1a: tells a damaged or foreign state from a good one; not a defence against forgery. */
+static uint64_t hash(const unsigned char *bytes, size_t size)
+{
+    uint64_t h = 1469598103934665603u;
+    for (size_t i = 0; i < size; ++i) {
+        h = (h ^ bytes[i]) * 1099511628211u;
+    }
+    return h;
+}
+
+static uint64_t token_hash(void)
+{
+    return hash((const unsigned char *)component->token, strlen(component->token));
+}
+
+bool vi_instance_save(vi_instance *instance, const char *function, vi_saved **saved)
+{
+    const size_t size = component->used_size(instance->self);
+    vi_saved *state = *saved;
+    if (state == NULL || state->capacity < size) {
+        state = realloc(state, sizeof(vi_saved) + size);
+        if (state == NULL) {
+            return vi_instance_fail(instance, function, "out of memory");
+        }
+        memset(state, 0, sizeof(vi_saved));
+        state->capacity = size;
+    }
+    memcpy(state->magic, MAGIC, sizeof MAGIC);
+    state->size = size;
+    state->mode = (int64_t)instance->mode;
+    state->start_time = instance->start_time;
+    state->outputs_stale = instance->outputs_stale;
+    memcpy(state->data, instance->self, size);
+    *saved = state;
+    return true;
+}
+
+bool vi_instance_restore(vi_instance *instance, const char *function, const vi_saved *saved)
+{
+    if (saved == NULL || saved->size > component->struct_size) {
+        return vi_instance_fail(instance, function, "expected a saved state, got none");
+    }
+    memcpy(instance->self, saved->data, saved->size);
+    instance->mode = (vi_mode_of_use)saved->mode;
+    instance->start_time = saved->start_time;
+    instance->outputs_stale = saved->outputs_stale != 0;
+    return true;
+}
+
+size_t vi_saved_size(const vi_saved *saved)
+{
+    return sizeof(vi_saved) + saved->size;
+}
+
+void vi_saved_write(const vi_saved *saved, unsigned char *bytes)
+{
+    vi_saved header = *saved;
+    header.token_hash = token_hash();
+    header.data_hash = hash(saved->data, saved->size);
+    header.capacity = saved->size;
+    memcpy(bytes, &header, sizeof header);
+    memcpy(bytes + sizeof header, saved->data, saved->size);
+}
+
+vi_saved *vi_saved_read(vi_instance *instance, const char *function, const unsigned char *bytes, size_t size)
+{
+    vi_saved header;
+    if (size < sizeof header) {
+        vi_instance_fail(instance, function, "expected a serialized state, got %lu bytes", (unsigned long)size);
+        return NULL;
+    }
+    memcpy(&header, bytes, sizeof header);
+    const unsigned char *data = bytes + sizeof header;
+    if (memcmp(header.magic, MAGIC, sizeof MAGIC) != 0 || header.token_hash != token_hash()
+        || header.size != size - sizeof header || header.size > component->struct_size
+        || header.data_hash != hash(data, header.size)) {
+        vi_instance_fail(instance, function, "these bytes are not an undamaged state of this component and version");
+        return NULL;
+    }
+    vi_saved *saved = malloc(size);
+    if (saved == NULL) {
+        vi_instance_fail(instance, function, "out of memory");
+        return NULL;
+    }
+    memcpy(saved, bytes, size);
+    saved->capacity = header.size;
+    return saved;
+}
+
+void vi_saved_free(vi_saved *saved)
+{
+    free(saved);
+}

@@ -1,0 +1,78 @@
+/* What the FMI 3.0 and the FMI 2.0 adapter share: an instance, its mode, its variables, its saved states. */
+#ifndef VIBROIMPACT_INSTANCE_H
+#define VIBROIMPACT_INSTANCE_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "component.h"
+
+typedef enum {
+    VI_MODE_INSTANTIATED = 1,
+    VI_MODE_INITIALIZATION = 2,
+    VI_MODE_STEP = 4,
+    VI_MODE_EVENT = 8,
+    VI_MODE_TERMINATED = 16,
+    VI_MODE_FAILED = 32
+} vi_mode_of_use;
+
+enum {
+    VI_ANY_MODE = 63,
+    VI_BEFORE_START = VI_MODE_INSTANTIATED | VI_MODE_INITIALIZATION,
+    VI_RUNNING = VI_MODE_STEP | VI_MODE_EVENT
+};
+
+typedef struct vi_instance vi_instance;
+
+struct vi_instance {
+    void *self;            /* the component's struct, with its record; the first member of nothing */
+    vi_mode_of_use mode;
+    bool outputs_stale;    /* an input was set since the outputs were computed */
+    bool event_mode_used, early_return_allowed, logging;
+    double start_time;
+    char *name;
+    char message[VI_MESSAGE_LENGTH];
+    /* version-specific logger: level 0 event, 1 warning, 3 error */
+    void (*log)(const vi_instance *instance, int level, const char *category, const char *text);
+    void *environment;
+    void (*callback)(void);
+    int32_t last_step_event; /* FMI 2.0 status enquiries */
+};
+
+/* NULL when memory is out. */
+vi_instance *vi_instance_new(const char *name);
+void vi_instance_free(vi_instance *instance);
+void vi_instance_reset(vi_instance *instance);
+
+/* Log an error `function: text` and return false. */
+bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...);
+
+/* Is the instance in one of these modes? If not, log it. */
+bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
+
+/* Initialization's end: false (with the component's message logged) when a parameter is bad. */
+bool vi_instance_initialize(vi_instance *instance, const char *function);
+
+/* Get and set `n` variables of one type. `convert` moves one variable's `count` elements between the struct and the
+ * importer's array, which is advanced by the caller's type. Return false after logging. */
+typedef void (*vi_convert)(void *field, void *values, size_t first, size_t count);
+bool vi_instance_get(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
+                     void *values, size_t value_count, vi_convert convert);
+bool vi_instance_set(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
+                     const void *values, size_t value_count, vi_convert convert);
+
+/* ---- saved states ---- */
+
+typedef struct vi_saved vi_saved;
+
+/* Save into *saved (reused when large enough, else allocated); false when memory is out. */
+bool vi_instance_save(vi_instance *instance, const char *function, vi_saved **saved);
+bool vi_instance_restore(vi_instance *instance, const char *function, const vi_saved *saved);
+size_t vi_saved_size(const vi_saved *saved);
+void vi_saved_write(const vi_saved *saved, unsigned char *bytes);
+/* A state from bytes; NULL (after logging) when they are not a state of this component. */
+vi_saved *vi_saved_read(vi_instance *instance, const char *function, const unsigned char *bytes, size_t size);
+void vi_saved_free(vi_saved *saved);
+
+#endif

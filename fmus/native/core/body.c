@@ -1,0 +1,415 @@
+#include "body.h"
+
+#include <float.h>
+#include <math.h>
+
+#include "impact.h"
+#include "majorant.h"
+
+/* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
+static const double LANDING = 1e-13;
+/* Rounding of a displacement, in units of the terms it is the sum of. */
+static const double ROUNDING = 4.0 * DBL_EPSILON;
+
+static double direction(const vi_body *body, int k)
+{
+    return vi_contact_direction(body->contacts[k].side);
+}
+
+double vi_body_held_now(const vi_body *body)
+{
+    return body->held + body->held_rate * vi_clock_elapsed(&body->clock, body->held_since, body->now);
+}
+
+static double phase_now(const vi_body *body)
+{
+    return body->clock.angular_frequency * body->now.rest;
+}
+
+void vi_body_hold(vi_body *body, double held, double held_rate)
+{
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        held -= direction(body, k) * body->contacts[k].applied_force / body->mass;
+    }
+    body->held = held;
+    body->held_rate = held_rate;
+    body->held_since = body->now;
+}
+
+/* ---- flight ---- */
+
+typedef enum { ENDS_ANYWHERE, ENDS_AT_TARGET, ENDS_AT_PERIOD } segment_end;
+
+/* How long one segment may be, and what its end is. */
+static double segment_length(const vi_body *body, vi_instant target, segment_end *end)
+{
+    const double remaining = vi_clock_elapsed(&body->clock, body->now, target);
+    const double to_period = (body->clock.period - body->now.rest) + body->clock.period_low;
+    if (body->record.periods && to_period <= remaining) {
+        *end = ENDS_AT_PERIOD;
+        return to_period;
+    }
+    *end = remaining <= body->clock.period ? ENDS_AT_TARGET : ENDS_ANYWHERE;
+    return fmin(remaining, body->clock.period);
+}
+
+static bool watched(const vi_body *body, int k)
+{
+    return body->contacts[k].law != VI_LAW_NONE && !body->passed;
+}
+
+/* Land on the contact found at clearance d and approach v: one step of the parabola that touches the motion there.
+ * Returns the speed of approach, 0 for a touch. */
+static double land(const vi_segment *segment, double sign, double clearance, vi_motion *m, double *u)
+{
+    const double v = sign * m->v, a = sign * m->a;
+    const double square = v * v + 2.0 * a * clearance;
+    *u += square >= 0.0 ? 2.0 * clearance / (v + sqrt(square)) : v / -a;
+    if (square < 0.0) {
+        return 0.0;
+    }
+    vi_segment_at(segment, *u, m);
+    return fmax(0.0, sign * m->v);
+}
+
+/* First contact at or after `u` in the segment: its index, with *u and the approach velocity; -1 when there is none. */
+static int locate(const vi_body *body, const vi_segment *segment, double *u, vi_motion *m, double *approach)
+{
+    for (;;) {
+        double step = segment->length - *u;
+        int nearest = -1;
+        for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+            if (!watched(body, k)) {
+                continue;
+            }
+            const double sign = direction(body, k), stop = body->contacts[k].position;
+            const double clearance = fmax(0.0, sign * (stop - m->x)), v = sign * m->v;
+            if (v > 0.0 && clearance <= ROUNDING * (fabs(stop) + segment->scale)) {
+                *approach = land(segment, sign, clearance, m, u);
+                return k;
+            }
+            const double certified = vi_certified_step(clearance, v, sign * m->a, m->jerk_bound, step);
+            nearest = certified < step ? k : nearest;
+            step = fmin(step, certified);
+        }
+        if (nearest >= 0 && *u + step == *u) {
+            *approach = fmax(0.0, direction(body, nearest) * m->v);
+            return nearest;
+        }
+        *u = nearest >= 0 ? *u + step : segment->length;
+        vi_segment_at(segment, *u, m);
+        if (nearest < 0) {
+            return -1;
+        }
+    }
+}
+
+/* After a release the first step is a jump that the jerk certifies: equations.md 2.4. Without one, *u stays 0. */
+static void jump_off(const vi_segment *segment, const vi_body *body, vi_motion *m, double *u)
+{
+    if (body->leaving && m->snap_bound > 0.0) {
+        *u = fmin(segment->length, 2.0 * fabs(m->j) / m->snap_bound);
+        vi_segment_at(segment, *u, m);
+    }
+}
+
+/* Can no stop ever be reached again under the present input? */
+static bool free_for_ever(const vi_body *body, const vi_segment *segment)
+{
+    double lowest, highest;
+    if (body->record.extrema || body->record.periods || body->leaving
+        || !vi_segment_range(segment, &lowest, &highest)) {
+        return false;
+    }
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        const double sign = direction(body, k);
+        const double furthest = sign > 0.0 ? highest : lowest;
+        if (watched(body, k) && sign * (body->contacts[k].position - furthest) <= 0.0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Move the body by u seconds to displacement x and velocity v; the two named ends are met exactly. */
+static void move(vi_body *body, double u, double x, double v, segment_end end, vi_instant target)
+{
+    body->displacement = x;
+    body->velocity = v;
+    body->leaving = 0;
+    if (end == ENDS_AT_PERIOD) {
+        body->now = (vi_instant){body->now.periods + 1, 0.0};
+        vi_record_period(&body->record, vi_clock_time(&body->clock, body->now), x, v);
+    } else {
+        body->now = end == ENDS_AT_TARGET ? target : vi_clock_after(&body->clock, body->now, u);
+    }
+}
+
+static double landing_room(const vi_body *body)
+{
+    bool external = false;
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        external = external || body->contacts[k].law == VI_LAW_EXTERNAL;
+    }
+    return external ? LANDING * (1.0 + fabs(vi_clock_time(&body->clock, body->now))) : 0.0;
+}
+
+/* A contact with an external law: stop there and wait, or (FMI 2.0) note its time and fly through. */
+static void meet_external(vi_body *body, int k, double approach, bool stop_here)
+{
+    vi_contact *contact = &body->contacts[k];
+    contact->event_time = vi_clock_time(&body->clock, body->now);
+    contact->answered = 0;
+    body->displacement = contact->position;
+    body->velocity = direction(body, k) * approach;
+    if (stop_here) {
+        body->pending = k + 1;
+    } else {
+        body->passed = k + 1;
+    }
+}
+
+static void meet(vi_body *body, int k, double approach, double remaining, const vi_step_request *request)
+{
+    if (body->contacts[k].law == VI_LAW_EXTERNAL) {
+        meet_external(body, k, approach, request->stop_at_contacts || fabs(remaining) <= landing_room(body));
+    } else {
+        const vi_contact_law law = {body->contacts[k].law, body->contacts[k].restitution};
+        vi_body_impact(body, k, approach, vi_contact_law_restitution(&law, approach));
+    }
+}
+
+/* A flight to the target over which no stop can be met: one evaluation, however long. */
+static void fly_free(vi_body *body, const vi_segment *segment, vi_instant target)
+{
+    double x, v;
+    vi_segment_end(segment, vi_clock_elapsed(&body->clock, body->now, target),
+                   body->clock.angular_frequency * target.rest, &x, &v);
+    move(body, 0.0, x, v, ENDS_AT_TARGET, target);
+}
+
+/* Fly to the next contact, the end of the segment, or the target, whichever comes first. */
+static void fly(vi_body *body, vi_instant target, const vi_step_request *request)
+{
+    segment_end end;
+    const double length = segment_length(body, target, &end);
+    const double room = end == ENDS_AT_TARGET ? landing_room(body) : 0.0;
+    vi_segment segment;
+    vi_segment_start(&segment, &body->mode, body->displacement, body->velocity, phase_now(body),
+                     vi_body_held_now(body), body->held_rate, length + room);
+    if (free_for_ever(body, &segment)) {
+        fly_free(body, &segment, target);
+        return;
+    }
+    vi_motion m;
+    vi_segment_at(&segment, 0.0, &m);
+    m.x = body->displacement; /* on the stop exactly, after an impact */
+    m.v = body->velocity;
+    double u = 0.0, approach = 0.0;
+    jump_off(&segment, body, &m, &u);
+    const int k = locate(body, &segment, &u, &m, &approach);
+    const bool whole = k < 0 && segment.length >= length;
+    if (whole && room > 0.0) {
+        u = length; /* the room after the end was only searched */
+        vi_segment_at(&segment, length, &m);
+    }
+    if (body->record.extrema) {
+        vi_body_follow_extrema(body, &segment, u);
+        vi_record_extend(&body->record, k < 0 ? m.x : body->contacts[k].position);
+    }
+    if (k < 0) {
+        move(body, u, m.x, m.v, whole ? end : ENDS_ANYWHERE, target);
+    } else {
+        move(body, u, body->contacts[k].position, direction(body, k) * approach, ENDS_ANYWHERE, target);
+        meet(body, k, approach, vi_clock_elapsed(&body->clock, body->now, target), request);
+    }
+}
+
+/* ---- rest on a stop ---- */
+
+/* Seconds until the contact force passes through zero, at most `length`: equations.md 3.3. */
+static double time_to_release(const vi_body *body, int k, double length, bool *released)
+{
+    const double sign = direction(body, k), w = body->clock.angular_frequency;
+    const double stop = body->contacts[k].position, held = vi_body_held_now(body);
+    const double force = fabs(body->mode.force), third = force * w * w * w;
+    const double noise = ROUNDING * (force + fabs(held) + body->mode.stiffness * fabs(stop));
+    double u = 0.0;
+    *released = false;
+    while (u < length) {
+        double pressure, slope;
+        const double phase = phase_now(body) + w * u;
+        vi_mode_held(&body->mode, stop, phase, held + body->held_rate * u, body->held_rate, &pressure, &slope);
+        pressure = fmax(0.0, sign * pressure);
+        const double closing = -sign * slope;
+        const double bend = sign * body->mode.force * w * w * cos(phase);
+        if (closing > 0.0 && pressure <= noise) {
+            *released = true;
+            return fmin(length, u + pressure / closing);
+        }
+        const double step = vi_certified_step(pressure, closing, bend, third, length - u);
+        if (u + step == u) {
+            return length; /* no pressure and no trend: it stays */
+        }
+        u = step < length - u ? u + step : length;
+    }
+    return length;
+}
+
+/* Does the pressure outlast every phase of the force? */
+static bool pressed_for_ever(const vi_body *body, int k)
+{
+    const double constant = vi_body_held_now(body) - body->mode.stiffness * body->contacts[k].position;
+    return body->held_rate == 0.0 && direction(body, k) * constant > fabs(body->mode.force);
+}
+
+static void release(vi_body *body)
+{
+    vi_contact *contact = &body->contacts[body->stuck - 1];
+    contact->stick_end = fmax(contact->stick_start, vi_clock_time(&body->clock, body->now));
+    vi_record_stick(&body->record, contact->stick_start, contact->stick_end, body->stuck, body->tail_impulse);
+    contact->stuck = 0;
+    body->stuck = 0;
+    body->leaving = 1;
+}
+
+static void stay(vi_body *body, vi_instant target)
+{
+    const int k = body->stuck - 1;
+    const double stop = body->contacts[k].position;
+    if (!body->record.periods && pressed_for_ever(body, k)) {
+        body->now = target;
+        return;
+    }
+    segment_end end;
+    bool released;
+    const double length = segment_length(body, target, &end);
+    const double u = time_to_release(body, k, length, &released);
+    move(body, u, stop, 0.0, u >= length ? end : ENDS_ANYWHERE, target);
+    if (released) {
+        release(body);
+    }
+}
+
+/* ---- on a stop at the start of a step, or after its inputs changed ---- */
+
+/* What a body that touches stop k does now: hit it, rest on it, or leave it. */
+static void settle(vi_body *body, int k, const vi_step_request *request)
+{
+    const vi_contact *contact = &body->contacts[k];
+    const double sign = direction(body, k), approach = sign * body->velocity;
+    if (approach > 0.0) {
+        meet(body, k, approach, 0.0, request);
+        return;
+    }
+    if (approach < 0.0) {
+        return;
+    }
+    const double held = vi_body_held_now(body);
+    double pressure, slope;
+    vi_mode_held(&body->mode, contact->position, phase_now(body), held, body->held_rate, &pressure, &slope);
+    const double noise =
+        ROUNDING * (fabs(body->mode.force) + fabs(held) + body->mode.stiffness * fabs(contact->position));
+    const bool leaves = sign * slope < 0.0 || body->leaving;
+    if (sign * pressure > noise || (sign * pressure >= -noise && !leaves)) {
+        body->leaving = 0;
+        vi_body_stick(body, k, 0.0, 0.0);
+    } else {
+        body->leaving = sign * pressure >= -noise;
+    }
+}
+
+static void settle_all(vi_body *body, const vi_step_request *request)
+{
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        if (!body->stuck && !body->pending && watched(body, k)
+            && body->displacement == body->contacts[k].position) {
+            settle(body, k, request);
+        }
+    }
+}
+
+void vi_body_start(vi_body *body, vi_instant now, double displacement, double velocity)
+{
+    body->now = body->held_since = now;
+    body->displacement = displacement;
+    body->velocity = velocity;
+    body->stuck = body->leaving = body->pending = body->passed = 0;
+    body->fastest_impact = body->tail_impulse = 0.0;
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        vi_contact *contact = &body->contacts[k];
+        contact->mass = body->mass;
+        contact->stuck = contact->answered = 0;
+        contact->count = contact->graze_count = 0;
+        contact->force = contact->impulse = contact->last_velocity = 0.0;
+        contact->last_time = contact->last_phase = contact->stick_start = contact->stick_end = NAN;
+        contact->event_time = NAN;
+    }
+}
+
+/* ---- a step ---- */
+
+static void open_first_period(vi_body *body)
+{
+    if (body->record.periods && !body->record.period_open && body->now.rest == 0.0) {
+        vi_record_period(&body->record, vi_clock_time(&body->clock, body->now), body->displacement, body->velocity);
+    }
+}
+
+static int64_t impacts_so_far(const vi_body *body)
+{
+    int64_t sum = 0;
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        sum += body->contacts[k].count + body->contacts[k].graze_count;
+    }
+    return sum;
+}
+
+vi_step_result vi_body_advance(vi_body *body, vi_instant target, const vi_step_request *request)
+{
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        body->contacts[k].event_time = NAN;
+    }
+    vi_record_begin_step(&body->record, body->displacement);
+    settle_all(body, request);
+    open_first_period(body);
+    const int64_t most = body->impact_limit > 0 ? impacts_so_far(body) + body->impact_limit : INT64_MAX;
+    while (!body->pending && vi_clock_elapsed(&body->clock, body->now, target) > 0.0) {
+        if (vi_record_full(&body->record) && request->early_return) {
+            return VI_STEP_RECORD_FULL;
+        }
+        if (impacts_so_far(body) >= most) {
+            return VI_STEP_IMPACT_LIMIT;
+        }
+        if (body->stuck) {
+            stay(body, target);
+        } else {
+            fly(body, target, request);
+        }
+    }
+    return body->pending ? VI_STEP_CONTACT : VI_STEP_DONE;
+}
+
+void vi_body_resolve(vi_body *body)
+{
+    const int k = body->pending - 1;
+    body->pending = 0;
+    body->contacts[k].answered = 0;
+    vi_body_impact(body, k, fabs(body->velocity), body->contacts[k].applied_restitution);
+}
+
+double vi_body_outputs(vi_body *body)
+{
+    const vi_mode *mode = &body->mode;
+    double free_acceleration, slope;
+    vi_mode_held(mode, body->displacement, phase_now(body), vi_body_held_now(body), body->held_rate,
+                 &free_acceleration, &slope);
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        vi_contact *contact = &body->contacts[k];
+        contact->displacement = body->displacement;
+        contact->velocity = body->velocity;
+        const double pressure = direction(body, k) * free_acceleration;
+        contact->force = body->stuck == k + 1 ? fmax(0.0, body->mass * pressure) : 0.0;
+    }
+    return body->stuck ? 0.0 : free_acceleration - 2.0 * mode->decay * body->velocity;
+}

@@ -1,0 +1,73 @@
+/* A body with stops: flies on the exact flow, meets its stops, chatters, sticks and is released.
+ *
+ * This is the one place where contact is resolved. State is flat: copying the struct copies the body.
+ */
+#ifndef VIBROIMPACT_BODY_H
+#define VIBROIMPACT_BODY_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "clock.h"
+#include "contact_law.h"
+#include "flow.h"
+#include "record.h"
+#include "step.h"
+
+enum { VI_BODY_CONTACTS = 2 };
+
+/* A contact port: where the body may meet a stop. Units: SI. */
+typedef struct {
+    /* parameters */
+    int64_t law, side;
+    double position, restitution;
+    /* the importer's answer for law external */
+    double applied_restitution, applied_force;
+    int32_t answered; /* applied_restitution was set since the pending contact was reported */
+    /* outputs */
+    int32_t stuck;
+    double displacement, velocity, mass, force, impulse;
+    int64_t count, graze_count;
+    double last_time, last_phase, last_velocity, stick_start, stick_end, event_time;
+} vi_contact;
+
+typedef struct {
+    /* set up by the component */
+    vi_mode mode;
+    vi_clock clock;
+    double mass;
+    int64_t impact_limit; /* 0: none */
+    /* state */
+    vi_instant now;
+    double displacement, velocity;
+    double held, held_rate; /* input per unit mass at held_since, and its slope */
+    vi_instant held_since;
+    int32_t stuck;          /* 0, or the contact (1-based) that the body rests on */
+    int32_t leaving;        /* just released: displacement on the stop, velocity and acceleration 0 */
+    int32_t pending;        /* 0, or the contact (1-based) whose external law must answer */
+    int32_t passed;         /* 0, or the external contact that the last step passed through (FMI 2.0) */
+    double fastest_impact;  /* largest approach since the last stick, m/s: the scale of a chatter sequence */
+    double tail_impulse;    /* of the chatter summed at the last stick, N s */
+    vi_contact contacts[VI_BODY_CONTACTS];
+    vi_record record; /* last */
+} vi_body;
+
+/* Begin at an instant; mode, clock, mass, contacts' parameters and inputs are set. */
+void vi_body_start(vi_body *body, vi_instant now, double displacement, double velocity);
+
+/* New inputs (force per unit mass, and slope) from now on. */
+void vi_body_hold(vi_body *body, double held, double held_rate);
+
+/* Advance to `target`. See step.h for what may end it earlier. */
+vi_step_result vi_body_advance(vi_body *body, vi_instant target, const vi_step_request *request);
+
+/* Resolve the pending contact with its answer. */
+void vi_body_resolve(vi_body *body);
+
+/* Relative acceleration, and the contacts' outputs, at the present instant. */
+double vi_body_outputs(vi_body *body);
+
+/* Size of displacements that double precision cannot tell apart here, m. */
+double vi_body_resolution(const vi_body *body, double position);
+
+#endif

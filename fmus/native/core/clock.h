@@ -1,0 +1,44 @@
+/* Time as whole forcing periods + rest, so that the phase of the 10^6th period is as exact as the first.
+ *
+ * The origin is the last instant of forcing phase 0 at or before time 0; hence phase = angular_frequency * rest.
+ * The period 2 pi / angular_frequency is kept to 32 digits (double + double). Unforced bodies count in a
+ * power of two near their natural period: conversions are then exact.
+ */
+#ifndef VIBROIMPACT_CLOCK_H
+#define VIBROIMPACT_CLOCK_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef struct {
+    double angular_frequency; /* rad/s; 0 when unforced */
+    double period, period_low; /* s; their sum is the period */
+    double origin, origin_low; /* time from the clock's origin to time 0, s */
+} vi_clock;
+
+typedef struct {
+    int64_t periods;
+    double rest; /* s, 0 <= rest < period */
+} vi_instant;
+
+/* A clock for a force of this angular frequency (rad/s, >= 0) and phase (rad) at time 0; `natural` (rad/s) is used
+ * when angular_frequency is 0. Returns false when the period is not a finite positive number of seconds. */
+bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, double natural);
+
+/* The instant of time = high + low, s. An instant closer to a period's start than double precision can tell at this
+ * time is put on it. Returns false beyond 2^53 periods. */
+bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant *instant);
+
+/* Time of an instant, s, rounded once. */
+double vi_clock_time(const vi_clock *clock, vi_instant instant);
+
+/* Seconds from `a` to `b`. */
+double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b);
+
+/* `instant` moved by `seconds` >= 0. */
+vi_instant vi_clock_after(const vi_clock *clock, vi_instant instant, double seconds);
+
+/* Forcing phase, rad, in [0, 2 pi); NaN when unforced. */
+double vi_clock_phase(const vi_clock *clock, vi_instant instant);
+
+#endif

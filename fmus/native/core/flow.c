@@ -1,0 +1,315 @@
+#include "flow.h"
+
+#include <math.h>
+
+/* The steady response may be this many times larger than the motion before the split loses too many digits. */
+static const double LARGEST_SPLIT = 8.0;
+/* Length of a series segment times the fastest rate: the 21st term is below 1e-17 of the first. */
+static const double SERIES_REACH = 0.7;
+
+/* stiffness/mass - (damping/(2 mass))^2 without cancellation: critical damping is recognized exactly. */
+static double discriminant(double mass, double damping, double stiffness)
+{
+    const double square = damping * damping;
+    const double square_error = fma(damping, damping, -square);
+    const double product = 4.0 * stiffness * mass;
+    const double product_error = fma(4.0 * stiffness, mass, -product);
+    return ((product - square) + (product_error - square_error)) / (4.0 * mass * mass);
+}
+
+static void start_steady(vi_mode *mode)
+{
+    const double w = mode->angular_frequency;
+    const double detuning = (mode->natural - w) * (mode->natural + w);
+    const double drag = 2.0 * mode->decay * w;
+    const double size = hypot(detuning, drag);
+    mode->steady_exists = size > 0.0 && mode->force != 0.0;
+    mode->steady_cos = mode->steady_sin = mode->steady_amplitude = 0.0;
+    if (mode->steady_exists) {
+        mode->steady_cos = mode->force * (detuning / size) / size;
+        mode->steady_sin = mode->force * (drag / size) / size;
+        mode->steady_amplitude = fabs(mode->force) / size;
+        mode->steady_exists = isfinite(mode->steady_amplitude);
+    }
+}
+
+void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness, double amplitude,
+                   double angular_frequency)
+{
+    mode->stiffness = stiffness / mass;
+    mode->natural = sqrt(mode->stiffness);
+    mode->decay = damping / (2.0 * mass);
+    const double d = discriminant(mass, damping, stiffness);
+    mode->regime = d > 0.0 ? VI_UNDERDAMPED : d < 0.0 ? VI_OVERDAMPED : VI_CRITICAL;
+    mode->rate = sqrt(fabs(d));
+    mode->fast = mode->decay + mode->rate;
+    mode->slow = mode->regime == VI_OVERDAMPED ? mode->stiffness / mode->fast : mode->decay;
+    mode->force = amplitude / mass;
+    mode->angular_frequency = angular_frequency;
+    mode->fastest = fmax(fmax(mode->natural, 2.0 * mode->decay), angular_frequency);
+    start_steady(mode);
+}
+
+/* ---- homogeneous flow: e_cos = Ce, e_sin = Se of equations.md 1.2 ---- */
+
+typedef struct {
+    double e_cos, e_sin; /* Phi11 = e_cos + decay e_sin, Phi12 = e_sin */
+    double back;         /* Phi22 */
+    double slow, fast;   /* the two decaying exponentials */
+} propagator;
+
+static propagator propagate_overdamped(const vi_mode *mode, double u)
+{
+    propagator p;
+    p.slow = exp(-mode->slow * u);
+    p.fast = exp(-mode->fast * u);
+    p.e_cos = 0.5 * (p.slow + p.fast);
+    p.e_sin = p.slow * (-expm1(-2.0 * mode->rate * u) / (2.0 * mode->rate));
+    /* far from critical Ce - decay Se cancels; near it the two exponentials do */
+    p.back = mode->rate > 0.5 * mode->decay
+                 ? (mode->fast * p.fast - mode->slow * p.slow) / (2.0 * mode->rate)
+                 : p.e_cos - mode->decay * p.e_sin;
+    return p;
+}
+
+static propagator propagate(const vi_mode *mode, double u)
+{
+    if (mode->regime == VI_OVERDAMPED) {
+        return propagate_overdamped(mode, u);
+    }
+    propagator p;
+    p.slow = p.fast = exp(-mode->decay * u);
+    if (mode->regime == VI_UNDERDAMPED) {
+        p.e_cos = p.slow * cos(mode->rate * u);
+        p.e_sin = p.slow * (sin(mode->rate * u) / mode->rate);
+    } else {
+        p.e_cos = p.slow;
+        p.e_sin = p.slow * u;
+    }
+    p.back = p.e_cos - mode->decay * p.e_sin;
+    return p;
+}
+
+/* ---- the split form ---- */
+
+static double motion_scale(const vi_segment *s, double x, double v)
+{
+    const vi_mode *mode = s->mode;
+    if (mode->fastest == 0.0) {
+        return fabs(x) + fabs(v);
+    }
+    const double time = 1.0 / mode->fastest;
+    return fabs(x) + (fabs(v) + (fabs(mode->force) + fabs(s->held)) * time) * time;
+}
+
+/* Try to split off the steady response and the level of the held input; false when digits would be lost. */
+static bool split(vi_segment *s, double x, double v)
+{
+    const vi_mode *mode = s->mode;
+    const double most = LARGEST_SPLIT * motion_scale(s, x, v);
+    if ((mode->force != 0.0 && !mode->steady_exists) || mode->steady_amplitude > most) {
+        return false;
+    }
+    s->level = s->level_rate = 0.0;
+    if (s->held != 0.0 || s->held_rate != 0.0) {
+        s->level_rate = s->held_rate / mode->stiffness;
+        s->level = (s->held - 2.0 * mode->decay * s->level_rate) / mode->stiffness;
+        if (!(fabs(s->level) <= most && fabs(s->level_rate) * s->length <= most)) {
+            return false;
+        }
+    }
+    const double c = cos(s->phase);
+    const double sn = sin(s->phase);
+    s->x = x - s->level - (mode->steady_cos * c + mode->steady_sin * sn);
+    s->v = v - s->level_rate - mode->angular_frequency * (mode->steady_sin * c - mode->steady_cos * sn);
+    return true;
+}
+
+static void bound_split(vi_segment *s)
+{
+    const vi_mode *mode = s->mode;
+    const double turned = s->v + mode->decay * s->x;
+    s->amplitude = s->slow_part = s->fast_part = 0.0;
+    if (mode->regime == VI_UNDERDAMPED) {
+        s->amplitude = hypot(s->x, turned / mode->rate);
+    } else if (mode->regime == VI_OVERDAMPED) {
+        s->slow_part = fabs(s->v + mode->fast * s->x) / (2.0 * mode->rate);
+        s->fast_part = fabs(s->v + mode->slow * s->x) / (2.0 * mode->rate);
+    }
+    s->scale = fabs(s->x) + mode->steady_amplitude + fabs(s->level) + fabs(s->level_rate) * s->length;
+}
+
+/* Bounds on the homogeneous |x'''| and |x''''| from the energy of the present state, which never grows. */
+static void energy_bounds(const vi_mode *mode, double x, double v, double *jerk, double *snap)
+{
+    const double damping = 2.0 * mode->decay;
+    const double energy = sqrt(v * v + mode->stiffness * x * x);
+    const double second = sqrt(damping * damping + mode->stiffness) * energy;
+    *jerk = damping * second + mode->stiffness * energy;
+    *snap = damping * *jerk + mode->stiffness * second;
+}
+
+static void homogeneous_bounds(const vi_segment *s, const propagator *p, double x, double v, vi_motion *m)
+{
+    const vi_mode *mode = s->mode;
+    if (mode->regime == VI_UNDERDAMPED) {
+        m->jerk_bound = mode->stiffness * mode->natural * s->amplitude * p->slow;
+        m->snap_bound = mode->natural * m->jerk_bound;
+        if (mode->rate > 0.1 * mode->natural) {
+            return; /* the amplitude bound is tight away from critical damping */
+        }
+    }
+    double jerk, snap;
+    energy_bounds(mode, x, v, &jerk, &snap);
+    if (mode->regime == VI_OVERDAMPED) {
+        const double slow = s->slow_part * p->slow, fast = s->fast_part * p->fast;
+        const double w1 = mode->slow, w2 = mode->fast;
+        m->jerk_bound = slow * w1 * w1 * w1 + fast * w2 * w2 * w2;
+        m->snap_bound = slow * w1 * w1 * w1 * w1 + fast * w2 * w2 * w2 * w2;
+    }
+    const bool none = mode->regime == VI_CRITICAL;
+    m->jerk_bound = none ? jerk : fmin(m->jerk_bound, jerk);
+    m->snap_bound = none ? snap : fmin(m->snap_bound, snap);
+}
+
+static void split_at(const vi_segment *s, double u, vi_motion *m)
+{
+    const vi_mode *mode = s->mode;
+    const double w = mode->angular_frequency;
+    const propagator p = propagate(mode, u);
+    const double x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
+    const double v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
+    const double angle = s->phase + w * u;
+    const double c = cos(angle), sn = sin(angle);
+    homogeneous_bounds(s, &p, x, v, m);
+    m->jerk_bound += w * w * w * mode->steady_amplitude;
+    m->snap_bound += w * w * w * w * mode->steady_amplitude;
+    m->x = x + (mode->steady_cos * c + mode->steady_sin * sn) + (s->level + s->level_rate * u);
+    m->v = v + w * (mode->steady_sin * c - mode->steady_cos * sn) + s->level_rate;
+    m->a = mode->force * c + (s->held + s->held_rate * u) - 2.0 * mode->decay * m->v - mode->stiffness * m->x;
+    m->j = s->held_rate - mode->force * w * sn - 2.0 * mode->decay * m->a - mode->stiffness * m->v;
+}
+
+/* ---- the series form ---- */
+
+/* Taylor coefficients from the differential equation itself. */
+static void start_series(vi_segment *s, double x, double v)
+{
+    const vi_mode *mode = s->mode;
+    const double w = mode->angular_frequency;
+    double drive[2] = {mode->force * cos(s->phase), -mode->force * w * sin(s->phase)};
+    double *c = s->coefficient;
+    c[0] = x;
+    c[1] = v;
+    for (int n = 0; n + 2 <= VI_SERIES_ORDER; ++n) {
+        const double k = (double)n;
+        const double held = n == 0 ? s->held : n == 1 ? s->held_rate : 0.0;
+        const double load = drive[0] + held - 2.0 * mode->decay * (k + 1.0) * c[n + 1] - mode->stiffness * c[n];
+        c[n + 2] = load / ((k + 1.0) * (k + 2.0));
+        const double next = -drive[0] * w * w / ((k + 1.0) * (k + 2.0));
+        drive[0] = drive[1];
+        drive[1] = next;
+    }
+}
+
+static void bound_series(vi_segment *s)
+{
+    const double *c = s->coefficient;
+    double jerk = 0.0, snap = 0.0, scale = 0.0;
+    for (int n = VI_SERIES_ORDER; n >= 0; --n) {
+        const double k = (double)n;
+        scale = scale * s->length + fabs(c[n]);
+        if (n >= 3) {
+            jerk = jerk * s->length + k * (k - 1.0) * (k - 2.0) * fabs(c[n]);
+        }
+        if (n >= 4) {
+            snap = snap * s->length + k * (k - 1.0) * (k - 2.0) * (k - 3.0) * fabs(c[n]);
+        }
+    }
+    s->series_jerk_bound = jerk;
+    s->series_snap_bound = snap;
+    s->scale = scale;
+}
+
+static void series_at(const vi_segment *s, double u, vi_motion *m)
+{
+    const vi_mode *mode = s->mode;
+    const double *c = s->coefficient;
+    double x = c[VI_SERIES_ORDER], v = (double)VI_SERIES_ORDER * c[VI_SERIES_ORDER];
+    for (int n = VI_SERIES_ORDER - 1; n >= 1; --n) {
+        x = x * u + c[n];
+        v = v * u + (double)n * c[n];
+    }
+    m->x = x * u + c[0];
+    m->v = v;
+    const double angle = s->phase + mode->angular_frequency * u;
+    m->a = mode->force * cos(angle) + (s->held + s->held_rate * u) - 2.0 * mode->decay * m->v
+           - mode->stiffness * m->x;
+    m->j = s->held_rate - mode->force * mode->angular_frequency * sin(angle) - 2.0 * mode->decay * m->a
+           - mode->stiffness * m->v;
+    m->jerk_bound = s->series_jerk_bound;
+    m->snap_bound = s->series_snap_bound;
+}
+
+/* ---- the door ---- */
+
+void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, double phase, double held,
+                      double held_rate, double length)
+{
+    segment->mode = mode;
+    segment->phase = phase;
+    segment->held = held;
+    segment->held_rate = held_rate;
+    segment->length = length;
+    segment->series = !split(segment, x, v);
+    if (segment->series) {
+        if (mode->fastest > 0.0) {
+            segment->length = fmin(length, SERIES_REACH / mode->fastest);
+        }
+        start_series(segment, x, v);
+        bound_series(segment);
+    } else {
+        bound_split(segment);
+    }
+}
+
+void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion)
+{
+    if (segment->series) {
+        series_at(segment, u, motion);
+    } else {
+        split_at(segment, u, motion);
+    }
+}
+
+void vi_segment_end(const vi_segment *segment, double u, double phase, double *x, double *v)
+{
+    const vi_mode *mode = segment->mode;
+    const double w = mode->angular_frequency;
+    const propagator p = propagate(mode, u);
+    const double c = cos(phase), sn = sin(phase);
+    *x = (p.e_cos + mode->decay * p.e_sin) * segment->x + p.e_sin * segment->v
+         + (mode->steady_cos * c + mode->steady_sin * sn) + (segment->level + segment->level_rate * u);
+    *v = -mode->stiffness * p.e_sin * segment->x + p.back * segment->v
+         + w * (mode->steady_sin * c - mode->steady_cos * sn) + segment->level_rate;
+}
+
+bool vi_segment_range(const vi_segment *segment, double *lowest, double *highest)
+{
+    const vi_mode *mode = segment->mode;
+    if (segment->series || mode->natural == 0.0 || segment->level_rate != 0.0) {
+        return false;
+    }
+    const double reach = sqrt(segment->x * segment->x + segment->v * segment->v / mode->stiffness)
+                         + mode->steady_amplitude;
+    *lowest = segment->level - reach;
+    *highest = segment->level + reach;
+    return isfinite(reach);
+}
+
+void vi_mode_held(const vi_mode *mode, double x, double phase, double held, double held_rate, double *acceleration,
+                  double *slope)
+{
+    *acceleration = mode->force * cos(phase) + held - mode->stiffness * x;
+    *slope = held_rate - mode->force * mode->angular_frequency * sin(phase);
+}

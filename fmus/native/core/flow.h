@@ -1,0 +1,80 @@
+/* The exact motion of one mode between impacts: equations.md 1.2 to 1.5, in dimensional form.
+ *
+ *     x'' + 2 decay x' + stiffness x = force cos(angular_frequency t) + held + held_rate (t - t0)
+ *
+ * all per unit mass. Two forms of the same solution, chosen once for each segment:
+ *  - the steady response split off, wherever it is not much larger than the motion itself;
+ *  - otherwise (near resonance, slow forcing, no spring) a Taylor series to the last bit on a short segment:
+ *    subtracting a huge steady response would lose the digits it is larger by.
+ */
+#ifndef VIBROIMPACT_FLOW_H
+#define VIBROIMPACT_FLOW_H
+
+#include <stdbool.h>
+
+enum { VI_SERIES_ORDER = 20 };
+
+typedef enum { VI_UNDERDAMPED, VI_CRITICAL, VI_OVERDAMPED } vi_damping_regime;
+
+/* A mode and the harmonic force on it. */
+typedef struct {
+    double stiffness;         /* natural angular frequency squared, 1/s^2, >= 0 */
+    double natural;           /* natural angular frequency, rad/s */
+    double decay;             /* damping_ratio * natural, 1/s, >= 0 */
+    vi_damping_regime regime;
+    double rate;              /* sqrt|natural^2 - decay^2|, rad/s (1/s overdamped) */
+    double slow, fast;        /* decay rates when overdamped, 1/s */
+    double force;             /* amplitude per unit mass, m/s^2 */
+    double angular_frequency; /* of the force, rad/s */
+    bool steady_exists;
+    double steady_cos, steady_sin; /* steady response = steady_cos cos(phase) + steady_sin sin(phase), m */
+    double steady_amplitude;  /* m */
+    double fastest;           /* largest of natural, 2 decay, angular_frequency, rad/s */
+} vi_mode;
+
+/* Displacement, velocity, acceleration and jerk at one instant, with bounds that hold from here on. */
+typedef struct {
+    double x, v, a, j;
+    double jerk_bound; /* >= |x'''| from here to the end of the segment */
+    double snap_bound; /* >= |x''''| likewise */
+} vi_motion;
+
+/* The flow from one state, with the held input. */
+typedef struct {
+    const vi_mode *mode;
+    double phase;         /* of the force at the start, rad */
+    double held, held_rate;
+    double length;        /* the segment is valid for 0 <= u <= length, s */
+    bool series;
+    double coefficient[VI_SERIES_ORDER + 1]; /* Taylor, when series */
+    double series_jerk_bound, series_snap_bound;
+    double x, v;          /* homogeneous state at the start, when split */
+    double level, level_rate; /* particular solution of the held input */
+    double amplitude;     /* |homogeneous| <= amplitude e^{-decay u} when underdamped */
+    double slow_part, fast_part; /* amplitudes of the two exponentials when overdamped */
+    double scale;         /* size of the terms added up for a displacement, m: its rounding is 1e-16 of this */
+} vi_segment;
+
+/* Prepare a mode; mass > 0, stiffness >= 0, damping >= 0, angular_frequency >= 0 in SI units. */
+void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness, double amplitude,
+                   double angular_frequency);
+
+/* Begin a segment of at most `length` seconds at displacement x, velocity v and forcing phase (rad). The series form
+ * may shorten the length. */
+void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, double phase, double held,
+                      double held_rate, double length);
+
+/* The motion `u` seconds after the start. */
+void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion);
+
+/* Displacement and velocity after any u, the forcing phase there being known exactly (used for long free flights). */
+void vi_segment_end(const vi_segment *segment, double u, double phase, double *x, double *v);
+
+/* Bounds of the displacement for all later time; false when there are none (series form, sloping input). */
+bool vi_segment_range(const vi_segment *segment, double *lowest, double *highest);
+
+/* Contact acceleration (m/s^2) and its slope for a mass held at displacement x, at forcing phase `phase`. */
+void vi_mode_held(const vi_mode *mode, double x, double phase, double held, double held_rate, double *acceleration,
+                  double *slope);
+
+#endif

@@ -1,0 +1,51 @@
+/* The record a body keeps of its impacts, sticks and periods while an importer takes long steps.
+ *
+ * Rows of eight numbers, appended only. The importer reads `count` and `rows`, and says how many rows it has taken
+ * by the input `taken`; they leave at the start of the next step. Switched off, it costs one test.
+ */
+#ifndef VIBROIMPACT_RECORD_H
+#define VIBROIMPACT_RECORD_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { VI_RECORD_CAPACITY = 512, VI_RECORD_WIDTH = 8, VI_RECORD_RESERVE = 4 };
+enum { VI_ROW_IMPACT = 1, VI_ROW_STICK = 2, VI_ROW_PERIOD = 3 };
+
+typedef struct {
+    /* inputs */
+    int32_t impacts, extrema, periods;
+    int64_t taken;
+    /* outputs */
+    double displacement_max, displacement_min; /* m */
+    int64_t count, dropped;
+    /* the period now open */
+    int32_t open;       /* extremes are being followed */
+    int32_t period_open;
+    double period_start; /* s */
+    double strobe_displacement, strobe_velocity;
+    int64_t period_impacts;
+    double rows[VI_RECORD_CAPACITY * VI_RECORD_WIDTH]; /* last: only the used part is saved with a state */
+} vi_record;
+
+/* Start of a step: drop the rows taken, open or close what the importer switched on or off. */
+void vi_record_begin_step(vi_record *record, double displacement);
+
+/* Is there too little room for what one event may write? */
+bool vi_record_full(const vi_record *record);
+
+void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
+                      double restitution);
+void vi_record_stick(vi_record *record, double start, double end, int contact, double tail_impulse);
+
+/* Let the extremes know of a displacement that the body has. */
+void vi_record_extend(vi_record *record, double displacement);
+
+/* A forcing period begins: write the one that ends (if it was followed from its start) and open the next. */
+void vi_record_period(vi_record *record, double time, double displacement, double velocity);
+
+/* Bytes at the end of the record that hold no rows. */
+size_t vi_record_unused(const vi_record *record);
+
+#endif

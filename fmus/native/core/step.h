@@ -1,0 +1,22 @@
+/* The words in which an importer's step and its outcome are said, for all bodies. */
+#ifndef VIBROIMPACT_STEP_H
+#define VIBROIMPACT_STEP_H
+
+#include <stdbool.h>
+
+typedef enum {
+    VI_STEP_DONE = 0,         /* the end of the step is reached */
+    VI_STEP_CONTACT = 1,      /* stopped at a contact whose law is external; an event must resolve it */
+    VI_STEP_RECORD_FULL = 2,  /* stopped early because the record has no more room */
+    VI_STEP_IMPACT_LIMIT = 3, /* stopped early after impact_limit impacts in one step */
+    VI_STEP_ERROR = 4         /* misuse; the state is unchanged */
+} vi_step_result;
+
+typedef struct {
+    double time;            /* communication point, s */
+    double size;            /* communication step, s, > 0 */
+    bool stop_at_contacts;  /* FMI 3.0 event mode: end the step at an external contact */
+    bool early_return;      /* may the step end before time + size for other reasons? */
+} vi_step_request;
+
+#endif
