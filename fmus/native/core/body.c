@@ -8,6 +8,8 @@
 
 /* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
 static const double LANDING = 1e-13;
+/* A bounce shorter than this over the fastest rate is followed from the stop, not from the origin. */
+static const double LOW_BOUNCE = 0.1;
 /* Rounding of a displacement, in units of the terms it is the sum of. */
 static const double ROUNDING = 4.0 * DBL_EPSILON;
 
@@ -21,9 +23,9 @@ double vi_body_held_now(const vi_body *body)
     return body->held + body->held_rate * vi_clock_elapsed(&body->clock, body->held_since, body->now);
 }
 
-static double phase_now(const vi_body *body)
+vi_phase vi_body_phase_now(const vi_body *body)
 {
-    return body->clock.angular_frequency * body->now.rest;
+    return vi_phase_of(body->clock.angular_frequency * body->now.rest);
 }
 
 void vi_body_hold(vi_body *body, double held, double held_rate)
@@ -82,15 +84,16 @@ static int locate(const vi_body *body, const vi_segment *segment, double *u, vi_
             if (!watched(body, k)) {
                 continue;
             }
-            const double sign = direction(body, k), stop = body->contacts[k].position;
-            const double clearance = fmax(0.0, sign * (stop - m->x)), v = sign * m->v;
+            const double sign = direction(body, k), stop = body->contacts[k].position - segment->origin;
+            const double clearance = vi_max(0.0, sign * (stop - m->x)), v = sign * m->v;
             if (v > 0.0 && clearance <= ROUNDING * (fabs(stop) + segment->scale)) {
                 *approach = land(segment, sign, clearance, m, u);
                 return k;
             }
-            const double certified = vi_certified_step(clearance, v, sign * m->a, m->jerk_bound, step);
+            const vi_approach state = {clearance, v, sign * m->a, sign * m->j, m->snap_bound};
+            const double certified = vi_certified_step(&state, step);
             nearest = certified < step ? k : nearest;
-            step = fmin(step, certified);
+            step = vi_min(step, certified);
         }
         if (nearest >= 0 && *u + step == *u) {
             *approach = fmax(0.0, direction(body, nearest) * m->v);
@@ -101,15 +104,6 @@ static int locate(const vi_body *body, const vi_segment *segment, double *u, vi_
         if (nearest < 0) {
             return -1;
         }
-    }
-}
-
-/* After a release the first step is a jump that the jerk certifies: equations.md 2.4. Without one, *u stays 0. */
-static void jump_off(const vi_segment *segment, const vi_body *body, vi_motion *m, double *u)
-{
-    if (body->leaving && m->snap_bound > 0.0) {
-        *u = fmin(segment->length, 2.0 * fabs(m->j) / m->snap_bound);
-        vi_segment_at(segment, *u, m);
     }
 }
 
@@ -179,6 +173,25 @@ static void meet(vi_body *body, int k, double approach, double remaining, const 
     }
 }
 
+/* A body about to meet a stop: how long to follow it from where it is, s; HUGE_VAL when that is not needed. */
+static double low_bounce(const vi_body *body, vi_phase phase, double held)
+{
+    double free_acceleration, slope;
+    vi_mode_held(&body->mode, body->displacement, phase, held, body->held_rate, &free_acceleration, &slope);
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        if (!watched(body, k)) {
+            continue;
+        }
+        const double sign = direction(body, k);
+        const double clearance = fmax(0.0, sign * (body->contacts[k].position - body->displacement));
+        const double flight = vi_parabola_root(clearance, sign * body->velocity, sign * free_acceleration);
+        if (flight > 0.0 && flight * body->mode.fastest < LOW_BOUNCE) {
+            return 2.0 * flight;
+        }
+    }
+    return HUGE_VAL;
+}
+
 /* A flight to the target over which no stop can be met: one evaluation, however long. */
 static void fly_free(vi_body *body, const vi_segment *segment, vi_instant target)
 {
@@ -194,19 +207,21 @@ static void fly(vi_body *body, vi_instant target, const vi_step_request *request
     segment_end end;
     const double length = segment_length(body, target, &end);
     const double room = end == ENDS_AT_TARGET ? landing_room(body) : 0.0;
+    const vi_phase phase = vi_body_phase_now(body);
+    const double held = vi_body_held_now(body), bounce = low_bounce(body, phase, held);
     vi_segment segment;
-    vi_segment_start(&segment, &body->mode, body->displacement, body->velocity, phase_now(body),
-                     vi_body_held_now(body), body->held_rate, length + room);
+    vi_segment_start(&segment, &body->mode, body->displacement, body->velocity, phase, held, body->held_rate,
+                     vi_min(length + room, bounce), bounce < HUGE_VAL);
     if (free_for_ever(body, &segment)) {
         fly_free(body, &segment, target);
         return;
     }
     vi_motion m;
-    vi_segment_at(&segment, 0.0, &m);
-    m.x = body->displacement; /* on the stop exactly, after an impact */
-    m.v = body->velocity;
+    vi_segment_first(&segment, body->displacement, body->velocity, &m);
     double u = 0.0, approach = 0.0;
-    jump_off(&segment, body, &m, &u);
+    if (body->leaving) {
+        m.a = 0.0; /* exactly: that is what released it */
+    }
     const int k = locate(body, &segment, &u, &m, &approach);
     const bool whole = k < 0 && segment.length >= length;
     if (whole && room > 0.0) {
@@ -215,10 +230,10 @@ static void fly(vi_body *body, vi_instant target, const vi_step_request *request
     }
     if (body->record.extrema) {
         vi_body_follow_extrema(body, &segment, u);
-        vi_record_extend(&body->record, k < 0 ? m.x : body->contacts[k].position);
+        vi_record_extend(&body->record, k < 0 ? segment.origin + m.x : body->contacts[k].position);
     }
     if (k < 0) {
-        move(body, u, m.x, m.v, whole ? end : ENDS_ANYWHERE, target);
+        move(body, u, segment.origin + m.x, m.v, whole ? end : ENDS_ANYWHERE, target);
     } else {
         move(body, u, body->contacts[k].position, direction(body, k) * approach, ENDS_ANYWHERE, target);
         meet(body, k, approach, vi_clock_elapsed(&body->clock, body->now, target), request);
@@ -232,22 +247,24 @@ static double time_to_release(const vi_body *body, int k, double length, bool *r
 {
     const double sign = direction(body, k), w = body->clock.angular_frequency;
     const double stop = body->contacts[k].position, held = vi_body_held_now(body);
-    const double force = fabs(body->mode.force), third = force * w * w * w;
+    const double force = fabs(body->mode.force), fourth = force * w * w * w * w;
     const double noise = ROUNDING * (force + fabs(held) + body->mode.stiffness * fabs(stop));
     double u = 0.0;
     *released = false;
     while (u < length) {
         double pressure, slope;
-        const double phase = phase_now(body) + w * u;
+        const vi_phase phase = vi_phase_of(w * (body->now.rest + u));
         vi_mode_held(&body->mode, stop, phase, held + body->held_rate * u, body->held_rate, &pressure, &slope);
         pressure = fmax(0.0, sign * pressure);
         const double closing = -sign * slope;
-        const double bend = sign * body->mode.force * w * w * cos(phase);
+        const double bend = sign * body->mode.force * w * w * phase.cosine;
         if (closing > 0.0 && pressure <= noise) {
             *released = true;
             return fmin(length, u + pressure / closing);
         }
-        const double step = vi_certified_step(pressure, closing, bend, third, length - u);
+        const double twist = -sign * body->mode.force * w * w * w * phase.sine;
+        const vi_approach state = {pressure, closing, bend, twist, fourth};
+        const double step = vi_certified_step(&state, length - u);
         if (u + step == u) {
             return length; /* no pressure and no trend: it stays */
         }
@@ -307,7 +324,7 @@ static void settle(vi_body *body, int k, const vi_step_request *request)
     }
     const double held = vi_body_held_now(body);
     double pressure, slope;
-    vi_mode_held(&body->mode, contact->position, phase_now(body), held, body->held_rate, &pressure, &slope);
+    vi_mode_held(&body->mode, contact->position, vi_body_phase_now(body), held, body->held_rate, &pressure, &slope);
     const double noise =
         ROUNDING * (fabs(body->mode.force) + fabs(held) + body->mode.stiffness * fabs(contact->position));
     const bool leaves = sign * slope < 0.0 || body->leaving;
@@ -402,7 +419,7 @@ double vi_body_outputs(vi_body *body)
 {
     const vi_mode *mode = &body->mode;
     double free_acceleration, slope;
-    vi_mode_held(mode, body->displacement, phase_now(body), vi_body_held_now(body), body->held_rate,
+    vi_mode_held(mode, body->displacement, vi_body_phase_now(body), vi_body_held_now(body), body->held_rate,
                  &free_acceleration, &slope);
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
         vi_contact *contact = &body->contacts[k];

@@ -31,6 +31,7 @@ static void start_steady(vi_mode *mode)
         mode->steady_amplitude = fabs(mode->force) / size;
         mode->steady_exists = isfinite(mode->steady_amplitude);
     }
+    mode->steady_snap = w * w * w * w * mode->steady_amplitude;
 }
 
 void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness, double amplitude,
@@ -118,8 +119,7 @@ static bool split(vi_segment *s, double x, double v)
             return false;
         }
     }
-    const double c = cos(s->phase);
-    const double sn = sin(s->phase);
+    const double c = s->phase.cosine, sn = s->phase.sine;
     s->x = x - s->level - (mode->steady_cos * c + mode->steady_sin * sn);
     s->v = v - s->level_rate - mode->angular_frequency * (mode->steady_sin * c - mode->steady_cos * sn);
     return true;
@@ -131,7 +131,7 @@ static void bound_split(vi_segment *s)
     const double turned = s->v + mode->decay * s->x;
     s->amplitude = s->slow_part = s->fast_part = 0.0;
     if (mode->regime == VI_UNDERDAMPED) {
-        s->amplitude = hypot(s->x, turned / mode->rate);
+        s->amplitude = sqrt(s->x * s->x + (turned / mode->rate) * (turned / mode->rate));
     } else if (mode->regime == VI_OVERDAMPED) {
         s->slow_part = fabs(s->v + mode->fast * s->x) / (2.0 * mode->rate);
         s->fast_part = fabs(s->v + mode->slow * s->x) / (2.0 * mode->rate);
@@ -139,37 +139,31 @@ static void bound_split(vi_segment *s)
     s->scale = fabs(s->x) + mode->steady_amplitude + fabs(s->level) + fabs(s->level_rate) * s->length;
 }
 
-/* Bounds on the homogeneous |x'''| and |x''''| from the energy of the present state, which never grows. */
-static void energy_bounds(const vi_mode *mode, double x, double v, double *jerk, double *snap)
+/* Bound on the homogeneous |x''''| from the energy of the present state, which never grows. */
+static double energy_bound(const vi_mode *mode, double x, double v)
 {
     const double damping = 2.0 * mode->decay;
     const double energy = sqrt(v * v + mode->stiffness * x * x);
     const double second = sqrt(damping * damping + mode->stiffness) * energy;
-    *jerk = damping * second + mode->stiffness * energy;
-    *snap = damping * *jerk + mode->stiffness * second;
+    const double third = damping * second + mode->stiffness * energy;
+    return damping * third + mode->stiffness * second;
 }
 
-static void homogeneous_bounds(const vi_segment *s, const propagator *p, double x, double v, vi_motion *m)
+/* Bound on the homogeneous |x''''| from here on: equations.md 2.2, one order up. */
+static double homogeneous_bound(const vi_segment *s, double slow_left, double fast_left, double x, double v)
 {
     const vi_mode *mode = s->mode;
-    if (mode->regime == VI_UNDERDAMPED) {
-        m->jerk_bound = mode->stiffness * mode->natural * s->amplitude * p->slow;
-        m->snap_bound = mode->natural * m->jerk_bound;
-        if (mode->rate > 0.1 * mode->natural) {
-            return; /* the amplitude bound is tight away from critical damping */
-        }
+    const double amplitude_bound = mode->stiffness * mode->stiffness * s->amplitude * slow_left;
+    if (mode->regime == VI_UNDERDAMPED && mode->rate > 0.1 * mode->natural) {
+        return amplitude_bound; /* tight away from critical damping */
     }
-    double jerk, snap;
-    energy_bounds(mode, x, v, &jerk, &snap);
-    if (mode->regime == VI_OVERDAMPED) {
-        const double slow = s->slow_part * p->slow, fast = s->fast_part * p->fast;
-        const double w1 = mode->slow, w2 = mode->fast;
-        m->jerk_bound = slow * w1 * w1 * w1 + fast * w2 * w2 * w2;
-        m->snap_bound = slow * w1 * w1 * w1 * w1 + fast * w2 * w2 * w2 * w2;
+    const double energy = energy_bound(mode, x, v);
+    if (mode->regime == VI_CRITICAL) {
+        return energy;
     }
-    const bool none = mode->regime == VI_CRITICAL;
-    m->jerk_bound = none ? jerk : fmin(m->jerk_bound, jerk);
-    m->snap_bound = none ? snap : fmin(m->snap_bound, snap);
+    const double slow = mode->slow * mode->slow, fast = mode->fast * mode->fast;
+    const double parts = s->slow_part * slow_left * slow * slow + s->fast_part * fast_left * fast * fast;
+    return fmin(energy, mode->regime == VI_UNDERDAMPED ? amplitude_bound : parts);
 }
 
 static void split_at(const vi_segment *s, double u, vi_motion *m)
@@ -179,11 +173,9 @@ static void split_at(const vi_segment *s, double u, vi_motion *m)
     const propagator p = propagate(mode, u);
     const double x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
     const double v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
-    const double angle = s->phase + w * u;
+    const double angle = s->phase.angle + w * u;
     const double c = cos(angle), sn = sin(angle);
-    homogeneous_bounds(s, &p, x, v, m);
-    m->jerk_bound += w * w * w * mode->steady_amplitude;
-    m->snap_bound += w * w * w * w * mode->steady_amplitude;
+    m->snap_bound = homogeneous_bound(s, p.slow, p.fast, x, v) + mode->steady_snap;
     m->x = x + (mode->steady_cos * c + mode->steady_sin * sn) + (s->level + s->level_rate * u);
     m->v = v + w * (mode->steady_sin * c - mode->steady_cos * sn) + s->level_rate;
     m->a = mode->force * c + (s->held + s->held_rate * u) - 2.0 * mode->decay * m->v - mode->stiffness * m->x;
@@ -197,13 +189,14 @@ static void start_series(vi_segment *s, double x, double v)
 {
     const vi_mode *mode = s->mode;
     const double w = mode->angular_frequency;
-    double drive[2] = {mode->force * cos(s->phase), -mode->force * w * sin(s->phase)};
+    double drive[2] = {mode->force * s->phase.cosine, -mode->force * w * s->phase.sine};
     double *c = s->coefficient;
-    c[0] = x;
+    s->origin = x;
+    c[0] = 0.0;
     c[1] = v;
     for (int n = 0; n + 2 <= VI_SERIES_ORDER; ++n) {
         const double k = (double)n;
-        const double held = n == 0 ? s->held : n == 1 ? s->held_rate : 0.0;
+        const double held = n == 0 ? s->held - mode->stiffness * x : n == 1 ? s->held_rate : 0.0;
         const double load = drive[0] + held - 2.0 * mode->decay * (k + 1.0) * c[n + 1] - mode->stiffness * c[n];
         c[n + 2] = load / ((k + 1.0) * (k + 2.0));
         const double next = -drive[0] * w * w / ((k + 1.0) * (k + 2.0));
@@ -215,18 +208,14 @@ static void start_series(vi_segment *s, double x, double v)
 static void bound_series(vi_segment *s)
 {
     const double *c = s->coefficient;
-    double jerk = 0.0, snap = 0.0, scale = 0.0;
+    double snap = 0.0, scale = 0.0;
     for (int n = VI_SERIES_ORDER; n >= 0; --n) {
         const double k = (double)n;
         scale = scale * s->length + fabs(c[n]);
-        if (n >= 3) {
-            jerk = jerk * s->length + k * (k - 1.0) * (k - 2.0) * fabs(c[n]);
-        }
         if (n >= 4) {
             snap = snap * s->length + k * (k - 1.0) * (k - 2.0) * (k - 3.0) * fabs(c[n]);
         }
     }
-    s->series_jerk_bound = jerk;
     s->series_snap_bound = snap;
     s->scale = scale;
 }
@@ -240,28 +229,46 @@ static void series_at(const vi_segment *s, double u, vi_motion *m)
         x = x * u + c[n];
         v = v * u + (double)n * c[n];
     }
-    m->x = x * u + c[0];
+    m->x = x * u;
     m->v = v;
-    const double angle = s->phase + mode->angular_frequency * u;
+    const double angle = s->phase.angle + mode->angular_frequency * u;
     m->a = mode->force * cos(angle) + (s->held + s->held_rate * u) - 2.0 * mode->decay * m->v
-           - mode->stiffness * m->x;
+           - mode->stiffness * (s->origin + m->x);
     m->j = s->held_rate - mode->force * mode->angular_frequency * sin(angle) - 2.0 * mode->decay * m->a
            - mode->stiffness * m->v;
-    m->jerk_bound = s->series_jerk_bound;
     m->snap_bound = s->series_snap_bound;
 }
 
 /* ---- the door ---- */
 
-void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, double phase, double held,
-                      double held_rate, double length)
+vi_phase vi_phase_of(double angle)
+{
+    return (vi_phase){angle, cos(angle), sin(angle)};
+}
+
+void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *m)
+{
+    const vi_mode *mode = segment->mode;
+    const double damping = 2.0 * mode->decay;
+    m->x = x - segment->origin;
+    m->v = v;
+    m->a = mode->force * segment->phase.cosine + segment->held - damping * v - mode->stiffness * x;
+    m->j = segment->held_rate - mode->force * mode->angular_frequency * segment->phase.sine - damping * m->a
+           - mode->stiffness * v;
+    m->snap_bound = segment->series ? segment->series_snap_bound
+                                    : homogeneous_bound(segment, 1.0, 1.0, segment->x, segment->v) + mode->steady_snap;
+}
+
+void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
+                      double held_rate, double length, bool local)
 {
     segment->mode = mode;
+    segment->origin = 0.0;
     segment->phase = phase;
     segment->held = held;
     segment->held_rate = held_rate;
     segment->length = length;
-    segment->series = !split(segment, x, v);
+    segment->series = local || !split(segment, x, v);
     if (segment->series) {
         if (mode->fastest > 0.0) {
             segment->length = fmin(length, SERIES_REACH / mode->fastest);
@@ -307,9 +314,9 @@ bool vi_segment_range(const vi_segment *segment, double *lowest, double *highest
     return isfinite(reach);
 }
 
-void vi_mode_held(const vi_mode *mode, double x, double phase, double held, double held_rate, double *acceleration,
+void vi_mode_held(const vi_mode *mode, double x, vi_phase phase, double held, double held_rate, double *acceleration,
                   double *slope)
 {
-    *acceleration = mode->force * cos(phase) + held - mode->stiffness * x;
-    *slope = held_rate - mode->force * mode->angular_frequency * sin(phase);
+    *acceleration = mode->force * phase.cosine + held - mode->stiffness * x;
+    *slope = held_rate - mode->force * mode->angular_frequency * phase.sine;
 }

@@ -29,25 +29,32 @@ typedef struct {
     bool steady_exists;
     double steady_cos, steady_sin; /* steady response = steady_cos cos(phase) + steady_sin sin(phase), m */
     double steady_amplitude;  /* m */
+    double steady_snap;       /* its largest fourth derivative, m/s^4 */
     double fastest;           /* largest of natural, 2 decay, angular_frequency, rad/s */
 } vi_mode;
 
-/* Displacement, velocity, acceleration and jerk at one instant, with bounds that hold from here on. */
+/* Displacement, velocity, acceleration and jerk at one instant, with a bound that holds from here on. */
 typedef struct {
-    double x, v, a, j;
-    double jerk_bound; /* >= |x'''| from here to the end of the segment */
-    double snap_bound; /* >= |x''''| likewise */
+    double x; /* from the segment's origin */
+    double v, a, j;
+    double snap_bound; /* >= |x''''| from here to the end of the segment */
 } vi_motion;
+
+/* A forcing phase, rad, with its cosine and sine. */
+typedef struct {
+    double angle, cosine, sine;
+} vi_phase;
 
 /* The flow from one state, with the held input. */
 typedef struct {
     const vi_mode *mode;
-    double phase;         /* of the force at the start, rad */
+    vi_phase phase;       /* of the force at the start */
     double held, held_rate;
     double length;        /* the segment is valid for 0 <= u <= length, s */
+    double origin;        /* displacements of the segment are counted from here, m: 0 when split, else the start */
     bool series;
     double coefficient[VI_SERIES_ORDER + 1]; /* Taylor, when series */
-    double series_jerk_bound, series_snap_bound;
+    double series_snap_bound;
     double x, v;          /* homogeneous state at the start, when split */
     double level, level_rate; /* particular solution of the held input */
     double amplitude;     /* |homogeneous| <= amplitude e^{-decay u} when underdamped */
@@ -60,9 +67,15 @@ void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness,
                    double angular_frequency);
 
 /* Begin a segment of at most `length` seconds at displacement x, velocity v and forcing phase (rad). The series form
- * may shorten the length. */
-void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, double phase, double held,
-                      double held_rate, double length);
+ * may shorten the length. Low bounces ask for it (`local`): it counts from the start, so that a bounce of 1e-12 m on a
+ * stop at 1 m keeps all its digits. */
+void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
+                      double held_rate, double length, bool local);
+
+vi_phase vi_phase_of(double angle);
+
+/* The motion at the start, from the state (x, v) that the segment was begun with: no rounding, no evaluation. */
+void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *motion);
 
 /* The motion `u` seconds after the start. */
 void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion);
@@ -74,7 +87,7 @@ void vi_segment_end(const vi_segment *segment, double u, double phase, double *x
 bool vi_segment_range(const vi_segment *segment, double *lowest, double *highest);
 
 /* Contact acceleration (m/s^2) and its slope for a mass held at displacement x, at forcing phase `phase`. */
-void vi_mode_held(const vi_mode *mode, double x, double phase, double held, double held_rate, double *acceleration,
+void vi_mode_held(const vi_mode *mode, double x, vi_phase phase, double held, double held_rate, double *acceleration,
                   double *slope);
 
 #endif

@@ -50,16 +50,11 @@ void vi_body_stick(vi_body *body, int k, double delay, double tail_impulse)
     contact->stick_end = NAN;
 }
 
-/* Rest on stop k now if the bounces still to come can be summed (or are too low to be followed). */
-static void rest_if_summable(vi_body *body, int k, double rebound, double restitution)
+/* Rest on stop k now if the bounces still to come can be summed (or are too low to be followed); `pressure` is the
+ * acceleration towards the stop, `slope` its rate. */
+static void rest_if_summable(vi_body *body, int k, double pressure, double slope, double rebound, double restitution)
 {
     const vi_contact *contact = &body->contacts[k];
-    const double sign = vi_contact_direction(contact->side);
-    double pressure, slope;
-    vi_mode_held(&body->mode, contact->position, body->clock.angular_frequency * body->now.rest,
-                 vi_body_held_now(body), body->held_rate, &pressure, &slope);
-    pressure *= sign;
-    slope *= sign;
     if (!(pressure > 0.0)) {
         return;
     }
@@ -88,13 +83,14 @@ static double undecidable_velocity(const vi_body *body, int k, double accelerati
 void vi_body_impact(vi_body *body, int k, double approach, double restitution)
 {
     vi_contact *contact = &body->contacts[k];
-    const double rebound = restitution * approach;
+    const double sign = vi_contact_direction(contact->side), rebound = restitution * approach;
     double acceleration, slope;
-    vi_mode_held(&body->mode, contact->position, body->clock.angular_frequency * body->now.rest,
-                 vi_body_held_now(body), body->held_rate, &acceleration, &slope);
+    vi_mode_held(&body->mode, contact->position, vi_body_phase_now(body), vi_body_held_now(body), body->held_rate,
+                 &acceleration, &slope);
+    const bool graze = approach <= undecidable_velocity(body, k, acceleration);
     body->displacement = contact->position;
-    body->velocity = -vi_contact_direction(contact->side) * rebound;
-    if (approach <= undecidable_velocity(body, k, acceleration)) {
+    body->velocity = -sign * rebound;
+    if (graze) {
         contact->graze_count += 1;
     } else {
         contact->count += 1;
@@ -106,9 +102,8 @@ void vi_body_impact(vi_body *body, int k, double approach, double restitution)
                          restitution);
     }
     body->fastest_impact = fmax(body->fastest_impact, approach);
-    if (rebound <= TAIL_VELOCITY * body->fastest_impact || approach <= undecidable_velocity(body, k, acceleration)
-        || restitution == 0.0) {
-        rest_if_summable(body, k, rebound, restitution);
+    if (rebound <= TAIL_VELOCITY * body->fastest_impact || graze) {
+        rest_if_summable(body, k, sign * acceleration, sign * slope, rebound, restitution);
     }
 }
 
@@ -116,8 +111,7 @@ void vi_body_follow_extrema(vi_body *body, const vi_segment *segment, double end
 {
     vi_motion m;
     double u = 0.0;
-    vi_segment_at(segment, 0.0, &m);
-    m.v = body->velocity;
+    vi_segment_first(segment, body->displacement, body->velocity, &m);
     vi_record_extend(&body->record, body->displacement);
     const double noise = 4.0 * DBL_EPSILON * (fabs(m.v) + segment->scale * segment->mode->fastest);
     double sign = m.v != 0.0 ? copysign(1.0, m.v) : copysign(1.0, m.a);
@@ -127,12 +121,13 @@ void vi_body_follow_extrema(vi_body *body, const vi_segment *segment, double end
         if (closing > 0.0 && speed <= noise) {
             u = fmin(end, u + speed / closing);
             vi_segment_at(segment, u, &m);
-            vi_record_extend(&body->record, m.x);
+            vi_record_extend(&body->record, segment->origin + m.x);
             m.v = 0.0;
             sign = -sign;
             continue;
         }
-        const double step = vi_certified_step(speed, closing, -sign * m.j, m.snap_bound, end - u);
+        const vi_approach state = {speed, closing, -sign * m.j, m.snap_bound, 0.0};
+        const double step = vi_certified_step(&state, end - u);
         u = fmin(end, u + fmax(step, 1e-12 * end));
         vi_segment_at(segment, u, &m);
     }

@@ -7,6 +7,9 @@
 /* Held input per unit mass at the present instant, m/s^2. */
 double vi_body_held_now(const vi_body *body);
 
+/* Forcing phase at the present instant. */
+vi_phase vi_body_phase_now(const vi_body *body);
+
 /* The body, on stop k (0-based), has this speed of approach (>= 0): apply the law with restitution r in [0, 1], and
  * let the body rest when the chatter that follows can be summed. equations.md 1.6, 3.1. */
 void vi_body_impact(vi_body *body, int k, double approach, double restitution);

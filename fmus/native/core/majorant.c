@@ -1,37 +1,43 @@
 #include "majorant.h"
 
-#include <math.h>
-
-double vi_parabola_root(double clearance, double velocity, double acceleration)
+/* Up to s the quartic lies below the parabola with this acceleration: a + j s/3 + bound s^2/12 is convex in s, so it
+ * is largest at an end. */
+static inline double acceleration_up_to(const vi_approach *p, double s)
 {
-    const double square = velocity * velocity + 2.0 * acceleration * clearance;
-    if (velocity > 0.0) {
-        return square < 0.0 ? HUGE_VAL : 2.0 * clearance / (velocity + sqrt(square));
-    }
-    return acceleration > 0.0 ? (sqrt(square) - velocity) / acceleration : HUGE_VAL;
+    return p->acceleration + vi_max(0.0, s * (p->jerk / 3.0 + s * p->bound / 12.0));
 }
 
-double vi_certified_step(double clearance, double velocity, double acceleration, double bound, double horizon)
+/* The longest s up to which that acceleration is not positive; 0 when there is none. A body that does not approach
+ * and is not accelerated towards the stop cannot reach it before. */
+static double longest_retreat(const vi_approach *p)
 {
-    /* Over [0, s] the cubic lies below the parabola with acceleration a + bound s/3. A step s is certified when that
-     * parabola has no root before s; start from the whole horizon and widen what is certified. */
-    const double slope = bound / 3.0;
-    double certified = vi_parabola_root(clearance, velocity, acceleration + slope * horizon);
-    if (!(certified < horizon)) {
-        return horizon;
+    const double slope = p->jerk / 3.0, bend = p->bound / 12.0, a = p->acceleration;
+    if (a > 0.0 || (a == 0.0 && slope >= 0.0)) {
+        return 0.0;
     }
-    if (velocity <= 0.0 && acceleration < 0.0) {
-        /* leaving and speeding up: no return before the majorant's acceleration changes sign */
-        certified = fmax(certified, fmin(horizon, -acceleration / slope));
+    const double root = sqrt(slope * slope - 4.0 * bend * a);
+    return slope > 0.0 ? -2.0 * a / (slope + root) : bend > 0.0 ? (root - slope) / (2.0 * bend) : HUGE_VAL;
+}
+
+double vi_certified_step(const vi_approach *p, double horizon)
+{
+    /* A step s is certified when the parabola with acceleration_up_to(s) has no root before s. `limit` is never
+     * certified too small: it is the root under the least acceleration. */
+    double limit = vi_min(horizon, vi_parabola_root(p->clearance, p->velocity, p->acceleration));
+    double certified = vi_parabola_root(p->clearance, p->velocity, acceleration_up_to(p, limit));
+    if (!(certified < limit)) {
+        return limit;
     }
-    double limit = fmin(horizon, vi_parabola_root(clearance, velocity, acceleration + slope * certified));
-    for (int pass = 0; pass < 3 && limit > 1.05 * certified; ++pass) {
+    if (p->velocity <= 0.0) {
+        certified = vi_max(certified, vi_min(horizon, longest_retreat(p)));
+    }
+    for (int pass = 0; pass < 3 && limit > 1.2 * certified; ++pass) {
         const double middle = 0.5 * (certified + limit);
-        const double root = vi_parabola_root(clearance, velocity, acceleration + slope * middle);
+        const double root = vi_parabola_root(p->clearance, p->velocity, acceleration_up_to(p, middle));
         if (root >= middle) {
             certified = middle;
         } else {
-            certified = fmax(certified, root);
+            certified = vi_max(certified, root);
             limit = middle;
         }
     }

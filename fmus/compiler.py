@@ -1,0 +1,126 @@
+"""Finds a C compiler and makes shared libraries with it."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.fmus.platform_names import library_suffix, system
+
+#: Chosen by the user; if it does not work that is an error, not a reason to take another.
+CHOICE = "VIBROIMPACT_CC"
+ON_PATH = ("cc", "gcc", "clang")
+
+# contraction off: a * b + c is rounded twice everywhere, so all machines give the same bits
+LANGUAGE = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno")
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion")
+
+
+def find_compiler() -> tuple[str, ...]:
+    """Return the command of the first C compiler that works.
+
+    Tried in order: `$VIBROIMPACT_CC`, `$CC`, cc, gcc, clang, and the ziglang package.
+
+    Raises
+    ------
+    ComponentError
+        None works, or the one that `$VIBROIMPACT_CC` names does not.
+    """
+    for command in _candidates():
+        if _works(command):
+            return command
+        if os.environ.get(CHOICE):
+            chosen = os.environ[CHOICE]
+            raise ComponentError(f"{CHOICE}: expected a C compiler that works, got {chosen!r}.")
+    raise ComponentError(
+        f"compiler: expected ${CHOICE}, $CC, {', '.join(ON_PATH)} or the package ziglang, "
+        "got none that works. Run `pip install ziglang`."
+    )
+
+
+def has_compiler() -> bool:
+    """Return whether a compiler is there without the ziglang package."""
+    return any(_works(command) for command in _candidates() if "ziglang" not in command)
+
+
+def compile_library(
+    target: Path,
+    sources: Sequence[Path],
+    include: Sequence[Path],
+    *,
+    export_all: bool = False,
+    strict: bool = True,
+) -> None:
+    """Compile C files into one shared library.
+
+    Parameters
+    ----------
+    target : Path
+        The library to write.
+    sources, include : sequence of Path
+        The C files and the folders of their headers.
+    export_all : bool
+        Export every function, not only those marked for export.
+    strict : bool
+        Warnings are errors; off where users build, since a newer compiler may know new warnings.
+
+    Raises
+    ------
+    ComponentError
+        With the compiler's own words.
+    """
+    compiler = find_compiler()
+    options = [*LANGUAGE, *WARNINGS, *(["-Werror"] if strict else []), *_platform_options(compiler)]
+    options += [] if export_all else ["-fvisibility=hidden"]
+    folders = [f"-I{folder}" for folder in include]
+    command = [*compiler, *options, *folders, "-o", str(target), *map(str, sources), "-lm"]
+    result = subprocess.run(command, capture_output=True, text=True)
+    if result.returncode != 0:
+        raise ComponentError(
+            f"{target.name}: expected {shlex.join(compiler)} to compile it, "
+            f"got exit code {result.returncode}:\n"
+            f"{result.stderr.strip()}"
+        )
+
+
+def _platform_options(compiler: Sequence[str]) -> list[str]:
+    options = ["-shared"] if system() == "windows" else ["-shared", "-fPIC"]
+    if "ziglang" in compiler:
+        # by default zig compiles for the very processor at hand; a wheel must run on every one
+        options += ["-mcpu=baseline", "-fno-sanitize=undefined"]
+    return options
+
+
+def _candidates() -> Iterator[tuple[str, ...]]:
+    if os.environ.get(CHOICE):
+        yield tuple(shlex.split(os.environ[CHOICE]))
+        return
+    if os.environ.get("CC"):
+        yield tuple(shlex.split(os.environ["CC"]))
+    yield from ((path,) for path in map(shutil.which, ON_PATH) if path)
+    if importlib.util.find_spec("ziglang"):
+        yield (sys.executable, "-m", "ziglang", "cc")
+
+
+@cache
+def _works(command: tuple[str, ...]) -> bool:
+    # a compiler without the C library's headers, or the stub of a system without one, is none
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder, "probe.c")
+        source.write_text("#include <math.h>\ndouble probe(double x) { return sin(x); }\n")
+        target = source.with_suffix(library_suffix())
+        options = [*_platform_options(command), str(source), "-o", str(target), "-lm"]
+        try:
+            result = subprocess.run([*command, *options], capture_output=True)
+        except OSError:
+            return False
+        return result.returncode == 0 and target.exists()
