@@ -1,0 +1,170 @@
+"""Scene files: what is simulated, what is recorded and what is swept.
+
+`load_scene` reads a TOML file into a frozen `Scene` or raises one `SceneError` with everything that is wrong.
+The keys are described in `docs/scene.md`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.orchestrator.scene_file import parse_toml, read_text
+from vibroimpact.orchestrator.scene_keys import coordinate_name, numeric_key, replacement
+from vibroimpact.orchestrator.scene_models import Execution, Forcing, OscillatorBody, Record, RestitutionStop
+from vibroimpact.orchestrator.scene_tables import read_tables
+from vibroimpact.orchestrator.sweep import SweepAxis
+
+__all__ = ["Scene", "load_scene", "parse_scene"]
+
+
+class Scene(BaseModel):
+    """A validated scene; it never changes, `with_values` makes another.
+
+    Attributes
+    ----------
+    source : str
+        Where the scene came from, for messages.
+    text : str
+        The TOML text, for provenance.
+    title : str
+        What the scene is called; may be empty.
+    units : {"SI", "nondimensional"}
+        The meaning of all numbers.
+    body : OscillatorBody
+        The body that moves.
+    forcing : Forcing or None
+        What drives it; None without a `[forcing]` table.
+    stops : tuple of RestitutionStop
+        Zero, one or two stops in the order of the file.
+    record : Record
+        What is recorded; periods in a forced scene, times in any other.
+    sweep : tuple of SweepAxis
+        The swept keys in the order of the file; see `vibroimpact.orchestrator.sweep.expand`.
+    execution : Execution
+        How the points run.
+    """
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    source: str
+    text: str = Field(repr=False)
+    title: str
+    units: Literal["SI", "nondimensional"]
+    body: OscillatorBody
+    forcing: Forcing | None
+    stops: tuple[RestitutionStop, ...]
+    record: Record
+    sweep: tuple[SweepAxis, ...]
+    execution: Execution
+
+    @property
+    def period(self) -> float | None:
+        """Forcing period 2 pi / angular_frequency; None unforced and under a constant force."""
+        if self.forcing is None or self.forcing.angular_frequency == 0.0:
+            return None
+        return 2.0 * math.pi / self.forcing.angular_frequency
+
+    def value(self, key: str) -> float:
+        """Return the number that a key such as `stop[1].position` has in this scene.
+
+        Raises
+        ------
+        UsageError
+            When the scene has no such number.
+        """
+        table, place, name = numeric_key(key)
+        number = getattr(self._numbered_tables().get(table if place is None else place), name, None)
+        if number is None:
+            raise UsageError(f"{self.source}: {key}: expected a number of this scene, got nothing.")
+        return float(number)
+
+    def with_values(self, values: Mapping[str, float]) -> Scene:
+        """Return this scene with other numbers, without validating it again.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            New values of sweepable keys. Values of the scene's own sweep are known to be valid; others are
+            the caller's responsibility. An angular_frequency replaces a frequency that the scene gives, and
+            a damping its damping_ratio; and the other way round.
+
+        Examples
+        --------
+        >>> text = "[body]\\nmass = 1\\nstiffness = 1\\n[record]\\nrecorded_time = 5"
+        >>> parse_scene(text, "free.toml").with_values({"body.mass": 2.0}).body.mass
+        2.0
+        """
+        tables = self._numbered_tables()
+        for key, value in values.items():
+            table, place, name = numeric_key(key)
+            slot = table if place is None else place
+            owner = tables.get(slot)
+            if owner is None:
+                raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent table.")
+            tables[slot] = owner.model_copy(update=replacement(type(owner), name, value))
+        stops = tuple(tables[place] for place in range(len(self.stops)))
+        return self.model_copy(update={"body": tables["body"], "forcing": tables["forcing"], "stops": stops})
+
+    def sweep_coordinate_name(self, key: str) -> str:
+        """Return the name that a swept key has as a coordinate of the dataset."""
+        return coordinate_name(key, [axis.key for axis in self.sweep])
+
+    def _numbered_tables(self) -> dict[str | int, BaseModel | None]:
+        """Return the tables that hold numbers; a stop has its 0-based place for a name."""
+        return {"body": self.body, "forcing": self.forcing, **dict(enumerate(self.stops))}
+
+
+def load_scene(path: str | PathLike[str]) -> Scene:
+    """Read a scene file.
+
+    Parameters
+    ----------
+    path : path-like
+        A TOML file, UTF-8, at most 1 MiB.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the file, each on one line.
+    """
+    source = str(path)
+    return parse_scene(read_text(Path(path), source), source)
+
+
+def parse_scene(text: str, source: str) -> Scene:
+    """Read a scene from TOML text.
+
+    Parameters
+    ----------
+    text : str
+        The TOML text.
+    source : str
+        The name of the text in messages, usually its file.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the text, each on one line.
+    """
+    tables, problems = read_tables(parse_toml(text, source))
+    if tables is None:
+        raise SceneError(tuple(dict.fromkeys(problem.line(source) for problem in problems)))
+    return Scene(
+        source=source,
+        text=text,
+        title=tables.header.title,
+        units=tables.header.units,
+        body=tables.body,
+        forcing=tables.forcing,
+        stops=tables.stops,
+        record=tables.record,
+        sweep=tables.sweep,
+        execution=tables.execution,
+    )

@@ -1,0 +1,254 @@
+"""How problems of a scene file are told: `file: key: expected ..., got .... hint`.
+
+A problem is a value, not an exception: the parts of the scene reader hand on lists of them, and one
+`SceneError` at the end carries them all.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from typing import Any, get_args
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+LONGEST_QUOTE = 60
+
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+\Z")
+_TOML_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\Z")
+_NUMBER_IN_TEXT = re.compile(r"\s*[-+.]?\d")
+
+_SYNTAX_HINTS = {
+    "Cannot declare ('stop',) twice": "Write [[stop]], with two brackets, for each stop.",
+    "Cannot overwrite": "Give each key once.",
+    "twice": "Give each table once.",
+    "Invalid value": "Text goes in double quotes, numbers use a decimal point.",
+    "Expected newline": "Give each key a line of its own, numbers with a decimal point (0.5, not 0,5).",
+    "Expected '=' after a key": 'A key with a dot or brackets in its name needs quotes ("stop[1].position").',
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong with a scene: where, what is expected, what is there, and what to do."""
+
+    key: str
+    expected: str
+    got: str
+    hint: str = ""
+
+    def line(self, source: str) -> str:
+        """Return the problem as the line that a user reads."""
+        where = f"{source}: {self.key}: " if self.key else f"{source}: "
+        hint = f" {self.hint}" if self.hint else ""
+        return f"{where}expected {self.expected}, got {self.got}.{hint}"
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What a field of a scene model accepts, in words; stands beside its constraints in the model.
+
+    Attributes
+    ----------
+    expected : str
+        Completes "expected ...".
+    unit : str
+        The unit of the field in an SI scene; empty where it has none.
+    hint : str
+        What to do about a value outside the rule.
+    unavailable : tuple of str
+        Words of the scene format that this version does not run.
+    item : str
+        Completes "expected ..." for one item of an array.
+    """
+
+    expected: str
+    unit: str = ""
+    hint: str = ""
+    unavailable: tuple[str, ...] = ()
+    item: str = ""
+
+
+def rule_of(field: FieldInfo) -> Rule:
+    """Return the rule of a model field; each field of a scene model has one."""
+    return next(entry for entry in field.metadata if isinstance(entry, Rule))
+
+
+def quoted(value: object) -> str:
+    """Write a value of a TOML document as a person would recognize it, on one short line.
+
+    Examples
+    --------
+    >>> quoted(True), quoted("0.5"), quoted({}), quoted([1, 2]), quoted(None)
+    ('true', '"0.5"', 'a table', 'an array of 2', 'nothing')
+    """
+    if value is None:
+        return "nothing"
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list):
+        return f"an array of {len(value)}" if value else "an empty array"
+    if isinstance(value, bool | str):
+        return _shortened(json.dumps(value, ensure_ascii=False))
+    if isinstance(value, int) and abs(value) >= 10**LONGEST_QUOTE:
+        return f"a number near 1e{math.floor(math.log10(abs(value)))}"
+    return _shortened(str(value))
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_QUOTE else text[: LONGEST_QUOTE - 3] + "..."
+
+
+def key_path(parts: Iterable[str | int]) -> str:
+    """Join the parts of a key, with 1-based indices.
+
+    Examples
+    --------
+    >>> key_path(("stop", 0, "restitution")), key_path(("sweep", "body.mass", "points"))
+    ('stop[1].restitution', 'sweep."body.mass".points')
+    """
+    path = ""
+    for part in parts:
+        if isinstance(part, int):
+            path += f"[{part + 1}]"
+        else:
+            path += ("." if path else "") + (part if _BARE_KEY.match(part) else quoted(part))
+    return path
+
+
+def nearest(word: object, known: Iterable[str]) -> str:
+    """Return a hint that names the nearest spelling of a word, or all known words where none is near."""
+    options = list(known)
+    near = _nearest_word(word, options)
+    return f"Did you mean {near}?" if near else f"Known here: {', '.join(options)}."
+
+
+def _nearest_word(word: object, options: Sequence[str]) -> str | None:
+    near = get_close_matches(word.lower(), options, n=1) if isinstance(word, str) else []
+    return near[0] if near else None
+
+
+def unknown_key(path: Sequence[str | int], known: Iterable[str]) -> Problem:
+    """Return the problem of a key that its table does not have."""
+    return Problem(
+        key_path(path), "a known key", f"the unknown key {quoted(path[-1])}", nearest(path[-1], known)
+    )
+
+
+def known_keys(model: type[BaseModel]) -> list[str]:
+    """Return the keys of a table as a scene file spells them."""
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def problems_of(
+    error: ValidationError, model: type[BaseModel], table: tuple[str | int, ...]
+) -> list[Problem]:
+    """Translate what pydantic found in one table.
+
+    Parameters
+    ----------
+    error : ValidationError
+        The error of validating the table.
+    model : type of BaseModel
+        The model of the table; its fields carry a `Rule`.
+    table : tuple
+        Where the table is, for example ("stop", 0).
+    """
+    entries = error.errors(include_url=False, include_context=False)
+    return [_problem_of(entry, model, table) for entry in entries if not _is_an_echo(entry, entries, model)]
+
+
+def _is_an_echo(entry: Any, entries: Sequence[Any], model: type[BaseModel]) -> bool:
+    """Whether an error only follows from another one of the same table."""
+    location = entry["loc"]
+    if entry["type"] == "too_short":  # bad items do not count as items
+        return bool(entry["input"])
+    misspelt = (
+        other["loc"][-1]
+        for other in entries
+        if other["type"] == "extra_forbidden" and other["loc"][:-1] == location[:-1]
+    )
+    known = known_keys(_owner(model, location)[0])
+    return entry["type"] == "missing" and any(_nearest_word(word, known) == location[-1] for word in misspelt)
+
+
+def _problem_of(entry: Any, model: type[BaseModel], table: tuple[str | int, ...]) -> Problem:
+    path = (*table, *entry["loc"])
+    owner, name = _owner(model, entry["loc"])
+    if entry["type"] == "extra_forbidden":
+        return unknown_key(path, known_keys(owner))
+    field = _field(owner, name)
+    if entry["type"] == "missing":
+        hint = f"Add {key_path(path[-1:])} = ... to {_header(path[:-1])}."
+        return Problem(key_path(path), rule_of(field).expected, "nothing", hint)
+    return value_problem(path, field, entry["input"])
+
+
+def _owner(model: type[BaseModel], location: Sequence[str | int]) -> tuple[type[BaseModel], str]:
+    """Return the innermost table that a location passes through, and the key in it."""
+    name = str(location[0])
+    if len(location) == 1 or isinstance(location[1], int):
+        return model, name
+    inner = next(part for part in _parts(_field(model, name).annotation) if isinstance(part, type))
+    return _owner(inner, location[1:])
+
+
+def value_problem(path: Sequence[str | int], field: FieldInfo, value: object) -> Problem:
+    """Return the problem of a value that breaks the rule of its field."""
+    rule = rule_of(field)
+    expected = rule.item if rule.item and isinstance(path[-1], int) else rule.expected
+    return Problem(key_path(path), expected, quoted(value), _value_hint(rule, field, value))
+
+
+def _value_hint(rule: Rule, field: FieldInfo, value: object) -> str:
+    if isinstance(value, str) and value in rule.unavailable:
+        return f'"{value}" is not available in this version.'
+    choices = [choice for choice in _parts(field.annotation) if isinstance(choice, str)]
+    if isinstance(value, str) and choices:
+        near = _nearest_word(value, choices)
+        return f'Did you mean "{near}"?' if near else rule.hint
+    if isinstance(value, str) and _NUMBER_IN_TEXT.match(value):
+        unit = f"; the unit of this key is {rule.unit} in an SI scene" if rule.unit else ""
+        return f"Write the number alone, without quotes{unit}."
+    return rule.hint
+
+
+def _parts(annotation: Any) -> list[Any]:
+    """Return the innermost parts of an annotation: "a" and "b" of tuple[Literal["a", "b"], ...]."""
+    found: list[Any] = []
+    for argument in get_args(annotation):
+        found += _parts(argument) if get_args(argument) else [argument]
+    return found
+
+
+def _field(model: type[BaseModel], key: str) -> FieldInfo:
+    return next(field for name, field in model.model_fields.items() if key in (field.alias, name))
+
+
+def _header(table: tuple[str | int, ...]) -> str:
+    if len(table) > 1 and isinstance(table[1], int):
+        return f"[[{table[0]}]]"
+    return f"[{key_path(table)}]"
+
+
+def syntax_problem(error: ValueError, text: str) -> Problem:
+    """Return the problem of a text that is not TOML, with its place and the line itself."""
+    if not isinstance(error, tomllib.TOMLDecodeError):
+        return Problem("", "numbers of a usual length", "one of thousands of digits")
+    message = str(error)
+    place = _TOML_PLACE.search(message)
+    what = message[: place.start()] if place else message
+    hint = next((advice for start, advice in _SYNTAX_HINTS.items() if start in what), "")
+    said = f"{what.rstrip('.')}. {hint}".rstrip()
+    lines = re.split(r"\r?\n", text.rstrip())
+    if place is None or place[1] is None:
+        return Problem("end of file", "valid TOML", quoted(lines[-1].strip()), said)
+    number = int(place[1])
+    line = lines[number - 1] if number <= len(lines) else ""
+    return Problem(f"line {number}, column {place[2]}", "valid TOML", quoted(line.strip()), said)

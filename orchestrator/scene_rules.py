@@ -1,0 +1,251 @@
+"""Rules between the fields and tables of a scene; each rule yields the problems that it finds.
+
+A rule looks only at parts that are valid by themselves, so that one mistake is reported once. Swept keys
+count with their lowest and highest value: the axes of a sweep span all combinations, so a rule that holds at
+the worst corner holds everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from vibroimpact.orchestrator.scene_errors import Problem, key_path, quoted
+from vibroimpact.orchestrator.scene_keys import START_STATE, parse_key
+from vibroimpact.orchestrator.scene_models import (
+    MOST_SAMPLES_PER_RUN,
+    Forcing,
+    OscillatorBody,
+    Record,
+    RestitutionStop,
+    SceneHeader,
+)
+from vibroimpact.orchestrator.sweep import SweepAxis, run_count
+
+MOST_POINTS = 10**8
+MOST_STOPS = 2
+
+FREQUENCY_KEYS = frozenset({"angular_frequency", "frequency"})
+PERIOD_KEYS = ("transient_periods", "recorded_periods")
+TIME_KEYS = ("transient_time", "recorded_time")
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """A scene on its way: the document, and those of its tables that are valid by themselves (else None)."""
+
+    document: Mapping[str, Any]
+    header: SceneHeader | None
+    body: OscillatorBody | None
+    forcing: Forcing | None
+    stops: tuple[RestitutionStop | None, ...]
+    record: Record | None
+    axes: tuple[SweepAxis, ...]
+
+    def written(self, table: str) -> Mapping[str, Any]:
+        """Return a table as written, or an empty one."""
+        raw = self.document.get(table)
+        return raw if isinstance(raw, dict) else {}
+
+    def span(self, text: str) -> tuple[float, float] | None:
+        """Return the lowest and highest value of a key over all points; None where its table is not valid."""
+        for axis in self.axes:
+            if axis.key == text:
+                return min(axis.values), max(axis.values)
+        key = parse_key(text)
+        assert key is not None
+        owner = self.stops[key.place] if key.place is not None else getattr(self, key.table)
+        return None if owner is None else (getattr(owner, key.name), getattr(owner, key.name))
+
+    def angular_frequency_span(self) -> tuple[float, float] | None:
+        """Return the lowest and highest angular frequency: 0 unforced, None where it is not valid."""
+        if "forcing" not in self.document:
+            return 0.0, 0.0
+        if self.forcing is None or not FREQUENCY_KEYS & self.written("forcing").keys():
+            return None
+        if self.forcing.frequency is None:
+            return self.span("forcing.angular_frequency")
+        span = self.span("forcing.frequency")
+        return span and (2.0 * math.pi * span[0], 2.0 * math.pi * span[1])
+
+
+def rule_problems(draft: Draft) -> list[Problem]:
+    """Return everything that is wrong between the tables of a scene."""
+    rules = (
+        _damping_is_given_once,
+        _damping_ratio_has_a_spring,
+        _frequency_is_given_once,
+        _units_agree,
+        _stops_leave_room,
+        _start_is_on_the_free_side,
+        _record_counts_what_there_is,
+        _samples_fit,
+        _sweep_fits,
+    )
+    return [problem for rule in rules for problem in rule(draft)]
+
+
+def _damping_is_given_once(draft: Draft) -> Iterator[Problem]:
+    body = draft.written("body")
+    if "damping" in body and "damping_ratio" in body:
+        yield Problem(
+            "body.damping", "damping or damping_ratio", "both", f"Remove one{_swept_counts(draft)}."
+        )
+
+
+def _damping_ratio_has_a_spring(draft: Draft) -> Iterator[Problem]:
+    stiffness = draft.span("body.stiffness")
+    if draft.body and draft.body.damping_ratio is not None and stiffness and stiffness[0] == 0.0:
+        hint = "The ratio is to 2 sqrt(stiffness mass); give damping instead."
+        yield Problem(
+            "body.damping_ratio", "a stiffness > 0 beside a damping_ratio", "a stiffness of 0", hint
+        )
+
+
+def _frequency_is_given_once(draft: Draft) -> Iterator[Problem]:
+    if "forcing" not in draft.document:
+        return
+    given = FREQUENCY_KEYS & draft.written("forcing").keys()
+    if len(given) == 2:
+        expected = "angular_frequency (rad/s) or frequency (Hz)"
+        yield Problem("forcing.frequency", expected, "both", f"Remove one{_swept_counts(draft)}.")
+    if not given and isinstance(draft.document["forcing"], dict):
+        hint = "Add angular_frequency = ... to [forcing], in rad/s; 0 makes a constant force."
+        yield Problem("forcing.angular_frequency", "a number >= 0", "nothing", hint)
+
+
+def _swept_counts(draft: Draft) -> str:
+    return "; a swept key counts as given" if draft.axes else ""
+
+
+def _units_agree(draft: Draft) -> Iterator[Problem]:
+    if draft.header and draft.header.units == "nondimensional" and "frequency" in draft.written("forcing"):
+        hint = 'Hz is an SI unit: give angular_frequency in radians per unit of time, or units = "SI".'
+        yield Problem("forcing.frequency", "no frequency in Hz in a nondimensional scene", "one", hint)
+
+
+def _stops_leave_room(draft: Draft) -> Iterator[Problem]:
+    if len(draft.stops) > MOST_STOPS:
+        yield Problem("stop", f"at most {MOST_STOPS} stops", str(len(draft.stops)), "Remove [[stop]] tables.")
+        return
+    sides = [stop.side for stop in draft.stops if stop]
+    if len(sides) < MOST_STOPS:
+        return
+    if sides[0] == sides[1]:
+        hint = "Motion never reaches the farther of two stops on one side: remove it."
+        yield Problem("stop[2].side", "one upper and one lower stop", f"two {sides[0]} stops", hint)
+        return
+    upper, lower = sides.index("upper"), sides.index("lower")
+    lowest_upper, highest_lower = _position(draft, upper)[0], _position(draft, lower)[1]
+    if lowest_upper <= highest_lower:
+        expected = f"the upper stop[{upper + 1}] above the lower stop[{lower + 1}]"
+        got = f"upper {quoted(lowest_upper)} and lower {quoted(highest_lower)}{_worst(draft, 'stop')}"
+        yield Problem(
+            f"stop[{upper + 1}].position", expected, got, "Leave room for motion between the stops."
+        )
+
+
+def _position(draft: Draft, index: int) -> tuple[float, float]:
+    span = draft.span(f"stop[{index + 1}].position")
+    assert span is not None
+    return span
+
+
+def _worst(draft: Draft, *tables: str) -> str:
+    """Return a note for a number that may be the worst of a sweep."""
+    swept = any(axis.key.startswith(tables) for axis in draft.axes)
+    return " (the worst of the swept values)" if swept else ""
+
+
+def _start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
+    start = draft.span("body.displacement_start")
+    for index, stop in enumerate(draft.stops):
+        if start is None or stop is None:
+            continue
+        upper = stop.side == "upper"
+        limit, displacement = (
+            (_position(draft, index)[0], start[1]) if upper else (_position(draft, index)[1], start[0])
+        )
+        if displacement > limit if upper else displacement < limit:
+            relation = "<=" if upper else ">="
+            expected = (
+                f"a start on the free side of stop[{index + 1}] (displacement {relation} {quoted(limit)})"
+            )
+            got = f"{quoted(displacement)}{_worst(draft, 'stop', 'body.displacement_start')}"
+            hint = "Start on the stop or away from it, or move the stop."
+            yield Problem("body.displacement_start", expected, got, hint)
+
+
+def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:
+    span = draft.angular_frequency_span()
+    if span is None:
+        return
+    if span[0] == 0.0 < span[1]:
+        hint = "A constant force has no period to count; run it as a scene of its own."
+        yield Problem("sweep", "frequencies that are all > 0, or all 0", "0 among others", hint)
+        return
+    forced = span[0] > 0.0
+    right, wrong = (PERIOD_KEYS, TIME_KEYS) if forced else (TIME_KEYS, PERIOD_KEYS)
+    yield from _wrong_durations(draft, right, wrong, forced)
+    yield from _missing_duration(draft, right[1], wrong[1])
+
+
+def _missing_duration(draft: Draft, right: str, wrong: str) -> Iterator[Problem]:
+    raw = draft.document.get("record")
+    if raw is None and "body" not in draft.document:
+        return  # a file without the main table is told only that
+    if raw is None or (isinstance(raw, dict) and right not in raw and wrong not in raw):
+        unit = "a whole number of forcing periods" if right in PERIOD_KEYS else "a number > 0 (time)"
+        yield Problem(f"record.{right}", unit, "nothing", f"Add {right} = ... to [record].")
+
+
+def _wrong_durations(
+    draft: Draft, right: tuple[str, ...], wrong: tuple[str, ...], forced: bool
+) -> Iterator[Problem]:
+    reason = "A forced scene counts forcing periods" if forced else "A scene without a period counts time"
+    for key, instead in zip(wrong, right, strict=True):
+        value = draft.written("record").get(key)
+        if value is not None:
+            scene = "a forced scene" if forced else "an unforced scene"
+            yield Problem(
+                f"record.{key}",
+                f"{instead} in {scene}",
+                f"{key} = {quoted(value)}",
+                f"{reason}: give {instead}.",
+            )
+
+
+def _samples_fit(draft: Draft) -> Iterator[Problem]:
+    span = draft.angular_frequency_span()
+    if span is None or draft.record is None or draft.record.time_series is None:
+        return
+    forced = span[0] > 0.0
+    duration = (
+        draft.record.recorded_periods * 2.0 * math.pi / span[0] if forced else draft.record.recorded_time
+    )
+    samples = draft.record.time_series.rate * duration
+    if samples > MOST_SAMPLES_PER_RUN:
+        hint = f"Lower the rate or the recorded {'periods' if forced else 'time'}."
+        yield Problem(
+            "record.time_series.rate",
+            f"at most {MOST_SAMPLES_PER_RUN} samples per run",
+            f"{samples:.3g}",
+            hint,
+        )
+
+
+def _sweep_fits(draft: Draft) -> Iterator[Problem]:
+    count = run_count(draft.axes)
+    if count > MOST_POINTS:
+        yield Problem("sweep", f"at most {MOST_POINTS} points in all", str(count), "Lower points of an axis.")
+    carried = [axis.key for axis in draft.axes if axis.continuation]
+    if len(carried) > 1:
+        hint = 'Make the others "independent": they span the branches.'
+        yield Problem("sweep", "at most one key with a path up, down or up-down", ", ".join(carried), hint)
+    for key in carried:
+        if key in START_STATE:
+            where = key_path(("sweep", key, "path"))
+            hint = "Along a continuation each point starts from the state of the one before."
+            yield Problem(where, '"independent" for a start state', "a continuation", hint)

@@ -1,0 +1,384 @@
+"""What is said about a scene file that is wrong: one clear line for each mistake, all of them at once."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from vibroimpact.fmus.errors import SceneError
+from vibroimpact.orchestrator.scene import load_scene, parse_scene
+
+SOURCE = "s.toml"
+FORCED = """\
+[scene]
+title = "t"
+units = "nondimensional"
+[body]
+mass = 1.0
+stiffness = 1.0
+damping = 0.1
+[forcing]
+amplitude = 0.5
+angular_frequency = 0.8
+[[stop]]
+position = 1.0
+restitution = 0.7
+[record]
+transient_periods = 10
+recorded_periods = 5
+"""
+
+
+def problems_of(text: str) -> list[str]:
+    with pytest.raises(SceneError) as caught:
+        parse_scene(text, SOURCE)
+    assert str(caught.value) == "\n".join(caught.value.problems)
+    return [problem.removeprefix("s.toml: ") for problem in caught.value.problems]
+
+
+def forced(old: str, new: str) -> str:
+    assert old in FORCED
+    return FORCED.replace(old, new)
+
+
+def swept(*entries: str) -> str:
+    return FORCED + "[sweep]\n" + "\n".join(entries)
+
+
+# What is said about a single mistake.
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("mass = 1.0", "mass = 0", "body.mass: expected a number > 0, got 0."),
+        ("mass = 1.0", "mass = true", "body.mass: expected a number > 0, got true."),
+        ("mass = 1.0", "mass = nan", "body.mass: expected a number > 0, got nan."),
+        ("mass = 1.0", "mass = inf", "body.mass: expected a number > 0, got inf."),
+        ("mass = 1.0", f"mass = 1{'0' * 400}", "body.mass: expected a number > 0, got a number near 1e400."),
+        (
+            "mass = 1.0",
+            'mass = "1 kg"',
+            'body.mass: expected a number > 0, got "1 kg". Write the number alone, without quotes; '
+            "the unit of this key is kg in an SI scene.",
+        ),
+        ("mass = 1.0\n", "", "body.mass: expected a number > 0, got nothing. Add mass = ... to [body]."),
+        (
+            "stiffness = 1.0",
+            "stifness = 1.0",
+            'body.stifness: expected a known key, got the unknown key "stifness". Did you mean stiffness?',
+        ),
+        (
+            "restitution = 0.7",
+            "restitution = 1.2",
+            "stop[1].restitution: expected 0 <= r <= 1, got 1.2. "
+            "Use 1 for an elastic stop, 0 for a dead one.",
+        ),
+        (
+            "restitution = 0.7",
+            'restitution = 0.7\nside = "uper"',
+            'stop[1].side: expected "upper" or "lower", got "uper". Did you mean "upper"?',
+        ),
+        (
+            "restitution = 0.7",
+            'restitution = 0.7\nlaw = "hertz"\nexponent = 1.5',
+            'stop[1].law: expected "restitution", got "hertz". "hertz" is not available in this version.',
+        ),
+        (
+            "mass = 1.0",
+            'kind = "chain"\nmasses = [1.0]',
+            'body.kind: expected "oscillator", got "chain". "chain" is not available in this version.',
+        ),
+        (
+            "damping = 0.1",
+            "damping = 0.1\ndamping_ratio = 0.05",
+            "body.damping: expected damping or damping_ratio, got both. Remove one.",
+        ),
+        (
+            "stiffness = 1.0\ndamping = 0.1",
+            "stiffness = 0\ndamping_ratio = 0.1",
+            "body.damping_ratio: expected a stiffness > 0 beside a damping_ratio, got a stiffness of 0. "
+            "The ratio is to 2 sqrt(stiffness mass); give damping instead.",
+        ),
+        (
+            "angular_frequency = 0.8",
+            "frequency = 0.8",
+            "forcing.frequency: expected no frequency in Hz in a nondimensional scene, got one. "
+            'Hz is an SI unit: give angular_frequency in radians per unit of time, or units = "SI".',
+        ),
+        (
+            'units = "nondimensional"',
+            'units = "imperial"',
+            'scene.units: expected "SI" or "nondimensional", got "imperial". '
+            "A scene has one system of units for all of its numbers.",
+        ),
+        (
+            "recorded_periods = 5",
+            "recorded_periods = 5.0",
+            "record.recorded_periods: expected a whole number from 1 to 100000000, got 5.0.",
+        ),
+        (
+            "transient_periods = 10",
+            "transient_time = 10",
+            "record.transient_time: expected transient_periods in a forced scene, got transient_time = 10. "
+            "A forced scene counts forcing periods: give transient_periods.",
+        ),
+        (
+            "recorded_periods = 5",
+            "recorded_periods = 5\ntime_series = { rate = 1e8 }",
+            "record.time_series.rate: expected at most 100000000 samples per run, got 3.93e+09. "
+            "Lower the rate or the recorded periods.",
+        ),
+        (
+            "recorded_periods = 5",
+            'recorded_periods = 5\ntime_series = { rate = 1, variables = ["velocty"] }',
+            'record.time_series.variables[1]: expected a variable name, got "velocty". '
+            'Did you mean "velocity"?',
+        ),
+        (
+            "position = 1.0",
+            "position = -0.5",
+            "body.displacement_start: expected a start on the free side of stop[1] (displacement <= -0.5), "
+            "got 0.0. Start on the stop or away from it, or move the stop.",
+        ),
+        (
+            "[[stop]]",
+            "[stop]",
+            "stop: expected [[stop]] tables, got a table. Write [[stop]], with two brackets, for each stop.",
+        ),
+        (
+            "[body]",
+            "[[body]]",
+            "body: expected a table, got an array of 1. Write [body], with single brackets, once.",
+        ),
+    ],
+)
+def test_one_mistake_is_one_clear_line(old: str, new: str, problem: str) -> None:
+    assert problems_of(forced(old, new)) == [problem]
+
+
+@pytest.mark.parametrize(
+    ("entry", "where", "hint"),
+    [
+        ('"body.mas" = { values = [1] }', 'sweep."body.mas"', "Did you mean body.mass?"),
+        ('"body.kind" = { values = [1] }', 'sweep."body.kind"', "cannot be swept"),
+        ('"stop[1].side" = { values = [1] }', 'sweep."stop[1].side"', "cannot be swept"),
+        ('"stop[0].position" = { values = [1] }', 'sweep."stop[0].position"', "Indices start at 1"),
+        ('"stop[2].position" = { values = [1] }', 'sweep."stop[2].position"', "has 1 [[stop]]"),
+        ("forcing.angular_frequency = { values = [1] }", "sweep.forcing", "quotes"),
+        ('"body.mass" = [1, 2]', 'sweep."body.mass"', "values = [0.6, 0.7]"),
+        ('"body.mass" = {}', 'sweep."body.mass"', "Add start, stop and points."),
+        ('"body.mass" = { start = 1, points = 2 }', 'sweep."body.mass"', "Add stop."),
+        (
+            '"body.mass" = { start = 1, stop = 2, points = 3, values = [1] }',
+            'sweep."body.mass"',
+            "Remove values",
+        ),
+        ('"body.mass" = { start = 1, stop = 2, points = 1 }', 'sweep."body.mass".points', ">= 2"),
+        ('"body.mass" = { start = 1, stop = 2, points = 0 }', 'sweep."body.mass".points', "from 1 to"),
+        ('"body.mass" = { start = 1, stop = 1, points = 2 }', 'sweep."body.mass"', "1.0 2 times"),
+        ('"body.mass" = { start = 1, stop = 2, points = 1e3 }', 'sweep."body.mass".points', "whole number"),
+        ('"body.mass" = { values = [] }', 'sweep."body.mass".values', "an empty array"),
+        ('"body.mass" = { values = [1, 2, 1.0] }', 'sweep."body.mass"', "1.0 2 times"),
+        ('"body.mass" = { values = [1, 0] }', 'sweep."body.mass"', "expected a number > 0, got 0.0"),
+        ('"body.mass" = { values = [1, true] }', 'sweep."body.mass".values[2]', "got true"),
+        ('"body.mass" = { values = [1], path = "upp" }', 'sweep."body.mass".path', 'Did you mean "up"?'),
+        (
+            '"stop[1].restitution" = { values = [0.5, 1.1] }',
+            'sweep."stop[1].restitution"',
+            "0 <= r <= 1, got 1.1",
+        ),
+        ('"stop[1].position" = { values = [1, -1] }', "body.displacement_start", "worst of the swept values"),
+        ('"body.displacement_start" = { values = [0, 2] }', "body.displacement_start", "got 2.0"),
+        (
+            '"body.velocity_start" = { values = [0, 2], path = "up" }',
+            'sweep."body.velocity_start".path',
+            "state",
+        ),
+        ('"body.damping_ratio" = { values = [0.1] }', "body.damping", "a swept key counts as given"),
+        ('"forcing.angular_frequency" = { values = [0, 1] }', "sweep", "all > 0, or all 0"),
+    ],
+)
+def test_a_wrong_sweep_is_one_clear_line(entry: str, where: str, hint: str) -> None:
+    (problem,) = problems_of(swept(entry))
+    assert problem.startswith(f"{where}: expected ")
+    assert hint in problem
+
+
+def test_corners_of_a_sweep_are_checked_where_the_axes_alone_are_fine() -> None:
+    start, position = (
+        '"body.displacement_start" = { values = [0.0, 0.8] }',
+        '"stop[1].position" = { values = [1.0, 0.5] }',
+    )
+    assert parse_scene(swept(start), SOURCE)
+    assert parse_scene(swept(position), SOURCE)
+    (problem,) = problems_of(swept(start, position))
+    assert "displacement <= 0.5), got 0.8 (the worst of the swept values)" in problem
+
+
+def test_a_sweep_carries_its_state_along_one_key_only() -> None:
+    (problem,) = problems_of(
+        swept(
+            '"body.mass" = { values = [1], path = "up" }',
+            '"body.stiffness" = { values = [1], path = "down" }',
+        )
+    )
+    assert problem.startswith(
+        "sweep: expected at most one key with a path up, down or up-down, got body.mass, body.stiffness."
+    )
+
+
+def test_a_sweep_has_at_most_a_hundred_million_points() -> None:
+    ten_thousand = "{ start = 1, stop = 2, points = 10_000 }"
+    assert parse_scene(swept(f'"body.mass" = {ten_thousand}', f'"body.stiffness" = {ten_thousand}'), SOURCE)
+    longer = "{ start = 1, stop = 2, points = 10_001 }"
+    (problem,) = problems_of(swept(f'"body.mass" = {ten_thousand}', f'"body.stiffness" = {longer}'))
+    assert problem.startswith("sweep: expected at most 100000000 points in all, got 100010000.")
+
+
+@pytest.mark.parametrize(
+    ("stop", "problem"),
+    [
+        (
+            'position = 2\nrestitution = 1\nside = "lower"',
+            "stop[1].position: expected the upper stop[1] above the lower stop[2]",
+        ),
+        (
+            'position = 1\nrestitution = 1\nside = "lower"',
+            "stop[1].position: expected the upper stop[1] above the lower stop[2]",
+        ),
+        (
+            "position = 2\nrestitution = 1",
+            "stop[2].side: expected one upper and one lower stop, got two upper stops.",
+        ),
+        (
+            "position = 2\nrestitution = 1\n[[stop]]\nposition = 3\nrestitution = 1",
+            "stop: expected at most 2 stops, got 3.",
+        ),
+    ],
+)
+def test_two_stops_leave_room_between_them(stop: str, problem: str) -> None:
+    assert any(line.startswith(problem) for line in problems_of(FORCED + f"[[stop]]\n{stop}\n"))
+
+
+@pytest.mark.parametrize("how", ["coupled", "batch"])
+def test_an_execution_of_a_later_version_is_refused_by_name(how: str) -> None:
+    (problem,) = problems_of(FORCED + f'[execution]\nhow = "{how}"\n')
+    assert (
+        problem == f'execution.how: expected "auto" or "fused", got "{how}". '
+        f'"{how}" is not available in this version.'
+    )
+
+
+@pytest.mark.parametrize("table", ["sensor", "load_cell", "exciter", "noise", "daq", "replay"])
+def test_a_table_of_a_later_version_is_refused_not_ignored(table: str) -> None:
+    (problem,) = problems_of(FORCED + f"[{table}]\nlevel = 1\n")
+    assert problem.startswith(
+        f"{table}: expected a scene without [{table}], got one. [{table}] is not available"
+    )
+
+
+def test_a_general_scene_is_refused_with_one_message() -> None:
+    text = '[component.ball]\nfmu = "ball.fmu"\n[[connection]]\nfrom = "a.x"\nto = "b.u"\n[[event]]\n'
+    (problem,) = problems_of(text)
+    assert problem.startswith(
+        "component: expected a scene of [body], [forcing] and [[stop]] tables, got [component]"
+    )
+    assert "not available in this version" in problem
+
+
+@pytest.mark.parametrize("text", ["", '[scene]\ntitle = "empty"\n'])
+def test_a_scene_without_a_body_says_so(text: str) -> None:
+    assert problems_of(text) == [
+        "body: expected one [body] table, got nothing. Add [body] with mass, stiffness and damping."
+    ]
+
+
+def test_all_problems_are_reported_at_once() -> None:
+    text = forced("mass = 1.0", "mass = -1").replace("damping = 0.1", "damping = 0.1\ndamping_ratio = 0.1")
+    text = text.replace("restitution = 0.7", "restitution = 1.2").replace(
+        "recorded_periods", "recordd_periods"
+    )
+    text += '[sweep]\n"body.mas" = { values = [1] }\n[extra]\n'
+    keys = [problem.split(": ")[0] for problem in problems_of(text)]
+    assert sorted(keys) == sorted(
+        [
+            "extra",
+            "body.mass",
+            "body.damping",
+            "stop[1].restitution",
+            "record.recordd_periods",
+            "record.recorded_periods",
+            'sweep."body.mas"',
+        ]
+    )
+
+
+# What is said about a file that is not a scene at all.
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("[body]\nmass = 0,5\n", 'line 2, column 9: expected valid TOML, got "mass = 0,5".'),
+        ("[body]\nmass = 1\nmass = 2\n", 'line 3, column 9: expected valid TOML, got "mass = 2".'),
+        ("[body", 'end of file: expected valid TOML, got "[body".'),
+        ("[sweep]\nstop[1].position = { values = [1] }\n", "line 2, column 5: expected valid TOML"),
+        ("x = " + "[" * 50_000, "expected shallow tables and arrays, got nesting too deep to read."),
+        ("x = " + "9" * 5_000, "expected numbers of a usual length, got one of thousands of digits."),
+    ],
+)
+def test_text_that_is_not_toml_is_reported_with_its_line(text: str, problem: str) -> None:
+    (line,) = problems_of(text)
+    assert line.startswith(problem)
+
+
+def load_problem(path: Path) -> str:
+    with pytest.raises(SceneError) as caught:
+        load_scene(path)
+    (problem,) = caught.value.problems
+    assert problem.startswith(f"{path}: ")
+    return problem.removeprefix(f"{path}: ")
+
+
+def test_a_missing_file_is_told_with_the_nearest_name(tmp_path: Path) -> None:
+    (tmp_path / "bifurcation.toml").write_text(FORCED)
+    hint = f"Did you mean {tmp_path / 'bifurcation.toml'}?"
+    assert (
+        load_problem(tmp_path / "bifurcaton.toml")
+        == f"expected a scene file, got no file of this name. {hint}"
+    )
+    assert f"There is no folder {tmp_path / 'no'}" in load_problem(tmp_path / "no" / "scene.toml")
+
+
+def test_a_folder_or_a_device_is_not_a_scene(tmp_path: Path) -> None:
+    assert "got a folder" in load_problem(tmp_path)
+    os.mkfifo(tmp_path / "pipe.toml")
+    assert "not a regular file" in load_problem(tmp_path / "pipe.toml")
+
+
+def test_a_file_that_is_not_utf_8_is_told_with_the_line(tmp_path: Path) -> None:
+    path = tmp_path / "latin.toml"
+    path.write_bytes(b'[scene]\ntitle = "D\xe4mpfer"\n')
+    assert load_problem(path) == "line 2: expected UTF-8 text, got the byte 0xe4. Save the file as UTF-8."
+
+
+def test_a_huge_file_is_refused_unread(tmp_path: Path) -> None:
+    path = tmp_path / "huge.toml"
+    with path.open("wb") as file:
+        file.truncate(2**34)
+    assert "expected a scene file of at most 1 MiB" in load_problem(path)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may read every file")
+def test_an_unreadable_file_is_told_with_the_reason(tmp_path: Path) -> None:
+    path = tmp_path / "secret.toml"
+    path.write_text(FORCED)
+    path.chmod(0)
+    assert "Permission denied" in load_problem(path)
+
+
+def test_bad_scenes_exit_with_code_2() -> None:
+    assert SceneError.exit_code == 2

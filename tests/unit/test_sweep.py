@@ -1,0 +1,98 @@
+"""Sweeps expand into branches and points in one documented order."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass
+
+import pytest
+
+from vibroimpact.orchestrator.sweep import Branch, SweepAxis, expand, run_count
+
+FREQUENCY = "forcing.angular_frequency"
+POSITION = "stop[1].position"
+MASS = "body.mass"
+
+
+@dataclass(frozen=True)
+class Swept:
+    """The part of a scene that a sweep looks at."""
+
+    sweep: tuple[SweepAxis, ...] = ()
+
+
+def frequencies(branch: Branch) -> list[float]:
+    return [point.values[FREQUENCY] for point in branch.points]
+
+
+def indices(branches: tuple[Branch, ...]) -> list[int]:
+    return [point.index for branch in branches for point in branch.points]
+
+
+def test_a_scene_without_a_sweep_is_one_point() -> None:
+    (branch,) = expand(Swept())
+    assert branch.direction == "independent"
+    assert [(point.index, dict(point.values)) for point in branch.points] == [(0, {})]
+
+
+def test_independent_axes_make_one_flat_branch_with_the_last_key_fastest() -> None:
+    (branch,) = expand(Swept((SweepAxis(MASS, (1.0, 2.0)), SweepAxis(FREQUENCY, (0.6, 0.7, 0.8)))))
+    assert branch.direction == "independent"
+    assert branch.fixed == {}
+    expected = [(mass, frequency) for mass in (1.0, 2.0) for frequency in (0.6, 0.7, 0.8)]
+    assert [(point.values[MASS], point.values[FREQUENCY]) for point in branch.points] == expected
+    assert indices((branch,)) == list(range(6))
+
+
+@pytest.mark.parametrize(("path", "travelled"), [("up", [0.6, 0.7, 0.8]), ("down", [0.8, 0.7, 0.6])])
+def test_a_path_is_travelled_in_its_direction(path: str, travelled: list[float]) -> None:
+    (branch,) = expand(Swept((SweepAxis(FREQUENCY, (0.6, 0.7, 0.8), path),)))  # type: ignore[arg-type]
+    assert branch.direction == path
+    assert frequencies(branch) == travelled
+    assert indices((branch,)) == [0, 1, 2]
+
+
+def test_up_down_is_an_up_branch_and_a_down_branch_that_starts_at_the_top() -> None:
+    up, down = expand(Swept((SweepAxis(FREQUENCY, (0.6, 0.7, 0.8), "up-down"),)))
+    assert (up.direction, frequencies(up)) == ("up", [0.6, 0.7, 0.8])
+    assert (down.direction, frequencies(down)) == ("down", [0.8, 0.7, 0.6])
+    assert indices((up, down)) == list(range(6))
+
+
+def test_other_keys_span_the_branches_of_a_continuation_wherever_it_stands_in_the_file() -> None:
+    carried = SweepAxis(FREQUENCY, (0.6, 0.7), "up-down")
+    branches = expand(Swept((carried, SweepAxis(MASS, (1.0, 2.0)), SweepAxis(POSITION, (0.0, 0.5)))))
+    assert [(branch.fixed[MASS], branch.fixed[POSITION], branch.direction) for branch in branches] == [
+        (mass, position, direction)
+        for mass in (1.0, 2.0)
+        for position in (0.0, 0.5)
+        for direction in ("up", "down")
+    ]
+    assert indices(branches) == list(range(16))
+    assert all(point.values.keys() == {FREQUENCY, MASS, POSITION} for point in branches[0].points)
+
+
+def test_points_are_a_sequence_that_can_be_cut_into_chunks() -> None:
+    (branch,) = expand(Swept((SweepAxis(MASS, (1.0, 2.0)), SweepAxis(FREQUENCY, (0.6, 0.7, 0.8)))))
+    assert tuple(branch.points) == branch.points[:]
+    assert branch.points[2:4] == (branch.points[2], branch.points[3])
+    assert branch.points[-1].index == 5
+    with pytest.raises(IndexError):
+        branch.points[6]
+
+
+def test_a_hundred_million_points_are_not_held_in_memory() -> None:
+    axis = tuple(float(value) for value in range(10_000))
+    (branch,) = expand(Swept((SweepAxis(MASS, axis), SweepAxis(FREQUENCY, axis))))
+    assert len(branch.points) == 10**8
+    assert branch.points[10**8 - 1].values == {MASS: 9999.0, FREQUENCY: 9999.0}
+
+
+def test_run_count_counts_both_ways_of_up_down() -> None:
+    assert run_count(()) == 1
+    assert run_count((SweepAxis(MASS, (1.0, 2.0)), SweepAxis(FREQUENCY, (0.6, 0.7, 0.8), "up-down"))) == 12
+
+
+def test_branches_travel_to_workers() -> None:
+    branches = expand(Swept((SweepAxis(FREQUENCY, (0.6, 0.7), "up-down"),)))
+    assert pickle.loads(pickle.dumps(branches)) == branches
