@@ -1,0 +1,156 @@
+"""The thin door to the C functions that the FMUs are made of: flow and next contact.
+
+Analyses fit and follow orbits with these, never with a second implementation of the physics.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from pathlib import Path
+
+from vibroimpact.fmus.errors import ComponentError, UsageError
+
+SIDES = {"upper": 1, "lower": 2}
+
+
+class _Oscillator(ctypes.Structure):
+    _fields_ = [
+        (name, ctypes.c_double) for name in ("mass", "damping", "stiffness", "amplitude", "angular_frequency")
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class Oscillator:
+    """A forced oscillator: mass x'' + damping x' + stiffness x = amplitude cos(phase).
+
+    Attributes
+    ----------
+    mass, damping, stiffness : float
+        kg, N s/m, N/m.
+    amplitude : float
+        Force amplitude, N.
+    angular_frequency : float
+        Of the force, rad/s; 0: a constant force.
+    """
+
+    mass: float = 1.0
+    damping: float = 0.0
+    stiffness: float = 1.0
+    amplitude: float = 0.0
+    angular_frequency: float = 0.0
+
+    def _as_structure(self) -> _Oscillator:
+        return _Oscillator(self.mass, self.damping, self.stiffness, self.amplitude, self.angular_frequency)
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A contact found: seconds from now, and the speed of approach (m/s)."""
+
+    time: float
+    velocity: float
+
+
+@lru_cache(maxsize=1)
+def _library() -> ctypes.CDLL:
+    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+    path = Path(str(files("vibroimpact.fmus"))) / "built" / f"libvibroimpact_core{suffix}"
+    try:
+        library = ctypes.CDLL(str(path))
+    except OSError as error:
+        raise ComponentError(
+            f"{path.name}: expected the built core library, got: {error}. Run `python -m vibroimpact.fmus.build`."
+        ) from error
+    pair, number = ctypes.POINTER(ctypes.c_double), ctypes.c_double
+    library.vi_door_flow.argtypes = [
+        ctypes.POINTER(_Oscillator), number, pair, number, number, number, pair,
+    ]  # fmt: skip
+    library.vi_door_next_contact.argtypes = [
+        ctypes.POINTER(_Oscillator), number, pair, number, ctypes.c_int, number, pair,
+    ]  # fmt: skip
+    return library
+
+
+def _pair(first: float = 0.0, second: float = 0.0) -> ctypes.Array[ctypes.c_double]:
+    return (ctypes.c_double * 2)(first, second)
+
+
+def flow(
+    oscillator: Oscillator,
+    state: tuple[float, float],
+    duration: float,
+    *,
+    phase: float = 0.0,
+    held: float = 0.0,
+    held_rate: float = 0.0,
+) -> tuple[float, float]:
+    """Return displacement (m) and velocity (m/s) after `duration` s without a stop: equations.md 1.4.
+
+    Parameters
+    ----------
+    oscillator : Oscillator
+        The oscillator.
+    state : tuple of float
+        Displacement (m) and velocity (m/s) now.
+    duration : float
+        Seconds, >= 0.
+    phase : float
+        Forcing phase now, rad.
+    held, held_rate : float
+        A further acceleration held + held_rate * time, m/s^2 and m/s^3.
+
+    Raises
+    ------
+    UsageError
+        An argument is not finite, or out of its range.
+
+    Examples
+    --------
+    >>> x, v = flow(Oscillator(), (1.0, 0.0), 3.141592653589793)
+    >>> round(x, 12)
+    -1.0
+    """
+    end = _pair()
+    body = oscillator._as_structure()
+    if _library().vi_door_flow(body, phase, _pair(*state), held, held_rate, duration, end) != 0:
+        raise UsageError(
+            f"flow: expected finite arguments, mass > 0, damping, stiffness, angular_frequency, duration >= 0, "
+            f"got {oscillator}, state {state}, duration {duration}."
+        )
+    return end[0], end[1]
+
+
+def next_contact(
+    oscillator: Oscillator,
+    state: tuple[float, float],
+    position: float,
+    duration: float,
+    *,
+    side: str = "upper",
+    phase: float = 0.0,
+) -> Contact | None:
+    """Return the first contact with a stop within `duration` s, or None: equations.md 2, certified.
+
+    Parameters are those of `flow`; `position` (m) and `side` ("upper", "lower") are the stop's.
+
+    Examples
+    --------
+    >>> contact = next_contact(Oscillator(), (0.0, 1.0), 0.5, 10.0)
+    >>> round(contact.time, 12), round(contact.velocity, 12)
+    (0.523598775598, 0.866025403784)
+    """
+    found = _pair()
+    body = oscillator._as_structure()
+    status = _library().vi_door_next_contact(
+        body, phase, _pair(*state), position, SIDES.get(side, 0), duration, found
+    )
+    if status < 0 or side not in SIDES:
+        raise UsageError(
+            f"next_contact: expected finite arguments and side upper or lower, got {oscillator}, state {state}, "
+            f"position {position}, side {side!r}, duration {duration}."
+        )
+    return Contact(found[0], found[1]) if status else None

@@ -1,0 +1,20 @@
+/* The functions that vibroimpact.fmus.core calls: the physics of the FMUs, one call at a time. */
+#ifndef VIBROIMPACT_DOOR_H
+#define VIBROIMPACT_DOOR_H
+
+/* A forced oscillator, SI units. */
+typedef struct {
+    double mass, damping, stiffness, amplitude, angular_frequency;
+} vi_door_oscillator;
+
+/* Displacement and velocity after `duration` s >= 0 from displacement x and velocity v at forcing phase `phase`,
+ * without any stop, under a held acceleration `held` + `held_rate` * time. Returns 0, or 1 for a bad argument. */
+int vi_door_flow(const vi_door_oscillator *oscillator, double phase, const double state[2], double held,
+                 double held_rate, double duration, double end[2]);
+
+/* First contact within `duration` with a stop at `position` (side 1 upper, 2 lower). Returns 1 with the time from now
+ * and the speed of approach in `contact`, 0 when there is none, -1 for a bad argument. */
+int vi_door_next_contact(const vi_door_oscillator *oscillator, double phase, const double state[2], double position,
+                         int side, double duration, double contact[2]);
+
+#endif

@@ -1,0 +1,60 @@
+"""The shared library of an FMU, loaded once for each process."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.fmus.archive import UnpackedFmu, binary_path
+from vibroimpact.fmus.errors import ComponentFileError
+
+Function = Callable[..., Any]
+
+
+class Library:
+    """The functions of one FMU binary.
+
+    Parameters
+    ----------
+    fmu : UnpackedFmu
+        The FMU; its binary for this machine is loaded.
+
+    Raises
+    ------
+    ComponentFileError
+        There is no binary for this machine, or the system cannot load it.
+    """
+
+    def __init__(self, fmu: UnpackedFmu) -> None:
+        self.fmu = fmu
+        self._handle = _load(binary_path(fmu), fmu.source)
+
+    def function(self, name: str, *argument_types: Any, result: Any = ctypes.c_int) -> Function:
+        """Return a function by name, with its argument types bound.
+
+        Raises
+        ------
+        ComponentFileError
+            The binary does not export it.
+        """
+        try:
+            # a fresh function object: those of the handle are shared by all who ask for the same name
+            found = self._handle[name]
+        except AttributeError as error:
+            raise ComponentFileError(
+                f"{self.fmu.source}: expected a binary that exports {name}, got one without it."
+            ) from error
+        found.argtypes = argument_types
+        found.restype = result
+        return found  # type: ignore[no-any-return]  # ctypes types function pointers as Any
+
+
+@lru_cache(maxsize=None)
+def _load(path: Path, source: Path) -> ctypes.CDLL:
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError as error:
+        raise ComponentFileError(f"{source}: expected a binary that this system can load, got: {error}") from error

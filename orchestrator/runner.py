@@ -1,0 +1,225 @@
+"""Runs the points of a scene: one point in, one `RunRecord` out.
+
+`fused` execution: the contact law runs inside the body FMU, and one step covers as many periods as the scene
+lets pass unrecorded.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+import time
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.fmus.errors import SceneError
+from vibroimpact.orchestrator.body_driver import (
+    ROW_IMPACT,
+    ROW_PERIOD,
+    ROW_STICK,
+    BodyDriver,
+    DeadlineReached,
+    ImpactLimitReached,
+)
+from vibroimpact.orchestrator.oscillator_parameters import float_parameters, integer_parameters
+from vibroimpact.orchestrator.scene import Scene
+
+TWO_PI = 2.0 * math.pi
+#: Columns of `body_driver.OUTPUTS` that a time series can name.
+SAMPLED = {"displacement": 0, "velocity": 1, "acceleration": 2}
+FORCES = slice(5, 7)
+#: A run with a deadline looks at the clock at least every so many forcing periods.
+PERIODS_PER_SLICE = 64.0
+
+
+class PointRunner:
+    """Runs points of one scene in this process, with component instances that are used again.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; swept keys take their values from each point.
+    execution : str
+        `auto` takes `fused`.
+
+    Attributes
+    ----------
+    execution : str
+        What runs: `fused`.
+    instruction_set : str
+        Machine architecture the components are compiled for.
+    fmu_hashes : dict of str to str
+        SHA-256 of each component's FMU, by instance.
+    """
+
+    def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
+        if execution not in ("auto", "fused"):
+            raise SceneError([f'{scene.source}: execution.how: expected "auto" or "fused", got "{execution}".'])
+        self.execution = "fused"
+        self.instruction_set = platform.machine()
+        self._scene = scene
+        self._driver = BodyDriver(float_parameters(scene, None), integer_parameters(scene))
+        self.fmu_hashes = {"body": self._driver.fmu.sha256}
+
+    def run(self, values: Mapping[str, float], start: tuple[float, float] | None = None) -> RunRecord:
+        """Run one point.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the swept keys.
+        start : tuple of float or None
+            Displacement and velocity carried over at forcing phase 0; None for the scene's start state.
+
+        Raises
+        ------
+        ComponentError
+            The body refuses its parameters or fails.
+        """
+        began = time.perf_counter()
+        scene = self._scene.with_values(values) if values else self._scene
+        run = _Run(scene, self._driver, start)
+        outcome, message = run.run()
+        return run.record(outcome, message, time.perf_counter() - began)
+
+    def close(self) -> None:
+        """Free the components."""
+        self._driver.close()
+
+
+class _Run:
+    """One run: when its recording begins and ends, and what it records."""
+
+    def __init__(self, scene: Scene, driver: BodyDriver, start: tuple[float, float] | None) -> None:
+        self.scene = scene
+        self.driver = driver
+        self.parameters = float_parameters(scene, start)
+        self.samples: list[tuple[float, ...]] = []
+        self.begin_time, self.end_time = self._window()
+        self.slice_length = self._slice_length()
+
+    def _window(self) -> tuple[float, float]:
+        """Start and end of the recording, s; those of a forced scene are at forcing phase 0."""
+        record, period = self.scene.record, self.scene.period
+        if period is None:
+            return record.transient_time, record.transient_time + record.recorded_time
+        phase = self.parameters["forcing.phase"] % TWO_PI
+        lag = phase / self.parameters["forcing.angular_frequency"]
+        first = record.transient_periods + (1 if phase > 0.0 else 0)
+        return first * period - lag, (first + record.recorded_periods) * period - lag
+
+    def _slice_length(self) -> float:
+        if self.scene.execution.deadline is None or self.scene.period is None:
+            return math.inf
+        return PERIODS_PER_SLICE * self.scene.period
+
+    def run(self) -> tuple[Outcome, str]:
+        """Run to the end; returns how that went."""
+        execution, driver = self.scene.execution, self.driver
+        driver.begin(self.parameters, execution.deadline)
+        try:
+            driver.advance(self.begin_time, self.slice_length)
+            self._begin_recording()
+            self._advance_sampling()
+            driver.advance(self.end_time, self.slice_length)
+        except ImpactLimitReached:
+            most = execution.impact_limit
+            return Outcome.impact_limit, f"impact_limit: {most} impacts in one step at time {driver.time:.17g}"
+        except DeadlineReached:
+            return Outcome.timeout, f"deadline: {execution.deadline} s passed at time {driver.time:.17g}"
+        return (Outcome.stuck, "") if self._rests_for_ever() else (Outcome.ok, "")
+
+    def _begin_recording(self) -> None:
+        record = self.scene.record
+        periods = self.scene.period is not None and (record.extrema or record.strobe)
+        self.driver.record(impacts=record.impacts, extrema=record.extrema, periods=periods)
+
+    # ---- time series ----
+
+    def _advance_sampling(self) -> None:
+        series = self.scene.record.time_series
+        if series is None:
+            return
+        count = math.floor((self.end_time - self.begin_time) * series.rate * (1.0 + 1e-12)) + 1
+        for i in range(count):
+            self.driver.advance(min(self.begin_time + i / series.rate, self.end_time), self.slice_length)
+            self.samples.append((self.driver.time, *self._sample(series.variables)))
+
+    def _sample(self, names: tuple[str, ...]) -> list[float]:
+        outputs = self.driver.outputs()
+        forcing = self._forcing()
+        based = self.scene.forcing is not None and self.scene.forcing.kind == "base_acceleration"
+        values = {name: float(outputs[column]) for name, column in SAMPLED.items()}
+        values["contact_force"] = float(outputs[FORCES].sum())
+        values["forcing"] = forcing
+        if based:
+            values["acceleration"] += forcing  # the body's own output knows only the inertial force
+        return [values[name] for name in names]
+
+    def _forcing(self) -> float:
+        """Force, N (base acceleration, m/s^2) at the present time."""
+        forcing = self.scene.forcing
+        if forcing is None:
+            return 0.0
+        angle = forcing.angular_frequency * self.driver.time + self.parameters["forcing.phase"]
+        return forcing.amplitude * math.cos(angle)
+
+    # ---- what was recorded ----
+
+    def _rests_for_ever(self) -> bool:
+        """Does the body rest on a stop that no phase of the force can lift it from?"""
+        resting = self.driver.sticks_open()
+        if not resting:
+            return False
+        stop = self.scene.stops[resting[0][0] - 1]
+        sign = 1.0 if stop.side == "upper" else -1.0
+        amplitude = self.parameters.get("forcing.amplitude", 0.0)
+        spring = -sign * self.scene.body.stiffness * stop.position
+        if self.scene.period is None:
+            return True
+        return spring > abs(amplitude)
+
+    def record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
+        """Return the record of the run."""
+        self.driver.take_rows()
+        wanted, rows = self.scene.record, self.driver.rows
+        outputs = self.driver.outputs()
+        return RunRecord(
+            outcome=outcome,
+            message=message,
+            periods=self._period_rows(),
+            impacts=rows.of_kind(ROW_IMPACT)[:, 1:6] if wanted.impacts else None,
+            sticks=self._stick_rows() if wanted.impacts else None,
+            samples=self._sample_rows(),
+            final_displacement=float(outputs[0]),
+            final_velocity=float(outputs[1]),
+            final_phase=self._final_phase(outcome),
+            seconds=seconds,
+        )
+
+    def _final_phase(self, outcome: Outcome) -> float:
+        if self.scene.period is None:
+            return math.nan
+        if outcome in (Outcome.ok, Outcome.stuck):
+            return 0.0  # runs end at forcing phase 0, exactly
+        angle = self.parameters["forcing.angular_frequency"] * self.driver.time
+        return (angle + self.parameters["forcing.phase"]) % TWO_PI
+
+    def _period_rows(self) -> NDArray[np.float64] | None:
+        if self.scene.period is None or not (self.scene.record.extrema or self.scene.record.strobe):
+            return None
+        return self.driver.rows.of_kind(ROW_PERIOD)[:, 2:7]
+
+    def _stick_rows(self) -> NDArray[np.float64]:
+        ended = self.driver.rows.of_kind(ROW_STICK)[:, 1:4]
+        open_sticks = [(start, math.nan, float(contact)) for contact, start in self.driver.sticks_open()]
+        return np.concatenate([ended, np.array(open_sticks).reshape(-1, 3)])
+
+    def _sample_rows(self) -> NDArray[np.float64] | None:
+        series = self.scene.record.time_series
+        if series is None:
+            return None
+        return np.array(self.samples, dtype=np.float64).reshape(-1, 1 + len(series.variables))
