@@ -63,7 +63,8 @@ def _library() -> ctypes.CDLL:
         library = ctypes.CDLL(str(path))
     except OSError as error:
         raise ComponentError(
-            f"{path.name}: expected the built core library, got: {error}. Run `python -m vibroimpact.fmus.build`."
+            f"{path.name}: expected the built core library, got: {error}. "
+            "Run `python -m vibroimpact.fmus.build`."
         ) from error
     pair, number = ctypes.POINTER(ctypes.c_double), ctypes.c_double
     library.vi_door_flow.argtypes = [
@@ -118,8 +119,8 @@ def flow(
     body = oscillator._as_structure()
     if _library().vi_door_flow(body, phase, _pair(*state), held, held_rate, duration, end) != 0:
         raise UsageError(
-            f"flow: expected finite arguments, mass > 0, damping, stiffness, angular_frequency, duration >= 0, "
-            f"got {oscillator}, state {state}, duration {duration}."
+            "flow: expected finite arguments, mass > 0, and damping, stiffness, "
+            f"angular_frequency, duration >= 0, got {oscillator}, state {state}, duration {duration}."
         )
     return end[0], end[1]
 
@@ -150,7 +151,7 @@ def next_contact(
     )
     if status < 0 or side not in SIDES:
         raise UsageError(
-            f"next_contact: expected finite arguments and side upper or lower, got {oscillator}, state {state}, "
-            f"position {position}, side {side!r}, duration {duration}."
+            f"next_contact: expected finite arguments and side upper or lower, got {oscillator}, "
+            f"state {state}, position {position}, side {side!r}, duration {duration}."
         )
     return Contact(found[0], found[1]) if status else None

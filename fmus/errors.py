@@ -16,7 +16,7 @@ class VibroimpactError(Exception):
 
 
 class UsageError(VibroimpactError):
-    """A command was given something it cannot use (a folder that cannot be written, an address without a scheduler)."""
+    """A command was given what it cannot use: a folder that cannot be written, an address without a scheduler."""
 
     exit_code = 2
 

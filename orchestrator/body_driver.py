@@ -52,7 +52,8 @@ class Rows:
     def of_kind(self, kind: float) -> NDArray[np.float64]:
         """Return the rows of one kind, shape (n, 8)."""
         rows = np.concatenate(self.blocks) if self.blocks else np.empty((0, ROW_WIDTH))
-        return rows[rows[:, 0] == kind]
+        chosen: NDArray[np.float64] = rows[rows[:, 0] == kind]
+        return chosen
 
 
 class BodyDriver:

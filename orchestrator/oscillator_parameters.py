@@ -16,8 +16,8 @@ def float_parameters(scene: Scene, start: tuple[float, float] | None) -> dict[st
     scene : Scene
         The scene.
     start : tuple of float or None
-        Displacement (m) and velocity (m/s) carried over from the run before, at forcing phase 0; a displacement
-        beyond a stop (the stop moved) is put on it, at rest. None: the scene's own start state and phase.
+        Displacement (m) and velocity (m/s) carried over from the run before, at forcing phase 0; a
+        displacement beyond a stop (the stop moved) is put on it, at rest. None: the scene's own start.
     """
     body, forcing = scene.body, scene.forcing
     parameters = {
@@ -56,7 +56,7 @@ def on_free_side(scene: Scene, start: tuple[float, float]) -> tuple[float, float
 
 
 def integer_parameters(scene: Scene, law: str | None = None) -> dict[str, int]:
-    """Return the integer and enumeration parameters; `law` replaces the laws of all stops (coupled: external)."""
+    """Return the integer and enumeration parameters; `law` replaces those of all stops."""
     parameters = {"impact_limit": scene.execution.impact_limit}
     for k, stop in enumerate(scene.stops, start=1):
         parameters[f"contact[{k}].law"] = LAW_NUMBERS[law or stop.law]

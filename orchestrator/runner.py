@@ -57,7 +57,8 @@ class PointRunner:
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         if execution not in ("auto", "fused"):
-            raise SceneError([f'{scene.source}: execution.how: expected "auto" or "fused", got "{execution}".'])
+            problem = f'{scene.source}: execution.how: expected "auto" or "fused", got "{execution}".'
+            raise SceneError([problem])
         self.execution = "fused"
         self.instruction_set = platform.machine()
         self._scene = scene
@@ -126,8 +127,8 @@ class _Run:
             self._advance_sampling()
             driver.advance(self.end_time, self.slice_length)
         except ImpactLimitReached:
-            most = execution.impact_limit
-            return Outcome.impact_limit, f"impact_limit: {most} impacts in one step at time {driver.time:.17g}"
+            limit = f"{execution.impact_limit} impacts in one step"
+            return Outcome.impact_limit, f"impact_limit: {limit} at time {driver.time:.17g}"
         except DeadlineReached:
             return Outcome.timeout, f"deadline: {execution.deadline} s passed at time {driver.time:.17g}"
         return (Outcome.stuck, "") if self._rests_for_ever() else (Outcome.ok, "")

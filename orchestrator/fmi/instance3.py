@@ -69,8 +69,8 @@ class Instance3:
         )
         resources = str(self.fmu.resources) + "/"
         pointer = instantiate(
-            self.name.encode(), self.fmu.token.encode(), resources.encode(), False, False, event_mode, early_return,
-            None, 0, None, self._callback, None,
+            self.name.encode(), self.fmu.token.encode(), resources.encode(),
+            False, False, event_mode, early_return, None, 0, None, self._callback, None,
         )  # fmt: skip
         if not pointer:
             raise ComponentError(
@@ -111,7 +111,9 @@ class Instance3:
         self._get_state = library.function("fmi3GetFMUState", c_void_p, state)
         self._set_state = library.function("fmi3SetFMUState", c_void_p, c_void_p)
         self._free_state = library.function("fmi3FreeFMUState", c_void_p, state)
-        self._state_size = library.function("fmi3SerializedFMUStateSize", c_void_p, c_void_p, POINTER(c_size_t))
+        self._state_size = library.function(
+            "fmi3SerializedFMUStateSize", c_void_p, c_void_p, POINTER(c_size_t)
+        )
         self._serialize = library.function("fmi3SerializeFMUState", c_void_p, c_void_p, c_char_p, c_size_t)
         self._deserialize = library.function("fmi3DeserializeFMUState", c_void_p, c_char_p, c_size_t, state)
 
@@ -130,7 +132,7 @@ class Instance3:
             )
 
     def group(self, kind: str, references: Sequence[int], size: int | None = None) -> VariableGroup:
-        """Return a group of variables of type `kind` (Float64, Int64, Int32, Boolean), to read or to write at once.
+        """Return a group of variables of type `kind` (Float64, Int64, Int32, Boolean), moved in one call.
 
         `size` is the number of values when some variables are arrays.
         """
@@ -152,7 +154,8 @@ class Instance3:
         """Enter initialization mode at `start_time`, s."""
         self.time = start_time
         self.check(
-            self._enter_initialization(self._pointer, False, 0.0, start_time, False, 0.0), "EnterInitializationMode"
+            self._enter_initialization(self._pointer, False, 0.0, start_time, False, 0.0),
+            "EnterInitializationMode",
         )
 
     def exit_initialization(self) -> None:
@@ -246,5 +249,7 @@ class Instance3:
     def deserialize(self, data: bytes) -> c_void_p:
         """Return a saved state made from bytes of `serialize`."""
         slot = c_void_p()
-        self.check(self._deserialize(self._pointer, data, len(data), ctypes.byref(slot)), "DeserializeFMUState")
+        self.check(
+            self._deserialize(self._pointer, data, len(data), ctypes.byref(slot)), "DeserializeFMUState"
+        )
         return slot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -49,12 +49,14 @@ class Library:
             ) from error
         found.argtypes = argument_types
         found.restype = result
-        return found  # type: ignore[no-any-return]  # ctypes types function pointers as Any
+        return found
 
 
-@lru_cache(maxsize=None)
+@cache
 def _load(path: Path, source: Path) -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))
     except OSError as error:
-        raise ComponentFileError(f"{source}: expected a binary that this system can load, got: {error}") from error
+        raise ComponentFileError(
+            f"{source}: expected a binary that this system can load, got: {error}"
+        ) from error

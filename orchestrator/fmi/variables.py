@@ -20,7 +20,7 @@ class VariableGroup:
     Attributes
     ----------
     values : ndarray
-        The buffer: `get` fills it, `set` sends it. Float64, int64, int32 or bool, by the type of the variables.
+        The buffer: `get` fills it, `set` sends it. Float64, int64, int32 or bool, by the variables' type.
     """
 
     __slots__ = ("_check", "_get", "_name", "_set", "values")

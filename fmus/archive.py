@@ -1,0 +1,293 @@
+"""Opens FMU files safely and unpacks each once per machine.
+
+An FMU is a zip with native code: whoever loads it trusts its code, but merely opening it must not write
+outside its folder, fill the disk, or expand entities. Everything here raises `ComponentFileError`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import stat
+import tempfile
+import time
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from io import BufferedReader
+from pathlib import Path, PurePosixPath
+
+import platformdirs
+
+from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.safe_xml import root_of
+
+CACHE_VARIABLE = "VIBROIMPACT_CACHE"
+#: Most bytes that an archive may expand to, and most members: far above any real FMU.
+EXPANSION_LIMIT = 1 << 30
+MEMBER_LIMIT = 10_000
+#: Age after which the temporary folder of a process that was killed is swept, s.
+ABANDONED_AFTER = 3600.0
+INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
+#: The XML files that tools parse; all must be free of entities.
+PARSED_XML = (
+    "modelDescription.xml",
+    "sources/buildDescription.xml",
+    "terminalsAndIcons/terminalsAndIcons.xml",
+)
+BLOCK = 1 << 20
+
+
+@dataclass(frozen=True, slots=True)
+class UnpackedFmu:
+    """An FMU that was checked and lies unpacked in the cache.
+
+    Attributes
+    ----------
+    source : Path
+        The FMU file.
+    folder : Path
+        Its unpacked contents; shared by all processes of the machine, never to be written to.
+    sha256 : str
+        Hash of the FMU file.
+    fmi_version, token : str
+        `2.0` or `3.0`; FMI 3.0 instantiationToken or FMI 2.0 guid.
+    identifiers : tuple of str
+        Model identifiers, one for each interface it has, co-simulation first.
+    """
+
+    source: Path
+    folder: Path
+    sha256: str
+    fmi_version: str
+    token: str
+    identifiers: tuple[str, ...]
+
+    @property
+    def resources(self) -> Path:
+        """Folder of the FMU's resources; need not exist."""
+        return self.folder / "resources"
+
+
+def cache_folder() -> Path:
+    """Return where FMUs are unpacked: `$VIBROIMPACT_CACHE`, else the user's cache folder of the system."""
+    chosen = os.environ.get(CACHE_VARIABLE)
+    return Path(chosen) if chosen else platformdirs.user_cache_path("vibroimpact")
+
+
+def content_hash(path: Path) -> str:
+    """Return the SHA-256 of a file, as hexadecimal text."""
+    with _opened(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
+    """Check an FMU and unpack it, unless this machine has unpacked the same contents before.
+
+    Safe with any number of processes at once: each unpacks into a folder of its own, and the first to
+    rename it into place wins.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU file.
+    limit : int
+        Most bytes that it may expand to.
+
+    Returns
+    -------
+    UnpackedFmu
+        Where it is and what its description's head says.
+
+    Raises
+    ------
+    ComponentFileError
+        It is missing, no zip, unsafe, too large, or its description is not one of FMI 2.0 or 3.0.
+    """
+    path = Path(path)
+    with _opened(path) as file, _archive(path, file) as archive:
+        file.seek(0)
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        members = _checked_members(path, archive, limit)
+        folder = cache_folder() / "fmus" / digest
+        if not _is_complete(folder, members):
+            _unpack_into_place(path, archive, members, folder)
+    return _described(path, folder, digest)
+
+
+def binary_path(fmu: UnpackedFmu) -> Path:
+    """Return the shared library of an FMU for this machine.
+
+    Raises
+    ------
+    ComponentFileError
+        It has none; the message names the platforms it does have.
+    """
+    # FMI 2.0.4 allows FMI 3.0's names of platforms too
+    folders = dict.fromkeys((binary_folder(fmu.fmi_version), binary_folder("3.0")))
+    names = [f"{folder}/{fmu.identifiers[0]}{library_suffix()}" for folder in folders]
+    for name in names:
+        if (fmu.folder / "binaries" / name).is_file():
+            return fmu.folder / "binaries" / name
+    raise ComponentFileError(
+        f"{fmu.source}: expected a binary for this machine (binaries/{names[0]}), "
+        f"got {', '.join(platforms(fmu)) or 'no binaries'}. Use an FMU made for {binary_folder('3.0')}."
+    )
+
+
+def platforms(fmu: UnpackedFmu) -> tuple[str, ...]:
+    """Return the names of the platforms that an FMU has files for."""
+    return tuple(sorted(p.name for p in fmu.folder.glob("binaries/*") if p.is_dir()))
+
+
+def _opened(path: Path) -> BufferedReader:
+    try:
+        return path.open("rb")
+    except OSError as error:
+        raise ComponentFileError(f"{path}: expected an FMU file, got: {error.strerror}.") from error
+
+
+def _archive(path: Path, file: BufferedReader) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(file)
+    except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError) as error:
+        raise ComponentFileError(
+            f"{path}: expected an FMU (a zip archive), got a file with: {error}."
+        ) from error
+
+
+def _checked_members(path: Path, archive: zipfile.ZipFile, limit: int) -> list[zipfile.ZipInfo]:
+    members = archive.infolist()
+    problems = [f"member {m.orig_filename!r} {problem}" for m in members for problem in _problems(m)]
+    names = {member.filename.rstrip("/") for member in members}
+    if len(names) < len(members):
+        problems.append("two members have the same name")
+    if len(members) > MEMBER_LIMIT:
+        problems.append(f"{len(members)} members, limit {MEMBER_LIMIT}")
+    size = sum(member.file_size for member in members)
+    if size > limit:
+        problems.append(f"{size} bytes when unpacked, limit {limit}")
+    if "modelDescription.xml" not in names:
+        problems.append("no modelDescription.xml")
+    if problems:
+        raise ComponentFileError(
+            f"{path}: expected a safe FMU, got: {'; '.join(problems[:5])}. It was not unpacked."
+        )
+    return members
+
+
+def _problems(member: zipfile.ZipInfo) -> Iterator[str]:
+    # orig_filename: zipfile replaces backslashes on Windows and cuts names at a zero byte
+    name = member.orig_filename
+    if "\\" in name or "\0" in name:
+        yield "has a backslash or a zero byte in its name"
+    if name.startswith("/") or ":" in name.split("/")[0]:
+        yield "has an absolute path"
+    if ".." in PurePosixPath(name).parts:
+        yield "leads out of the archive"
+    kind = stat.S_IFMT(member.external_attr >> 16)
+    if member.create_system == 3 and kind not in {0, stat.S_IFREG, stat.S_IFDIR}:
+        yield "is a link or a device, not a file"
+    if member.flag_bits & 0x1:
+        yield "is encrypted"
+
+
+def _is_complete(folder: Path, members: list[zipfile.ZipInfo]) -> bool:
+    # caches get cleaned by the system, sometimes file by file
+    try:
+        return all(m.is_dir() or (folder / m.filename).stat().st_size == m.file_size for m in members)
+    except OSError:
+        return False
+
+
+def _unpack_into_place(
+    path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo], folder: Path
+) -> None:
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        _sweep(folder.parent)
+        temporary = Path(tempfile.mkdtemp(prefix=".unpacking-", dir=folder.parent))
+    except OSError as error:
+        raise ComponentFileError(
+            f"{folder.parent}: expected a folder that can be written, got: {error.strerror}. "
+            f"Set {CACHE_VARIABLE} to another one."
+        ) from error
+    try:
+        _extract(path, archive, members, temporary)
+        _check_xml(path, temporary)
+        _rename(temporary, folder, members)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo], folder: Path) -> None:
+    try:
+        for member in members:
+            target = folder / member.filename
+            if member.is_dir():
+                target.mkdir(parents=True, exist_ok=True)
+                continue
+            target.parent.mkdir(parents=True, exist_ok=True)
+            # reading ends at the size in the directory, whatever the data would expand to
+            with archive.open(member) as source, target.open("wb") as file:
+                shutil.copyfileobj(source, file, BLOCK)
+    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+        raise ComponentFileError(f"{path}: expected an intact FMU, got a damaged one: {error}.") from error
+    except OSError as error:
+        raise ComponentFileError(
+            f"{path}: could not be unpacked into {folder.parent}: {error.strerror}."
+        ) from error
+
+
+def _check_xml(path: Path, folder: Path) -> None:
+    for name in PARSED_XML:
+        if (folder / name).is_file():
+            root_of((folder / name).read_bytes(), f"{path}: {name}")
+
+
+def _rename(temporary: Path, folder: Path, members: list[zipfile.ZipInfo]) -> None:
+    try:
+        temporary.rename(folder)
+    except OSError as error:
+        if _is_complete(folder, members):
+            return  # another process was first
+        # a folder with files missing: out of the way, then ours in its place
+        shutil.rmtree(folder, ignore_errors=True)
+        try:
+            temporary.rename(folder)
+        except OSError:
+            if not _is_complete(folder, members):
+                raise ComponentFileError(
+                    f"{folder}: expected to replace a damaged copy, got: {error.strerror}. Delete it."
+                ) from error
+
+
+def _sweep(cache: Path) -> None:
+    for left in cache.glob(".unpacking-*"):
+        try:
+            abandoned = time.time() - left.stat().st_mtime > ABANDONED_AFTER
+        except FileNotFoundError:
+            continue
+        if abandoned:
+            shutil.rmtree(left, ignore_errors=True)
+
+
+def _described(path: Path, folder: Path, digest: str) -> UnpackedFmu:
+    root = root_of((folder / "modelDescription.xml").read_bytes(), f"{path}: modelDescription.xml")
+    version = root.get("fmiVersion", "")
+    token = root.get("guid") if version == "2.0" else root.get("instantiationToken")
+    identifiers = tuple(e.get("modelIdentifier", "") for tag in INTERFACES for e in root.findall(tag))
+    known = version == "2.0" or version.startswith("3.0")
+    if not (known and token and identifiers and all(identifiers)):
+        raise ComponentFileError(
+            f"{path}: modelDescription.xml: expected FMI 2.0 or 3.0 with a token and a model identifier, "
+            f"got version {version!r}, token {token!r}, identifiers {identifiers!r}."
+        )
+    if any(PurePosixPath(name).name != name for name in identifiers):
+        raise ComponentFileError(
+            f"{path}: modelDescription.xml: modelIdentifier: expected a plain name, got {identifiers!r}."
+        )
+    return UnpackedFmu(path, folder, digest, version, token, identifiers)

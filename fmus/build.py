@@ -1,0 +1,221 @@
+"""Builds every component into FMUs for this machine: `python -m vibroimpact.fmus.build`.
+
+Each folder of `native/` with a `variables.toml` is a component. Its library holds the shared core, both FMI
+adapters and its own C files; FMI's headers come from the FMPy package. Imports the standard library only
+(FMPy is located, not imported), since it also runs while the package itself is being built.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import html
+import importlib.util
+import shutil
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from vibroimpact.fmus.compiler import LANGUAGE, WARNINGS, compile_library
+from vibroimpact.fmus.description import (
+    Component,
+    c_header,
+    fmi2_xml,
+    fmi3_xml,
+    header_name,
+    read_component,
+    with_table,
+)
+from vibroimpact.fmus.errors import ComponentError, VibroimpactError
+from vibroimpact.fmus.fmu_zip import write_fmu
+from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+
+HERE = Path(__file__).resolve().parent
+NATIVE = HERE / "native"
+BUILT = HERE / "built"
+VERSIONS = {"fmi3": "3.0", "fmi2": "2.0"}
+CORE_LIBRARY = "libvibroimpact_core"
+#: Name of the file that says from which sources the folder was built.
+FINGERPRINT = "sources.sha256"
+
+
+def read_components(native: Path = NATIVE) -> tuple[Component, ...]:
+    """Read every component of a folder of C sources, in the order of their folders' names."""
+    return tuple(read_component(path) for path in sorted(native.glob("*/variables.toml")))
+
+
+def build(output: Path = BUILT, *, native: Path = NATIVE, strict: bool = True) -> tuple[Path, ...]:
+    """Compile all components and the core library for this machine.
+
+    Parameters
+    ----------
+    output : Path
+        Folder to fill: `fmi3/*.fmu`, `fmi2/*.fmu`, the core library, the fingerprint of the sources.
+    native : Path
+        The C sources.
+    strict : bool
+        Compiler warnings are errors.
+
+    Returns
+    -------
+    tuple of Path
+        The files written.
+
+    Raises
+    ------
+    ComponentError
+        No compiler works, or one found an error.
+    """
+    output.mkdir(parents=True, exist_ok=True)
+    (output / FINGERPRINT).unlink(missing_ok=True)
+    written = [_build_core(output, native, strict)]
+    for component in read_components(native):
+        written += _build_component(component, output, native, strict)
+    (output / FINGERPRINT).write_text(fingerprint(native) + "\n", encoding="ascii")
+    return (*written, output / FINGERPRINT)
+
+
+def is_current(output: Path = BUILT, *, native: Path = NATIVE) -> bool:
+    """Return whether a folder holds what `build` would make of the sources as they are now."""
+    stamp = output / FINGERPRINT
+    return stamp.is_file() and stamp.read_text(encoding="ascii").strip() == fingerprint(native)
+
+
+def fingerprint(native: Path = NATIVE) -> str:
+    """Return the SHA-256 of everything that an FMU is made from, except the compiler."""
+    digest = hashlib.sha256(repr((LANGUAGE, WARNINGS, sys.platform)).encode())
+    sources = [p for p in native.rglob("*") if p.suffix in {".c", ".h", ".toml", ".md"}]
+    for path in sorted([*sources, *(HERE / "description").glob("*.py"), HERE / "build.py"]):
+        digest.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def update_readmes(native: Path = NATIVE, *, write: bool = True) -> tuple[Path, ...]:
+    """Renew the table of variables in each component's README; return the READMEs that were out of date."""
+    stale = []
+    for component in read_components(native):
+        path = _readme(component)
+        if not path.is_file():
+            continue
+        text = path.read_text(encoding="utf-8")
+        renewed = with_table(text, component)
+        if renewed != text:
+            stale.append(path)
+            if write:
+                path.write_text(renewed, encoding="utf-8")
+    return tuple(stale)
+
+
+def fmi_headers() -> Path:
+    """Return the folder of FMI's C headers in the FMPy package."""
+    spec = importlib.util.find_spec("fmpy")
+    if spec is None or spec.origin is None:
+        raise ComponentError(
+            "build: expected the package FMPy for FMI's headers, got none. Run `pip install fmpy`."
+        )
+    return Path(spec.origin).parent / "c-code"
+
+
+def _build_core(output: Path, native: Path, strict: bool) -> Path:
+    target = output / f"{CORE_LIBRARY}{library_suffix()}"
+    with tempfile.TemporaryDirectory() as folder:
+        library = Path(folder, target.name)
+        compile_library(library, _c_files(native / "core"), [native / "core"], export_all=True, strict=strict)
+        _replace(library, target)
+    return target
+
+
+def _build_component(component: Component, output: Path, native: Path, strict: bool) -> list[Path]:
+    own = native / component.folder
+    shared = [native / "core", native / "adapters"]
+    sources = [path for folder in (*shared, own) for path in _c_files(folder)]
+    with tempfile.TemporaryDirectory() as folder:
+        generated = Path(folder)
+        (generated / header_name(component)).write_text(c_header(component), encoding="utf-8")
+        library = generated / f"{component.name}{library_suffix()}"
+        compile_library(library, sources, [*shared, own, generated, fmi_headers()], strict=strict)
+        binary = library.read_bytes()
+    return [
+        _write_component(component, binary, output / folder, version) for folder, version in VERSIONS.items()
+    ]
+
+
+def _write_component(component: Component, binary: bytes, folder: Path, version: str) -> Path:
+    description = fmi3_xml(component) if version == "3.0" else fmi2_xml(component)
+    members = {
+        "modelDescription.xml": description.encode("utf-8"),
+        f"binaries/{binary_folder(version)}/{component.name}{library_suffix()}": binary,
+        **_documentation(component),
+    }
+    path = folder / f"{component.name}.fmu"
+    write_fmu(path, members)
+    return path
+
+
+def _documentation(component: Component) -> dict[str, bytes]:
+    path = _readme(component)
+    has_readme = path.is_file()
+    text = with_table(path.read_text(encoding="utf-8"), component) if has_readme else component.description
+    title, body = html.escape(component.name), html.escape(text)
+    page = f'<!DOCTYPE html>\n<meta charset="utf-8">\n<title>{title}</title>\n<pre>\n{body}</pre>\n'
+    return {
+        "documentation/README.md": text.encode("utf-8"),
+        "documentation/index.html": page.encode("utf-8"),
+        "documentation/licenses/license.txt": _licence(),
+    }
+
+
+def _readme(component: Component) -> Path:
+    return component.source.with_name("README.md")
+
+
+def _licence() -> bytes:
+    # beside the sources in a checkout, inside the package when installed
+    places = (HERE.parent / "LICENSE", HERE / "LICENSE")
+    return next(path for path in places if path.is_file()).read_bytes()
+
+
+def _c_files(folder: Path) -> list[Path]:
+    return sorted(folder.glob("*.c"))
+
+
+def _replace(source: Path, target: Path) -> None:
+    # a running process may have the old library loaded: give the new one a new file, never overwrite
+    beside = target.with_name(f".{target.name}.new")
+    shutil.copyfile(source, beside)
+    beside.replace(target)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Build from the command line; return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m vibroimpact.fmus.build", description=__doc__)
+    parser.add_argument("--output", type=Path, default=BUILT, help="folder to fill (default: %(default)s)")
+    parser.add_argument(
+        "--check", action="store_true", help="build nothing; exit 1 if something is out of date"
+    )
+    options = parser.parse_args(arguments)
+    try:
+        return _check(options.output) if options.check else _build_and_say(options.output)
+    except VibroimpactError as error:
+        print(error, file=sys.stderr)
+        return error.exit_code
+
+
+def _check(output: Path) -> int:
+    stale = [str(path) for path in update_readmes(write=False)]
+    if not is_current(output):
+        stale.append(str(output))
+    for path in stale:
+        print(f"{path}: out of date. Run `python -m vibroimpact.fmus.build`.", file=sys.stderr)
+    return 1 if stale else 0
+
+
+def _build_and_say(output: Path) -> int:
+    for path in (*update_readmes(), *build(output)):
+        print(path)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

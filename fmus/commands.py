@@ -1,0 +1,90 @@
+"""The command `vibroimpact fmu`: list, build, check and export the package's components."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from vibroimpact.fmus import component_name, components, fmu_path
+from vibroimpact.fmus.archive import platforms, unpack
+from vibroimpact.fmus.build import BUILT, build, read_components, update_readmes
+from vibroimpact.fmus.check import check_fmu
+from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.export import export_fmu
+
+VERSIONS = ("3.0", "2.0")
+commands = typer.Typer(no_args_is_help=True, help="List, build, check and export the FMUs of the package.")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command `fmu` to the command line."""
+    app.add_typer(commands, name="fmu")
+
+
+@commands.command("list")
+def list_components() -> None:
+    """Show every component, its FMUs and what they run on.
+
+    Example: vibroimpact fmu list
+    """
+    table = Table("component", "FMI", "variables", "platforms", "file", title="Components")
+    for component in read_components():
+        for version in VERSIONS:
+            count = len(component.variables_of(int(version[0])))
+            table.add_row(component.name, version, str(count), *_binaries(component.name, version))
+    # paths are for copying: never cut them
+    Console(soft_wrap=True).print(table)
+
+
+def _binaries(name: str, version: str) -> tuple[str, str]:
+    try:
+        path = fmu_path(name, version)
+    except ComponentFileError:
+        return "-", "not built: vibroimpact fmu build"
+    return ", ".join(platforms(unpack(path))), str(path)
+
+
+@commands.command("build")
+def build_components(
+    output: Annotated[Path, typer.Option(help="Folder to fill.")] = BUILT,
+) -> None:
+    """Compile all components for this machine.
+
+    Example: vibroimpact fmu build
+    """
+    for path in (*update_readmes(), *build(output)):
+        typer.echo(str(path))
+
+
+@commands.command("check")
+def check_files(
+    files: Annotated[list[Path] | None, typer.Argument(help="FMU files; all of the package if none.")] = None,
+) -> None:
+    """Check FMUs: description, binaries, functions, token. Runs their code.
+
+    Example: vibroimpact fmu check Oscillator.fmu
+    """
+    paths = files or [fmu_path(name, version) for name in components() for version in VERSIONS]
+    problems = [f"{path}: {problem}" for path in paths for problem in check_fmu(path)]
+    if problems:
+        raise ComponentFileError("\n".join(problems))
+    typer.echo(f"{len(paths)} FMU{'s' if len(paths) != 1 else ''} checked: no problems.")
+
+
+@commands.command("export")
+def export_component(
+    component: Annotated[str, typer.Argument(help="Component, for example oscillator.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
+    contacts: Annotated[int | None, typer.Option(help="Contacts in its description; default: all.")] = None,
+    fmi: Annotated[str, typer.Option(help="FMI version, 3.0 or 2.0.")] = "3.0",
+) -> None:
+    """Write an FMU for another tool, with as many contacts as wanted. Needs no compiler.
+
+    Example: vibroimpact fmu export oscillator --contacts 1 -o Oscillator1.fmu
+    """
+    path = output or Path(f"{component_name(component)}.fmu")
+    typer.echo(str(export_fmu(component, path, contacts=contacts, fmi=fmi)))

@@ -1,0 +1,27 @@
+"""One `variables.toml` per component generates everything that lists its variables.
+
+Both modelDescription.xml files, the C header with the value references, and the table in the component's
+README come from the same file. Imports the standard library only: the package's own build uses it.
+"""
+
+from vibroimpact.fmus.description.c_header import c_header, header_name
+from vibroimpact.fmus.description.fmi2_xml import fmi2_xml
+from vibroimpact.fmus.description.fmi3_xml import fmi3_xml
+from vibroimpact.fmus.description.model import Component, Enumeration, EnumerationItem, Unit, Variable
+from vibroimpact.fmus.description.reading import read_component
+from vibroimpact.fmus.description.readme_table import readme_table, with_table
+
+__all__ = [
+    "Component",
+    "Enumeration",
+    "EnumerationItem",
+    "Unit",
+    "Variable",
+    "c_header",
+    "fmi2_xml",
+    "fmi3_xml",
+    "header_name",
+    "read_component",
+    "readme_table",
+    "with_table",
+]

@@ -1,0 +1,49 @@
+"""The C header of a component: value references, token and the table that the adapters read and write by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from vibroimpact.fmus.description.model import Component, Variable
+
+C_TYPES = {"Float64": "VI_FLOAT64", "Int64": "VI_INT64", "Boolean": "VI_BOOLEAN", "Enumeration": "VI_INT64"}
+
+
+def header_name(component: Component) -> str:
+    """Return the file name of the generated header."""
+    return f"{component.folder}_variables.h"
+
+
+def c_header(component: Component) -> str:
+    """Return the text of `<folder>_variables.h`; the index into the table is the value reference."""
+    return "\n".join(_lines(component)) + "\n"
+
+
+def _lines(component: Component) -> Iterator[str]:
+    prefix = component.folder.upper()
+    guard = f"{prefix}_VARIABLES_H"
+    yield f"/* Generated from {component.folder}/variables.toml; edit that file and build again. */"
+    yield from (f"#ifndef {guard}", f"#define {guard}", "")
+    yield from ("#include <stddef.h>", '#include "component.h"', f'#include "{component.header}"', "")
+    yield f'#define {prefix}_NAME "{component.name}"'
+    yield f'#define {prefix}_TOKEN "{component.token}"'
+    yield from ("", "enum {")
+    yield from (f"    {prefix}_{v.code} = {v.value_reference}," for v in component.variables)
+    yield from (f"    {prefix}_VARIABLE_COUNT = {len(component.variables)}", "};", "")
+    yield f"static const vi_variable {component.folder}_variables[] = {{"
+    yield from (_row(component, v) for v in component.variables)
+    yield from ("};", "", "#endif")
+
+
+def _row(component: Component, variable: Variable) -> str:
+    offset = f"offsetof({component.struct}, {variable.field})"
+    kind = f"{C_TYPES[variable.type]}, {_access(variable)}, {variable.count}u"
+    return f"    {{{kind}, {offset}}}, /* {variable.name} */"
+
+
+def _access(variable: Variable) -> str:
+    if variable.causality == "input":
+        return "VI_SET_INPUT"
+    if variable.causality == "parameter" and variable.variability == "tunable":
+        return "VI_SET_TUNABLE"
+    return "VI_SET_INITIAL" if variable.initial in {"exact", "approx"} else "VI_READ_ONLY"

@@ -1,0 +1,157 @@
+"""What a component's `variables.toml` says, as plain frozen data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import prod
+from pathlib import Path
+
+Number = float | int | bool
+
+#: FMI's default of `initial` for each (causality, variability); absent pairs have none.
+DEFAULT_INITIAL = {
+    ("parameter", "fixed"): "exact",
+    ("parameter", "tunable"): "exact",
+    ("calculatedParameter", "fixed"): "calculated",
+    ("calculatedParameter", "tunable"): "calculated",
+    ("output", "constant"): "exact",
+    ("output", "discrete"): "calculated",
+    ("output", "continuous"): "calculated",
+    ("local", "constant"): "exact",
+    ("local", "fixed"): "calculated",
+    ("local", "tunable"): "calculated",
+    ("local", "discrete"): "calculated",
+    ("local", "continuous"): "calculated",
+    ("input", "discrete"): None,
+    ("input", "continuous"): None,
+    ("independent", "continuous"): None,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit by its SI exponents: value in base units = factor * value + offset."""
+
+    name: str
+    base: Mapping[str, int]
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class EnumerationItem:
+    """One named value of an enumeration."""
+
+    name: str
+    value: int
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Enumeration:
+    """A named set of integer values, an FMI type definition."""
+
+    name: str
+    items: tuple[EnumerationItem, ...]
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One variable of the FMU.
+
+    Attributes
+    ----------
+    value_reference : int
+        Index into the C table of variables; the same in both FMI versions and in every export.
+    field : str
+        Member of the component's C struct that stores it.
+    code : str
+        Name of its value reference in C, without the component's prefix.
+    initial : str or None
+        FMI's `initial`; None for inputs and the independent variable, which have no such attribute.
+    dependencies : tuple of str or None
+        Names of the knowns an output depends on; None says that it may depend on all of them. Only inputs
+        among them reach the description: FMI counts no parameter as a known of an output.
+    repeat : str
+        Name of the block it repeats in (`contact`), empty for a single variable.
+    repeat_index : int
+        1-based index in that block, 0 for a single variable.
+    shown_name, shown_description : str
+        For a reader: with the letter k in place of the index.
+    """
+
+    name: str
+    description: str
+    type: str
+    causality: str
+    variability: str
+    initial: str | None
+    value_reference: int
+    field: str
+    code: str
+    unit: str = ""
+    enumeration: str = ""
+    start: Number | None = None
+    minimum: Number | None = None
+    maximum: Number | None = None
+    dimensions: tuple[int, ...] = ()
+    dependencies: tuple[str, ...] | None = None
+    versions: tuple[int, ...] = (2, 3)
+    repeat: str = ""
+    repeat_index: int = 0
+    shown_name: str = ""
+    shown_description: str = ""
+
+    @property
+    def count(self) -> int:
+        """Number of scalars it holds."""
+        return prod(self.dimensions)
+
+    @property
+    def is_initial_unknown(self) -> bool:
+        """Whether ModelStructure lists it among the unknowns of initialization."""
+        calculated_output = self.causality == "output" and self.initial in {"approx", "calculated"}
+        return calculated_output or self.causality == "calculatedParameter"
+
+
+@dataclass(frozen=True, slots=True)
+class Component:
+    """One component: what its two model descriptions, its C header and its README table are made of.
+
+    Attributes
+    ----------
+    token : str
+        Identifies this very list of variables; FMI 3.0 instantiationToken and FMI 2.0 guid.
+    repeats : mapping of str to int
+        How often each repeated block occurs, `{"contact": 2}`.
+    """
+
+    name: str
+    folder: str
+    struct: str
+    header: str
+    description: str
+    event_mode: bool
+    token: str
+    source: Path
+    repeats: Mapping[str, int]
+    units: tuple[Unit, ...]
+    enumerations: tuple[Enumeration, ...]
+    variables: tuple[Variable, ...]
+
+    def variables_of(self, version: int) -> tuple[Variable, ...]:
+        """Return the variables that FMI 2.0 (`version=2`) or 3.0 (`version=3`) can express, in order."""
+        return tuple(v for v in self.variables if version in v.versions)
+
+    def direct_inputs(self, variable: Variable, version: int) -> tuple[str, ...]:
+        """Return the names of the inputs of that FMI version that an output depends on directly."""
+        inputs = {v.name for v in self.variables_of(version) if v.causality == "input"}
+        return tuple(name for name in variable.dependencies or () if name in inputs)
+
+    def with_repeats(self, repeats: Mapping[str, int]) -> Component:
+        """Return the component with fewer repeated blocks; the value references that stay are unchanged."""
+        counts = {**self.repeats, **repeats}
+        kept = tuple(v for v in self.variables if not v.repeat or v.repeat_index <= counts[v.repeat])
+        return replace(self, repeats=counts, variables=kept)

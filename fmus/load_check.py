@@ -1,0 +1,137 @@
+"""Loads the binary of an FMU and reports what is wrong with it.
+
+Run as `python -m vibroimpact.fmus.load_check FACTS`, in a process of its own, since the code of a broken FMU
+may do anything. FACTS is a JSON object; the last line printed is a JSON list of problems.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import re
+import sys
+from collections.abc import Iterator
+from ctypes import CDLL, CFUNCTYPE, POINTER, Structure, c_bool, c_char_p, c_int, c_size_t, c_void_p
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.fmus.build import fmi_headers
+
+EXPORTED = {"2": r"FMI2_Export\s+fmi2\w+TYPE\s+(fmi2\w+);", "3": r"FMI3_Export\s+fmi3\w+TYPE\s+(fmi3\w+);"}
+#: FMI 3.0 wants all functions in every FMU, FMI 2.0 only those of the interfaces that it has.
+MODEL_EXCHANGE = re.compile(
+    r"(?s)Functions for FMI2 for Model Exchange.*?Functions for FMI2 for Co-Simulation"
+)
+CO_SIMULATION = re.compile(r"(?s)Functions for FMI2 for Co-Simulation.*")
+WRONG_TOKEN = "{not the token of any model}"
+
+Logger = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+Allocate = CFUNCTYPE(c_void_p, c_size_t, c_size_t)
+Free = CFUNCTYPE(None, c_void_p)
+StepFinished = CFUNCTYPE(None, c_void_p, c_int)
+
+
+class Fmi2Callbacks(Structure):
+    """FMI 2.0's fmi2CallbackFunctions."""
+
+    _fields_ = (
+        ("logger", Logger),
+        ("allocateMemory", Allocate),
+        ("freeMemory", Free),
+        ("stepFinished", StepFinished),
+        ("componentEnvironment", c_void_p),
+    )
+
+
+def problems_of(facts: dict[str, str]) -> Iterator[str]:
+    """Yield what is wrong with a binary.
+
+    Parameters
+    ----------
+    facts : dict
+        `binary`, `fmi_version`, `token`, `interface` (CoSimulation, ...) and `resources` (a folder).
+    """
+    name = Path(facts["binary"]).name
+    try:
+        library = CDLL(facts["binary"])
+    except OSError as error:
+        yield f"{name}: expected a library that loads, got: {error}."
+        return
+    required = required_functions(facts["fmi_version"], facts["interface"])
+    missing = [function for function in required if not hasattr(library, function)]
+    if missing:
+        version = facts["fmi_version"]
+        yield f"{name}: expected all functions of FMI {version}, got none called {', '.join(missing)}."
+        return
+    if not _opens(library, facts, facts["token"]):
+        yield f"{name}: expected an instance for the token of the description, got none."
+    if _opens(library, facts, WRONG_TOKEN):
+        yield f"{name}: expected no instance for a wrong token, got one: its token is not checked."
+
+
+def required_functions(fmi_version: str, interface: str) -> list[str]:
+    """Return the functions that FMI's own header declares for an interface."""
+    major = fmi_version[0]
+    text = (fmi_headers() / f"fmi{major}Functions.h").read_text(encoding="utf-8", errors="replace")
+    _, _, declared = text.rpartition("Common Functions")
+    if major == "2":
+        other = MODEL_EXCHANGE if interface == "CoSimulation" else CO_SIMULATION
+        declared = other.sub("", declared)
+    return re.findall(EXPORTED[major], declared)
+
+
+def _opens(library: CDLL, facts: dict[str, str], token: str) -> bool:
+    instantiate = _instantiate3 if facts["fmi_version"].startswith("3") else _instantiate2
+    free_name = "fmi3FreeInstance" if facts["fmi_version"].startswith("3") else "fmi2FreeInstance"
+    instance = instantiate(library, facts, token.encode())
+    if not instance:
+        return False
+    free = library[free_name]
+    free.argtypes, free.restype = [c_void_p], None
+    free(instance)
+    return True
+
+
+def _instantiate3(library: CDLL, facts: dict[str, str], token: bytes) -> Any:
+    function = library[f"fmi3Instantiate{facts['interface']}"]
+    function.restype = c_void_p
+    log = CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)(lambda *_: None)
+    resources = c_char_p(_resource_path(facts))
+    head = (c_char_p(b"check"), c_char_p(token), resources, c_bool(False), c_bool(False))
+    if facts["interface"] == "CoSimulation":
+        # no event mode, no early return, no intermediate variables, no intermediate update
+        events = (c_bool(False), c_bool(False), POINTER(ctypes.c_uint32)(), c_size_t(0))
+        return function(*head, *events, c_void_p(), log, c_void_p())
+    rest = (c_void_p(), c_void_p(), c_void_p()) if facts["interface"] == "ScheduledExecution" else ()
+    return function(*head, c_void_p(), log, *rest)
+
+
+def _instantiate2(library: CDLL, facts: dict[str, str], token: bytes) -> Any:
+    function = library["fmi2Instantiate"]
+    function.restype = c_void_p
+    kind = c_int(0 if facts["interface"] == "ModelExchange" else 1)
+    location = c_char_p(Path(facts["resources"]).as_uri().encode())
+    # FMI 2.0 keeps a pointer to the callbacks for as long as the instance lives: until this process ends
+    _kept.append(callbacks := _fmi2_callbacks())
+    pointer = ctypes.byref(callbacks)
+    return function(c_char_p(b"check"), kind, c_char_p(token), location, pointer, c_int(0), c_int(0))
+
+
+_kept: list[Fmi2Callbacks] = []
+
+
+def _fmi2_callbacks() -> Fmi2Callbacks:
+    runtime = ctypes.cdll.msvcrt if sys.platform == "win32" else CDLL(None)
+    allocate, free = Allocate(("calloc", runtime)), Free(("free", runtime))
+    return Fmi2Callbacks(Logger(lambda *_: None), allocate, free, StepFinished(), None)
+
+
+def _resource_path(facts: dict[str, str]) -> bytes:
+    # FMI 3.0: an absolute path that ends with a separator
+    return str(Path(facts["resources"])).encode() + b"/"
+
+
+if __name__ == "__main__":
+    found = list(problems_of(json.loads(sys.argv[1])))
+    print()
+    print(json.dumps(found))

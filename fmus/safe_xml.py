@@ -1,0 +1,56 @@
+"""Parses XML from strangers: no document type, no entities, so nothing to expand and nothing to fetch."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
+
+from vibroimpact.fmus.errors import ComponentFileError
+
+
+def root_of(content: bytes, where: str) -> Element:
+    """Parse a document and return its root.
+
+    The parser itself reports declarations, so they are found in every encoding it reads.
+
+    Parameters
+    ----------
+    content : bytes
+        The document.
+    where : str
+        Its name, for messages.
+
+    Raises
+    ------
+    ComponentFileError
+        It is not well-formed, or it declares a document type or an entity.
+    """
+    builder = TreeBuilder()
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = _refuse_doctype
+    parser.EntityDeclHandler = _refuse_entity
+    try:
+        parser.Parse(content, True)
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        raise ComponentFileError(f"{where}: expected well-formed XML, got: {error}.") from error
+    except _DeclarationError as error:
+        raise ComponentFileError(
+            f"{where}: expected XML without {error}, got one with it. It was not read."
+        ) from None
+    return builder.close()
+
+
+class _DeclarationError(Exception):
+    """Carries what was declared out of the parser's callback."""
+
+
+def _refuse_doctype(*_: object) -> NoReturn:
+    raise _DeclarationError("a document type declaration (which can hide entities)")
+
+
+def _refuse_entity(*_: object) -> NoReturn:
+    raise _DeclarationError("entity declarations")

@@ -1,0 +1,84 @@
+"""Build hook: compiles the FMUs into the wheel, and links the packages for an editable install."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import tempfile
+import types
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+PACKAGES = ("fmus", "orchestrator", "analysis", "hardware")
+NAMESPACE = "vibroimpact"
+ZIG = "ziglang>=0.13"
+
+
+class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
+    """Adds what the sources alone do not have: binaries for this machine."""
+
+    def dependencies(self) -> list[str]:
+        """Ask for a compiler only where there is none."""
+        self._make_importable()
+        from vibroimpact.fmus.compiler import has_compiler
+
+        return [] if has_compiler() else [ZIG]
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile the FMUs: into the wheel, or into the checkout for an editable install."""
+        self._make_importable()
+        from vibroimpact.fmus.build import BUILT, build
+
+        # strict is for the project's own machines: a newer compiler's new warning must not stop a user
+        if version == "editable":
+            link_packages(Path(self.root))
+            build(BUILT, strict=False)
+        else:
+            self._built = Path(tempfile.mkdtemp())
+            build(self._built, strict=False)
+            build_data["force_include"][str(self._built)] = f"{NAMESPACE}/fmus/built"
+            build_data["force_include"][str(Path(self.root, "LICENSE"))] = f"{NAMESPACE}/fmus/LICENSE"
+        build_data["pure_python"] = False
+        build_data["tag"] = f"py3-none-{_platform()}"
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:
+        """Remove what the wheel has taken in."""
+        if version != "editable":
+            shutil.rmtree(self._built)
+
+    def _make_importable(self) -> None:
+        # the folders of the checkout are not yet installed under their namespace
+        namespace = types.ModuleType(NAMESPACE)
+        namespace.__path__ = [self.root]
+        sys.modules[NAMESPACE] = namespace
+
+
+def link_packages(root: Path) -> None:
+    """Make `.editable/vibroimpact/<package>` lead to each package's folder."""
+    folder = root / ".editable" / NAMESPACE
+    folder.mkdir(parents=True, exist_ok=True)
+    for package in PACKAGES:
+        link = folder / package
+        if not link.exists():
+            _link(link, root / package)
+
+
+def _link(link: Path, target: Path) -> None:
+    if sys.platform == "win32":
+        # symbolic links need a privilege there, junctions do not
+        import _winapi
+
+        _winapi.CreateJunction(str(target), str(link))
+    else:
+        link.unlink(missing_ok=True)
+        link.symlink_to(Path("../..", target.name), target_is_directory=True)
+
+
+def _platform() -> str:
+    # the libraries know nothing of Python: one wheel per platform serves every version of it
+    from packaging.tags import sys_tags
+
+    names = (tag.platform for tag in sys_tags())
+    return next(name for name in names if "manylinux" not in name and "musllinux" not in name)

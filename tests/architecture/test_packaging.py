@@ -1,0 +1,84 @@
+"""The wheel made from the sdist holds everything, and works where nothing else of the project is."""
+
+import os
+import subprocess
+import sys
+import tarfile
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from vibroimpact.fmus import components
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("fmus", "orchestrator", "analysis", "hardware")
+
+
+def run(*command: str, cwd: Path, **environment: str) -> str:
+    inherited = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    result = subprocess.run(command, cwd=cwd, env=inherited | environment, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
+    return result.stdout
+
+
+@pytest.fixture(scope="module")
+def sdist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sdist")
+    run(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(folder), cwd=ROOT)
+    (path,) = folder.glob("*.tar.gz")
+    return path
+
+
+@pytest.fixture(scope="module")
+def wheel(sdist: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("wheel")
+    with tarfile.open(sdist) as archive:
+        archive.extractall(folder, filter="data")
+    (source,) = (path for path in folder.iterdir() if path.is_dir())
+    run(sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder), cwd=source)
+    (path,) = folder.glob("*.whl")
+    return path
+
+
+def test_the_sdist_has_the_sources_of_all_packages_and_nothing_built(sdist: Path) -> None:
+    with tarfile.open(sdist) as archive:
+        names = [name.partition("/")[2] for name in archive.getnames()]
+    for package in PACKAGES:
+        assert f"{package}/__init__.py" in names
+    assert "fmus/native/oscillator/variables.toml" in names
+    assert "LICENSE" in names
+    left_out = (".editable", ".venv", "fmus/built", ".git/")
+    assert [name for name in names if name.startswith(left_out)] == []
+
+
+def test_the_wheel_has_all_packages_and_the_fmus_and_is_for_one_platform(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+    for package in PACKAGES:
+        assert f"vibroimpact/{package}/__init__.py" in names
+        assert f"vibroimpact/{package}/py.typed" in names
+    for component in components():
+        assert f"vibroimpact/fmus/built/fmi3/{component}.fmu" in names
+        assert f"vibroimpact/fmus/built/fmi2/{component}.fmu" in names
+    assert "vibroimpact/fmus/LICENSE" in names
+    assert "vibroimpact/__init__.py" not in names
+    # the binaries bind it to a platform, but to no version of Python
+    assert "-py3-none-" in wheel.name
+    assert not wheel.name.endswith("-any.whl")
+
+
+def test_the_wheel_works_in_a_fresh_environment(wheel: Path, tmp_path: Path) -> None:
+    environment = tmp_path / "venv"
+    venv.create(environment, with_pip=True)
+    python = str(environment / ("Scripts" if sys.platform == "win32" else "bin") / "python")
+    run(python, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", str(wheel), cwd=tmp_path)
+    # finding the FMUs takes the standard library only, so the other dependencies need not be there
+    code = (
+        "from vibroimpact.fmus import components, fmu_path; "
+        "print(*(fmu_path(name, version) for name in components() for version in ('3.0', '2.0')))"
+    )
+    paths = [Path(p) for p in run(python, "-c", code, cwd=tmp_path).split()]
+    assert len(paths) == 2 * len(components())
+    assert all(path.is_file() and path.is_relative_to(environment) for path in paths)

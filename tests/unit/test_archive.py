@@ -1,0 +1,259 @@
+"""Bad FMU files: each is one clear message, and nothing is left behind."""
+
+import stat
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from vibroimpact.fmus import archive
+from vibroimpact.fmus.archive import binary_path, platforms, unpack
+from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.fmpy_door import read_description
+from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="{t}">
+  <CoSimulation modelIdentifier="M"/>
+  <ModelVariables><Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+  </ModelVariables><ModelStructure/>
+</fmiModelDescription>
+"""
+BINARY = f"binaries/{binary_folder('3.0')}/M{library_suffix()}"
+Members = dict[str | zipfile.ZipInfo, str | bytes]
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "cache"
+    monkeypatch.setenv("VIBROIMPACT_CACHE", str(folder))
+    return folder
+
+
+def written(path: Path, members: Members | None = None, description: str | bytes = DESCRIPTION) -> Path:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("modelDescription.xml", description)
+        for name, content in (members or {BINARY: b"code"}).items():
+            file.writestr(name, content)
+    return path
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(ComponentFileError) as caught:
+        unpack(path)
+    message = str(caught.value)
+    assert str(path) in message
+    assert caught.value.exit_code == 2
+    return message
+
+
+def unpacked_folders(cache: Path) -> list[str]:
+    return sorted(p.name for p in (cache / "fmus").glob("*")) if cache.exists() else []
+
+
+def test_a_good_fmu_is_unpacked_once_and_found_again(tmp_path: Path, cache: Path) -> None:
+    path = written(tmp_path / "M.fmu")
+    first = unpack(path)
+    assert binary_path(first).read_bytes() == b"code"
+    before = binary_path(first).stat().st_mtime_ns
+    assert unpack(path) == first
+    assert binary_path(first).stat().st_mtime_ns == before
+    assert unpacked_folders(cache) == [first.sha256]
+
+
+def test_equal_contents_under_two_names_share_one_folder(tmp_path: Path) -> None:
+    one = written(tmp_path / "one.fmu")
+    other = tmp_path / "other.fmu"
+    other.write_bytes(one.read_bytes())
+    assert unpack(one).folder == unpack(other).folder
+
+
+def test_a_cache_with_a_file_missing_is_repaired(tmp_path: Path) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    binary_path(fmu).unlink()
+    assert binary_path(unpack(fmu.source)).read_bytes() == b"code"
+
+
+def test_many_processes_may_unpack_the_same_fmu_at_once(tmp_path: Path, cache: Path) -> None:
+    path = written(tmp_path / "M.fmu", {BINARY: b"x" * 3_000_000})
+    code = (
+        "import sys; from pathlib import Path; from vibroimpact.fmus.archive import *; "
+        "assert binary_path(unpack(Path(sys.argv[1]))).stat().st_size == 3_000_000"
+    )
+    running = [subprocess.Popen([sys.executable, "-c", code, str(path)]) for _ in range(6)]
+    assert [process.wait() for process in running] == [0] * 6
+    assert len(unpacked_folders(cache)) == 1
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    assert "No such file" in refusal(tmp_path / "absent.fmu")
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip at all", b"PK\x03\x04 cut off"])
+def test_a_file_that_is_no_zip_is_refused(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "M.fmu"
+    path.write_bytes(content)
+    assert "expected an FMU (a zip archive)" in refusal(path)
+
+
+def test_a_truncated_fmu_is_refused(tmp_path: Path) -> None:
+    path = written(tmp_path / "M.fmu")
+    path.write_bytes(path.read_bytes()[:-30])
+    refusal(path)
+
+
+def test_a_damaged_member_is_refused_and_leaves_nothing(tmp_path: Path, cache: Path) -> None:
+    path = tmp_path / "M.fmu"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("modelDescription.xml", DESCRIPTION)
+        file.writestr(BINARY, b"recognisable contents")
+    path.write_bytes(path.read_bytes().replace(b"recognisable", b"unrecognised"))
+    assert "damaged" in refusal(path)
+    assert unpacked_folders(cache) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("../outside.txt", "leads out"),
+        ("resources/../../outside.txt", "leads out"),
+        ("/tmp/outside.txt", "absolute"),
+        ("C:/outside.txt", "absolute"),
+        ("..\\outside.txt", "backslash"),
+    ],
+)
+def test_a_member_that_would_land_outside_is_refused(
+    tmp_path: Path, cache: Path, name: str, words: str
+) -> None:
+    assert words in refusal(written(tmp_path / "M.fmu", {name: b"x"}))
+    assert not list(tmp_path.rglob("outside.txt"))
+    assert unpacked_folders(cache) == []
+
+
+def test_a_symbolic_link_is_refused(tmp_path: Path) -> None:
+    link = zipfile.ZipInfo("resources/link")
+    link.create_system = 3
+    link.external_attr = (stat.S_IFLNK | 0o777) << 16
+    assert "a link" in refusal(written(tmp_path / "M.fmu", {link: b"/etc/passwd"}))
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_two_members_with_one_name_are_refused(tmp_path: Path) -> None:
+    path = written(tmp_path / "M.fmu", {"modelDescription.xml": DESCRIPTION})
+    assert "the same name" in refusal(path)
+
+
+def test_a_zip_bomb_is_refused_before_it_is_unpacked(tmp_path: Path, cache: Path) -> None:
+    path = written(tmp_path / "M.fmu", {"resources/zeros": bytes(5_000_000)})
+    assert path.stat().st_size < 50_000
+    with pytest.raises(ComponentFileError, match="bytes when unpacked, limit 1000000"):
+        unpack(path, limit=1_000_000)
+    assert unpacked_folders(cache) == []
+
+
+def test_a_zip_bomb_that_lies_about_its_size_is_not_expanded(tmp_path: Path, cache: Path) -> None:
+    path = written(tmp_path / "M.fmu", {"resources/zeros": bytes(5_000_000)})
+    size = (5_000_000).to_bytes(4, "little")
+    path.write_bytes(path.read_bytes().replace(size, (10).to_bytes(4, "little")))
+    assert "damaged" in refusal(path)
+    assert unpacked_folders(cache) == []
+
+
+def test_a_crowd_of_members_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(archive, "MEMBER_LIMIT", 3)
+    assert "5 members, limit 3" in refusal(written(tmp_path / "M.fmu", {f"r/{k}": b"" for k in range(4)}))
+
+
+BILLION_LAUGHS = """<?xml version="1.0"?>
+<!DOCTYPE f [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;"><!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;">]>
+<fmiModelDescription fmiVersion="3.0" modelName="&c;" instantiationToken="t"/>"""
+EXTERNAL_ENTITY = """<?xml version="1.0"?>
+<!DOCTYPE f [<!ENTITY secret SYSTEM "file:///etc/passwd">]>
+<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">&secret;</fmiModelDescription>"""
+EXTERNAL_TYPE = (
+    """<?xml version="1.0"?><!DOCTYPE f SYSTEM "http://127.0.0.1:9/f.dtd"><fmiModelDescription/>"""
+)
+
+
+@pytest.mark.parametrize("text", [BILLION_LAUGHS, EXTERNAL_ENTITY, EXTERNAL_TYPE])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_xml_with_entities_is_refused_in_every_encoding(
+    tmp_path: Path, cache: Path, text: str, encoding: str
+) -> None:
+    path = written(tmp_path / "M.fmu", description=text.encode(encoding))
+    assert "without a document type" in refusal(path)
+    with pytest.raises(ComponentFileError):
+        read_description(path)
+    assert unpacked_folders(cache) == []
+
+
+def test_entities_in_the_build_description_are_refused_too(tmp_path: Path) -> None:
+    path = written(tmp_path / "M.fmu", {"sources/buildDescription.xml": BILLION_LAUGHS})
+    assert "sources/buildDescription.xml" in refusal(path)
+
+
+def test_broken_xml_is_refused(tmp_path: Path) -> None:
+    assert "well-formed" in refusal(written(tmp_path / "M.fmu", description="<fmiModelDescription>"))
+
+
+@pytest.mark.parametrize(
+    "description",
+    [
+        '<fmiModelDescription fmiVersion="1.0" guid="t"/>',
+        DESCRIPTION.replace('instantiationToken="{t}"', ""),
+        DESCRIPTION.replace('modelIdentifier="M"', 'modelIdentifier="../../M"'),
+        DESCRIPTION.replace("CoSimulation", "Simulation"),
+    ],
+)
+def test_a_description_without_version_token_or_identifier_is_refused(
+    tmp_path: Path, description: str
+) -> None:
+    assert "modelDescription.xml" in refusal(written(tmp_path / "M.fmu", description=description))
+
+
+def test_an_archive_without_a_description_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "M.fmu"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("readme.txt", "not an FMU")
+    assert "no modelDescription.xml" in refusal(path)
+
+
+def test_an_fmu_for_another_platform_says_which_it_has(tmp_path: Path) -> None:
+    fmu = unpack(
+        written(tmp_path / "M.fmu", {"binaries/riscv64-plan9/M.so": b"", "binaries/sparc-sunos/M.so": b""})
+    )
+    assert platforms(fmu) == ("riscv64-plan9", "sparc-sunos")
+    with pytest.raises(ComponentFileError, match="got riscv64-plan9, sparc-sunos") as caught:
+        binary_path(fmu)
+    assert BINARY in str(caught.value)
+    assert str(fmu.source) in str(caught.value)
+
+
+def test_fmi_2_platforms_have_their_own_names(tmp_path: Path) -> None:
+    text = DESCRIPTION.replace('"3.0"', '"2.0"').replace("instantiationToken", "guid")
+    name = f"binaries/{binary_folder('2.0')}/M{library_suffix()}"
+    fmu = unpack(written(tmp_path / "M.fmu", {name: b"code"}, text))
+    assert (fmu.fmi_version, fmu.token) == ("2.0", "{t}")
+    assert binary_path(fmu).parent.name == binary_folder("2.0")
+
+
+def test_a_cache_that_cannot_be_made_is_a_clear_message(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("a file, not a folder")
+    monkeypatch.setenv("VIBROIMPACT_CACHE", str(blocked))
+    with pytest.raises(ComponentFileError, match="VIBROIMPACT_CACHE"):
+        unpack(written(tmp_path / "M.fmu"))
+
+
+def test_what_a_killed_process_left_is_swept(
+    tmp_path: Path, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = cache / "fmus" / ".unpacking-killed"
+    left.mkdir(parents=True)
+    monkeypatch.setattr(archive, "ABANDONED_AFTER", -1.0)
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    assert unpacked_folders(cache) == [fmu.sha256]

@@ -1,0 +1,90 @@
+"""Building: which compiler is taken, what a failure says, and that nothing but the sources matters."""
+
+import ctypes
+import shutil
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from vibroimpact.fmus import build as building
+from vibroimpact.fmus.build import CORE_LIBRARY, NATIVE, build, fingerprint, is_current, main
+from vibroimpact.fmus.compiler import compile_library, find_compiler
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.fmus.platform_names import library_suffix
+
+
+@pytest.fixture
+def sources(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(NATIVE, tmp_path / "native"))
+
+
+def test_building_twice_gives_the_same_bytes(tmp_path: Path) -> None:
+    one, other = (build(tmp_path / name) for name in ("one", "other"))
+    assert [path.read_bytes() for path in one] == [path.read_bytes() for path in other]
+
+
+def test_an_edit_of_the_c_makes_the_build_out_of_date(sources: Path, tmp_path: Path) -> None:
+    build(tmp_path / "built", native=sources)
+    assert is_current(tmp_path / "built", native=sources)
+    source = next((sources / "core").glob("*.c"))
+    source.write_text(source.read_text() + "\n")
+    assert not is_current(tmp_path / "built", native=sources)
+    assert fingerprint(sources) != fingerprint()
+
+
+def test_an_error_in_the_c_is_told_in_the_compilers_words(sources: Path, tmp_path: Path) -> None:
+    (sources / "core" / "zz_wrong.c").write_text("int wrong(void) { return undeclared_name; }\n")
+    with pytest.raises(ComponentError, match="undeclared_name"):
+        build(tmp_path / "built", native=sources)
+    # a build that failed is not taken for a good one
+    assert not is_current(tmp_path / "built", native=sources)
+
+
+def test_warnings_stop_the_project_but_not_a_user(tmp_path: Path) -> None:
+    source = tmp_path / "warns.c"
+    source.write_text("int narrow(double x);\nint narrow(double x) { return x; }\n")
+    target = tmp_path / f"warns{library_suffix()}"
+    with pytest.raises(ComponentError, match="conversion"):
+        compile_library(target, [source], [])
+    compile_library(target, [source], [], strict=False)
+    assert target.is_file()
+
+
+def test_a_chosen_compiler_that_does_not_work_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VIBROIMPACT_CC", "no-such-compiler --flag")
+    with pytest.raises(
+        ComponentError, match="VIBROIMPACT_CC: expected a C compiler that works, got 'no-such"
+    ):
+        find_compiler()
+
+
+def test_a_machine_without_a_compiler_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("VIBROIMPACT_CC", raising=False)
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(ComponentError, match="pip install ziglang"):
+        find_compiler()
+
+
+def test_the_core_library_exports_the_functions_that_the_fmu_hides(sources: Path, tmp_path: Path) -> None:
+    (sources / "core" / "zz_probe.c").write_text("int vi_probe(void);\nint vi_probe(void) { return 42; }\n")
+    library = build(tmp_path, native=sources)[0]
+    assert library.name == f"{CORE_LIBRARY}{library_suffix()}"
+    assert ctypes.CDLL(str(library)).vi_probe() == 42
+    with zipfile.ZipFile(tmp_path / "fmi3" / "Oscillator.fmu") as fmu:
+        (binary,) = (name for name in fmu.namelist() if name.startswith("binaries/"))
+        component = ctypes.CDLL(fmu.extract(binary, tmp_path))
+    assert hasattr(component, "fmi3DoStep")
+    assert not hasattr(component, "vi_probe")
+
+
+def test_the_command_says_what_is_out_of_date(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(building, "update_readmes", lambda write=True: ())
+    assert main(["--output", str(tmp_path), "--check"]) == 1
+    assert "out of date" in capsys.readouterr().err
+    assert main(["--output", str(tmp_path)]) == 0
+    assert main(["--output", str(tmp_path), "--check"]) == 0

@@ -1,0 +1,280 @@
+"""One variables.toml makes the two descriptions, the C header and the README's table."""
+
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from fmpy.validation import validate_fmu
+
+from vibroimpact.fmus.build import NATIVE, fmi_headers, read_components, update_readmes
+from vibroimpact.fmus.compiler import find_compiler
+from vibroimpact.fmus.description import (
+    Component,
+    c_header,
+    fmi2_xml,
+    fmi3_xml,
+    header_name,
+    read_component,
+    readme_table,
+    with_table,
+)
+from vibroimpact.fmus.errors import ComponentFileError
+
+SMALL = """
+[component]
+name = "Small"
+folder = "small"
+struct = "small"
+header = "small.h"
+description = "A small one"
+contacts = 2
+event_mode = true
+[[unit]]
+name = "m"
+base = { m = 1 }
+[[enumeration]]
+name = "Law"
+items = [{ name = "none", value = 0 }, { name = "restitution", value = 1, description = "an impact" }]
+[[variable]]
+name = "time"
+description = "Time"
+causality = "independent"
+variability = "continuous"
+type = "Float64"
+field = "time"
+code = "TIME"
+[[variable]]
+name = "push"
+description = "A force"
+causality = "input"
+variability = "continuous"
+type = "Float64"
+start = 0
+field = "push"
+code = "PUSH"
+[[variable]]
+name = "contact[{k}].law"
+description = "Law | of stop {k}"
+causality = "parameter"
+variability = "fixed"
+type = "Enumeration"
+enumeration = "Law"
+start = 1
+field = "contacts[{i}].law"
+code = "CONTACT_LAW"
+repeat = "contact"
+[[variable]]
+name = "contact[{k}].gap"
+description = "Gap to stop {k}"
+causality = "output"
+variability = "continuous"
+type = "Float64"
+unit = "m"
+field = "contacts[{i}].gap"
+code = "CONTACT_GAP"
+repeat = "contact"
+dependencies = ["push"]
+[[variable]]
+name = "rows"
+description = "A record"
+causality = "local"
+variability = "discrete"
+type = "Float64"
+field = "rows"
+code = "ROWS"
+dimensions = [4, 3]
+[[variable]]
+name = "moving"
+description = "Does it move?"
+causality = "output"
+variability = "discrete"
+type = "Boolean"
+field = "moving"
+code = "MOVING"
+dependencies = []
+[[variable]]
+name = "gain"
+description = "A gain"
+causality = "parameter"
+variability = "tunable"
+type = "Float64"
+start = inf
+field = "gain"
+code = "GAIN"
+"""
+C_SOURCE = """
+#include "small_variables.h"
+int main(void) {
+    const vi_variable *v = small_variables;
+    if (SMALL_VARIABLE_COUNT != 9 || sizeof small_variables / sizeof *v != 9) return 1;
+    if (SMALL_CONTACT_LAW_2 != 4) return 2;
+    if (v[4].offset != offsetof(small, contacts) + sizeof(((small *)0)->contacts[0])) return 2;
+    if (v[SMALL_ROWS].count != 12 || v[SMALL_ROWS].access != VI_READ_ONLY) return 3;
+    if (v[SMALL_PUSH].access != VI_SET_INPUT || v[SMALL_GAIN].access != VI_SET_TUNABLE) return 4;
+    return v[SMALL_CONTACT_LAW_1].type == VI_INT64 && v[SMALL_MOVING].type == VI_BOOLEAN ? 0 : 5;
+}
+"""
+C_STRUCT = """
+#include <stdint.h>
+typedef struct {
+    double time, push, gain;
+    struct { int64_t law; double gap; } contacts[2];
+    double rows[12];
+    int32_t moving;
+} small;
+"""
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Component:
+    path = tmp_path / "variables.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    return read_component(path)
+
+
+def problems(tmp_path: Path, old: str, new: str) -> str:
+    path = tmp_path / "variables.toml"
+    assert old in SMALL
+    path.write_text(SMALL.replace(old, new), encoding="utf-8")
+    with pytest.raises(ComponentFileError) as caught:
+        read_component(path)
+    assert str(path) in str(caught.value)
+    return str(caught.value)
+
+
+def attributes(text: str, tag: str) -> list[dict[str, str]]:
+    return [element.attrib for element in ElementTree.fromstring(text).iter(tag)]
+
+
+def test_value_references_count_through_the_file_block_by_block(small: Component) -> None:
+    assert [v.name for v in small.variables] == [
+        *("time", "push", "contact[1].law", "contact[1].gap", "contact[2].law", "contact[2].gap"),
+        *("rows", "moving", "gain"),
+    ]
+    assert [v.value_reference for v in small.variables] == list(range(9))
+
+
+@pytest.mark.parametrize("contacts", [0, 1, 2])
+@pytest.mark.parametrize("emit", [fmi2_xml, fmi3_xml])
+def test_fmpy_finds_nothing_wrong_with_either_version(
+    small: Component, tmp_path: Path, contacts: int, emit: object
+) -> None:
+    for component in (small, *read_components()):
+        text = (fmi2_xml if emit is fmi2_xml else fmi3_xml)(component.with_repeats({"contact": contacts}))
+        (tmp_path / "modelDescription.xml").write_text(text, encoding="utf-8")
+        assert validate_fmu(str(tmp_path)) == []
+
+
+def test_fewer_contacts_leave_the_other_value_references_alone(small: Component) -> None:
+    names = {v.name: v.value_reference for v in small.with_repeats({"contact": 1}).variables}
+    assert names == {
+        v.name: v.value_reference for v in small.variables if not v.name.startswith("contact[2]")
+    }
+
+
+def test_fmi_2_has_no_arrays_and_no_time(small: Component) -> None:
+    names = [a["name"] for a in attributes(fmi2_xml(small), "ScalarVariable")]
+    assert "rows" not in names
+    assert "time" not in names
+    assert "gain" in names
+
+
+def test_outputs_depend_on_inputs_by_reference_or_by_position(small: Component) -> None:
+    three = attributes(fmi3_xml(small), "Output")
+    assert {"valueReference": "3", "dependencies": "1"} in three
+    assert {"valueReference": "7", "dependencies": ""} in three
+    outputs = ElementTree.fromstring(fmi2_xml(small)).find("ModelStructure/Outputs")
+    assert outputs is not None
+    # without time, push is the first variable of FMI 2.0
+    assert outputs[0].attrib == {"index": "3", "dependencies": "1"}
+
+
+def test_numbers_are_spelled_as_xml_schema_wants(small: Component) -> None:
+    starts = {a["name"]: a.get("start") for a in attributes(fmi3_xml(small), "Float64")}
+    assert starts["gain"] == "INF"
+    assert starts["push"] == "0.0"
+
+
+def test_both_versions_and_the_c_code_have_one_token_that_follows_the_file(
+    small: Component, tmp_path: Path
+) -> None:
+    assert f'instantiationToken="{small.token}"' in fmi3_xml(small)
+    assert f'guid="{small.token}"' in fmi2_xml(small)
+    assert f'#define SMALL_TOKEN "{small.token}"' in c_header(small)
+    other = tmp_path / "other.toml"
+    other.write_text(SMALL + "# changed\n", encoding="utf-8")
+    assert read_component(other).token != small.token
+
+
+def test_the_generated_header_compiles_and_points_into_the_struct(small: Component, tmp_path: Path) -> None:
+    (tmp_path / "small.h").write_text(C_STRUCT)
+    (tmp_path / header_name(small)).write_text(c_header(small))
+    (tmp_path / "main.c").write_text(C_SOURCE)
+    folders = [tmp_path, NATIVE / "adapters", NATIVE / "core", fmi_headers()]
+    options = ["-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Werror", *(f"-I{f}" for f in folders)]
+    program = tmp_path / "program"
+    subprocess.run([*find_compiler(), *options, str(tmp_path / "main.c"), "-o", str(program)], check=True)
+    assert subprocess.run([str(program)]).returncode == 0
+
+
+def test_the_readme_shows_a_repeated_block_once(small: Component) -> None:
+    table = readme_table(small)
+    assert "| `contact[k].gap` | output, continuous | m | - | Gap to stop k |" in table
+    assert "Law \\| of stop k" in table
+    assert "| restitution |" in table
+    assert table.count("contact[") == 2
+
+
+def test_a_readme_keeps_everything_but_its_table(small: Component) -> None:
+    frame = (
+        "# Small\n<!-- variables: generated from variables.toml -->\nold\n<!-- end of variables -->\nafter\n"
+    )
+    renewed = with_table(frame, small)
+    assert renewed.startswith("# Small\n")
+    assert renewed.endswith("-->\nafter\n")
+    assert "old" not in renewed
+    assert with_table(renewed, small) == renewed
+    with pytest.raises(ComponentFileError, match="end of variables"):
+        with_table("# no markers", small)
+
+
+def test_the_readmes_of_the_repository_are_up_to_date() -> None:
+    assert update_readmes(write=False) == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            'type = "Boolean"',
+            'type = "Bool"',
+            "expected one of Float64, Int64, Boolean, Enumeration, got 'Bool'",
+        ),
+        ('unit = "m"', 'unit = "metre"', "unit: expected a unit of the file, got 'metre'"),
+        ('enumeration = "Law"', 'enumeration = "Lore"', "enumeration: expected"),
+        ('variability = "tunable"', 'variability = "continuous"', "variability: expected"),
+        ('dependencies = ["push"]', 'dependencies = ["pull"]', "dependencies: expected"),
+        ("contacts = 2", "", "repeat: expected a count"),
+        ("start = inf", "", "start: expected"),
+        ('code = "GAIN"', "", "gain: expected the keys code"),
+        ('code = "GAIN"', 'code = "GAIN"\ncolour = "red"', "got colour"),
+        ('name = "push"', 'name = "gain"', "unique"),
+        ('causality = "independent"', 'causality = "local"', "time first"),
+        ("base = { m = 1 }", "base = { metre = 1 }", "base units"),
+        ('struct = "small"', "", "component.struct: expected a string"),
+        ("[component]", "[component", "expected a TOML file"),
+    ],
+)
+def test_a_mistake_in_variables_toml_is_named(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert words in problems(tmp_path, old, new)
+
+
+def test_all_mistakes_are_reported_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "variables.toml"
+    path.write_text(
+        SMALL.replace('unit = "m"', 'unit = "x"').replace('"Boolean"', '"Bool"'), encoding="utf-8"
+    )
+    with pytest.raises(ComponentFileError) as caught:
+        read_component(path)
+    assert len(str(caught.value).splitlines()) == 2

@@ -1,0 +1,138 @@
+"""`fmu check` finds what a validator of the description alone does not."""
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from vibroimpact.fmus import component_name, components, fmu_path
+from vibroimpact.fmus.archive import unpack
+from vibroimpact.fmus.build import is_current
+from vibroimpact.fmus.check import check_fmu
+from vibroimpact.fmus.errors import ComponentFileError, UsageError
+from vibroimpact.fmus.export import export_fmu
+from vibroimpact.fmus.fmpy_door import read_description, validate
+from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+
+VERSIONS = ("2.0", "3.0")
+SUFFIX = library_suffix()
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("VIBROIMPACT_CACHE", str(tmp_path / "cache"))
+
+
+def changed(path: Path, target: Path, change: Callable[[str, bytes], tuple[str, bytes]]) -> Path:
+    with zipfile.ZipFile(path) as source, zipfile.ZipFile(target, "w") as out:
+        for name in source.namelist():
+            out.writestr(*change(name, source.read(name)))
+    return target
+
+
+def with_text(old: str, new: str) -> Callable[[str, bytes], tuple[str, bytes]]:
+    def change(name: str, content: bytes) -> tuple[str, bytes]:
+        described = name == "modelDescription.xml"
+        assert not described or old.encode() in content
+        return name, content.replace(old.encode(), new.encode()) if described else content
+
+    return change
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+@pytest.mark.parametrize("name", components())
+def test_every_fmu_of_the_package_passes(name: str, fmi: str) -> None:
+    assert check_fmu(fmu_path(name, fmi)) == ()
+
+
+def test_the_built_fmus_belong_to_the_present_sources() -> None:
+    assert is_current(), "run `python -m vibroimpact.fmus.build`"
+
+
+def test_a_misspelt_capability_is_found_though_the_schema_lets_it_pass(tmp_path: Path) -> None:
+    change = with_text("canGetAndSetFMUState", "canGetAndSetFMUstate")
+    path = changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change)
+    assert validate(path) == ()
+    (problem,) = check_fmu(path)
+    assert "got canGetAndSetFMUstate. Did you mean canGetAndSetFMUState?" in problem
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_a_token_that_is_not_the_binarys_is_found(tmp_path: Path, fmi: str) -> None:
+    token = unpack(fmu_path("Oscillator", fmi)).token
+    change = with_text(token, "{00000000-0000-0000-0000-000000000000}")
+    (problem,) = check_fmu(changed(fmu_path("Oscillator", fmi), tmp_path / "O.fmu", change))
+    assert "expected an instance for the token of the description" in problem
+
+
+def test_a_declared_binary_that_is_absent_is_found(tmp_path: Path) -> None:
+    def change(name: str, content: bytes) -> tuple[str, bytes]:
+        return name.replace(f"/Oscillator{SUFFIX}", f"/Other{SUFFIX}"), content
+
+    problems = check_fmu(changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change))
+    assert f"binaries/{binary_folder('3.0')}/Oscillator{SUFFIX}: expected this file" in problems[0]
+
+
+def test_a_binary_that_does_not_load_is_found(tmp_path: Path) -> None:
+    def change(name: str, content: bytes) -> tuple[str, bytes]:
+        return name, b"no machine code" if name.startswith("binaries/") else content
+
+    (problem,) = check_fmu(changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change))
+    assert "expected a library that loads" in problem
+
+
+def test_a_function_that_does_not_resolve_is_found(tmp_path: Path) -> None:
+    def change(name: str, content: bytes) -> tuple[str, bytes]:
+        renamed = content.replace(b"\0fmi3GetShiftDecimal\0", b"\0fmi3GetShiftDecimax\0")
+        return name, renamed if name.startswith("binaries/") else content
+
+    problems = check_fmu(changed(fmu_path("Oscillator"), tmp_path / "O.fmu", change))
+    assert "got none called fmi3GetShiftDecimal" in problems[0]
+
+
+def test_a_file_that_is_no_fmu_is_one_problem(tmp_path: Path) -> None:
+    path = tmp_path / "O.fmu"
+    path.write_bytes(b"nothing")
+    assert len(check_fmu(path)) == 1
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+@pytest.mark.parametrize("contacts", [0, 1, 2])
+def test_an_exported_fmu_has_just_the_contacts_asked_for_and_passes(
+    tmp_path: Path, contacts: int, fmi: str
+) -> None:
+    path = export_fmu("oscillator", tmp_path / "O.fmu", contacts=contacts, fmi=fmi)
+    assert check_fmu(path) == ()
+    names = {v.name for v in read_description(path).modelVariables}
+    assert {name.split(".")[0] for name in names if name.startswith("contact[")} == {
+        f"contact[{k + 1}]" for k in range(contacts)
+    }
+    assert (unpack(path).resources / "contacts.txt").read_text() == f"{contacts}\n"
+
+
+def test_an_export_needs_no_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setenv("VIBROIMPACT_CC", "no-such-compiler")
+    assert export_fmu("Oscillator", tmp_path / "O.fmu", contacts=1).is_file()
+
+
+def test_the_same_export_twice_gives_the_same_bytes(tmp_path: Path) -> None:
+    one, other = (export_fmu("Oscillator", tmp_path / name, contacts=1) for name in ("a.fmu", "b.fmu"))
+    assert one.read_bytes() == other.read_bytes()
+
+
+def test_more_contacts_than_were_compiled_in_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="contacts: expected 0 to 2, got 3"):
+        export_fmu("Oscillator", tmp_path / "O.fmu", contacts=3)
+
+
+def test_an_unknown_component_gets_the_nearest_name_offered() -> None:
+    with pytest.raises(ComponentFileError, match="Did you mean Oscillator"):
+        fmu_path("Oscilator")
+    assert component_name("OSCILLATOR") == "Oscillator"
+
+
+def test_an_unknown_version_is_refused() -> None:
+    with pytest.raises(ComponentFileError, match=r"expected FMI version 3\.0 or 2\.0, got '1\.0'"):
+        fmu_path("Oscillator", fmi="1.0")
