@@ -1,0 +1,53 @@
+"""Write a file so that it is whole or not there at all, whatever happens in between."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from contextlib import suppress
+from pathlib import Path
+
+
+def write_atomically(path: str | os.PathLike[str], content: bytes | memoryview) -> None:
+    """Write the whole content of a file, or leave what was there before.
+
+    The content goes to a temporary name in the same folder (hidden, ending in `.tmp`), is forced to the disk
+    and renamed; then the folder is forced to the disk. On any failure the temporary file is removed.
+
+    Parameters
+    ----------
+    path : path
+    content : bytes-like
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written (no space, no permission, no folder), with the system's reason.
+    """
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
+    try:
+        with open(temporary, "xb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, target)
+    except BaseException as problem:
+        with suppress(OSError):
+            temporary.unlink()
+        if isinstance(problem, OSError):
+            # A failing write does not know its file, and a person knows the target, not the temporary name.
+            problem.filename, problem.filename2 = os.fspath(target), None
+        raise
+    _sync_folder(target.parent)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Force the new name of a file to the disk; a system that cannot open folders keeps its names itself."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

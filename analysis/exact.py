@@ -1,0 +1,246 @@
+"""Closed-form landmarks of the impact oscillator: grazing, period doubling and fold of the P(1,1) motion.
+
+One mass with spring and dashpot under a harmonic force, an impulsive stop with constant restitution.
+Symbols, in units of the natural frequency wn = sqrt(k/m) and of one unit of length: w drive frequency, zeta
+damping ratio, F force over stiffness, a stop position (> 0), r restitution, T = 2 pi/w, H = exp(-zeta T),
+V impact velocity, theta forcing phase at impact.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from vibroimpact.fmus.errors import DatasetError
+
+Floats = npt.NDArray[np.float64]
+
+# Points of the scan that separates the roots of a locus, and samples of one flight in the penetration test.
+_SCAN_POINTS = 4001
+_FLIGHT_SAMPLES = 4001
+
+
+@dataclass(frozen=True, slots=True)
+class ImpactOscillator:
+    """A harmonically forced oscillator with one impulsive stop, in consistent units.
+
+    Attributes
+    ----------
+    mass, damping, stiffness : float
+        kg, N s/m, N/m.
+    amplitude : float
+        Of the force, N.
+    stop_position : float
+        Distance from rest to the stop, > 0, m.
+    restitution : float
+        Coefficient of restitution, 0 to 1.
+    """
+
+    mass: float
+    damping: float
+    stiffness: float
+    amplitude: float
+    stop_position: float
+    restitution: float
+
+    @property
+    def natural_frequency(self) -> float:
+        """Undamped angular natural frequency, rad/s."""
+        return math.sqrt(self.stiffness / self.mass)
+
+    @property
+    def damping_ratio(self) -> float:
+        """Damping over critical damping."""
+        return self.damping / (2 * math.sqrt(self.stiffness * self.mass))
+
+    @property
+    def force(self) -> float:
+        """Static deflection under the force amplitude, m."""
+        return self.amplitude / self.stiffness
+
+    @classmethod
+    def from_scene(cls, text: str) -> ImpactOscillator:
+        """Read the parameters from the text of a scene.
+
+        Raises
+        ------
+        DatasetError
+            If the scene is not an oscillator with one impulsive stop in front of it.
+        """
+        scene = tomllib.loads(text)
+        stops = scene.get("stop", [])
+        if scene.get("body", {}).get("kind") != "oscillator" or len(stops) != 1 or "forcing" not in scene:
+            raise DatasetError(
+                "scene: expected a forced oscillator with one stop, got another scene. "
+                "Exact landmarks are known for that one only."
+            )
+        body, stop = scene["body"], stops[0]
+        sign = -1.0 if stop.get("side", "upper") == "lower" else 1.0
+        oscillator = cls(
+            mass=float(body["mass"]),
+            damping=_damping(body),
+            stiffness=float(body["stiffness"]),
+            amplitude=abs(float(scene["forcing"]["amplitude"])),
+            stop_position=sign * float(stop["position"]),
+            restitution=float(stop["restitution"]),
+        )
+        if oscillator.damping_ratio >= 1:
+            raise DatasetError(f"scene: expected damping_ratio < 1, got {oscillator.damping_ratio}.")
+        if stop.get("law", "restitution") != "restitution" or oscillator.stop_position <= 0:
+            raise DatasetError(
+                "scene: expected an impulsive stop at a positive distance, "
+                f"got law {stop.get('law')!r} at distance {oscillator.stop_position}."
+            )
+        return oscillator
+
+
+def _damping(body: dict[str, Any]) -> float:
+    """Return the damping of a body table, N s/m."""
+    if "damping_ratio" in body:
+        return 2 * float(body["damping_ratio"]) * math.sqrt(float(body["stiffness"]) * float(body["mass"]))
+    return float(body.get("damping", 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class StabilityLimit:
+    """Where P(1,1) loses stability: angular frequency (rad/s), impact velocity (m/s), impact phase (rad)."""
+
+    angular_frequency: float
+    impact_velocity: float
+    impact_phase: float
+
+
+def grazing_frequencies(oscillator: ImpactOscillator) -> tuple[float, ...]:
+    """Return the angular frequencies at which the steady motion just touches the stop, ascending, rad/s.
+
+    Steady amplitude = stop distance (thesis eqs. 2.32, 2.33): two, one (strong force) or none (weak force).
+
+    Examples
+    --------
+    >>> oscillator = ImpactOscillator(1.0, 0.08, 1.0, 0.3, 0.8, 0.75)
+    >>> [round(w, 12) for w in grazing_frequencies(oscillator)]
+    [0.79398912032, 1.167553543446]
+    """
+    middle = 1 - 2 * oscillator.damping_ratio**2
+    rest = 1 - (oscillator.force / oscillator.stop_position) ** 2
+    if middle**2 < rest:
+        return ()
+    upper = middle + math.sqrt(middle**2 - rest)
+    # The difference of the quadratic formula cancels as F -> a; the product of the roots does not.
+    squares = (rest / upper, upper) if upper > 0 else (rest,)
+    return tuple(oscillator.natural_frequency * math.sqrt(square) for square in squares if square > 0)
+
+
+def period_doublings(oscillator: ImpactOscillator, low: float, high: float) -> list[StabilityLimit]:
+    """Return where P(1,1) doubles its period (multiplier -1) between two angular frequencies, ascending.
+
+    Parameters
+    ----------
+    oscillator : ImpactOscillator
+    low, high : float
+        Angular frequencies, rad/s.
+
+    Examples
+    --------
+    >>> oscillator = ImpactOscillator(1.0, 0.08, 1.0, 0.450214238658253, 0.8, 0.75)
+    >>> [round(limit.angular_frequency, 9) for limit in period_doublings(oscillator, 0.85, 0.92)]
+    [0.88]
+    """
+    return _limits(oscillator, low, high, sigma=-1.0)
+
+
+def folds(oscillator: ImpactOscillator, low: float, high: float) -> list[StabilityLimit]:
+    """Return where P(1,1) folds (multiplier +1, saddle-node); parameters as for `period_doublings`."""
+    return _limits(oscillator, low, high, sigma=1.0)
+
+
+def _limits(oscillator: ImpactOscillator, low: float, high: float, sigma: float) -> list[StabilityLimit]:
+    """Find where the locus of a multiplier sigma crosses the force; physical orbits only."""
+    scale = oscillator.natural_frequency
+
+    def excess(w: Any) -> Any:
+        return np.hypot(*_locus(oscillator, w, sigma)[1:]) - oscillator.force
+
+    limits = []
+    for w in _roots(excess, np.linspace(low / scale, high / scale, _SCAN_POINTS)):
+        velocity, cosine, sine = (float(value) for value in _locus(oscillator, np.float64(w), sigma))
+        theta = math.atan2(sine, cosine) % (2 * math.pi)
+        if velocity > 0 and _clears_the_stop(oscillator, w, velocity, theta):
+            limits.append(StabilityLimit(w * scale, velocity * scale, theta))
+    return limits
+
+
+def _roots(function: Callable[[Any], Any], grid: Floats) -> list[float]:
+    """Return the roots of a function between grid points; a change of sign through a pole is none."""
+    values = function(grid)
+    roots = []
+    for k in np.flatnonzero(values[:-1] * values[1:] <= 0):
+        root = float(brentq(function, grid[k], grid[k + 1], xtol=1e-15, rtol=1e-15))
+        if abs(function(root)) < 1e-6 * max(1.0, abs(values[k])):
+            roots.append(root)
+    return roots
+
+
+def _flight(zeta: float, u: Any) -> tuple[Any, Any]:
+    """Return Phi12 and Phi11 of the free flow over u (thesis eqs. 2.12-2.17), underdamped."""
+    damped = math.sqrt(1 - zeta**2)
+    sine = np.exp(-zeta * u) * np.sin(damped * u) / damped
+    return sine, np.exp(-zeta * u) * np.cos(damped * u) + zeta * sine
+
+
+def _homogeneous(oscillator: ImpactOscillator, w: Any) -> tuple[Any, Any]:
+    """Return alpha and the homogeneous velocity after impact, each for unit V, of the P(1,1) motion."""
+    zeta, r = oscillator.damping_ratio, oscillator.restitution
+    period = 2 * math.pi / w
+    phi12, phi11 = _flight(zeta, period)
+    decay = np.exp(-zeta * period)
+    determinant = 1 - 2 * decay * np.cos(math.sqrt(1 - zeta**2) * period) + decay**2
+    return -(1 + r) * phi12 / determinant, (1 + r) * (phi11 - 1) / determinant
+
+
+def _locus(oscillator: ImpactOscillator, w: Any, sigma: float) -> tuple[Any, Any, Any]:
+    """Return V, F cos theta and F sin theta of the P(1,1) motion that has a multiplier sigma at w.
+
+    Explicit for given w: the condition tr = sigma (1 + det) is linear in V (thesis eqs. 2.67-2.69, 3.2).
+    """
+    zeta, r, a = oscillator.damping_ratio, oscillator.restitution, oscillator.stop_position
+    period = 2 * math.pi / w
+    decay = np.exp(-zeta * period)
+    phi12, _ = _flight(zeta, period)
+    alpha, after = _homogeneous(oscillator, w)
+    beta = after + 1 + r
+    cosine = np.cos(math.sqrt(1 - zeta**2) * period)
+    kappa = (sigma * (1 + (r * decay) ** 2) + 2 * r * decay * cosine) / ((1 + r) * phi12)
+    velocity = -(w**2) * a / (kappa + (1 - w**2) * alpha - 2 * zeta * (1 - beta))
+    in_phase = a + kappa * velocity
+    quadrature = 2 * zeta * w * (a - alpha * velocity) - (1 - w**2) * (1 - beta) * velocity / w
+    return velocity, in_phase, quadrature
+
+
+def _clears_the_stop(oscillator: ImpactOscillator, w: float, velocity: float, theta: float) -> bool:
+    """Say whether the flight between two impacts stays below the stop, certified by a bound on acceleration.
+
+    At both ends the flight leaves the stop with a known speed; in between the largest sample plus what the
+    displacement can rise by between samples must stay below the stop.
+    """
+    zeta, a = oscillator.damping_ratio, oscillator.stop_position
+    period = 2 * math.pi / w
+    alpha, after = _homogeneous(oscillator, w)
+    transfer = oscillator.force / complex(1 - w**2, 2 * zeta * w)
+    bound = abs(transfer) * w**2 + velocity * math.hypot(
+        alpha, (after + zeta * alpha) / math.sqrt(1 - zeta**2)
+    )
+    start, end = oscillator.restitution * velocity / bound, period - velocity / bound
+    u = np.linspace(start, end, _FLIGHT_SAMPLES)
+    phi12, phi11 = _flight(zeta, u)
+    displacement = velocity * (phi11 * alpha + phi12 * after) + np.real(
+        transfer * np.exp(1j * (theta + w * u))
+    )
+    return bool(displacement.max() + bound * (u[1] - u[0]) ** 2 / 8 < a)

@@ -1,0 +1,326 @@
+"""Open dataset files: one-dimensional as they are stored, or on the real dimensions of the sweep."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from vibroimpact.analysis.schema import RAGGED, RULES, SCHEMA_VERSION, Direction, Outcome, swept_names
+from vibroimpact.fmus.errors import DatasetError
+
+# A sweep that is no grid (scattered points) would waste memory on a grid; then `run` stays the dimension.
+_LARGEST_GRID_PER_RUN = 10
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """What resuming a campaign needs of a written part.
+
+    Attributes
+    ----------
+    run_index : ndarray of int, shape (run,)
+    final_displacement, final_velocity, final_phase : float
+        State of the last run at its end (m, m/s, rad).
+    last_outcome : Outcome
+        Outcome of the last run.
+    attrs : dict
+        Global attributes.
+    """
+
+    run_index: NDArray[np.int32]
+    final_displacement: float
+    final_velocity: float
+    final_phase: float
+    last_outcome: Outcome
+    attrs: dict[str, Any]
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
+    """Open a file with the NetCDF library; whatever is wrong with the file is one DatasetError."""
+    try:
+        with netCDF4.Dataset(os.fspath(path), "r") as file:
+            file.set_auto_mask(False)
+            _refuse_foreign(path, file.ncattrs(), file.variables)
+            yield file
+    except (OSError, RuntimeError) as problem:
+        raise unreadable(path, problem) from problem
+
+
+def unreadable(path: str | os.PathLike[str], problem: Exception) -> DatasetError:
+    """Return the error for a file that is missing or damaged."""
+    if isinstance(problem, FileNotFoundError):
+        return DatasetError(f"{os.fspath(path)}: expected a dataset file, got no such file.")
+    return DatasetError(
+        f"{os.fspath(path)}: expected a readable NetCDF dataset, got {problem}. "
+        "The file is damaged or of another kind; write it again."
+    )
+
+
+def _refuse_foreign(path: str | os.PathLike[str], attributes: Any, variables: Any) -> None:
+    """Refuse a NetCDF file that vibroimpact did not write."""
+    if "dataset_schema" not in attributes or "run_index" not in variables or "outcome" not in variables:
+        raise DatasetError(
+            f"{os.fspath(path)}: expected a dataset written by vibroimpact, got other NetCDF contents. "
+            "Use the dataset.nc of a campaign or the file of a run."
+        )
+
+
+def read_part(path: str | os.PathLike[str]) -> Part:
+    """Read what resuming needs of a part: which runs it holds and the final state of the last one.
+
+    Raises
+    ------
+    DatasetError
+        If the file is missing, damaged, foreign or holds no run.
+    """
+    with _opened(path) as file:
+        if file.dimensions["run"].size == 0:
+            raise DatasetError(
+                f"{os.fspath(path)}: expected a part with at least one run, got none. Delete the file."
+            )
+        variables = file.variables
+        return Part(
+            run_index=variables["run_index"][:],
+            final_displacement=float(variables["final_displacement"][-1]),
+            final_velocity=float(variables["final_velocity"][-1]),
+            final_phase=float(variables["final_phase"][-1]),
+            last_outcome=Outcome(int(variables["outcome"][-1])),
+            attrs={name: file.getncattr(name) for name in file.ncattrs()},
+        )
+
+
+def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read a whole file into memory, one-dimensional as it is stored.
+
+    Raises
+    ------
+    DatasetError
+        If the file is missing, damaged or foreign.
+    """
+    with _opened(path) as file:
+        data = {
+            name: (variable.dimensions, variable[...], _attributes(variable))
+            for name, variable in file.variables.items()
+        }
+        linked = getattr(file.variables["outcome"], "coordinates", "").split()
+        attrs = {name: file.getncattr(name) for name in file.ncattrs()}
+    return xr.Dataset(data, coords={name: data.pop(name) for name in linked}, attrs=attrs)
+
+
+def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:
+    """Return the attributes of a stored variable without those that only the file needs."""
+    return {
+        name: variable.getncattr(name)
+        for name in variable.ncattrs()
+        if name not in ("_FillValue", "coordinates")
+    }
+
+
+def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Open a dataset on the real dimensions of its sweep.
+
+    Per-run variables get the dimensions `direction` (where the sweep has directions) and one for each swept
+    parameter; points that no run covers are NaN, or -1 in integers. With independent runs only, `direction`
+    is a scalar coordinate; one run without swept parameters has scalars only. Runs that are no grid
+    (scattered or repeated points) keep the dimension `run`. Impacts, sticks and samples stay on their own
+    dimension; `impact_run` and so on give the `run_id` each row belongs to, under any selection.
+    `displacement_range` is the largest displacement minus the smallest over the recorded periods (m).
+    A variable is read from the file when it is first used.
+
+    Parameters
+    ----------
+    path : path
+        A dataset file, or a campaign's folder (then its `dataset.nc`).
+
+    Raises
+    ------
+    DatasetError
+        If the file is missing, damaged or foreign.
+
+    Examples
+    --------
+    >>> ds = open_dataset("campaign")  # doctest: +SKIP
+    >>> up = ds.displacement_range.sel(direction="up")  # doctest: +SKIP
+    >>> up.sel(angular_frequency=0.9, method="nearest")  # doctest: +SKIP
+    >>> ds.vibroimpact.impacts(direction="up", angular_frequency=0.9)  # doctest: +SKIP
+    """
+    file = Path(path) / "dataset.nc" if Path(path).is_dir() else Path(path)
+    flat = _open_flat(file)
+    try:
+        opened = _on_grid(flat)
+    except (OSError, RuntimeError) as problem:
+        flat.close()
+        raise unreadable(file, problem) from problem
+    except DatasetError:
+        flat.close()
+        raise
+    opened.set_close(flat.close)
+    opened.encoding["source"] = str(file)
+    return opened
+
+
+def _open_flat(file: Path) -> xr.Dataset:
+    """Open a file lazily in its one-dimensional form."""
+    with _opened(file) as stored:
+        schema = stored.getncattr("dataset_schema")
+    if schema != SCHEMA_VERSION:
+        raise DatasetError(
+            f"{file}: expected dataset schema {SCHEMA_VERSION}, got {schema}. "
+            "Open it with the version of vibroimpact that wrote it."
+        )
+    # Plain numbers: seconds are not dates, flags are not floats, NaN is already NaN.
+    return xr.open_dataset(file, engine="netcdf4", decode_times=False, mask_and_scale=False)
+
+
+class _RunArray(BackendArray):
+    """A per-run variable laid out on the grid, read as a whole when first used."""
+
+    def __init__(
+        self, read: Callable[[], NDArray[Any]], run_id: NDArray[np.int32], like: xr.Variable
+    ) -> None:
+        self._read = read
+        self._run_id = run_id
+        self.shape = (*run_id.shape, *like.shape[1:])
+        self.dtype = like.dtype
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        return indexing.explicit_indexing_adapter(
+            key, self.shape, indexing.IndexingSupport.BASIC, lambda basic: self._values[basic]
+        )
+
+    @cached_property
+    def _values(self) -> NDArray[Any]:
+        values = self._read()[self._run_id]
+        missing = self._run_id < 0
+        if missing.any():
+            values[missing] = {"f": np.nan, "i": -1}.get(values.dtype.kind, "")
+        return values
+
+
+def _on_grid(flat: xr.Dataset) -> xr.Dataset:
+    """Return the dataset on the dimensions of its sweep, with the ragged arrays beside it."""
+    axes, scalars, run_id = _grid(flat)
+    dims, swept = tuple(axes), swept_names(flat)
+    variables: dict[str, xr.Variable] = {}
+    # The order of the schema reads better than the alphabet; sampled variables come last.
+    order = [name for name in RULES if name in flat.variables]
+    for name in [*order, *(name for name in flat.variables if name not in RULES)]:
+        variable = flat.variables[name]
+        if name in swept or name == "direction":
+            continue
+        variables[str(name)] = _placed(variable, dims, run_id) if variable.dims[:1] == ("run",) else variable
+    variables["run_id"] = xr.Variable(
+        dims, run_id, {"long_name": "position of the run in the file", "units": "1"}
+    )
+    variables |= _row_owners(flat)
+    if "displacement_max" in flat.variables:
+        variables["displacement_range"] = _displacement_range(flat, dims, run_id)
+    coordinates = {"run_index": variables.pop("run_index")}
+    if dims == ("run",):
+        coordinates |= {name: flat.variables[name] for name in swept}
+        coordinates["direction"] = xr.Variable(
+            "run", _direction_names(flat), _plain(flat.variables["direction"])
+        )
+        axes = {}
+    return xr.Dataset(variables, coords=coordinates | axes | scalars, attrs=flat.attrs)
+
+
+def _placed(variable: xr.Variable, dims: tuple[str, ...], run_id: NDArray[np.int32]) -> xr.Variable:
+    """Return a per-run variable on the grid; it is read when it is first used."""
+    attributes = {
+        key: value for key, value in variable.attrs.items() if key not in ("_FillValue", "coordinates")
+    }
+    array = _RunArray(lambda: np.asarray(variable.values), run_id, variable)
+    return xr.Variable((*dims, *variable.dims[1:]), indexing.LazilyIndexedArray(array), attributes)
+
+
+def _displacement_range(flat: xr.Dataset, dims: tuple[str, ...], run_id: NDArray[np.int32]) -> xr.Variable:
+    """Return the largest minus the smallest displacement over the recorded periods, NaN periods aside."""
+
+    def read() -> NDArray[np.float64]:
+        largest = np.fmax.reduce(flat.variables["displacement_max"].values, axis=1, initial=-np.inf)
+        smallest = np.fmin.reduce(flat.variables["displacement_min"].values, axis=1, initial=np.inf)
+        return np.where(largest >= smallest, largest - smallest, np.nan)
+
+    attributes = {
+        "long_name": "displacement range over the recorded periods",
+        "units": flat.variables["displacement_max"].attrs["units"],
+    }
+    array = _RunArray(read, run_id, flat.variables["final_displacement"])
+    return xr.Variable(dims, indexing.LazilyIndexedArray(array), attributes)
+
+
+def _row_owners(flat: xr.Dataset) -> dict[str, xr.Variable]:
+    """Return, for each row of each ragged array, the run_id of the run it belongs to."""
+    runs = np.arange(flat.sizes["run"], dtype=np.int32)
+    return {
+        f"{dimension}_run": xr.Variable(
+            dimension,
+            np.repeat(runs, flat.variables[count].values),
+            {"long_name": f"run_id of the run of each {dimension}", "units": "1"},
+        )
+        for dimension, count in RAGGED.items()
+        if count in flat.variables
+    }
+
+
+def _grid(flat: xr.Dataset) -> tuple[dict[str, xr.Variable], dict[str, xr.Variable], NDArray[np.int32]]:
+    """Return the axes of the sweep, its scalar coordinates, and the run at each point (-1: none)."""
+    axes: dict[str, xr.Variable] = {}
+    scalars: dict[str, xr.Variable] = {}
+    places: list[NDArray[np.intp]] = []
+    directions = flat.variables["direction"].values
+    names = _direction_names(flat)
+    if directions.size and (directions != Direction.independent).any():
+        present, place = np.unique(directions, return_inverse=True)
+        labels = np.array([Direction(int(value)).name for value in present])
+        axes["direction"] = xr.Variable("direction", labels, _plain(flat.variables["direction"]))
+        places.append(place)
+    elif directions.size:
+        scalars["direction"] = xr.Variable((), names[0], _plain(flat.variables["direction"]))
+    for name in swept_names(flat):
+        values, place = np.unique(flat.variables[name].values, return_inverse=True)
+        axes[name] = xr.Variable(name, values, flat.variables[name].attrs)
+        places.append(place)
+    shape = tuple(axis.size for axis in axes.values())
+    run_id = _runs_on(shape, places, flat.sizes["run"])
+    if run_id is None:
+        count = np.arange(flat.sizes["run"], dtype=np.int32)
+        return {"run": xr.Variable("run", count)}, {}, count
+    return axes, scalars, run_id
+
+
+def _runs_on(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) -> NDArray[np.int32] | None:
+    """Return the run at each grid point, or None when the runs are no grid."""
+    size = int(np.prod(shape, dtype=np.int64))
+    if runs == 0 or size > _LARGEST_GRID_PER_RUN * runs:
+        return None
+    where = np.ravel_multi_index(tuple(places), shape) if shape else np.zeros(runs, dtype=np.intp)
+    if np.unique(where).size != runs:
+        return None
+    run_id = np.full(size, -1, dtype=np.int32)
+    run_id[where] = np.arange(runs, dtype=np.int32)
+    return run_id.reshape(shape)
+
+
+def _direction_names(flat: xr.Dataset) -> NDArray[np.str_]:
+    """Return the direction of each run as a word."""
+    return np.array([Direction(int(value)).name for value in flat.variables["direction"].values])
+
+
+def _plain(variable: xr.Variable) -> dict[str, Any]:
+    """Return the attributes of a flag variable that is opened as words."""
+    return {"long_name": variable.attrs.get("long_name", RULES["direction"].long_name)}

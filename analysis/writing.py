@@ -1,0 +1,371 @@
+"""Build datasets from runs, merge them, and write them so that a file is whole or not there at all."""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import netCDF4
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.atomic import write_atomically
+from vibroimpact.analysis.reading import read_flat
+from vibroimpact.analysis.schema import (
+    CONVENTIONS,
+    IMPACT_COLUMNS,
+    PERIOD_COLUMNS,
+    RAGGED,
+    RULES,
+    SCHEMA_VERSION,
+    STICK_COLUMNS,
+    Direction,
+    RunRecord,
+    UnitSystem,
+    attributes_of,
+    check,
+    file_name_of,
+    flat_order,
+    names_list,
+    quantity_unit,
+    swept_names,
+    unit_in,
+)
+from vibroimpact.fmus.errors import DatasetError
+
+# Where the superblock of an HDF5 file has its version, and in versions 2 and 3 the address of the end.
+_SUPERBLOCK_VERSION = 8
+_END_OF_FILE = 28
+
+_Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]
+
+
+def build_dataset(
+    runs: Sequence[RunRecord],
+    *,
+    coordinates: Mapping[str, NDArray[np.float64]],
+    direction: Sequence[Direction],
+    run_index: Sequence[int] | NDArray[np.integer[Any]],
+    sample_variables: Sequence[str] = (),
+    units: UnitSystem = "SI",
+    attrs: Mapping[str, Any] | None = None,
+    unit_of: Mapping[str, str] | None = None,
+    omit: Collection[str] = (),
+) -> xr.Dataset:
+    """Build the one-dimensional dataset of some runs, as it is written to a file.
+
+    Parameters
+    ----------
+    runs : sequence of RunRecord
+        All with the same groups recorded; a failed run may have None where the others have arrays.
+    coordinates : mapping of str to ndarray, shape (run,)
+        Values of each swept parameter, under its name in the file.
+    direction : sequence of Direction, length run
+    run_index : ndarray of int, shape (run,)
+        Index of each run in its campaign.
+    sample_variables : sequence of str
+        Names of the sampled variables, columns 1 on of `RunRecord.samples`.
+    units : {"SI", "nondimensional"}
+        Units of the scene.
+    attrs : mapping, optional
+        Provenance: scene text, versions, hashes; written as global attributes.
+    unit_of : mapping of str to str, optional
+        SI units of swept parameters or sampled variables whose name does not tell.
+    omit : collection of str
+        Per-period variables that the scene does not record; they are not stored.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions `run`, and `period`, `impact`, `stick`, `sample` where recorded. Not checked yet: `check`.
+
+    Raises
+    ------
+    DatasetError
+        If the parts do not fit together.
+
+    Examples
+    --------
+    >>> from vibroimpact.analysis.schema import Outcome
+    >>> run = RunRecord(Outcome.ok, "", None, np.empty((0, 5)), None, None, 0.0, 0.0, 0.0, 1e-3)
+    >>> dataset = build_dataset([run], coordinates={}, direction=[Direction.independent], run_index=[0])
+    >>> dict(dataset.sizes)
+    {'run': 1, 'impact': 0}
+    """
+    _check_lengths(len(runs), coordinates, direction, run_index)
+    variables = _run_variables(runs, direction, run_index, units)
+    variables |= _period_variables(runs, units, omit)
+    variables |= _ragged_variables("impact", [run.impacts for run in runs], IMPACT_COLUMNS, units)
+    variables |= _ragged_variables("stick", [run.sticks for run in runs], STICK_COLUMNS, units)
+    variables |= _sample_variables(runs, sample_variables, units, unit_of or {})
+    swept: _Variables = {
+        name: (
+            ("run",),
+            np.asarray(values, dtype=np.float64),
+            _quantity_attributes(name, units, unit_of or {}),
+        )
+        for name, values in coordinates.items()
+    }
+    described = {
+        "Conventions": CONVENTIONS,
+        "dataset_schema": SCHEMA_VERSION,
+        "units_system": units,
+        "history": "simulated by vibroimpact",
+    }
+    on_run = {name: variables.pop(name) for name in ("run_index", "direction")}
+    return xr.Dataset(variables, coords=on_run | swept, attrs=described | dict(attrs or {}))
+
+
+def _check_lengths(
+    runs: int,
+    coordinates: Mapping[str, NDArray[np.float64]],
+    direction: Sequence[Direction],
+    run_index: Sequence[int] | NDArray[np.integer[Any]],
+) -> None:
+    """Refuse per-run arrays of different lengths, and swept parameters that would hide a variable."""
+    lengths = {"direction": len(direction), "run_index": len(run_index)}
+    lengths |= {name: len(values) for name, values in coordinates.items()}
+    problems = [
+        f"dataset: {name}: expected one value for each of {runs} runs, got {length}."
+        for name, length in lengths.items()
+        if length != runs
+    ]
+    problems += [
+        f"dataset: {name}: expected a swept parameter with a name of its own, got that of a variable."
+        for name in coordinates
+        if name in RULES
+    ]
+    if problems:
+        raise DatasetError("\n".join(problems))
+
+
+def _run_variables(
+    runs: Sequence[RunRecord],
+    direction: Sequence[Direction],
+    run_index: Sequence[int] | NDArray[np.integer[Any]],
+    units: UnitSystem,
+) -> _Variables:
+    """Return the variables that every run has."""
+    message = np.empty(len(runs), dtype=object)
+    message[:] = [run.message for run in runs]
+    values: dict[str, NDArray[Any]] = {
+        "run_index": np.asarray(run_index, dtype=np.int32),
+        "direction": np.array(direction, dtype=np.int8),
+        "outcome": np.array([run.outcome for run in runs], dtype=np.int8),
+        "message": message,
+        "point_seconds": np.array([run.seconds for run in runs], dtype=np.float64),
+        "final_displacement": np.array([run.final_displacement for run in runs], dtype=np.float64),
+        "final_velocity": np.array([run.final_velocity for run in runs], dtype=np.float64),
+        "final_phase": np.array([run.final_phase for run in runs], dtype=np.float64),
+    }
+    return {name: (("run",), array, attributes_of(name, units)) for name, array in values.items()}
+
+
+def _period_variables(runs: Sequence[RunRecord], units: UnitSystem, omit: Collection[str]) -> _Variables:
+    """Return the per-period variables; a run that recorded fewer periods than the others ends in NaN."""
+    tables = [run.periods for run in runs]
+    if all(table is None for table in tables):
+        return {}
+    length = max(len(table) for table in tables if table is not None)
+    values = np.full((len(runs), length, len(PERIOD_COLUMNS)), np.nan)
+    for row, table in enumerate(tables):
+        if table is not None:
+            values[row, : len(table)] = table
+    return {
+        name: (("run", "period"), np.ascontiguousarray(values[:, :, column]), attributes_of(name, units))
+        for column, name in enumerate(PERIOD_COLUMNS)
+        if name not in omit
+    }
+
+
+def _ragged_variables(
+    dimension: str, tables: Sequence[NDArray[np.float64] | None], columns: Sequence[str], units: UnitSystem
+) -> _Variables:
+    """Return a contiguous ragged array (CF-1.11 section 9.3.3): the count of each run, then all rows."""
+    if all(table is None for table in tables):
+        return {}
+    count = np.array([0 if table is None else len(table) for table in tables], dtype=np.int32)
+    rows = np.concatenate([table for table in tables if table is not None])
+    variables: _Variables = {RAGGED[dimension]: (("run",), count, attributes_of(RAGGED[dimension], units))}
+    for column, name in enumerate(columns):
+        values = rows[:, column].astype(RULES[name].dtype)
+        variables[name] = ((dimension,), values, attributes_of(name, units))
+    return variables
+
+
+def _sample_variables(
+    runs: Sequence[RunRecord], names: Sequence[str], units: UnitSystem, unit_of: Mapping[str, str]
+) -> _Variables:
+    """Return the time series: `time` and the sampled variables."""
+    tables = [run.samples for run in runs]
+    variables = _ragged_variables("sample", tables, ("time",), units)
+    if not variables:
+        return {}
+    rows = np.concatenate([table for table in tables if table is not None])
+    if rows.shape[1] != 1 + len(names):
+        raise DatasetError(
+            f"dataset: samples: expected time and {len(names)} variables ({names_list(names)}), "
+            f"got {rows.shape[1]} columns."
+        )
+    for column, name in enumerate(names, start=1):
+        variables[file_name_of(name)] = (
+            ("sample",),
+            np.ascontiguousarray(rows[:, column]),
+            _quantity_attributes(file_name_of(name), units, unit_of),
+        )
+    return variables
+
+
+def _quantity_attributes(name: str, units: UnitSystem, unit_of: Mapping[str, str]) -> dict[str, Any]:
+    """Return the attributes of a swept parameter or sampled variable."""
+    unit = unit_in(units, unit_of[name]) if name in unit_of else quantity_unit(name, units)
+    return {"long_name": name.replace("_", " "), "units": unit}
+
+
+def merge_datasets(paths: Sequence[str | os.PathLike[str]]) -> xr.Dataset:
+    """Merge dataset files of one campaign into one dataset, ordered by `run_index`.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        One-dimensional files with the same variables, in any order.
+
+    Returns
+    -------
+    xarray.Dataset
+        In memory; the global attributes are those of the file with the lowest run index.
+
+    Raises
+    ------
+    DatasetError
+        If a file cannot be read, the files differ in their variables, or a run is in two files.
+    """
+    if not paths:
+        raise DatasetError("merge: expected at least one file, got none.")
+    parts = [read_flat(path) for path in paths]
+    first_index = [part.run_index.values[0] if part.sizes["run"] else -1 for part in parts]
+    order = np.argsort(first_index, kind="stable")
+    return _joined([parts[k] for k in order], [os.fspath(paths[k]) for k in order])
+
+
+def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
+    """Join parts along run and along every ragged dimension, then put the runs in order."""
+    first = parts[0]
+    for name, part in zip(names, parts, strict=True):
+        if set(part.variables) != set(first.variables):
+            different = sorted(map(str, set(part.variables) ^ set(first.variables)))
+            raise DatasetError(
+                f"{name}: expected the variables of {names[0]}, got a difference in {', '.join(different)}."
+            )
+    periods = max(part.sizes.get("period", 0) for part in parts)
+    columns = {
+        str(name): _stacked([part.variables[name].values for part in parts], variable.dims, periods)
+        for name, variable in first.variables.items()
+    }
+    index = columns["run_index"]
+    if np.unique(index).size != index.size:
+        raise DatasetError(
+            f"merge: expected each run in one file, got a run_index twice in {len(parts)} files."
+        )
+    if (np.diff(index) < 0).any():
+        columns = _ordered(columns, first, np.argsort(index))
+    data = {
+        str(name): (variable.dims, columns[str(name)], variable.attrs)
+        for name, variable in first.variables.items()
+    }
+    coords = {str(name): data.pop(str(name)) for name in first.coords}
+    return xr.Dataset(data, coords=coords, attrs=first.attrs)
+
+
+def _stacked(arrays: Sequence[NDArray[Any]], dims: tuple[Any, ...], periods: int) -> NDArray[Any]:
+    """Join the arrays of one variable; runs with fewer periods than the longest end in NaN."""
+    if "period" in dims and any(array.shape[1] < periods for array in arrays):
+        arrays = [np.pad(a, ((0, 0), (0, periods - a.shape[1])), constant_values=np.nan) for a in arrays]
+    return np.concatenate(arrays)
+
+
+def _ordered(
+    columns: dict[str, NDArray[Any]], like: xr.Dataset, order: NDArray[np.intp]
+) -> dict[str, NDArray[Any]]:
+    """Return all columns with the runs, and the ragged rows of each run, in this order."""
+    rows = {"run": order}
+    for dimension, count_name in RAGGED.items():
+        if count_name in columns:
+            count = columns[count_name].astype(np.int64)
+            rows[dimension] = flat_order((np.cumsum(count) - count)[order], count[order])
+    return {name: values[rows[str(like.variables[name].dims[0])]] for name, values in columns.items()}
+
+
+def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compression: int = 0) -> None:
+    """Check a dataset and write it as one NetCDF-4 file that is whole or not there at all.
+
+    The file is made in memory first and then written in one go: the HDF5 library would keep a file open,
+    and its space taken, after the disk was full.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One-dimensional, as `build_dataset` and `merge_datasets` make it.
+    path : path
+        An older file of this name is replaced only when the new one is complete.
+    compression : int
+        zlib level from 0 (none) to 9.
+
+    Raises
+    ------
+    DatasetError
+        If the dataset does not follow the schema.
+    OSError
+        If the file cannot be written (no space, no permission), with the reason of the operating system.
+    """
+    check(dataset)
+    write_atomically(path, _image(dataset, compression))
+
+
+def _image(dataset: xr.Dataset, compression: int) -> memoryview:
+    """Return the bytes of the NetCDF-4 file of a dataset."""
+    linked = " ".join(("run_index", "direction", *swept_names(dataset)))
+    file = netCDF4.Dataset("dataset.nc", "w", format="NETCDF4", memory=1)
+    # Every value is written below: filling first would write everything twice.
+    file.set_fill_off()
+    file.setncatts(dict(dataset.attrs))
+    for name, size in dataset.sizes.items():
+        file.createDimension(str(name), size)
+    for name, variable in dataset.variables.items():
+        is_data = variable.dims[0] == "run" and name not in dataset.coords
+        _store(file, str(name), variable, compression, linked if is_data else None)
+    return _without_padding(memoryview(file.close()))
+
+
+def _without_padding(image: memoryview) -> memoryview:
+    """Cut off what the library rounded the memory up by; a truncated file is then always noticed."""
+    if image[_SUPERBLOCK_VERSION] not in (2, 3):
+        return image
+    (end,) = struct.unpack_from("<Q", image, _END_OF_FILE)
+    return image[:end]
+
+
+def _store(
+    file: netCDF4.Dataset, name: str, variable: xr.Variable, compression: int, linked: str | None
+) -> None:
+    """Store one variable with its attributes; floats mark what is missing by NaN."""
+    is_text = variable.dtype.kind == "O"
+    # CF forbids missing values in coordinates, so these have no fill value.
+    may_miss = variable.dtype.kind == "f" and (linked is not None or variable.dims[0] != "run")
+    kind: Any = str if is_text else variable.dtype
+    level: Any = compression
+    stored = file.createVariable(
+        name,
+        kind,
+        tuple(map(str, variable.dims)),
+        fill_value=np.nan if may_miss else None,
+        compression="zlib" if compression and not is_text else None,
+        complevel=level,
+        shuffle=True,
+    )
+    stored.setncatts(dict(variable.attrs) if linked is None else {**variable.attrs, "coordinates": linked})
+    if variable.size:
+        stored[...] = variable.values

@@ -1,0 +1,87 @@
+"""Small datasets for tests of the schema, its writers and its readers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset
+
+PERIODS = 3
+
+
+def impact_rows(number: int, start: float) -> NDArray[np.float64]:
+    """Return impacts that follow each other from a time on; velocities tell them apart."""
+    rows = np.ones((number, 5))
+    rows[:, 0] = start + np.arange(number)
+    rows[:, 1] = np.linspace(0.0, 6.0, number)
+    rows[:, 2] = start + 0.01 * np.arange(number)
+    rows[:, 3] = 1.7 * rows[:, 2]
+    return rows
+
+
+def record(value: float, impacts: int = 0, sticks: int = 0, samples: int = 0) -> RunRecord:
+    """Return a run whose every number can be traced back to `value`."""
+    periods = np.column_stack(
+        [np.full(PERIODS, value + k) for k in (1.0, -1.0, 0.5, 0.25)] + [np.zeros(PERIODS)]
+    )
+    stick_rows = np.column_stack(
+        [value + np.arange(sticks), value + np.arange(sticks) + 0.5, np.ones(sticks)]
+    )
+    sample_rows = np.column_stack(
+        [value + np.arange(samples), np.full(samples, value), np.full(samples, -value)]
+    )
+    return RunRecord(
+        outcome=Outcome.ok,
+        message="",
+        periods=periods,
+        impacts=impact_rows(impacts, value),
+        sticks=stick_rows,
+        samples=sample_rows,
+        final_displacement=value,
+        final_velocity=-value,
+        final_phase=0.5,
+        seconds=1e-3,
+    )
+
+
+def failed(message: str) -> RunRecord:
+    """Return a run that ended in an error: no rows, no final state."""
+    return RunRecord(
+        Outcome.error,
+        message,
+        np.empty((0, 5)),
+        np.empty((0, 5)),
+        np.empty((0, 3)),
+        np.empty((0, 3)),
+        np.nan,
+        np.nan,
+        np.nan,
+        0.0,
+    )
+
+
+def dataset_of(runs: list[RunRecord], **changes: Any) -> xr.Dataset:
+    """Return a dataset of runs, by default an independent sweep of the angular frequency 0, 1, 2, ..."""
+    arguments: dict[str, Any] = {
+        "coordinates": {"angular_frequency": np.arange(len(runs), dtype=np.float64)},
+        "direction": [Direction.independent] * len(runs),
+        "run_index": np.arange(len(runs)),
+        "sample_variables": ["displacement", "velocity"],
+        "units": "SI",
+        "attrs": {"title": "example"},
+    }
+    return build_dataset(runs, **(arguments | changes))
+
+
+def up_down(points: int = 3) -> xr.Dataset:
+    """Return an up-down sweep of angular frequencies 0, 1, ...; the run at position k has k + 1 impacts."""
+    up = np.arange(points, dtype=np.float64)
+    return dataset_of(
+        [record(float(k), impacts=k + 1, sticks=k % 2, samples=2) for k in range(2 * points)],
+        coordinates={"angular_frequency": np.concatenate([up, up[::-1]])},
+        direction=[Direction.up] * points + [Direction.down] * points,
+    )

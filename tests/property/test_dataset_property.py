@@ -1,0 +1,74 @@
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from dataset_examples import dataset_of, failed, record
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from vibroimpact.analysis import open_dataset
+from vibroimpact.analysis.dataset import Direction, RunRecord, merge_datasets, write_dataset
+
+Lengths = st.lists(st.tuples(*(st.integers(0, 4),) * 3), min_size=1, max_size=8)
+
+
+def runs_of(lengths: list[tuple[int, int, int]]) -> list[RunRecord]:
+    return [record(float(k), *sizes) for k, sizes in enumerate(lengths)]
+
+
+@settings(max_examples=40, deadline=None)
+@given(Lengths, st.randoms(use_true_random=False))
+def test_ragged_arrays_come_back_run_by_run_from_a_file(
+    lengths: list[tuple[int, int, int]], random: object
+) -> None:
+    runs = runs_of(lengths)
+    places = np.arange(len(runs), dtype=np.float64)
+    random.shuffle(places)  # type: ignore[attr-defined]
+    dataset = dataset_of(runs, coordinates={"angular_frequency": places})
+    with tempfile.TemporaryDirectory() as folder:
+        write_dataset(dataset, Path(folder, "runs.nc"))
+        with open_dataset(Path(folder, "runs.nc")) as opened:
+            for run, place in zip(runs, places, strict=True):
+                hits = opened.vibroimpact.impacts(angular_frequency=place + 0.2)
+                stuck = opened.sel(angular_frequency=[place]).vibroimpact.sticks()
+                sampled = opened.vibroimpact.samples(angular_frequency=place, exact=True)
+                assert run.impacts is not None
+                assert run.sticks is not None
+                assert run.samples is not None
+                np.testing.assert_array_equal(hits.impact_time, run.impacts[:, 0])
+                np.testing.assert_array_equal(hits.impact_impulse, run.impacts[:, 3])
+                np.testing.assert_array_equal(stuck.stick_end, run.sticks[:, 1])
+                np.testing.assert_array_equal(sampled.velocity, run.samples[:, 2])
+
+
+@settings(max_examples=40, deadline=None)
+@given(Lengths, st.data())
+def test_parts_in_any_order_merge_into_what_one_build_gives(
+    lengths: list[tuple[int, int, int]], data: st.DataObject
+) -> None:
+    runs = runs_of(lengths)
+    if data.draw(st.booleans()):
+        runs[0] = failed("broken")
+    order = data.draw(st.permutations(range(len(runs))))
+    cuts = sorted(data.draw(st.sets(st.integers(1, len(runs)), max_size=3)))
+    with tempfile.TemporaryDirectory() as folder:
+        paths = []
+        for first, last in zip([0, *cuts], [*cuts, len(runs)], strict=True):
+            chosen = order[first:last]
+            if chosen:
+                paths.append(Path(folder, f"{first}.nc"))
+                write_dataset(part_of(runs, chosen), paths[-1])
+        merged = merge_datasets(data.draw(st.permutations(paths)))
+    xr.testing.assert_identical(merged, part_of(runs, list(range(len(runs)))))
+
+
+def part_of(runs: list[RunRecord], chosen: list[int]) -> xr.Dataset:
+    return dataset_of(
+        [runs[k] for k in chosen],
+        run_index=np.array(chosen),
+        coordinates={"angular_frequency": np.array(chosen, dtype=np.float64)},
+        direction=[Direction(k % 3) for k in chosen],
+    )

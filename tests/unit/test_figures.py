@@ -1,0 +1,229 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+import xarray as xr
+from dataset_examples import dataset_of, record, up_down
+from impact_sweep import SCENE, Oscillator
+from matplotlib.figure import Figure
+from typer.testing import CliRunner
+
+from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
+from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
+from vibroimpact.fmus.errors import DatasetError, UsageError
+
+PNG = b"\x89PNG\r\n"
+
+
+def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
+    write_dataset(dataset, folder / "runs.nc")
+    return open_dataset(folder / "runs.nc")
+
+
+def sampled_run() -> xr.Dataset:
+    """One period of the P(1,1) motion at angular frequency 1, sampled, with its impact."""
+    oscillator = Oscillator(1.0, 0.0, 0.0)
+    for _ in range(100):
+        oscillator.advance(None, 0.0)
+    start = (oscillator.displacement, oscillator.velocity)
+    impacts: list[list[float]] = []
+    oscillator.advance(impacts, 0.0)
+    before = impacts[0][0]
+    rows = []
+    for t in np.linspace(0.0, oscillator.period, 200):
+        if t < before:
+            rows.append([t, *oscillator.flow(*start, 0.0, t)])
+        else:
+            rows.append([t, *oscillator.flow(1.0, -0.7 * impacts[0][2], before, t - before)])
+    run = RunRecord(
+        Outcome.ok, "", None, np.array(impacts[:1]), np.empty((0, 3)), np.array(rows), 0.0, 0.0, 0.0, 1e-3
+    )
+    return dataset_of([run], coordinates={}, units="nondimensional", attrs={"scene": SCENE})
+
+
+def texts(figure: Figure) -> list[str]:
+    axes = figure.axes
+    return [text for axis in axes for text in (axis.get_xlabel(), axis.get_ylabel()) if text]
+
+
+def smallest_font(figure: Figure) -> float:
+    labels = [tick for axis in figure.axes for tick in (*axis.get_xticklabels(), *axis.get_yticklabels())]
+    names = [axis.xaxis.label for axis in figure.axes] + [axis.yaxis.label for axis in figure.axes]
+    legends = [text for legend in figure.legends for text in legend.get_texts()]
+    return min(float(text.get_fontsize()) for text in (*labels, *names, *legends))
+
+
+def test_a_bifurcation_diagram_is_one_column_wide_with_fonts_that_can_be_read(tmp_path: Path) -> None:
+    figure = figures.draw(opened(up_down(), tmp_path))
+    assert figure.get_figwidth() == pytest.approx(85 / 25.4)
+    assert smallest_font(figure) >= 7
+
+
+def test_axes_name_quantities_and_units(tmp_path: Path) -> None:
+    assert texts(figures.draw(opened(up_down(), tmp_path))) == [
+        "displacement range (m)",
+        "angular frequency (rad/s)",
+        "impact velocity (m/s)",
+    ]
+
+
+def test_nondimensional_axes_say_so(tmp_path: Path) -> None:
+    runs = [record(float(k), impacts=1) for k in range(3)]
+    figure = figures.draw(opened(dataset_of(runs, units="nondimensional"), tmp_path))
+    assert "angular frequency (-)" in texts(figure)
+
+
+def test_up_and_down_differ_in_colour_and_marker_and_the_legend_covers_no_point(tmp_path: Path) -> None:
+    figure = figures.draw(opened(up_down(), tmp_path))
+    up, down = figure.axes[0].get_lines()
+    assert up.get_color() != down.get_color()
+    assert up.get_marker() != down.get_marker()
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["up sweep", "down sweep"]
+    figure.draw_without_rendering()
+    below = legend.get_window_extent().y0
+    assert all(axis.get_window_extent().y1 <= below for axis in figure.axes)
+
+
+def test_every_impact_is_one_point_at_the_parameter_of_its_run(tmp_path: Path) -> None:
+    figure = figures.draw(opened(up_down(), tmp_path))
+    up, down = figure.axes[1].get_lines()
+    assert up.get_xdata().tolist() == [0.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+    assert down.get_xdata().tolist() == [2.0] * 4 + [1.0] * 5 + [0.0] * 6
+
+
+def test_a_selection_of_a_dataset_draws_only_its_own_impacts(tmp_path: Path) -> None:
+    chosen = opened(up_down(), tmp_path).sel(direction=["down"]).isel(angular_frequency=slice(0, 2))
+    (down,) = figures.draw(chosen).axes[1].get_lines()
+    assert sorted(down.get_xdata().tolist()) == [0.0] * 6 + [1.0] * 5
+
+
+def test_two_swept_parameters_give_colour_maps_of_the_grid(tmp_path: Path) -> None:
+    mass, position = np.meshgrid([1.0, 2.0], [0.1, 0.2, 0.3], indexing="ij")
+    runs = [record(float(k), impacts=k) for k in range(6)]
+    grid = {"mass": mass.ravel(), "position": position.ravel()}
+    dataset = opened(dataset_of(runs, coordinates=grid), tmp_path)
+    largest = figures.largest_impact_velocity(dataset)
+    np.testing.assert_allclose(largest, [[np.nan, 1.0, 2.01], [3.02, 4.03, 5.04]])
+    figure = figures.draw(dataset)
+    assert {"mass (kg)", "position (m)", "largest impact velocity (m/s)"} <= set(texts(figure))
+
+
+def test_a_map_of_an_up_down_sweep_has_a_column_for_each_direction(tmp_path: Path) -> None:
+    grid = {"mass": np.array([1.0, 1.0, 2.0, 2.0] * 2), "position": np.array([0.1, 0.2] * 4)}
+    directions = [Direction.up] * 4 + [Direction.down] * 4
+    runs = [record(float(k), impacts=1) for k in range(8)]
+    figure = figures.draw(opened(dataset_of(runs, coordinates=grid, direction=directions), tmp_path))
+    assert {axis.get_title() for axis in figure.axes} >= {"up sweep", "down sweep"}
+
+
+def test_a_run_shows_its_stop_and_a_velocity_that_breaks_at_the_impact(tmp_path: Path) -> None:
+    figure = figures.draw(opened(sampled_run(), tmp_path))
+    above, middle, below = figure.axes
+    assert [line.get_ydata() for line in above.get_lines() if line.get_linestyle() == "--"] == [[1.0, 1.0]]
+    velocity = middle.get_lines()[0].get_ydata()
+    assert np.isnan(velocity).sum() == 1
+    marks = below.get_lines()[1]
+    # The impact of the P(1,1) motion at zeta = .05 is on the stop, moving into it.
+    assert marks.get_xdata() == pytest.approx([1.0])
+    assert marks.get_ydata()[0] > 0.5
+    assert smallest_font(figure) >= 7
+
+
+def test_a_run_without_time_series_shows_its_periods(tmp_path: Path) -> None:
+    figure = figures.draw(opened(up_down().drop_dims("sample").drop_vars("sample_count"), tmp_path), "run", 4)
+    assert texts(figure)[0] == "recorded forcing period (-)"
+    assert "impact velocity (m/s)" in texts(figure)
+
+
+@pytest.mark.parametrize(
+    ("kind", "run", "message"),
+    [("run", None, "expected one run, got 6"), ("run", 99, "expected one run, got")],
+)
+def test_a_run_must_be_named_among_several(
+    kind: figures.Kind, run: int, message: str, tmp_path: Path
+) -> None:
+    dataset = up_down().drop_dims("sample").drop_vars("sample_count")
+    with pytest.raises(DatasetError, match=message):
+        figures.draw(opened(dataset, tmp_path), kind, run)
+
+
+def test_a_bifurcation_of_a_single_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="expected one or two swept parameters, got 0"):
+        figures.draw(opened(sampled_run(), tmp_path), "bifurcation")
+
+
+@pytest.mark.parametrize(("ending", "start"), [("png", PNG), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_the_ending_chooses_the_format(ending: str, start: bytes, tmp_path: Path) -> None:
+    figures.save(figures.draw(opened(up_down(), tmp_path)), tmp_path / f"figure.{ending}")
+    assert (tmp_path / f"figure.{ending}").read_bytes().startswith(start)
+
+
+def command_line() -> typer.Typer:
+    app = typer.Typer()
+    app.callback()(lambda: None)
+    commands.register(app)
+    return app
+
+
+def test_plot_writes_the_figure_and_nothing_else(tmp_path: Path) -> None:
+    write_dataset(up_down(), tmp_path / "dataset.nc")
+    done = CliRunner().invoke(command_line(), ["plot", str(tmp_path), "-o", str(tmp_path / "figure.png")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "figure.png").read_bytes().startswith(PNG)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["dataset.nc", "figure.png"]
+
+
+def test_plot_help_has_an_example() -> None:
+    done = CliRunner().invoke(command_line(), ["plot", "--help"])
+    assert "Example: vibroimpact plot" in done.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (
+            ["missing.nc", "-o", "a.png"],
+            DatasetError,
+            "missing.nc: expected a dataset file, got no such file",
+        ),
+        (["corrupt.nc", "-o", "a.png"], DatasetError, "corrupt.nc: expected a readable NetCDF dataset"),
+        (["runs.nc", "-o", "a.docx"], UsageError, "expected a name ending in .png, .pdf, .svg, got '.docx'"),
+        (["runs.nc", "-o", "none/a.png"], UsageError, "could not be written: No such file or directory"),
+        (
+            ["runs.nc", "-o", "a.png", "--kind", "pie"],
+            UsageError,
+            "expected one of auto, bifurcation, run, got 'pie'",
+        ),
+    ],
+)
+def test_plot_says_what_is_wrong_with_its_files(
+    arguments: list[str],
+    error: type[Exception],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_dataset(up_down(), tmp_path / "runs.nc")
+    Path("corrupt.nc").write_bytes(Path("runs.nc").read_bytes()[:5000])
+    done = CliRunner().invoke(command_line(), ["plot", *arguments])
+    assert isinstance(done.exception, error)
+    assert message in str(done.exception)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["corrupt.nc", "runs.nc"]
+
+
+def test_a_file_that_is_damaged_in_its_data_is_one_message_too(tmp_path: Path) -> None:
+    path = tmp_path / "runs.nc"
+    write_dataset(dataset_of([record(float(k), impacts=400) for k in range(3)]), path, compression=1)
+    content = bytearray(path.read_bytes())
+    # Damage in the middle of the compressed values; the structure of the file stays whole.
+    middle = slice(len(content) // 2, len(content) * 3 // 4)
+    content[middle] = bytes(len(content[middle]))
+    path.write_bytes(content)
+    done = CliRunner().invoke(command_line(), ["plot", str(path), "-o", str(tmp_path / "a.png")])
+    assert isinstance(done.exception, DatasetError)
+    assert "expected a readable NetCDF dataset" in str(done.exception)
