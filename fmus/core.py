@@ -56,7 +56,14 @@ class Contact:
 
 
 @lru_cache(maxsize=1)
-def _library() -> ctypes.CDLL:
+def core_library() -> ctypes.CDLL:
+    """Return the shared library of the core, loaded once.
+
+    Raises
+    ------
+    ComponentError
+        It is not built.
+    """
     suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
     path = Path(str(files("vibroimpact.fmus"))) / "built" / f"libvibroimpact_core{suffix}"
     try:
@@ -117,7 +124,7 @@ def flow(
     """
     end = _pair()
     body = oscillator._as_structure()
-    if _library().vi_door_flow(body, phase, _pair(*state), held, held_rate, duration, end) != 0:
+    if core_library().vi_door_flow(body, phase, _pair(*state), held, held_rate, duration, end) != 0:
         raise UsageError(
             "flow: expected finite arguments, mass > 0, and damping, stiffness, "
             f"angular_frequency, duration >= 0, got {oscillator}, state {state}, duration {duration}."
@@ -146,7 +153,7 @@ def next_contact(
     """
     found = _pair()
     body = oscillator._as_structure()
-    status = _library().vi_door_next_contact(
+    status = core_library().vi_door_next_contact(
         body, phase, _pair(*state), position, SIDES.get(side, 0), duration, found
     )
     if status < 0 or side not in SIDES:

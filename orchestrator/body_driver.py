@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.archive import UnpackedFmu, unpack
 from vibroimpact.fmus.fmpy_door import read_description
-from vibroimpact.orchestrator.fmi.instance3 import DISCARD, Instance3
+from vibroimpact.orchestrator.fmi.instance import DISCARD
+from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 
 ROW_WIDTH = 8

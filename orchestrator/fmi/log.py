@@ -1,27 +1,59 @@
-"""The last lines that an instance logged; a component that logs without end costs no memory."""
+"""The last lines that an instance logged, kept by C code in memory that may be shared with another process.
+
+A component that logs a million lines costs no memory and no call into Python.
+"""
 
 from __future__ import annotations
 
-from collections import deque
+import ctypes
 
-LINES_KEPT = 20
-LONGEST_LINE = 500
+from vibroimpact.fmus.core import core_library
+
+LINES = 20
+LENGTH = 480
+
+
+class _Ring(ctypes.Structure):
+    _fields_ = [("count", ctypes.c_uint64), ("lines", (ctypes.c_char * LENGTH) * LINES)]
+
+
+RING_SIZE = ctypes.sizeof(_Ring)
 
 
 class LogTail:
-    """Keeps the last lines that a component logged, for the message of an error."""
+    """Keeps the last lines that a component logged, for the message of an error.
 
-    def __init__(self) -> None:
-        self._lines: deque[str] = deque(maxlen=LINES_KEPT)
-        self.count = 0
+    Parameters
+    ----------
+    memory : memoryview or None
+        `RING_SIZE` writable bytes to keep them in, such as shared memory; None: memory of its own.
+    """
 
-    def add(self, status: int, text: bytes | None) -> None:
-        """Take one line from the component."""
-        self.count += 1
-        self._lines.append((text or b"")[:LONGEST_LINE].decode("utf-8", "replace"))
+    def __init__(self, memory: memoryview | None = None) -> None:
+        self._ring = _Ring() if memory is None else _Ring.from_buffer(memory)
+        self._read = 0
+
+    @property
+    def environment(self) -> ctypes.c_void_p:
+        """Pointer for the component's callbacks."""
+        return ctypes.c_void_p(ctypes.addressof(self._ring))
+
+    @property
+    def count(self) -> int:
+        """Lines logged so far."""
+        return int(self._ring.count)
 
     def take(self) -> tuple[str, ...]:
-        """Return the lines kept, and forget them."""
-        lines = tuple(self._lines)
-        self._lines.clear()
-        return lines
+        """Return the last lines since the call before, oldest first."""
+        first = max(self._read, self.count - LINES)
+        self._read = self.count
+        return tuple(self._line(i % LINES) for i in range(first, self._read))
+
+    def _line(self, slot: int) -> str:
+        return bytes(self._ring.lines[slot].value).decode("utf-8", "replace")
+
+
+def callback(name: str) -> ctypes.c_void_p:
+    """Return the address of one of the core library's callbacks: `fmi2`, `fmi3`, `allocate`, `free`."""
+    function = getattr(core_library(), f"vi_log_ring_{name}")
+    return ctypes.cast(function, ctypes.c_void_p)

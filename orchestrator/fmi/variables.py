@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 #: Raises when the status of a call is worse than a warning.
 Check = Callable[[int, str], None]
+Call = Callable[[], int]
 
 
 class VariableGroup:
@@ -20,16 +21,17 @@ class VariableGroup:
     Attributes
     ----------
     values : ndarray
-        The buffer: `get` fills it, `set` sends it. Float64, int64, int32 or bool, by the variables' type.
+        The buffer: `get` fills it, `set` sends it. Its type is that of the variables in C.
+    get_call, set_call : callable
+        The bare calls, which return FMI's status: for paths that check it themselves.
     """
 
-    __slots__ = ("_check", "_get", "_name", "_set", "values")
+    __slots__ = ("_check", "_name", "_references", "get_call", "set_call", "values")
 
     def __init__(
         self,
         name: str,
-        getter: Callable[..., int],
-        setter: Callable[..., int],
+        functions: tuple[Callable[..., int], Callable[..., int]],
         instance: ctypes.c_void_p,
         references: Sequence[int],
         values: NDArray[Any],
@@ -37,31 +39,45 @@ class VariableGroup:
         *,
         with_value_count: bool,
     ) -> None:
+        if not values.flags.c_contiguous:
+            raise ValueError("values: expected a contiguous buffer")
         self.values = values
         self._name = name
         self._check = check
-        count = ctypes.c_size_t(len(references))
-        refs = (ctypes.c_uint32 * max(1, len(references)))(*references)
-        buffer = ctypes.c_void_p(values.ctypes.data)
+        self._references = (ctypes.c_uint32 * max(1, len(references)))(*references)
         tail = (ctypes.c_size_t(values.size),) if with_value_count else ()
-        self._get = partial(getter, instance, refs, count, buffer, *tail)
-        self._set = partial(setter, instance, refs, count, buffer, *tail)
+        arguments = (
+            instance,
+            ctypes.byref(self._references),
+            ctypes.c_size_t(len(references)),
+            ctypes.c_void_p(values.ctypes.data),
+            *tail,
+        )
+        self.get_call: Call = partial(functions[0], *arguments)
+        self.set_call: Call = partial(functions[1], *arguments)
 
     def get(self) -> NDArray[Any]:
         """Read the variables; returns the buffer."""
-        status = self._get()
+        status = self.get_call()
         if status > 1:
             self._check(status, "Get" + self._name)
         return self.values
 
     def set(self) -> None:
         """Write the buffer to the variables."""
-        status = self._set()
+        status = self.set_call()
         if status > 1:
             self._check(status, "Set" + self._name)
 
 
-def buffer_of(kind: str, size: int) -> NDArray[Any]:
-    """Return a zeroed buffer for `size` values of an FMI type."""
-    types = {"Float64": np.float64, "Int64": np.int64, "Int32": np.int32, "Boolean": np.bool_}
-    return np.zeros(size, dtype=types[kind])
+#: C types of values by FMI type, for the versions that differ.
+DTYPES: dict[str, dict[str, Any]] = {
+    "3.0": {
+        "Float64": np.float64, "Float32": np.float32, "Boolean": np.bool_,
+        "Int64": np.int64, "Int32": np.int32, "Int16": np.int16, "Int8": np.int8,
+        "UInt64": np.uint64, "UInt32": np.uint32, "UInt16": np.uint16, "UInt8": np.uint8,
+    },
+    "2.0": {"Float64": np.float64, "Int64": np.int32, "Boolean": np.int32},
+}  # fmt: skip
+#: FMI 2.0's names of the types above.
+FMI2_NAMES = {"Float64": "Real", "Int64": "Integer", "Boolean": "Boolean"}

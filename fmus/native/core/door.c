@@ -5,14 +5,6 @@
 
 #include "body.h"
 
-#if defined(_WIN32)
-#define DOOR __declspec(dllexport)
-#elif defined(__GNUC__)
-#define DOOR __attribute__((visibility("default")))
-#else
-#define DOOR
-#endif
-
 static bool start(vi_body *body, const vi_door_oscillator *o, double phase, const double state[2])
 {
     memset(body, 0, sizeof *body);
@@ -39,7 +31,7 @@ static bool advance(vi_body *body, double duration)
            && vi_body_advance(body, target, &request) != VI_STEP_ERROR;
 }
 
-DOOR int vi_door_flow(const vi_door_oscillator *oscillator, double phase, const double state[2], double held,
+VI_DOOR int vi_door_flow(const vi_door_oscillator *oscillator, double phase, const double state[2], double held,
                       double held_rate, double duration, double end[2])
 {
     vi_body body;
@@ -55,7 +47,7 @@ DOOR int vi_door_flow(const vi_door_oscillator *oscillator, double phase, const 
     return 0;
 }
 
-DOOR int vi_door_next_contact(const vi_door_oscillator *oscillator, double phase, const double state[2],
+VI_DOOR int vi_door_next_contact(const vi_door_oscillator *oscillator, double phase, const double state[2],
                               double position, int side, double duration, double contact[2])
 {
     vi_body body;

@@ -2,6 +2,15 @@
 #ifndef VIBROIMPACT_DOOR_H
 #define VIBROIMPACT_DOOR_H
 
+/* Seen from outside the library whatever the compiler hides by default. */
+#if defined(_WIN32)
+#define VI_DOOR __declspec(dllexport)
+#elif defined(__GNUC__)
+#define VI_DOOR __attribute__((visibility("default")))
+#else
+#define VI_DOOR
+#endif
+
 /* A forced oscillator, SI units. */
 typedef struct {
     double mass, damping, stiffness, amplitude, angular_frequency;

@@ -1,0 +1,30 @@
+/* The last lines that a component logged, kept in memory that the importer gives (shared memory survives a crash).
+ *
+ * A component may log without end: nothing is allocated and nothing calls back into Python. FMI 2.0's logger is
+ * variadic, which Python cannot receive.
+ */
+#ifndef VIBROIMPACT_LOG_RING_H
+#define VIBROIMPACT_LOG_RING_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { VI_LOG_LINES = 20, VI_LOG_LENGTH = 480 };
+
+typedef struct {
+    uint64_t count; /* lines logged so far; line i is in lines[i % VI_LOG_LINES] */
+    char lines[VI_LOG_LINES][VI_LOG_LENGTH];
+} vi_log_ring;
+
+/* fmi3LogMessageCallback, with the ring as instance environment. */
+void vi_log_ring_fmi3(void *environment, int status, const char *category, const char *message);
+
+/* fmi2CallbackLogger, with the ring as component environment. */
+void vi_log_ring_fmi2(void *environment, const char *instance, int status, const char *category, const char *message,
+                      ...);
+
+/* fmi2CallbackAllocateMemory and fmi2CallbackFreeMemory. */
+void *vi_log_ring_allocate(size_t count, size_t size);
+void vi_log_ring_free(void *memory);
+
+#endif

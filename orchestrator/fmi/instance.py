@@ -1,0 +1,180 @@
+"""What FMI 3.0 and FMI 2.0 instances have in common; the importer works on this alone."""
+
+from __future__ import annotations
+
+import ctypes
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from ctypes import c_double, c_void_p
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.archive import UnpackedFmu
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.library import Function, Library
+from vibroimpact.orchestrator.fmi.log import LogTail
+from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
+
+OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+STATUS_WORDS = ("ok", "warning", "discard", "error", "fatal", "pending")
+
+#: Wraps a function of an FMU, given its name: for a guard that notes which call is under way.
+Wrapper = Callable[[str, Function], Function]
+
+
+class Instance(ABC):
+    """One instance of a co-simulation FMU, driven by prebound calls.
+
+    Parameters
+    ----------
+    fmu : UnpackedFmu
+        The FMU.
+    name : str
+        Instance name, used in messages.
+    log : LogTail or None
+        Where its log lines go; None: a tail of its own.
+    wrap : callable or None
+        Wraps each function of the FMU that is bound.
+
+    Attributes
+    ----------
+    time : float
+        The time reached by the last `step`, s.
+    needs_event_mode, returned_early, wants_to_end : bool
+        What the last `step` said (FMI 3.0; False in FMI 2.0).
+    """
+
+    fmi_version: ClassVar[str]
+    prefix: ClassVar[str]
+
+    def __init__(
+        self, fmu: UnpackedFmu, name: str, *, log: LogTail | None = None, wrap: Wrapper | None = None
+    ) -> None:
+        self.fmu = fmu
+        self.name = name
+        self.log = log or LogTail()
+        self.time = 0.0
+        self.needs_event_mode = self.returned_early = self.wants_to_end = False
+        self._library = Library(fmu)
+        self._wrap = wrap
+        self._pointer = c_void_p()
+        self._step_time, self._step_size = c_double(), c_double()
+
+    # ---- binding ----
+
+    def _function(self, name: str, result: Any = ctypes.c_int) -> Function:
+        found = self._library.function(self.prefix + name, result)
+        return found if self._wrap is None else self._wrap(self.prefix + name, found)
+
+    def _bound(self, name: str, *arguments: Any) -> Callable[[], int]:
+        return partial(self._function(name), self._pointer, *arguments)
+
+    def check(self, status: int, function: str) -> None:
+        """Raise ComponentError when `status` is worse than a warning."""
+        if status > WARNING or status < OK:
+            word = STATUS_WORDS[status] if 0 <= status < len(STATUS_WORDS) else f"status {status}"
+            self._fail(function, f"returned {word} at time {self.time:.17g}")
+
+    def _fail(self, function: str, what: str) -> None:
+        lines = self.log.take()
+        reason = lines[-1] if lines else "the component logged nothing"
+        raise ComponentError(
+            f"{self.name}: {self.prefix}{function} {what}: {reason}",
+            instance=self.name,
+            function=self.prefix + function,
+            time=self.time,
+            log=lines,
+        )
+
+    def group(
+        self,
+        kind: str,
+        references: Sequence[int],
+        *,
+        size: int | None = None,
+        values: NDArray[Any] | None = None,
+    ) -> VariableGroup:
+        """Return a group of variables, moved in one call.
+
+        Parameters
+        ----------
+        kind : str
+            FMI 3.0's name of their type (Float64, Int64, Boolean, ...).
+        references : sequence of int
+            Value references.
+        size : int or None
+            Number of values, when some variables are arrays.
+        values : ndarray or None
+            Buffer to use; two groups may share one. None: a new one.
+        """
+        if values is None:
+            count = len(references) if size is None else size
+            values = np.zeros(count, dtype=DTYPES[self.fmi_version][kind])
+        return VariableGroup(
+            kind,
+            (self._function("Get" + self._type_name(kind)), self._function("Set" + self._type_name(kind))),
+            self._pointer,
+            references,
+            values,
+            self.check,
+            with_value_count=self.fmi_version == "3.0",
+        )
+
+    @abstractmethod
+    def _type_name(self, kind: str) -> str:
+        """FMI's name of a type in the names of its functions."""
+
+    # ---- life ----
+
+    @abstractmethod
+    def enter_initialization(self, start_time: float) -> None:
+        """Enter initialization mode at `start_time`, s."""
+
+    def exit_initialization(self) -> None:
+        """Leave initialization mode; the FMU checks its parameters here."""
+        self.check(self._exit_initialization(), "ExitInitializationMode")
+
+    def reset(self) -> None:
+        """Go back to the state after instantiation: the instance is ready for another run."""
+        self.check(self._reset(), "Reset")
+
+    def terminate(self) -> None:
+        """End the run."""
+        self.check(self._terminate(), "Terminate")
+
+    def free(self) -> None:
+        """Give the instance's memory back; it must not be used afterwards."""
+        if self._pointer:
+            self._function("FreeInstance", None)(self._pointer)
+            self._pointer.value = None
+
+    def _bind_life(self) -> None:
+        self._exit_initialization = self._bound("ExitInitializationMode")
+        self._terminate = self._bound("Terminate")
+        self._reset = self._bound("Reset")
+
+    # ---- steps ----
+
+    @abstractmethod
+    def step(self, time: float, size: float) -> int:
+        """Advance from `time` by `size`, s; returns OK, WARNING or DISCARD and sets `self.time`."""
+
+    # ---- states ----
+
+    _get_state: Function
+    _set_state: Function
+
+    def save(self, slot: c_void_p) -> None:
+        """Save the state into `slot`, which is allocated at first use and used again later."""
+        status = self._get_state(self._pointer, ctypes.byref(slot))
+        if status > WARNING:
+            self.check(status, "GetFMUState")
+
+    def restore(self, slot: c_void_p) -> None:
+        """Go back to a saved state."""
+        status = self._set_state(self._pointer, slot)
+        if status > WARNING:
+            self.check(status, "SetFMUState")

@@ -1,0 +1,107 @@
+"""One instance of an FMI 2.0 co-simulation FMU."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
+
+from vibroimpact.fmus.archive import UnpackedFmu
+from vibroimpact.orchestrator.fmi.instance import DISCARD, WARNING, Instance, Wrapper
+from vibroimpact.orchestrator.fmi.log import LogTail, callback
+from vibroimpact.orchestrator.fmi.variables import FMI2_NAMES
+
+CO_SIMULATION = 1
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_ = [
+        ("logger", c_void_p),
+        ("allocate", c_void_p),
+        ("free", c_void_p),
+        ("step_finished", c_void_p),
+        ("environment", c_void_p),
+    ]
+
+
+class Instance2(Instance):
+    """An instance of an FMI 2.0 FMU: no event mode, so steps end where they are asked to."""
+
+    fmi_version = "2.0"
+    prefix = "fmi2"
+    event_mode = False
+
+    def __init__(
+        self, fmu: UnpackedFmu, name: str, *, log: LogTail | None = None, wrap: Wrapper | None = None
+    ) -> None:
+        super().__init__(fmu, name, log=log, wrap=wrap)
+        self._callbacks = _Callbacks(
+            callback("fmi2"), callback("allocate"), callback("free"), None, self.log.environment
+        )
+        self._instantiate()
+        self._bind_life()
+        self._do_step: Callable[[], int] = self._bound("DoStep", self._step_time, self._step_size, c_int(0))
+        self._get_state = self._function("GetFMUstate")
+        self._set_state = self._function("SetFMUstate")
+
+    def _instantiate(self) -> None:
+        instantiate = self._function("Instantiate", c_void_p)
+        location = self.fmu.resources.as_uri()
+        pointer = instantiate(
+            c_char_p(self.name.encode()),
+            c_int(CO_SIMULATION),
+            c_char_p(self.fmu.token.encode()),
+            c_char_p(location.encode()),
+            ctypes.byref(self._callbacks),
+            c_int(0),
+            c_int(0),
+        )
+        if not pointer:
+            self._fail("Instantiate", f"made no instance of {self.fmu.source}")
+        self._pointer.value = pointer
+
+    def _type_name(self, kind: str) -> str:
+        return FMI2_NAMES[kind]
+
+    def enter_initialization(self, start_time: float) -> None:
+        """Set the experiment up and enter initialization mode at `start_time`, s."""
+        self.time = start_time
+        no, zero = c_int(0), c_double(0.0)
+        setup = self._function("SetupExperiment")
+        self.check(setup(self._pointer, no, zero, c_double(start_time), no, zero), "SetupExperiment")
+        self.check(self._function("EnterInitializationMode")(self._pointer), "EnterInitializationMode")
+
+    def step(self, time: float, size: float) -> int:
+        """Advance from `time` by `size`, s; returns OK, WARNING or DISCARD and sets `self.time`."""
+        self._step_time.value = time
+        self._step_size.value = size
+        status = self._do_step()
+        if status > WARNING:
+            if status != DISCARD:
+                self.check(status, "DoStep")
+            return status
+        self.time = time + size
+        return status
+
+    # ---- states ----
+
+    def free_state(self, slot: c_void_p) -> None:
+        """Give a saved state's memory back."""
+        self.check(self._function("FreeFMUstate")(self._pointer, ctypes.byref(slot)), "FreeFMUstate")
+
+    def serialize(self, slot: c_void_p) -> bytes:
+        """Return a saved state as bytes, for another process."""
+        size = c_size_t()
+        found = self._function("SerializedFMUstateSize")(self._pointer, slot, ctypes.byref(size))
+        self.check(found, "SerializedFMUstateSize")
+        buffer = ctypes.create_string_buffer(size.value)
+        self.check(self._function("SerializeFMUstate")(self._pointer, slot, buffer, size), "SerializeFMUstate")
+        return buffer.raw
+
+    def deserialize(self, data: bytes) -> c_void_p:
+        """Return a saved state made from bytes of `serialize`."""
+        slot = c_void_p()
+        read = self._function("DeSerializeFMUstate")
+        status = read(self._pointer, c_char_p(data), c_size_t(len(data)), ctypes.byref(slot))
+        self.check(status, "DeSerializeFMUstate")
+        return slot
