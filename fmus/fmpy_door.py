@@ -8,13 +8,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import fmpy
-from fmpy.model_description import ModelDescription, ValidationError, read_model_description
+from fmpy.model_description import ModelDescription, ModelVariable, ValidationError, read_model_description
 from fmpy.validation import validate_fmu
 
 from vibroimpact.fmus.archive import unpack
 from vibroimpact.fmus.errors import ComponentFileError
 
-__all__ = ["ModelDescription", "read_description", "schema_folder", "validate"]
+__all__ = ["ModelDescription", "ModelVariable", "read_description", "schema_folder", "validate"]
 
 
 def read_description(path: Path) -> ModelDescription:

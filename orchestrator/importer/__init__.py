@@ -1,0 +1,13 @@
+"""The importer (FMI's word for a co-simulation master) that couples FMUs and locates their events.
+
+Any set of co-simulation FMUs, FMI 2.0 and 3.0 mixed. An event ends the step of all of them at one instant:
+
+- FMI 3.0 with event mode: the FMU returns early at its event;
+- FMI 2.0 of ours: the FMU reports the time in `event_time`; the step is repeated to it from a saved state;
+- any FMU with states: a watched variable's crossing is found by step revision (`revision`);
+- several events in one step: the earliest wins, the others are rolled back;
+- FMUs without states are stepped last, once the end of the step is agreed.
+
+`specification` says what an importer is made of, `component` is one FMU in it, `wiring` moves values between them,
+`master` steps them, `sampling` and `energy` watch without disturbing.
+"""

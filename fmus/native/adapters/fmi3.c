@@ -245,7 +245,8 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     }
     it->outputs_stale = false;
     const double end = currentCommunicationPoint + communicationStepSize;
-    *lastSuccessfulTime = result == VI_STEP_DONE ? end : vi_this_component.time(it->self);
+    const double reached = vi_this_component.time(it->self); /* a contact may lie within rounding after the end */
+    *lastSuccessfulTime = result == VI_STEP_DONE || reached > end ? end : reached;
     if (result == VI_STEP_IMPACT_LIMIT) {
         log_message(it, fmi3Discard, "logStatusWarning", "fmi3DoStep: impact_limit reached");
         return fmi3Discard;
@@ -325,7 +326,7 @@ static void write_boolean(void *field, void *values, size_t first, size_t count)
     fmi3Status fmi3Get##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
                              size_t nValueReferences, CTYPE values[], size_t nValues)                                \
     {                                                                                                                \
-        return status(instance != NULL && valueReferences != NULL && values != NULL                                  \
+        return status(instance != NULL && (nValueReferences == 0 || (valueReferences != NULL && values != NULL))      \
                       && vi_instance_get(instance, "fmi3Get" #NAME, TYPE, valueReferences, nValueReferences, values, \
                                          nValues, CONVERT));                                                         \
     }
@@ -333,7 +334,7 @@ static void write_boolean(void *field, void *values, size_t first, size_t count)
     fmi3Status fmi3Set##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
                              size_t nValueReferences, const CTYPE values[], size_t nValues)                          \
     {                                                                                                                \
-        return status(instance != NULL && valueReferences != NULL && values != NULL                                  \
+        return status(instance != NULL && (nValueReferences == 0 || (valueReferences != NULL && values != NULL))      \
                       && vi_instance_set(instance, "fmi3Set" #NAME, TYPE, valueReferences, nValueReferences, values, \
                                          nValues, CONVERT));                                                         \
     }

@@ -114,6 +114,12 @@ static void refresh_outputs(vi_instance *instance)
     instance->outputs_stale = false;
 }
 
+static bool all_values_used(vi_instance *instance, const char *function, size_t used, size_t given)
+{
+    return used == given || vi_instance_fail(instance, function, "expected %lu values, got %lu", (unsigned long)used,
+                                             (unsigned long)given);
+}
+
 bool vi_instance_get(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
                      void *values, size_t value_count, vi_convert convert)
 {
@@ -133,7 +139,7 @@ bool vi_instance_get(vi_instance *instance, const char *function, int type, cons
         convert((char *)instance->self + variable->offset, values, first, variable->count);
         first += variable->count;
     }
-    return true;
+    return all_values_used(instance, function, first, value_count);
 }
 
 static bool may_set(vi_instance *instance, const char *function, const vi_variable *variable, uint32_t reference)
@@ -166,7 +172,7 @@ bool vi_instance_set(vi_instance *instance, const char *function, int type, cons
         first += variable->count;
     }
     instance->outputs_stale = true;
-    return true;
+    return all_values_used(instance, function, first, value_count);
 }
 
 /* ---- saved states: a header, then the used part of the component's struct ---- */

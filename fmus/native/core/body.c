@@ -8,8 +8,6 @@
 
 /* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
 static const double LANDING = 1e-13;
-/* A bounce shorter than this over the fastest rate is followed from the stop, not from the origin. */
-static const double LOW_BOUNCE = 0.1;
 /* Rounding of a displacement, in units of the terms it is the sum of. */
 static const double ROUNDING = 4.0 * DBL_EPSILON;
 
@@ -128,14 +126,16 @@ static bool free_for_ever(const vi_body *body, const vi_segment *segment)
 /* Move the body by u seconds to displacement x and velocity v; the two named ends are met exactly. */
 static void move(vi_body *body, double u, double x, double v, segment_end end, vi_instant target)
 {
+    const vi_instant after = end == ENDS_AT_TARGET ? target : vi_clock_after(&body->clock, body->now, u);
     body->displacement = x;
     body->velocity = v;
     body->leaving = 0;
-    if (end == ENDS_AT_PERIOD) {
+    /* a contact may be so close before a period's end that rounding puts it there */
+    if (end == ENDS_AT_PERIOD || (body->record.periods && after.periods > body->now.periods)) {
         body->now = (vi_instant){body->now.periods + 1, 0.0};
         vi_record_period(&body->record, vi_clock_time(&body->clock, body->now), x, v);
     } else {
-        body->now = end == ENDS_AT_TARGET ? target : vi_clock_after(&body->clock, body->now, u);
+        body->now = after;
     }
 }
 
@@ -146,6 +146,13 @@ static double landing_room(const vi_body *body)
         external = external || body->contacts[k].law == VI_LAW_EXTERNAL;
     }
     return external ? LANDING * (1.0 + fabs(vi_clock_time(&body->clock, body->now))) : 0.0;
+}
+
+/* A contact found by rounding just past the end of the period or of the step is at its end. */
+static segment_end landing(segment_end end, double u, double length, double room)
+{
+    const bool past = end == ENDS_AT_PERIOD ? u >= length : u > length + room;
+    return past ? end : ENDS_ANYWHERE;
 }
 
 /* A contact with an external law: stop there and wait, or (FMI 2.0) note its time and fly through. */
@@ -185,7 +192,7 @@ static double low_bounce(const vi_body *body, vi_phase phase, double held)
         const double sign = direction(body, k);
         const double clearance = fmax(0.0, sign * (body->contacts[k].position - body->displacement));
         const double flight = vi_parabola_root(clearance, sign * body->velocity, sign * free_acceleration);
-        if (flight > 0.0 && flight * body->mode.fastest < LOW_BOUNCE) {
+        if (flight > 0.0 && flight * body->mode.fastest < VI_LOW_BOUNCE) {
             return 2.0 * flight;
         }
     }
@@ -235,7 +242,7 @@ static void fly(vi_body *body, vi_instant target, const vi_step_request *request
     if (k < 0) {
         move(body, u, segment.origin + m.x, m.v, whole ? end : ENDS_ANYWHERE, target);
     } else {
-        move(body, u, body->contacts[k].position, direction(body, k) * approach, ENDS_ANYWHERE, target);
+        move(body, u, body->contacts[k].position, direction(body, k) * approach, landing(end, u, length, room), target);
         meet(body, k, approach, vi_clock_elapsed(&body->clock, body->now, target), request);
     }
 }
@@ -248,7 +255,7 @@ static double time_to_release(const vi_body *body, int k, double length, bool *r
     const double sign = direction(body, k), w = body->clock.angular_frequency;
     const double stop = body->contacts[k].position, held = vi_body_held_now(body);
     const double force = fabs(body->mode.force), fourth = force * w * w * w * w;
-    const double noise = ROUNDING * (force + fabs(held) + body->mode.stiffness * fabs(stop));
+    const double noise = vi_body_pressure_noise(body, stop);
     double u = 0.0;
     *released = false;
     while (u < length) {
@@ -283,7 +290,8 @@ static bool pressed_for_ever(const vi_body *body, int k)
 static void release(vi_body *body)
 {
     vi_contact *contact = &body->contacts[body->stuck - 1];
-    contact->stick_end = fmax(contact->stick_start, vi_clock_time(&body->clock, body->now));
+    contact->stick_end = vi_clock_time(&body->clock, body->now);
+    contact->stick_start = fmin(contact->stick_start, contact->stick_end); /* lifted before the chatter had ended */
     vi_record_stick(&body->record, contact->stick_start, contact->stick_end, body->stuck, body->tail_impulse);
     contact->stuck = 0;
     body->stuck = 0;
@@ -325,8 +333,7 @@ static void settle(vi_body *body, int k, const vi_step_request *request)
     const double held = vi_body_held_now(body);
     double pressure, slope;
     vi_mode_held(&body->mode, contact->position, vi_body_phase_now(body), held, body->held_rate, &pressure, &slope);
-    const double noise =
-        ROUNDING * (fabs(body->mode.force) + fabs(held) + body->mode.stiffness * fabs(contact->position));
+    const double noise = vi_body_pressure_noise(body, contact->position);
     const bool leaves = sign * slope < 0.0 || body->leaving;
     if (sign * pressure > noise || (sign * pressure >= -noise && !leaves)) {
         body->leaving = 0;
@@ -353,6 +360,7 @@ void vi_body_start(vi_body *body, vi_instant now, double displacement, double ve
     body->velocity = velocity;
     body->stuck = body->leaving = body->pending = body->passed = 0;
     body->fastest_impact = body->tail_impulse = 0.0;
+    body->low_impacts = 0;
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
         vi_contact *contact = &body->contacts[k];
         contact->mass = body->mass;
@@ -390,9 +398,11 @@ vi_step_result vi_body_advance(vi_body *body, vi_instant target, const vi_step_r
     vi_record_begin_step(&body->record, body->displacement);
     settle_all(body, request);
     open_first_period(body);
+    /* a record that is full already was not emptied by the importer: ending the step again would end it for ever */
+    const bool ends_when_full = request->early_return && !vi_record_full(&body->record);
     const int64_t most = body->impact_limit > 0 ? impacts_so_far(body) + body->impact_limit : INT64_MAX;
     while (!body->pending && vi_clock_elapsed(&body->clock, body->now, target) > 0.0) {
-        if (vi_record_full(&body->record) && request->early_return) {
+        if (ends_when_full && vi_record_full(&body->record)) {
             return VI_STEP_RECORD_FULL;
         }
         if (impacts_so_far(body) >= most) {

@@ -47,6 +47,7 @@ typedef struct {
     int32_t pending;        /* 0, or the contact (1-based) whose external law must answer */
     int32_t passed;         /* 0, or the external contact that the last step passed through (FMI 2.0) */
     double fastest_impact;  /* largest approach since the last stick, m/s: the scale of a chatter sequence */
+    int64_t low_impacts;    /* impacts in a row that are far below that scale */
     double tail_impulse;    /* of the chatter summed at the last stick, N s */
     vi_contact contacts[VI_BODY_CONTACTS];
     vi_record record; /* last */
@@ -66,8 +67,5 @@ void vi_body_resolve(vi_body *body);
 
 /* Relative acceleration, and the contacts' outputs, at the present instant. */
 double vi_body_outputs(vi_body *body);
-
-/* Size of displacements that double precision cannot tell apart here, m. */
-double vi_body_resolution(const vi_body *body, double position);
 
 #endif

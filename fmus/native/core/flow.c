@@ -4,6 +4,10 @@
 
 /* The steady response may be this many times larger than the motion before the split loses too many digits. */
 static const double LARGEST_SPLIT = 8.0;
+/* A stiff dashpot may cost more than this many units of 1 / fastest rate to follow by series; then the split is taken
+ * up to the second ratio: its error, 1e-16 of the steady response, is a time error of 1e-16 of the slow decay time. */
+static const double LONGEST_SERIES = 1e4;
+static const double LARGEST_SPLIT_OVERDAMPED = 1e10;
 /* Length of a series segment times the fastest rate: the 21st term is below 1e-17 of the first. */
 static const double SERIES_REACH = 0.7;
 
@@ -93,21 +97,23 @@ static propagator propagate(const vi_mode *mode, double u)
 
 /* ---- the split form ---- */
 
-static double motion_scale(const vi_segment *s, double x, double v)
+/* The steady response that may be split off: a multiple of the displacements that the segment shows. */
+static double largest_split(const vi_segment *s, double x, double v)
 {
     const vi_mode *mode = s->mode;
-    if (mode->fastest == 0.0) {
-        return fabs(x) + fabs(v);
+    const double load = fabs(mode->force) + fabs(s->held);
+    if (mode->regime == VI_OVERDAMPED && mode->fastest * s->length > LONGEST_SERIES) {
+        return LARGEST_SPLIT_OVERDAMPED * (fabs(x) + (fabs(v) + load * s->length) / mode->fast);
     }
-    const double time = 1.0 / mode->fastest;
-    return fabs(x) + (fabs(v) + (fabs(mode->force) + fabs(s->held)) * time) * time;
+    const double time = mode->fastest * s->length > 1.0 ? 1.0 / mode->fastest : s->length;
+    return LARGEST_SPLIT * (fabs(x) + (fabs(v) + load * time) * time);
 }
 
 /* Try to split off the steady response and the level of the held input; false when digits would be lost. */
 static bool split(vi_segment *s, double x, double v)
 {
     const vi_mode *mode = s->mode;
-    const double most = LARGEST_SPLIT * motion_scale(s, x, v);
+    const double most = largest_split(s, x, v);
     if ((mode->force != 0.0 && !mode->steady_exists) || mode->steady_amplitude > most) {
         return false;
     }

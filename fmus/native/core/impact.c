@@ -11,10 +11,28 @@ static const double TAIL_VELOCITY = 1e-4;
 static const double TAIL_ERROR = 1e-16;
 /* A bounce lower than this times the resolution of displacements cannot be followed: the body rests. */
 static const double LOWEST_BOUNCE = 8.0;
+/* After so many impacts far down a sequence the body rests: only restitution (almost) 1 with damping gets there, whose
+ * chatter has no end (or none in reach). */
+static const int64_t MOST_LOW_IMPACTS = 4000000;
+/* The steady response counts in the resolution up to this multiple of what the force does within one radian. */
+static const double LARGEST_STEADY = 8.0;
 
-double vi_body_resolution(const vi_body *body, double position)
+/* Size of displacements that double precision cannot tell apart at a contact, m. Low bounces are followed from the
+ * stop: of the motion only the stop's position is rounded. */
+static double resolution(const vi_body *body, double position, double pressure, double approach)
 {
-    return DBL_EPSILON * (fabs(position) + body->mode.steady_amplitude);
+    const vi_mode *mode = &body->mode;
+    if (pressure > 0.0 && 2.0 * approach * mode->fastest < VI_LOW_BOUNCE * pressure) {
+        return DBL_EPSILON * fabs(position);
+    }
+    const double most = LARGEST_STEADY * fabs(mode->force) / (mode->fastest * mode->fastest);
+    return DBL_EPSILON * (fabs(position) + vi_min(most, mode->steady_amplitude));
+}
+
+double vi_body_pressure_noise(const vi_body *body, double position)
+{
+    return 4.0 * DBL_EPSILON
+           * (fabs(body->mode.force) + fabs(vi_body_held_now(body)) + body->mode.stiffness * fabs(position));
 }
 
 /* The end of a chatter sequence that leaves the stop at speed `rebound`, pressed at acceleration `pressure`. */
@@ -32,7 +50,9 @@ static chatter_tail sum_tail(const vi_body *body, double pressure, double slope,
     const double relative = (fabs(slope) / pressure + drag) * s;
     const double bend = fabs(mode->force) * mode->angular_frequency * mode->angular_frequency * s * s / pressure;
     chatter_tail tail;
-    tail.duration = s - s * s / 3.0 * (slope / pressure + 0.5 * drag);
+    /* 3.1 to second order in s; for r near 1, where s is long, drag g = 2 decay turns it into ln(1 + g s/3)/(g/3) */
+    const double dragged = drag * s / 3.0;
+    tail.duration = (dragged > 0.0 ? s * (log1p(dragged) / dragged) : s) - s * s / 3.0 * (slope / pressure);
     tail.error = s * (relative * relative + bend);
     tail.complete = relative + bend < 0.25;
     return tail;
@@ -45,39 +65,58 @@ void vi_body_stick(vi_body *body, int k, double delay, double tail_impulse)
     body->velocity = 0.0;
     body->tail_impulse = tail_impulse;
     body->fastest_impact = 0.0;
+    body->low_impacts = 0;
     contact->stuck = 1;
     contact->stick_start = vi_clock_time(&body->clock, vi_clock_after(&body->clock, body->now, delay));
     contact->stick_end = NAN;
 }
 
-/* Rest on stop k now if the bounces still to come can be summed (or are too low to be followed); `pressure` is the
- * acceleration towards the stop, `slope` its rate. */
-static void rest_if_summable(vi_body *body, int k, double pressure, double slope, double rebound, double restitution)
+/* The moment of an impact or graze. */
+typedef struct {
+    double pressure, slope; /* acceleration towards the stop of the body held there, m/s^2, and its rate */
+    double rebound;         /* speed after it, m/s */
+    double restitution;
+    double resolution; /* of displacements, m */
+} touch;
+
+/* Rest on stop k now if the bounces still to come can be summed (or are too low, or too many, to be followed). */
+static void rest_if_summable(vi_body *body, int k, const touch *t)
 {
-    const vi_contact *contact = &body->contacts[k];
-    if (!(pressure > 0.0)) {
+    if (t->rebound == 0.0 && t->slope >= 0.0
+        && fabs(t->pressure) <= vi_body_pressure_noise(body, body->contacts[k].position)) {
+        vi_body_stick(body, k, 0.0, 0.0); /* neither pressed nor lifted */
         return;
     }
-    const bool lowest =
-        rebound * rebound <= 2.0 * pressure * LOWEST_BOUNCE * vi_body_resolution(body, contact->position);
-    if (restitution == 1.0) {
-        if (lowest) {
-            vi_body_stick(body, k, 0.0, 0.0);
+    if (!(t->pressure > 0.0)) {
+        return;
+    }
+    const bool lowest = t->rebound * t->rebound <= 2.0 * t->pressure * LOWEST_BOUNCE * t->resolution;
+    const bool loses = t->restitution < 1.0 || body->mode.decay > 0.0;
+    const bool endless = loses && body->low_impacts > MOST_LOW_IMPACTS;
+    if (t->restitution < 1.0) {
+        const chatter_tail tail = sum_tail(body, t->pressure, t->slope, t->rebound, t->restitution);
+        const double precise = body->mode.fastest > 0.0 ? TAIL_ERROR / body->mode.fastest : HUGE_VAL;
+        if (tail.complete && (lowest || endless || tail.error <= precise)) {
+            const double impulse = body->mass * (1.0 + t->restitution) * t->rebound / (1.0 - t->restitution);
+            vi_body_stick(body, k, fmax(0.0, tail.duration), impulse);
+            return;
         }
-        return;
     }
-    const chatter_tail tail = sum_tail(body, pressure, slope, rebound, restitution);
-    const double precise = body->mode.fastest > 0.0 ? TAIL_ERROR / body->mode.fastest : HUGE_VAL;
-    if (tail.complete && (lowest || tail.error <= precise)) {
-        const double impulse = body->mass * (1.0 + restitution) * rebound / (1.0 - restitution);
-        vi_body_stick(body, k, fmax(0.0, tail.duration), impulse);
+    if (endless || (lowest && t->restitution == 1.0)) {
+        vi_body_stick(body, k, 0.0, 0.0);
     }
 }
 
-/* Below this speed a touch cannot be told from a miss: the penetration it stands for is below the resolution. */
-static double undecidable_velocity(const vi_body *body, int k, double acceleration)
+static void count_impact(vi_body *body, int k, double approach, double restitution)
 {
-    return sqrt(2.0 * fabs(acceleration) * vi_body_resolution(body, body->contacts[k].position));
+    vi_contact *contact = &body->contacts[k];
+    contact->count += 1;
+    contact->last_time = vi_clock_time(&body->clock, body->now);
+    contact->last_phase = vi_clock_phase(&body->clock, body->now);
+    contact->last_velocity = approach;
+    contact->impulse = body->mass * (1.0 + restitution) * approach;
+    vi_record_impact(&body->record, contact->last_time, contact->last_phase, approach, contact->impulse, k + 1,
+                     restitution);
 }
 
 void vi_body_impact(vi_body *body, int k, double approach, double restitution)
@@ -87,23 +126,23 @@ void vi_body_impact(vi_body *body, int k, double approach, double restitution)
     double acceleration, slope;
     vi_mode_held(&body->mode, contact->position, vi_body_phase_now(body), vi_body_held_now(body), body->held_rate,
                  &acceleration, &slope);
-    const bool graze = approach <= undecidable_velocity(body, k, acceleration);
+    const touch t = {sign * acceleration, sign * slope, rebound, restitution,
+                     resolution(body, contact->position, sign * acceleration, approach)};
+    /* below this speed a touch cannot be told from a miss: it stands for less penetration than can be resolved */
+    const bool graze = approach * approach <= 2.0 * fabs(acceleration) * t.resolution;
     body->displacement = contact->position;
     body->velocity = -sign * rebound;
     if (graze) {
         contact->graze_count += 1;
     } else {
-        contact->count += 1;
-        contact->last_time = vi_clock_time(&body->clock, body->now);
-        contact->last_phase = vi_clock_phase(&body->clock, body->now);
-        contact->last_velocity = approach;
-        contact->impulse = body->mass * (1.0 + restitution) * approach;
-        vi_record_impact(&body->record, contact->last_time, contact->last_phase, approach, contact->impulse, k + 1,
-                         restitution);
+        count_impact(body, k, approach, restitution);
     }
-    body->fastest_impact = fmax(body->fastest_impact, approach);
+    body->fastest_impact = vi_max(body->fastest_impact, approach);
     if (rebound <= TAIL_VELOCITY * body->fastest_impact || graze) {
-        rest_if_summable(body, k, sign * acceleration, sign * slope, rebound, restitution);
+        body->low_impacts += 1;
+        rest_if_summable(body, k, &t);
+    } else {
+        body->low_impacts = 0;
     }
 }
 

@@ -14,6 +14,12 @@ vi_phase vi_body_phase_now(const vi_body *body);
  * let the body rest when the chatter that follows can be summed. equations.md 1.6, 3.1. */
 void vi_body_impact(vi_body *body, int k, double approach, double restitution);
 
+/* Rounding of the contact acceleration of a body held at `position`, m/s^2. */
+double vi_body_pressure_noise(const vi_body *body, double position);
+
+/* A bounce shorter than this over the fastest rate is followed from the stop, not from the origin. */
+#define VI_LOW_BOUNCE 0.1
+
 /* Rest on stop k; the stick begins `delay` seconds from now (the summed chatter), with that chatter's impulse, N s. */
 void vi_body_stick(vi_body *body, int k, double delay, double tail_impulse);
 

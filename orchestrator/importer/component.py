@@ -1,0 +1,140 @@
+"""One component of an importer: its instance, its variables, what it can do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from ctypes import c_void_p
+from functools import lru_cache
+from pathlib import Path
+
+from vibroimpact.fmus.archive import unpack
+from vibroimpact.fmus.errors import ComponentError, ComponentFileError
+from vibroimpact.fmus.fmpy_door import ModelDescription, ModelVariable, read_description
+from vibroimpact.orchestrator.fmi.instance import Instance, Wrapper
+from vibroimpact.orchestrator.fmi.instance2 import Instance2
+from vibroimpact.orchestrator.fmi.instance3 import Instance3
+from vibroimpact.orchestrator.fmi.log import LogTail
+from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.importer.specification import ComponentSpec
+
+#: FMI types by the kind of call that moves them in FMI 3.0; FMI 2.0's names are translated.
+KINDS = {"Real": "Float64", "Integer": "Int64", "Enumeration": "Int64"}
+
+Value = float | int | bool | str
+
+
+@lru_cache(maxsize=64)
+def description_of(fmu: Path) -> ModelDescription:
+    """Return the description of an FMU file, read once for each process."""
+    return read_description(fmu)
+
+
+def kind_of(variable: ModelVariable) -> str:
+    """Return the kind of a variable: the FMI 3.0 name of the calls that move it."""
+    return KINDS.get(variable.type, variable.type)
+
+
+class Component:
+    """An FMU in an importer.
+
+    Parameters
+    ----------
+    spec : ComponentSpec
+        What it is.
+    log : LogTail or None
+        Where its log lines go.
+    wrap : callable or None
+        Wraps each function of the FMU.
+
+    Attributes
+    ----------
+    has_states : bool
+        It can go back to a saved state.
+    event_mode : bool
+        It handles events in event mode and may return early.
+    event_times : VariableGroup or None
+        FMI 2.0: the variables that report the first event of the last step.
+    """
+
+    def __init__(self, spec: ComponentSpec, *, log: LogTail | None = None, wrap: Wrapper | None = None) -> None:
+        self.spec = spec
+        self.name = spec.name
+        description = description_of(spec.fmu)
+        interface = description.coSimulation
+        if interface is None:
+            raise ComponentFileError(f"{spec.fmu}: expected an FMU with co-simulation, got model exchange only.")
+        self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
+        self.depends = _dependencies(description)
+        self.has_states = bool(interface.canGetAndSetFMUstate)
+        version = 3 if description.fmiVersion.startswith("3") else 2
+        self.event_mode = version == 3 and bool(interface.hasEventMode)
+        fmu = unpack(spec.fmu)
+        self.instance: Instance2 | Instance3 = (
+            Instance3(fmu, spec.name, event_mode=self.event_mode, log=log, wrap=wrap)
+            if version == 3
+            else Instance2(fmu, spec.name, log=log, wrap=wrap)
+        )
+        self.sha256 = fmu.sha256
+        self.at_start, self.at_end = c_void_p(), c_void_p()
+        self.event_times = self._event_time_group() if version == 2 and self.has_states else None
+
+    def _event_time_group(self) -> VariableGroup | None:
+        names = [
+            name
+            for name, variable in self.variables.items()
+            if name.split(".")[-1] == "event_time" and variable.causality == "output"
+        ]
+        return self.group("Float64", names) if names else None
+
+    def group(self, kind: str, names: Sequence[str]) -> VariableGroup:
+        """Return a group of this component's variables, by name."""
+        return self.instance.group(kind, [self.variables[name].valueReference for name in names])
+
+    def begin(self, values: Mapping[str, Value], start_time: float, *, first: bool) -> None:
+        """Set parameters and start values and enter initialization mode."""
+        if not first:
+            self.instance.reset()
+        for name, value in {**self.spec.parameters, **values}.items():
+            self._set_start(name, value)
+        self.instance.enter_initialization(start_time)
+
+    def _set_start(self, name: str, value: Value) -> None:
+        variable = self.variables[name]
+        kind = kind_of(variable)
+        group = self.group(kind, [name])
+        if isinstance(value, str):
+            value = _item_value(self.name, variable, value)
+        group.values[0] = value
+        group.set()
+
+    def free(self) -> None:
+        """Give back its saved states and its instance."""
+        for slot in (self.at_start, self.at_end):
+            if slot:
+                self.instance.free_state(slot)
+        self.instance.free()
+
+
+def _item_value(component: str, variable: ModelVariable, name: str) -> int:
+    """Value of an enumeration's item."""
+    items = variable.declaredType.items if variable.declaredType is not None else []
+    for item in items:
+        if item.name == name:
+            return int(item.value)
+    known = ", ".join(str(item.name) for item in items) or "none: it is no enumeration"
+    raise ComponentError(
+        f"{component}.{variable.name}: expected one of {known}, got {name!r}.", instance=component
+    )
+
+
+def _dependencies(description: ModelDescription) -> dict[str, frozenset[str]]:
+    """Inputs that each output is declared to depend on directly; an output that declares nothing has none.
+
+    An absent list means "perhaps all" in FMI. Importers that iterate on it find no loop that is there; treating it
+    as none is what all known importers do.
+    """
+    return {
+        unknown.variable.name: frozenset(v.name for v in unknown.dependencies or () if v.causality == "input")
+        for unknown in description.outputs
+        if unknown.variable is not None
+    }

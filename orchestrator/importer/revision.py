@@ -1,0 +1,185 @@
+"""Step revision: the instant at which a watched variable of a black-box FMU crosses its level.
+
+The FMU knows nothing of events. Its step is repeated from a saved state, each time to a better estimate, until the
+crossing lies in an interval of rounding size; the step that is kept ends just past it, so that an FMU that looks at
+its own state at the end of a step sees the event there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.specification import EventSpec
+
+#: Width of the interval that a crossing is located in, times (1 + |time|), s.
+PRECISION = 2e-13
+#: Events of one watch closer than this times (1 + |time|), s, have accumulated; they are no longer followed.
+SHORTEST_SPACING = 1e-9
+MOST_EVALUATIONS = 200
+#: How often a step is halved to find the variable on the near side of its level.
+MOST_HALVINGS = 30
+
+
+@dataclass(slots=True)
+class Bracket:
+    """Seconds from the start of the step, and the signed distance from the level: near side > 0 >= far side."""
+
+    near: float
+    near_value: float
+    far: float
+
+    @property
+    def width(self) -> float:
+        """Seconds between its ends."""
+        return self.far - self.near
+
+
+class Watch:
+    """A watched variable of a component with states.
+
+    Attributes
+    ----------
+    accumulated : bool
+        Its events came too close to be told apart and are no longer located.
+    """
+
+    def __init__(self, component: Component, event: EventSpec) -> None:
+        self.component = component
+        self.event = event
+        self._group = component.group("Float64", [event.variable])
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the run before."""
+        self.accumulated = False
+        self._last_time = -float("inf")
+        self._start = 0.0
+
+    def distance(self) -> float:
+        """Signed distance to the level now, positive on the side from which a crossing is an event."""
+        value = float(self._group.get()[0]) - self.event.level
+        return -value if self.event.direction == "rising" else value
+
+    def note_start(self) -> None:
+        """Remember the distance at the start of a step."""
+        self._start = self.distance()
+
+    def find(self, time: float, size: float) -> float | None:
+        """Return the seconds into the step just made at which the first crossing seen lies; None without one.
+
+        The component is left somewhere in the step; the caller restores it.
+        """
+        if self.accumulated:
+            return None
+        sign = -1.0 if self.event.direction == "either" and self._start < 0.0 else 1.0
+        end = sign * self.distance()
+        if end > 0.0:
+            return None
+        near = self._near_side(time, size, sign)
+        if near is None:
+            return None
+        bracket = Bracket(near[0], near[1], size)
+        located = refine(bracket, lambda u: sign * self._value_at(time, u), PRECISION * (1.0 + abs(time)))
+        return self._spaced(time, located)
+
+    def _spaced(self, time: float, located: float) -> float | None:
+        instant = time + located
+        self.accumulated = instant - self._last_time < SHORTEST_SPACING * (1.0 + abs(instant))
+        self._last_time = instant
+        return None if self.accumulated else located
+
+    def _near_side(self, time: float, size: float, sign: float) -> tuple[float, float] | None:
+        """A point of the step on the near side: its start, or (after an event) a moment later."""
+        if sign * self._start > 0.0:
+            return 0.0, sign * self._start
+        u = size
+        for _ in range(MOST_HALVINGS):
+            u *= 0.5
+            value = sign * self._value_at(time, u)
+            if value > 0.0:
+                return u, value
+        return None
+
+    def _value_at(self, time: float, u: float) -> float:
+        instance = self.component.instance
+        instance.restore(self.component.at_start)
+        instance.step(time, u)
+        return self.distance()
+
+
+def refine(bracket: Bracket, value: Callable[[float], float], precision: float) -> float:
+    """Narrow a bracket to `precision` and return its far end.
+
+    Guesses come from a parabola through the last near points, as values on the far side may be anything: the FMU
+    may have reset its state there. A guess that does not pay is followed by a bisection.
+
+    Parameters
+    ----------
+    bracket : Bracket
+        Near side > 0 >= far side.
+    value : callable
+        Signed distance at a number of seconds.
+    precision : float
+        Seconds.
+
+    Examples
+    --------
+    >>> round(refine(Bracket(0.0, 1.0, 2.0), lambda u: 1.0 - u * u, 1e-13), 12)
+    1.0
+    """
+    points = [(bracket.near, bracket.near_value)]
+    last_guess: float | None = None
+    for turn in range(MOST_EVALUATIONS):
+        if bracket.width <= precision:
+            break
+        guess = _extrapolated(points)
+        usable = guess is not None and bracket.near < guess < bracket.far and turn % 4 != 3
+        u = guess if usable and guess is not None else 0.5 * (bracket.near + bracket.far)
+        margin = abs(u - last_guess) if last_guess is not None else bracket.width
+        last_guess = u
+        width = bracket.width
+        _probe(bracket, points, value, u)
+        if usable and bracket.width > 0.5 * width:
+            # the guess was good on one side: close the other one
+            step = max(0.4 * precision, min(2.0 * margin, 0.25 * bracket.width))
+            beyond = bracket.near + step if bracket.near == u else bracket.far - step
+            _probe(bracket, points, value, beyond)
+    return bracket.far
+
+
+def _probe(
+    bracket: Bracket, points: list[tuple[float, float]], value: Callable[[float], float], u: float
+) -> None:
+    if not bracket.near < u < bracket.far:
+        return
+    found = value(u)
+    if found > 0.0:
+        bracket.near, bracket.near_value = u, found
+        points.append((u, found))
+        del points[:-3]
+    else:
+        bracket.far = u
+
+
+def _extrapolated(points: list[tuple[float, float]]) -> float | None:
+    """Next root of the parabola (or line) through the last near points; None when it has none ahead."""
+    if len(points) < 2:
+        return None
+    (a, fa), (b, fb) = points[-2:]
+    if b == a:
+        return None
+    slope = (fb - fa) / (b - a)
+    if len(points) == 2:
+        return b - fb / slope if slope < 0.0 else None
+    c, fc = points[-3]
+    bend = (slope - (fa - fc) / (a - c)) / (b - c)
+    # f(b + s) = fb + (slope + bend (b - a)) s + bend s^2
+    tangent = slope + bend * (b - a)
+    square = tangent * tangent - 4.0 * bend * fb
+    if square < 0.0:
+        return None
+    root = square**0.5
+    denominator = -tangent + root
+    return b + 2.0 * fb / denominator if denominator > 0.0 else None

@@ -1,0 +1,293 @@
+"""Moving values from outputs to inputs: in an order that respects direct feedthrough, without allocation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+
+import numpy as np
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.instance import Instance
+from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
+from vibroimpact.orchestrator.importer.component import Component, kind_of
+from vibroimpact.orchestrator.importer.specification import ConnectionSpec
+
+Connections = Sequence[ConnectionSpec]
+
+
+def connection_name(connection: ConnectionSpec) -> str:
+    """Return `component.output -> component.input`."""
+    return f"{'.'.join(connection.source)} -> {'.'.join(connection.target)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """Connections in the order in which they are moved, and the algebraic loops among them."""
+
+    connections: tuple[ConnectionSpec, ...]
+    loops: tuple[tuple[ConnectionSpec, ...], ...]
+
+
+def order_of(connections: Connections, components: dict[str, Component]) -> Order:
+    """Order connections so that each is moved after those that its output depends on directly.
+
+    Connections that depend on each other in a circle are an algebraic loop; they are moved last, by iteration.
+    """
+    before = {i: _feeding(connections, components, c) for i, c in enumerate(connections)}
+    loops: list[tuple[int, ...]] = []
+    while True:
+        try:
+            ranked = list(TopologicalSorter(before).static_order())
+        except CycleError as error:
+            cycle = tuple(sorted(set(error.args[1])))
+            loops.append(cycle)
+            before = {i: {j for j in js if not (i in cycle and j in cycle)} for i, js in before.items()}
+            continue
+        break
+    merged = _merged(loops)
+    return Order(
+        tuple(connections[i] for i in ranked),
+        tuple(tuple(connections[i] for i in loop) for loop in merged),
+    )
+
+
+def _feeding(connections: Connections, components: dict[str, Component], c: ConnectionSpec) -> set[int]:
+    """Connections into inputs that the output of `c` depends on directly."""
+    component, variable = c.source
+    needed = components[component].depends.get(variable, frozenset())
+    return {
+        j for j, other in enumerate(connections) if other.target[0] == component and other.target[1] in needed
+    }
+
+
+def _merged(cycles: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
+    """Cycles that share a connection are one loop."""
+    loops: list[set[int]] = []
+    for cycle in cycles:
+        touching = [loop for loop in loops if loop & set(cycle)]
+        joined = set(cycle).union(*touching)
+        loops = [loop for loop in loops if loop not in touching] + [joined]
+    return [tuple(sorted(loop)) for loop in loops]
+
+
+@dataclass(frozen=True, slots=True)
+class StatusCall:
+    """A bare call that returns FMI's status, with what an error message needs."""
+
+    call: Callable[[], int]
+    instance: Instance
+    function: str
+
+
+class Transfer:
+    """Connections from one component to another that are moved by one read and one write.
+
+    Where the two sides have the same type and no gains, both use one buffer and nothing is copied.
+
+    Attributes
+    ----------
+    read, write : VariableGroup
+        Groups of outputs and of inputs.
+    convert : callable or None
+        Carries the values read to those written, and returns status 0; None when they share one buffer.
+    """
+
+    def __init__(self, source: Component, target: Component, connections: Connections) -> None:
+        self.source, self.target = source, target
+        self.connections = tuple(connections)
+        self.kind = kind_of(source.variables[connections[0].source[1]])
+        target_kind = kind_of(target.variables[connections[0].target[1]])
+        inputs = [target.variables[c.target[1]].valueReference for c in connections]
+        self.read: VariableGroup = source.group(self.kind, [c.source[1] for c in connections])
+        self._gains = np.array([c.gain for c in connections])
+        same_type = (
+            DTYPES[target.instance.fmi_version].get(target_kind) is self.read.values.dtype.type
+        )
+        shared = same_type and bool(np.all(self._gains == 1.0))
+        self.write = target.instance.group(
+            target_kind, inputs, values=self.read.values if shared else None
+        )
+        self.convert: Callable[[], int] | None = None if shared else self._converter()
+
+    def _converter(self) -> Callable[[], int]:
+        read, write, gains = self.read.values, self.write.values, self._gains
+        if self.kind == "Float64" and write.dtype == np.float64:
+
+            def scale() -> int:
+                np.multiply(read, gains, out=write)
+                return 0
+
+            return scale
+
+        def copy() -> int:
+            np.copyto(write, read, casting="unsafe")
+            return 0
+
+        return copy
+
+    def set_gain(self, connection: ConnectionSpec, gain: float) -> None:
+        """Change the gain of one connection; it must have been given a gain other than 1 before."""
+        if self.convert is None:
+            self.write = self.target.instance.group(
+                kind_of(self.target.variables[connection.target[1]]),
+                [self.target.variables[c.target[1]].valueReference for c in self.connections],
+            )
+            self.convert = self._converter()
+        index = [c.target for c in self.connections].index(connection.target)
+        self._gains[index] = gain
+
+    def move(self) -> None:
+        """Read the outputs and write the inputs."""
+        self.read.get()
+        if self.convert is not None:
+            self.convert()
+        self.write.set()
+
+    def calls(self) -> list[StatusCall]:
+        """Return the bare calls of a move, for a path that checks their status itself."""
+        source, target = self.source.instance, self.target.instance
+        middle = [] if self.convert is None else [StatusCall(self.convert, target, "convert")]
+        return [
+            StatusCall(self.read.get_call, source, f"Get{self.kind}"),
+            *middle,
+            StatusCall(self.write.set_call, target, f"Set{self.kind}"),
+        ]
+
+
+class CallList:
+    """Bare calls made one after the other; the first bad status raises its instance's error."""
+
+    __slots__ = ("_bare", "_calls")
+
+    def __init__(self, calls: Iterable[StatusCall]) -> None:
+        self._calls = tuple(calls)
+        self._bare = tuple(c.call for c in self._calls)
+
+    def __call__(self) -> None:
+        """Make the calls."""
+        for call in self._bare:
+            status = call()
+            if status > 1:
+                self._explain(call, status)
+
+    def _explain(self, call: Callable[[], int], status: int) -> None:
+        found = next(c for c in self._calls if c.call is call)
+        found.instance.check(status, found.function)
+
+
+def moves_of(transfers: Iterable[Transfer]) -> CallList:
+    """Return the calls that move transfers in their order."""
+    return CallList(call for transfer in transfers for call in transfer.calls())
+
+
+def transfers_of(connections: Connections, components: dict[str, Component]) -> tuple[Transfer, ...]:
+    """Group ordered connections into as few transfers as their order allows."""
+    groups: list[list[ConnectionSpec]] = []
+    for connection in connections:
+        place = _group_for(connection, groups, components)
+        if place is None:
+            groups.append([connection])
+        else:
+            place.append(connection)
+    return tuple(
+        Transfer(components[group[0].source[0]], components[group[0].target[0]], group) for group in groups
+    )
+
+
+def _key(connection: ConnectionSpec, components: dict[str, Component]) -> tuple[str, str, str, str]:
+    source, target = components[connection.source[0]], components[connection.target[0]]
+    return (
+        source.name,
+        target.name,
+        kind_of(source.variables[connection.source[1]]),
+        kind_of(target.variables[connection.target[1]]),
+    )
+
+
+def _group_for(
+    connection: ConnectionSpec, groups: list[list[ConnectionSpec]], components: dict[str, Component]
+) -> list[ConnectionSpec] | None:
+    """The last group with the same ends, if nothing moved since then feeds this connection's output."""
+    key = _key(connection, components)
+    needed = components[connection.source[0]].depends.get(connection.source[1], frozenset())
+    for group in reversed(groups):
+        if _key(group[0], components) == key:
+            return group
+        if any(c.target[0] == connection.source[0] and c.target[1] in needed for c in group):
+            return None
+    return None
+
+
+#: Iteration of algebraic loops: relative change at which it ends, and most iterations.
+LOOP_TOLERANCE = 1e-12
+LOOP_ITERATIONS = 100
+
+
+class LoopSolver:
+    """Solves the algebraic loops of an exchange by fixed-point iteration with Aitken's relaxation.
+
+    Attributes
+    ----------
+    residual : float
+        Largest relative change of a loop's inputs in the last iteration.
+    iterations : int
+        Iterations that the last solution took.
+    """
+
+    def __init__(self, loops: tuple[tuple[ConnectionSpec, ...], ...], components: dict[str, Component]) -> None:
+        self._loops = loops
+        self.names = tuple(" , ".join(connection_name(c) for c in loop) for loop in loops)
+        inside = [c for loop in loops for c in loop]
+        self._transfers = [Transfer(components[c.source[0]], components[c.target[0]], [c]) for c in inside]
+        self.residual = 0.0
+        self.iterations = 0
+
+    def _values(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        values = []
+        for transfer in self._transfers:
+            transfer.read.get()
+            if transfer.convert is not None:
+                transfer.convert()
+            values.append(float(transfer.write.values[0]))
+        return np.array(values)
+
+    def _write(self, values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+        for transfer, value in zip(self._transfers, values, strict=True):
+            transfer.write.values[0] = value
+            transfer.write.set()
+
+    def solve(self, time: float) -> None:
+        """Iterate the loops' inputs until they are consistent.
+
+        Raises
+        ------
+        ComponentError
+            They do not settle; the message names the loop.
+        """
+        if not self._transfers:
+            return
+        guess = self._values()
+        relaxation, previous = 1.0, None
+        for self.iterations in range(1, LOOP_ITERATIONS + 1):
+            self._write(guess)
+            change = self._values() - guess
+            scale = np.maximum(1e-300, np.abs(guess) + np.abs(change))
+            self.residual = float(np.max(np.abs(change) / scale))
+            if self.residual <= LOOP_TOLERANCE:
+                return
+            if not np.all(np.isfinite(change)):
+                break
+            if previous is not None:
+                step = change - previous
+                square = float(step @ step)
+                relaxation = -relaxation * float(previous @ step) / square if square > 0.0 else 1.0
+            previous = change
+            guess = guess + relaxation * change
+        raise ComponentError(
+            f"algebraic loop {'; '.join(self.names)} at time {time:.17g}: expected an iteration that settles, "
+            f"got a relative residual of {self.residual:.3g} after {self.iterations} iterations. "
+            "Break the loop with a component that has a state, or reduce the gain.",
+            time=time,
+        )
