@@ -1,7 +1,7 @@
 """Runs the points of a scene: one point in, one `RunRecord` out.
 
 `fused` execution: the contact law runs inside the body FMU, and one step covers as many periods as the scene
-lets pass unrecorded.
+lets pass unrecorded. `coupled`: each stop is an FMU of its own, and the importer carries every contact between them.
 """
 
 from __future__ import annotations
@@ -16,19 +16,21 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import SceneError
-from vibroimpact.orchestrator.body_driver import (
+from vibroimpact.orchestrator.body_driver import BodyDriver
+from vibroimpact.orchestrator.body_record import (
     ROW_IMPACT,
     ROW_PERIOD,
     ROW_STICK,
-    BodyDriver,
     DeadlineReached,
     ImpactLimitReached,
+    RecordedBody,
 )
+from vibroimpact.orchestrator.coupled_driver import CoupledDriver
 from vibroimpact.orchestrator.oscillator_parameters import float_parameters, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
 
 TWO_PI = 2.0 * math.pi
-#: Columns of `body_driver.OUTPUTS` that a time series can name.
+#: Columns of `body_record.OUTPUTS` that a time series can name.
 SAMPLED = {"displacement": 0, "velocity": 1, "acceleration": 2}
 FORCES = slice(5, 7)
 #: A run with a deadline looks at the clock at least every so many forcing periods.
@@ -43,12 +45,12 @@ class PointRunner:
     scene : Scene
         The scene; swept keys take their values from each point.
     execution : str
-        `auto` takes `fused`.
+        `fused`, `coupled`, or `auto`, which takes `fused`.
 
     Attributes
     ----------
     execution : str
-        What runs: `fused`.
+        What runs: `fused` or `coupled`.
     instruction_set : str
         Machine architecture the components are compiled for.
     fmu_hashes : dict of str to str
@@ -56,14 +58,11 @@ class PointRunner:
     """
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
-        if execution not in ("auto", "fused"):
-            problem = f'{scene.source}: execution.how: expected "auto" or "fused", got "{execution}".'
-            raise SceneError([problem])
-        self.execution = "fused"
+        self.execution = "fused" if execution == "auto" else execution
         self.instruction_set = platform.machine()
         self._scene = scene
-        self._driver = BodyDriver(float_parameters(scene, None), integer_parameters(scene))
-        self.fmu_hashes = {"body": self._driver.fmu.sha256}
+        self._driver = _driver_of(scene, self.execution)
+        self.fmu_hashes = self._driver.hashes
 
     def run(self, values: Mapping[str, float], start: tuple[float, float] | None = None) -> RunRecord:
         """Run one point.
@@ -91,10 +90,26 @@ class PointRunner:
         self._driver.close()
 
 
+def _driver_of(scene: Scene, execution: str) -> RecordedBody:
+    floats = float_parameters(scene, None)
+    if execution == "fused":
+        return BodyDriver(floats, integer_parameters(scene))
+    if execution == "coupled":
+        step = scene.execution.macro_step
+        return CoupledDriver(
+            floats,
+            integer_parameters(scene, law="external"),
+            len(scene.stops),
+            macro_step=math.inf if step is None else step,
+            exchange=scene.execution.exchange,
+        )
+    raise SceneError([f'{scene.source}: execution.how: expected "fused" or "coupled", got "{execution}".'])
+
+
 class _Run:
     """One run: when its recording begins and ends, and what it records."""
 
-    def __init__(self, scene: Scene, driver: BodyDriver, start: tuple[float, float] | None) -> None:
+    def __init__(self, scene: Scene, driver: RecordedBody, start: tuple[float, float] | None) -> None:
         self.scene = scene
         self.driver = driver
         self.parameters = float_parameters(scene, start)

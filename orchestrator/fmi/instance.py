@@ -43,6 +43,8 @@ class Instance(ABC):
     ----------
     time : float
         The time reached by the last `step`, s.
+    is_fatal : bool
+        A call returned fatal: no function of the FMU may be called any more.
     needs_event_mode, returned_early, wants_to_end : bool
         What the last `step` said (FMI 3.0; False in FMI 2.0).
     """
@@ -58,6 +60,7 @@ class Instance(ABC):
         self.log = log or LogTail()
         self.time = 0.0
         self.needs_event_mode = self.returned_early = self.wants_to_end = False
+        self.is_fatal = False
         self._library = Library(fmu)
         self._wrap = wrap
         self._pointer = c_void_p()
@@ -75,6 +78,7 @@ class Instance(ABC):
     def check(self, status: int, function: str) -> None:
         """Raise ComponentError when `status` is worse than a warning."""
         if status > WARNING or status < OK:
+            self.is_fatal = self.is_fatal or status == FATAL
             word = STATUS_WORDS[status] if 0 <= status < len(STATUS_WORDS) else f"status {status}"
             self._fail(function, f"returned {word} at time {self.time:.17g}")
 
@@ -146,8 +150,11 @@ class Instance(ABC):
         self.check(self._terminate(), "Terminate")
 
     def free(self) -> None:
-        """Give the instance's memory back; it must not be used afterwards."""
-        if self._pointer:
+        """Give the instance's memory back; it must not be used afterwards.
+
+        After a fatal error FMI allows no call at all: the memory is left.
+        """
+        if self._pointer and not self.is_fatal:
             self._function("FreeInstance", None)(self._pointer)
             self._pointer.value = None
 

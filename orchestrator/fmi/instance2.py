@@ -54,7 +54,7 @@ class Instance2(Instance):
             c_char_p(location.encode()),
             ctypes.byref(self._callbacks),
             c_int(0),
-            c_int(0),
+            c_int(1),  # loggingOn: some FMUs report even fatal errors only then
         )
         if not pointer:
             self._fail("Instantiate", f"made no instance of {self.fmu.source}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from ctypes import c_void_p
 from functools import lru_cache
 from pathlib import Path
@@ -31,7 +31,8 @@ def description_of(fmu: Path) -> ModelDescription:
 
 def kind_of(variable: ModelVariable) -> str:
     """Return the kind of a variable: the FMI 3.0 name of the calls that move it."""
-    return KINDS.get(variable.type, variable.type)
+    name: str = variable.type
+    return KINDS.get(name, name)
 
 
 class Component:
@@ -76,6 +77,8 @@ class Component:
         )
         self.sha256 = fmu.sha256
         self.at_start, self.at_end = c_void_p(), c_void_p()
+        self._start_groups: dict[str, VariableGroup] = {}
+        self._inputs: list[VariableGroup] = []
         self.event_times = self._event_time_group() if version == 2 and self.has_states else None
 
     def _event_time_group(self) -> VariableGroup | None:
@@ -100,17 +103,35 @@ class Component:
 
     def _set_start(self, name: str, value: Value) -> None:
         variable = self.variables[name]
-        kind = kind_of(variable)
-        group = self.group(kind, [name])
-        if isinstance(value, str):
-            value = _item_value(self.name, variable, value)
-        group.values[0] = value
+        group = self._start_groups.get(name)
+        if group is None:
+            group = self._start_groups[name] = self.group(kind_of(variable), [name])
+        group.values[0] = _item_value(self.name, variable, value) if isinstance(value, str) else value
         group.set()
+
+    def watch_inputs(self, names: Iterable[str]) -> None:
+        """Say which inputs are connected; their slopes belong to them."""
+        wanted = [n for name in names for n in (name, f"{name}_rate") if n in self.variables]
+        by_kind: dict[str, list[str]] = {}
+        for name in wanted:
+            by_kind.setdefault(kind_of(self.variables[name]), []).append(name)
+        self._inputs = [self.group(kind, found) for kind, found in by_kind.items()]
+
+    def note_inputs(self) -> None:
+        """Remember the connected inputs of the step just made."""
+        for group in self._inputs:
+            group.get()
+
+    def revisit_start(self) -> None:
+        """Go back to the start of the step, with the inputs that `note_inputs` found."""
+        self.instance.restore(self.at_start)
+        for group in self._inputs:
+            group.set()
 
     def free(self) -> None:
         """Give back its saved states and its instance."""
         for slot in (self.at_start, self.at_end):
-            if slot:
+            if slot and not self.instance.is_fatal:
                 self.instance.free_state(slot)
         self.instance.free()
 

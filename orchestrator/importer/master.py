@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import DISCARD, Wrapper
@@ -34,6 +38,7 @@ INITIAL_ITERATIONS = 100
 #: Repetitions of a step with exchange "iterated", and the relative change at which they end.
 STEP_ITERATIONS = 50
 STEP_TOLERANCE = 1e-13
+SMALLEST = 1e-300
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +109,9 @@ class Importer:
         order = order_of(connections, self.components)
         self.transfers = transfers_of(order.connections, self.components)
         self.loops = LoopSolver(order.loops, self.components)
-        self._order = _stepping_order(self.components.values(), self.watches)
+        for name, component in self.components.items():
+            component.watch_inputs(c.target[1] for c in connections if c.target[0] == name)
+        self._order = _stepping_order(self.components.values())
         self._plan()
         self.watchers: list[StepWatcher] = []
         self.keeps_start = False
@@ -132,12 +139,11 @@ class Importer:
         instances = [c.instance for c in self._event_components]
         self._event_instances = [i for i in instances if isinstance(i, Instance3)]
         self._incoming = {c.name: [t for t in self.transfers if t.target is c] for c in self._order}
-        fresh = {c.name: self._fresh_inputs(c) for c in self._order}
-        self.plan_moves(fresh)
+        self._fresh = {c.name: self._fresh_inputs(c) for c in self._order}
+        self.plan_moves()
 
-    def plan_moves(self, fresh: Mapping[str, Sequence[Transfer]] | None = None) -> None:
+    def plan_moves(self) -> None:
         """Bind the calls of all paths; again after a transfer's buffers changed."""
-        self._fresh = fresh if fresh is not None else self._fresh
         refreshed = [t for ts in self._fresh.values() for t in ts]
         behind = [t for t in self.transfers if t not in refreshed]
         self._start_moves = moves_of(behind)
@@ -254,6 +260,9 @@ class Importer:
     def _step(self, target: float) -> None:
         time = self.time
         self._start_moves()
+        if self.exchange == "iterated":
+            for transfer in self.transfers:
+                transfer.note_begin()
         if self.loops.names:
             self.loops.solve(time)
         if self._saves or self.keeps_start:
@@ -416,24 +425,18 @@ class Importer:
     # ---- repeated steps ----
 
     def _iterate(self, time: float, target: float) -> None:
-        """Repeat the step until the inputs at its end are those that it was made with."""
-        previous = None
+        """Repeat the step until the inputs over it are those that its end gives."""
+        previous: list[NDArray[Any]] | None = None
         for _ in range(STEP_ITERATIONS):
-            for transfer in self.transfers:
-                transfer.read.get()
-                if transfer.convert is not None:
-                    transfer.convert()
-            values = [transfer.write.values.copy() for transfer in self.transfers]
-            if previous is not None and all(
-                abs(a - b).max() <= STEP_TOLERANCE * (1e-300 + abs(a).max())
-                for a, b in zip(values, previous, strict=True)
-            ):
+            values = [transfer.take() for transfer in self.transfers]
+            if previous is not None and _settled(values, previous):
                 return
             previous = values
             self._restore_start()
             for transfer in self.transfers:
-                transfer.write.set()
+                transfer.write_over_step(target - time)
             self.repeated_steps += 1
+            self._at_event = []
             for component in self._order:
                 self._step_one(component, time, target)
 
@@ -443,16 +446,23 @@ class Importer:
             component.free()
 
 
-def _stepping_order(components: Sequence[Component] | object, watches: Sequence[Watch]) -> list[Component]:
-    """Sources of events in event mode first, then others with states, those without states last."""
-    everyone = list(components)  # type: ignore[call-overload]
+def _stepping_order(components: Iterable[Component]) -> list[Component]:
+    """Components with event mode first, then others with states, those without states last."""
 
     def rank(component: Component) -> int:
         if not component.has_states:
             return 2
         return 0 if component.event_mode else 1
 
-    return sorted(everyone, key=rank)
+    return sorted(components, key=rank)
+
+
+def _settled(values: Sequence[NDArray[Any]], previous: Sequence[NDArray[Any]]) -> bool:
+    """Do two passes over the connections agree to rounding?"""
+    return all(
+        np.abs(a - b).max() <= STEP_TOLERANCE * (SMALLEST + np.abs(a).max())
+        for a, b in zip(values, previous, strict=True)
+    )
 
 
 def _takes_events(component: Component) -> bool:

@@ -73,6 +73,7 @@ class Watch:
         """
         if self.accumulated:
             return None
+        self.component.note_inputs()
         sign = -1.0 if self.event.direction == "either" and self._start < 0.0 else 1.0
         end = sign * self.distance()
         if end > 0.0:
@@ -103,9 +104,8 @@ class Watch:
         return None
 
     def _value_at(self, time: float, u: float) -> float:
-        instance = self.component.instance
-        instance.restore(self.component.at_start)
-        instance.step(time, u)
+        self.component.revisit_start()
+        self.component.instance.step(time, u)
         return self.distance()
 
 

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import Instance
@@ -110,6 +112,7 @@ class Transfer:
             target_kind, inputs, values=self.read.values if shared else None
         )
         self.convert: Callable[[], int] | None = None if shared else self._converter()
+        self._bind_rates()
 
     def _converter(self) -> Callable[[], int]:
         read, write, gains = self.read.values, self.write.values, self._gains
@@ -127,8 +130,54 @@ class Transfer:
 
         return copy
 
+    def _bind_rates(self) -> None:
+        """Inputs that come with an input for their slope (`force`, `force_rate`) can follow a straight line."""
+        variables = self.target.variables
+        slopes = [f"{c.target[1]}_rate" for c in self.connections]
+        self._sloping = [
+            i for i, name in enumerate(slopes) if name in variables and variables[name].causality == "input"
+        ]
+        names = [slopes[i] for i in self._sloping]
+        self._rates = self.target.group("Float64", names) if names else None
+        self._begin_values = np.zeros(len(self._sloping))
+
+    def note_begin(self) -> None:
+        """Remember the inputs at the start of a step."""
+        if self._rates is not None:
+            self._begin_values[:] = self.write.values[self._sloping]
+
+    def write_over_step(self, size: float) -> None:
+        """Write inputs for a repeated step of `size` s from the outputs at its end, which `take` has read.
+
+        An input with a slope follows the straight line from the start of the step; any other is held at its end.
+        """
+        if self._rates is not None:
+            self._rates.values[:] = (self.write.values[self._sloping] - self._begin_values) / size
+            self._rates.set()
+            kept = self.write.values.copy()
+            self.write.values[self._sloping] = self._begin_values
+            self.write.set()
+            self.write.values[:] = kept
+        else:
+            self.write.set()
+
+    def take(self) -> NDArray[Any]:
+        """Read the outputs into the inputs' buffer, without writing; returns a copy of it."""
+        self.read.get()
+        if self.convert is not None:
+            self.convert()
+        return self.write.values.copy()
+
+    def carries(self, connection: ConnectionSpec) -> bool:
+        """Is this one of the connections moved here?"""
+        return any(c.target == connection.target for c in self.connections)
+
+    def gain_of(self, connection: ConnectionSpec) -> float:
+        """Return the present gain of one connection."""
+        return float(self._gains[[c.target for c in self.connections].index(connection.target)])
+
     def set_gain(self, connection: ConnectionSpec, gain: float) -> None:
-        """Change the gain of one connection; it must have been given a gain other than 1 before."""
+        """Change the gain of one connection; the calls of `calls` must be bound again."""
         if self.convert is None:
             self.write = self.target.instance.group(
                 kind_of(self.target.variables[connection.target[1]]),
@@ -244,16 +293,13 @@ class LoopSolver:
         self.residual = 0.0
         self.iterations = 0
 
-    def _values(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    def _values(self) -> NDArray[np.float64]:
         values = []
         for transfer in self._transfers:
-            transfer.read.get()
-            if transfer.convert is not None:
-                transfer.convert()
-            values.append(float(transfer.write.values[0]))
+            values.append(float(transfer.take()[0]))
         return np.array(values)
 
-    def _write(self, values: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+    def _write(self, values: NDArray[np.float64]) -> None:
         for transfer, value in zip(self._transfers, values, strict=True):
             transfer.write.values[0] = value
             transfer.write.set()

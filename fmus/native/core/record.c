@@ -3,15 +3,19 @@
 #include <math.h>
 #include <string.h>
 
-void vi_record_begin_step(vi_record *record, double displacement)
+void vi_record_take(vi_record *record)
 {
     if (record->taken > 0) {
         const int64_t left = record->count > record->taken ? record->count - record->taken : 0;
         memmove(record->rows, record->rows + (record->count - left) * VI_RECORD_WIDTH,
                 (size_t)left * VI_RECORD_WIDTH * sizeof(double));
         record->count = left;
-        record->taken = 0;
     }
+    record->taken = 0;
+}
+
+void vi_record_begin_step(vi_record *record, double displacement)
+{
     if (record->extrema && !record->open) {
         record->displacement_max = record->displacement_min = displacement;
     }

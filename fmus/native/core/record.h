@@ -1,7 +1,7 @@
 /* The record a body keeps of its impacts, sticks and periods while an importer takes long steps.
  *
  * Rows of eight numbers, appended only. The importer reads `count` and `rows`, and says how many rows it has taken
- * by the input `taken`; they leave at the start of the next step. Switched off, it costs one test.
+ * by the input `taken`; they leave at once. Switched off, it costs one test.
  */
 #ifndef VIBROIMPACT_RECORD_H
 #define VIBROIMPACT_RECORD_H
@@ -29,7 +29,10 @@ typedef struct {
     double rows[VI_RECORD_CAPACITY * VI_RECORD_WIDTH]; /* last: only the used part is saved with a state */
 } vi_record;
 
-/* Start of a step: drop the rows taken, open or close what the importer switched on or off. */
+/* Drop the first `taken` rows: the importer has them. */
+void vi_record_take(vi_record *record);
+
+/* Start of a step: open or close what the importer switched on or off. */
 void vi_record_begin_step(vi_record *record, double displacement);
 
 /* Is there too little room for what one event may write? */

@@ -152,6 +152,8 @@ static void was_set(void *self, uint32_t value_reference)
         o->body.contacts[0].answered = 1;
     } else if (value_reference == OSCILLATOR_CONTACT_APPLIED_RESTITUTION_2) {
         o->body.contacts[1].answered = 1;
+    } else if (value_reference == OSCILLATOR_RECORD_TAKEN) {
+        vi_record_take(&o->body.record);
     }
 }
 

@@ -1,0 +1,124 @@
+"""What a body FMU of ours records during a run, and how it is fetched; the same for both drivers.
+
+The body keeps impacts, sticks and periods as rows of eight numbers (`core/record.h`), so that no call into Python
+or FMI is made for them.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.orchestrator.fmi.variables import VariableGroup
+
+ROW_WIDTH = 8
+ROW_CAPACITY = 512
+ROW_IMPACT, ROW_STICK, ROW_PERIOD = 1.0, 2.0, 3.0
+OUTPUTS = (
+    "displacement",
+    "velocity",
+    "acceleration",
+    "record.displacement_max",
+    "record.displacement_min",
+    "contact[1].force",
+    "contact[2].force",
+    "contact[1].stick_start",
+    "contact[2].stick_start",
+)
+
+
+class ImpactLimitReached(Exception):
+    """A run met more impacts than `impact_limit`; it ends here with what it has."""
+
+
+class DeadlineReached(Exception):
+    """A run took longer than its deadline; it ends here with what it has."""
+
+
+@dataclass(slots=True)
+class Rows:
+    """Rows taken from a body's record, in the order they were written; shape (row, 8) each."""
+
+    blocks: list[NDArray[np.float64]] = field(default_factory=list)
+
+    def of_kind(self, kind: float) -> NDArray[np.float64]:
+        """Return the rows of one kind, shape (n, 8)."""
+        rows = np.concatenate(self.blocks) if self.blocks else np.empty((0, ROW_WIDTH))
+        chosen: NDArray[np.float64] = rows[rows[:, 0] == kind]
+        return chosen
+
+
+class RecordedBody(ABC):
+    """A body whose runs are driven; its subclasses say how it is stepped.
+
+    Parameters
+    ----------
+    group : callable
+        Makes a group of the body's variables: kind, names, number of values (None: one for each name).
+    """
+
+    def __init__(self, group: Callable[[str, Sequence[str], int | None], VariableGroup]) -> None:
+        self._outputs = group("Float64", OUTPUTS, None)
+        self._switches = group("Boolean", ("record.impacts", "record.extrema", "record.periods"), None)
+        self._stuck = group("Boolean", ("contact[1].stuck", "contact[2].stuck"), None)
+        self._count = group("Int64", ("record.count",), None)
+        self._taken = group("Int64", ("record.taken",), None)
+        self._rows = group("Float64", ("record.rows",), ROW_CAPACITY * ROW_WIDTH)
+        self._table = self._rows.values.reshape(ROW_CAPACITY, ROW_WIDTH)
+        self.rows = Rows()
+
+    @property
+    @abstractmethod
+    def time(self) -> float:
+        """The time reached, s."""
+
+    @property
+    @abstractmethod
+    def hashes(self) -> dict[str, str]:
+        """SHA-256 of each component's FMU, by component."""
+
+    @abstractmethod
+    def begin(self, floats: Mapping[str, float], deadline: float | None) -> None:
+        """Start a run at time 0 with these real parameters; it may take `deadline` seconds of wall time."""
+
+    @abstractmethod
+    def advance(self, end: float, slice_length: float = np.inf) -> None:
+        """Advance to time `end`, s, in slices of at most `slice_length`, between which the deadline is looked at.
+
+        Raises
+        ------
+        ImpactLimitReached, DeadlineReached
+            The run ends before.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Free what is driven."""
+
+    def record(self, *, impacts: bool, extrema: bool, periods: bool) -> None:
+        """Say what the body records from now on."""
+        self._switches.values[:] = (impacts, extrema, periods)
+        self._switches.set()
+
+    def take_rows(self) -> None:
+        """Take the rows that the body has recorded since the last time."""
+        count = int(self._count.get()[0])
+        if count:
+            self._rows.get()
+            self.rows.blocks.append(self._table[:count].copy())
+            self._taken.values[0] = count
+            self._taken.set()
+
+    def outputs(self) -> NDArray[np.float64]:
+        """Return the present values of `OUTPUTS`; the buffer is used again at the next call."""
+        return self._outputs.get()
+
+    def sticks_open(self) -> list[tuple[int, float]]:
+        """Return the contacts (1-based) that the body rests on, with the time it came to rest, s."""
+        stuck = self._stuck.get()
+        starts = self._outputs.get()[-2:]
+        return [(k + 1, float(starts[k])) for k in range(2) if stuck[k]]

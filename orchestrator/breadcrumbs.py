@@ -1,0 +1,130 @@
+"""Notes that outlive a process: which FMI call is under way, at what time, and the last log lines.
+
+They lie in a file that two processes map. When an FMU takes its process down, or hangs, the other process reads
+what it was doing.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import mmap
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.orchestrator.fmi.instance import Wrapper
+from vibroimpact.orchestrator.fmi.library import Function
+from vibroimpact.orchestrator.fmi.log import RING_SIZE, LogTail
+
+MOST_COMPONENTS = 32
+MOST_CALLS = 4096
+NAME_LENGTH = 96
+
+
+class _Notes(ctypes.Structure):
+    _fields_ = [
+        ("call", ctypes.c_int64),  # 1-based; 0: none yet
+        ("time", ctypes.c_double),
+        ("calls", ctypes.c_int64),
+        ("components", ctypes.c_int64),
+        ("names", (ctypes.c_char * NAME_LENGTH) * MOST_CALLS),
+        ("owners", ctypes.c_int32 * MOST_CALLS),
+    ]
+
+
+SIZE = ctypes.sizeof(_Notes) + MOST_COMPONENTS * RING_SIZE
+
+
+class Breadcrumbs:
+    """The notes of one process, mapped from a file of `SIZE` bytes.
+
+    Parameters
+    ----------
+    path : Path
+        The file; made with `create`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        with path.open("r+b") as file:
+            self._memory = mmap.mmap(file.fileno(), SIZE)
+        self._notes = _Notes.from_buffer(self._memory)
+        self._rings: list[LogTail] = []
+        self._known: dict[str, int] = {}
+
+    @staticmethod
+    def create(path: Path) -> None:
+        """Make an empty file of notes."""
+        path.write_bytes(bytes(SIZE))
+
+    # ---- written by the process that runs FMUs ----
+
+    def log(self, component: str) -> LogTail:
+        """Return a log tail for a component that both processes see."""
+        index = int(self._notes.components)
+        self._known[component] = index
+        self._notes.components = index + 1
+        return self._ring(index)
+
+    def _ring(self, index: int) -> LogTail:
+        start = ctypes.sizeof(_Notes) + min(index, MOST_COMPONENTS - 1) * RING_SIZE
+        return LogTail(memoryview(self._memory)[start : start + RING_SIZE])
+
+    def wrap(self, component: str) -> Wrapper:
+        """Return what wraps the functions of a component: each call is noted before it is made."""
+
+        def wrapper(name: str, function: Function) -> Function:
+            number = self._register(component, name)
+            return self._noting_step(number, function) if name.endswith("DoStep") else self._noting(number, function)
+
+        return wrapper
+
+    def _register(self, component: str, name: str) -> int:
+        notes = self._notes
+        index = min(int(notes.calls), MOST_CALLS - 1)
+        notes.names[index].value = f"{component}\n{name}".encode()[: NAME_LENGTH - 1]
+        notes.owners[index] = self._known.get(component, 0)
+        notes.calls = index + 1
+        return index + 1
+
+    def _noting(self, number: int, function: Function) -> Function:
+        notes = self._notes
+
+        def noted(*arguments: Any) -> Any:
+            notes.call = number
+            return function(*arguments)
+
+        return noted
+
+    def _noting_step(self, number: int, function: Function) -> Function:
+        notes = self._notes
+
+        def noted(instance: Any, time: Any, *rest: Any) -> Any:
+            notes.call = number
+            notes.time = time.value
+            return function(instance, time, *rest)
+
+        return noted
+
+    # ---- read by the other process ----
+
+    def begin(self) -> None:
+        """Forget the call before."""
+        self._notes.call = 0
+
+    def last_call(self) -> tuple[str, str, float]:
+        """Return instance, function and time (s) of the last call noted; empty names when there is none."""
+        index = int(self._notes.call) - 1
+        if index < 0:
+            return "", "", 0.0
+        instance, _, function = self._notes.names[index].value.decode("utf-8", "replace").partition("\n")
+        return instance, function, float(self._notes.time)
+
+    def last_lines(self) -> tuple[str, ...]:
+        """Return the last log lines of the component of the last call."""
+        index = int(self._notes.call) - 1
+        return self._ring(self._notes.owners[index]).take() if index >= 0 else ()
+
+
+#: What gives a component its log tail, or the wrapper of its functions.
+LogOf = Callable[[str], LogTail]
+WrapOf = Callable[[str], Wrapper]

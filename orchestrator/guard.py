@@ -1,0 +1,188 @@
+"""Runs points in a child process that an FMU may crash or hang without taking the campaign with it.
+
+The child is used again for every point; only after a crash or a missed deadline a new one is made. What the child
+was doing is read from `breadcrumbs`.
+"""
+
+from __future__ import annotations
+
+import math
+import queue
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.breadcrumbs import Breadcrumbs
+from vibroimpact.orchestrator.empty_record import empty_record
+from vibroimpact.orchestrator.guard_pipe import Failure, Identity, Order, Point, receive, send
+from vibroimpact.orchestrator.scene import Scene
+
+#: Wall time that a guarded point may take where the scene names no deadline, s.
+DEFAULT_DEADLINE = 300.0
+#: What a child may take beyond the deadline to end the point by itself, s.
+GRACE = 0.5
+#: Starting Python and loading the FMUs, s.
+START_TIME = 60.0
+
+
+class _Child:
+    """A running child process with a thread that reads its answers."""
+
+    def __init__(self, order: Order) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "vibroimpact.orchestrator.guard_child"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+        )
+        self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        threading.Thread(target=self._read, daemon=True).start()
+        self.say(order)
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        while (answer := receive(self._process.stdout)) is not None:
+            self._answers.put(answer)
+        self._answers.put(None)
+
+    def say(self, message: Any) -> None:
+        """Send a message; a child that is gone shows in its answer."""
+        assert self._process.stdin is not None
+        try:
+            send(self._process.stdin, message)
+        except BrokenPipeError:
+            self._answers.put(None)
+
+    def answer(self, seconds: float) -> Any:
+        """Return the next answer, None when the child is gone; raises TimeoutError."""
+        try:
+            return self._answers.get(timeout=seconds)
+        except queue.Empty:
+            raise TimeoutError from None
+
+    def end(self) -> int:
+        """Kill the child if it still runs, and return its exit code (negative: the signal that ended it)."""
+        try:
+            code = self._process.wait(0.2)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            code = self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                try:
+                    pipe.close()
+                except BrokenPipeError:
+                    continue  # what was still to be sent has no reader any more
+        return code
+
+
+class GuardedRunner:
+    """Runs points of a scene in a guarded child process; the interface of any runner.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    execution : str
+        Handed on to the runner in the child.
+
+    Raises
+    ------
+    ComponentError
+        The child cannot load the scene's components; its message says why.
+    """
+
+    def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
+        self._scene = scene
+        self._wanted = execution
+        self._folder = tempfile.TemporaryDirectory(prefix="vibroimpact-guard-")
+        self._child: _Child | None = None
+        identity = self._start()
+        self.execution = identity.execution
+        self.instruction_set = identity.instruction_set
+        self.fmu_hashes = dict(identity.fmu_hashes)
+        deadline = scene.execution.deadline
+        self._deadline = DEFAULT_DEADLINE if deadline is None else deadline
+
+    def _start(self) -> Identity:
+        path = Path(self._folder.name) / "notes"
+        Breadcrumbs.create(path)
+        self._notes = Breadcrumbs(path)
+        self._child = _Child(Order(self._scene.text, self._scene.source, self._wanted, str(path)))
+        try:
+            answer = self._child.answer(START_TIME)
+        except TimeoutError:
+            answer = Failure(self._what_happened(f"no answer within {START_TIME:g} s while loading"))
+        if isinstance(answer, Identity):
+            return answer
+        code = self._child.end()
+        self._child = None
+        reason = answer.message if isinstance(answer, Failure) else self._what_happened(_ending(code))
+        raise ComponentError(reason)
+
+    def run(self, values: Mapping[str, float], start: tuple[float, float] | None = None) -> RunRecord:
+        """Run one point; a crash or a missed deadline is its outcome.
+
+        Raises
+        ------
+        ComponentError
+            The point failed in the child, which lives on.
+        """
+        began = time.perf_counter()
+        if self._child is None:
+            self._start()
+        assert self._child is not None
+        self._notes.begin()
+        self._child.say(Point(dict(values), start))
+        try:
+            answer = self._child.answer(self._deadline + GRACE)
+        except TimeoutError:
+            return self._lost(Outcome.timeout, f"no answer within {self._deadline:g} s", began)
+        if answer is None:
+            return self._lost(Outcome.crash, None, began)
+        if isinstance(answer, Failure):
+            raise ComponentError(answer.message)
+        record: RunRecord = answer
+        return record
+
+    def _lost(self, outcome: Outcome, what: str | None, began: float) -> RunRecord:
+        """Give the child up and say what it was doing."""
+        assert self._child is not None
+        code = self._child.end()
+        self._child = None
+        message = self._what_happened(_ending(code) if what is None else what)
+        return empty_record(self._scene, outcome, message, time.perf_counter() - began)
+
+    def _what_happened(self, what: str) -> str:
+        instance, function, at = self._notes.last_call()
+        if not instance:
+            return f"guard: expected an answer of the child process, got {what}."
+        lines = self._notes.last_lines()
+        logged = " | ".join(lines[-5:]) if lines else "nothing"
+        when = "" if math.isnan(at) else f" at time {at:.17g}"
+        return f"{instance}: {function}{when}: {what}; the component logged last: {logged}"
+
+    def close(self) -> None:
+        """End the child and remove its notes."""
+        if self._child is not None:
+            self._child.end()
+            self._child = None
+        self._folder.cleanup()
+
+
+def _ending(code: int) -> str:
+    if code < 0:
+        try:
+            name = signal.Signals(-code).name
+        except ValueError:
+            name = f"signal {-code}"
+        return f"the process was ended by {name}"
+    return f"the process ended with exit code {code}"

@@ -1,0 +1,72 @@
+"""The child process of `guard`: runs points that may take it down. Started as `python -m`, speaks over pipes."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.orchestrator.breadcrumbs import Breadcrumbs
+from vibroimpact.orchestrator.guard_pipe import Failure, Identity, Order, Point, receive, send
+from vibroimpact.orchestrator.runners import Runner, open_runner
+from vibroimpact.orchestrator.scene import parse_scene
+
+#: How often the child looks whether its parent still lives, s: a hanging FMU must not become an orphan.
+PARENT_LOOK = 0.5
+
+
+def _die_with(parent: int) -> None:
+    """End this process when its parent is gone, whatever the FMU is doing."""
+
+    def look() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_LOOK)
+        os._exit(1)
+
+    threading.Thread(target=look, daemon=True).start()
+
+
+def _private_output() -> BinaryIO:
+    """Keep standard output for the answers; what an FMU prints goes to standard error."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    return answers
+
+
+def _answer(runner: Runner, point: Point) -> Any:
+    try:
+        return runner.run(point.values, point.start)
+    except (VibroimpactError, ArithmeticError, ValueError) as error:
+        return Failure(str(error))
+
+
+def _open(order: Order) -> Runner:
+    notes = Breadcrumbs(Path(order.notes))
+    scene = parse_scene(order.scene_text, order.source)
+    return open_runner(scene, order.execution, log=notes.log, wrap=notes.wrap)
+
+
+def main() -> None:
+    """Serve points until standard input ends."""
+    _die_with(os.getppid())
+    answers, orders = _private_output(), sys.stdin.buffer
+    order = receive(orders)
+    if not isinstance(order, Order):
+        return
+    try:
+        runner = _open(order)
+    except VibroimpactError as error:
+        send(answers, Failure(str(error)))
+        return
+    send(answers, Identity.of(runner))
+    while isinstance(point := receive(orders), Point):
+        send(answers, _answer(runner, point))
+    runner.close()
+
+
+if __name__ == "__main__":
+    main()

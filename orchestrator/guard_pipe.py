@@ -1,0 +1,70 @@
+"""What a guard and its child say to each other: pickled messages with their length in front.
+
+Both ends are this package in processes of one user; nothing else can write to these pipes.
+"""
+
+from __future__ import annotations
+
+import pickle
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import IO, Any
+
+LENGTH = struct.Struct("<Q")
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What the child shall run: a scene, its execution, and the file of notes."""
+
+    scene_text: str
+    source: str
+    execution: str
+    notes: str
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What the child runs with."""
+
+    execution: str
+    instruction_set: str
+    fmu_hashes: Mapping[str, str]
+
+    @staticmethod
+    def of(runner: Any) -> Identity:
+        """Return the identity of a runner."""
+        return Identity(runner.execution, runner.instruction_set, dict(runner.fmu_hashes))
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One point to run."""
+
+    values: Mapping[str, float]
+    start: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """The point (or the scene) failed with this message; the child lives on."""
+
+    message: str
+
+
+def send(pipe: IO[bytes], message: Any) -> None:
+    """Write one message."""
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    pipe.write(LENGTH.pack(len(data)) + data)
+    pipe.flush()
+
+
+def receive(pipe: IO[bytes]) -> Any:
+    """Read one message; None when the other end is gone."""
+    head = pipe.read(LENGTH.size)
+    if len(head) < LENGTH.size:
+        return None
+    (size,) = LENGTH.unpack(head)
+    data = pipe.read(size)
+    return pickle.loads(data) if len(data) == size else None

@@ -1,0 +1,157 @@
+"""Sampling recorded variables on a time grid without disturbing the steps.
+
+A component with states is taken back to the start of the step, stepped to each sample, read, and put back where it
+was: the run is the same, bit for bit, whether it is sampled or not. A component without states is read at the
+communication points, with straight lines between them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.importer.component import Component, kind_of
+from vibroimpact.orchestrator.importer.master import Importer, StepWatcher
+
+#: A sample closer to the end of a step than this times (1 + |time|), s, is taken at the end.
+SAME_INSTANT = 1e-13
+
+
+class _Probe:
+    """The recorded variables of one component."""
+
+    def __init__(self, component: Component, columns: Sequence[tuple[int, str]]) -> None:
+        self.component = component
+        self.groups: list[tuple[list[int], VariableGroup]] = []
+        for kind in sorted({kind_of(component.variables[name]) for _, name in columns}):
+            chosen = [(i, name) for i, name in columns if kind_of(component.variables[name]) == kind]
+            self.groups.append(([i for i, _ in chosen], component.group(kind, [name for _, name in chosen])))
+        self.before = np.zeros(0)
+
+    def read(self, row: NDArray[np.float64]) -> None:
+        """Write the present values into their columns of a row."""
+        for columns, group in self.groups:
+            row[columns] = group.get()
+
+    @property
+    def columns(self) -> list[int]:
+        """The columns of a row that this probe fills."""
+        return [column for columns, _ in self.groups for column in columns]
+
+
+class Sampler:
+    """Samples variables of an importer's components.
+
+    Parameters
+    ----------
+    importer : Importer
+        Its steps are watched from now on.
+    variables : sequence of (component, variable)
+        What is recorded.
+    rate : float
+        Samples per second.
+
+    Attributes
+    ----------
+    rows : list of ndarray
+        One row for each sample: time, then the variables.
+    """
+
+    def __init__(self, importer: Importer, variables: Sequence[tuple[str, str]], rate: float) -> None:
+        self._importer = importer
+        self._rate = rate
+        self._width = 1 + len(variables)
+        columns: dict[str, list[tuple[int, str]]] = {}
+        for i, (component, name) in enumerate(variables, start=1):
+            columns.setdefault(component, []).append((i, name))
+        self._probes = [_Probe(importer.components[c], found) for c, found in columns.items()]
+        self.rows: list[NDArray[np.float64]] = []
+        self._first, self._index, self._end = np.inf, 0, -np.inf
+        importer.watchers.append(StepWatcher(self._before_step, self._after_step))
+
+    def begin(self, first: float, end: float) -> None:
+        """Sample from `first` to `end`, s; the first sample is taken when the run gets there."""
+        self.rows = []
+        self._first, self._index, self._end = first, 0, end
+        if self._importer.time >= first - self._room(first):
+            self._importer.keeps_start = True
+            self._take_now(self._importer.time)
+
+    @staticmethod
+    def _room(time: float) -> float:
+        return SAME_INSTANT * (1.0 + abs(time))
+
+    def _next(self) -> float:
+        time = self._first + self._index / self._rate
+        return time if time <= self._end + self._room(self._end) else np.inf
+
+    def _take_now(self, time: float) -> None:
+        row = np.empty(self._width)
+        row[0] = time
+        for probe in self._probes:
+            probe.read(row)
+        self.rows.append(row)
+        self._index += 1
+
+    def _before_step(self, time: float) -> None:
+        self._start_row = np.empty(self._width)
+        for probe in self._probes:
+            if not probe.component.has_states:
+                probe.read(self._start_row)
+
+    def _after_step(self, time: float, end: float) -> None:
+        inside = []
+        while self._next() < end - self._room(end):
+            inside.append(self._next())
+            self._index += 1
+        if inside:
+            self._take_inside(time, end, inside)
+        if self._next() <= end + self._room(end):
+            self._take_now(end)
+
+    def _take_inside(self, time: float, end: float, instants: Sequence[float]) -> None:
+        rows = [np.empty(self._width) for _ in instants]
+        for row, instant in zip(rows, instants, strict=True):
+            row[0] = instant
+        for probe in self._probes:
+            if probe.component.has_states:
+                self._revisit(probe, time, instants, rows)
+            else:
+                self._interpolate(probe, time, end, instants, rows)
+        self.rows.extend(rows)
+
+    def _revisit(
+        self, probe: _Probe, time: float, instants: Sequence[float], rows: Sequence[NDArray[np.float64]]
+    ) -> None:
+        """Read a component inside the step just made, and put it back at the step's end."""
+        component, instance = probe.component, probe.component.instance
+        instance.save(component.at_end)
+        kept = (instance.time, instance.needs_event_mode, instance.returned_early)
+        component.note_inputs()
+        component.revisit_start()
+        now = time
+        for row, instant in zip(rows, instants, strict=True):
+            if instant > now:
+                instance.step(now, instant - now)
+            probe.read(row)
+            now = instant
+        instance.restore(component.at_end)
+        instance.time, instance.needs_event_mode, instance.returned_early = kept
+
+    def _interpolate(
+        self,
+        probe: _Probe,
+        time: float,
+        end: float,
+        instants: Sequence[float],
+        rows: Sequence[NDArray[np.float64]],
+    ) -> None:
+        last = np.empty(self._width)
+        probe.read(last)
+        columns = probe.columns
+        for row, instant in zip(rows, instants, strict=True):
+            share = (instant - time) / (end - time)
+            row[columns] = (1.0 - share) * self._start_row[columns] + share * last[columns]
