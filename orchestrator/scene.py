@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from os import PathLike
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
 from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.orchestrator.general_scene import GeneralScene
 from vibroimpact.orchestrator.scene_file import parse_toml, read_text
 from vibroimpact.orchestrator.scene_keys import coordinate_name, numeric_key, replacement
 from vibroimpact.orchestrator.scene_models import Execution, Forcing, OscillatorBody, Record, RestitutionStop
@@ -38,13 +40,16 @@ class Scene(BaseModel):
     units : {"SI", "nondimensional"}
         The meaning of all numbers.
     body : OscillatorBody
-        The body that moves.
+        The body that moves; a general scene has none.
+    general : GeneralScene or None
+        What a scene of `[component.NAME]` tables asks of the importer; None in the short form.
     forcing : Forcing or None
         What drives it; None without a `[forcing]` table.
     stops : tuple of RestitutionStop
         Zero, one or two stops in the order of the file.
     record : Record
-        What is recorded; periods in a forced scene, times in any other.
+        What is recorded; periods in a forced scene, times in any other. In a general scene `impacts` says
+        whether located events are recorded.
     sweep : tuple of SweepAxis
         The swept keys in the order of the file; see `vibroimpact.orchestrator.sweep.expand`.
     execution : Execution
@@ -57,12 +62,36 @@ class Scene(BaseModel):
     text: str = Field(repr=False)
     title: str
     units: Literal["SI", "nondimensional"]
-    body: OscillatorBody
+    body_given: OscillatorBody | None = Field(alias="body")
     forcing: Forcing | None
     stops: tuple[RestitutionStop, ...]
     record: Record
     sweep: tuple[SweepAxis, ...]
     execution: Execution
+    general: GeneralScene | None = None
+
+    @field_serializer("general")
+    def _without_folders(self, general: GeneralScene | None) -> dict[str, Any] | None:
+        """Leave the folders of FMU files out, so that a scene is the same wherever it lies."""
+        if general is None:
+            return None
+        document = asdict(general)
+        for component in document["components"]:
+            component["fmu"] = component["fmu"].name
+        return document
+
+    @property
+    def body(self) -> OscillatorBody:
+        """The body of a scene of the short form.
+
+        Raises
+        ------
+        UsageError
+            For a general scene.
+        """
+        if self.body_given is None:
+            raise UsageError(f"{self.source}: body: expected a scene with [body], got a general scene.")
+        return self.body_given
 
     @property
     def period(self) -> float | None:
@@ -79,6 +108,8 @@ class Scene(BaseModel):
         UsageError
             When the scene has no such number.
         """
+        if self.general is not None:
+            return self.general.value(key)
         table, place, name = numeric_key(key)
         number = getattr(self._numbered_tables().get(table if place is None else place), name, None)
         if number is None:
@@ -101,6 +132,8 @@ class Scene(BaseModel):
         >>> parse_scene(text, "free.toml").with_values({"body.mass": 2.0}).body.mass
         2.0
         """
+        if self.general is not None:
+            return self.model_copy(update={"general": self.general.with_values(values)})
         tables = self._numbered_tables()
         for key, value in values.items():
             table, place, name = numeric_key(key)
@@ -110,7 +143,8 @@ class Scene(BaseModel):
                 raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent table.")
             tables[slot] = owner.model_copy(update=replacement(type(owner), name, value))
         stops = tuple(tables[place] for place in range(len(self.stops)))
-        return self.model_copy(update={"body": tables["body"], "forcing": tables["forcing"], "stops": stops})
+        changed = {"body_given": tables["body"], "forcing": tables["forcing"], "stops": stops}
+        return self.model_copy(update=changed)
 
     def sweep_coordinate_name(self, key: str) -> str:
         """Return the name that a swept key has as a coordinate of the dataset."""
@@ -118,7 +152,7 @@ class Scene(BaseModel):
 
     def _numbered_tables(self) -> dict[str | int, BaseModel | None]:
         """Return the tables that hold numbers; a stop has its 0-based place for a name."""
-        return {"body": self.body, "forcing": self.forcing, **dict(enumerate(self.stops))}
+        return {"body": self.body_given, "forcing": self.forcing, **dict(enumerate(self.stops))}
 
 
 def load_scene(path: str | PathLike[str]) -> Scene:
@@ -153,7 +187,7 @@ def parse_scene(text: str, source: str) -> Scene:
     SceneError
         With all problems of the text, each on one line.
     """
-    tables, problems = read_tables(parse_toml(text, source))
+    tables, problems = read_tables(parse_toml(text, source), Path(source).parent)
     if tables is None:
         raise SceneError(tuple(dict.fromkeys(problem.line(source) for problem in problems)))
     return Scene(
@@ -167,4 +201,5 @@ def parse_scene(text: str, source: str) -> Scene:
         record=tables.record,
         sweep=tables.sweep,
         execution=tables.execution,
+        general=tables.general,
     )

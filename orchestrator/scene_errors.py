@@ -19,6 +19,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 LONGEST_QUOTE = 60
+MOST_WORDS_LISTED = 12
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+\Z")
 _TOML_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\Z")
@@ -122,16 +123,31 @@ def key_path(parts: Iterable[str | int]) -> str:
     return path
 
 
-def nearest(word: object, known: Iterable[str]) -> str:
-    """Return a hint that names the nearest spelling of a word, or all known words where none is near."""
-    options = list(known)
+def nearest(word: object, known: Iterable[str], prefix: str = "") -> str:
+    """Return a hint that names the nearest spelling of a word, or the known words where none is near.
+
+    Examples
+    --------
+    >>> nearest("heigth", ["height", "velocity"], "ball.")
+    'Did you mean ball.height?'
+    """
+    options = [option for option in known if option.isprintable()]  # a problem is one line
     near = _nearest_word(word, options)
-    return f"Did you mean {near}?" if near else f"Known here: {', '.join(options)}."
+    if near:
+        return f"Did you mean {prefix}{near}?"
+    if not options:
+        return ""
+    more = len(options) - MOST_WORDS_LISTED
+    listed = ", ".join(options[:MOST_WORDS_LISTED])
+    return f"Known here: {listed}{f' and {more} more' if more > 0 else ''}."
 
 
 def _nearest_word(word: object, options: Sequence[str]) -> str | None:
-    near = get_close_matches(word.lower(), options, n=1) if isinstance(word, str) else []
-    return near[0] if near else None
+    if not isinstance(word, str):
+        return None
+    lower = {option.lower(): option for option in options}
+    near = get_close_matches(word.lower(), lower, n=1)
+    return lower[near[0]] if near else None
 
 
 def unknown_key(path: Sequence[str | int], known: Iterable[str]) -> Problem:

@@ -81,7 +81,8 @@ def replacement(model: type[BaseModel], key: str, value: float) -> dict[str, flo
 def coordinate_name(key: str, swept: Sequence[str]) -> str:
     """Return the name of a swept key as a coordinate of the dataset.
 
-    It is the last part of the key, or the whole key joined by `_` where two swept keys end alike.
+    It is the last part of the key, or the whole key joined by `_` where two swept keys end alike; a name has
+    letters, digits and `_` only.
 
     Examples
     --------
@@ -89,8 +90,19 @@ def coordinate_name(key: str, swept: Sequence[str]) -> str:
     'position'
     >>> coordinate_name("stop[1].position", ["stop[1].position", "stop[2].position"])
     'stop_1_position'
+    >>> coordinate_name("chain.mass[2]", ["chain.mass[2]", "connection[1].gain"])
+    'mass_2'
     """
-    last = key.rpartition(".")[2]
-    if any(other != key and other.rpartition(".")[2] == last for other in swept):
-        return re.sub(r"\W+", "_", key)
-    return last
+    last = _last_part(key)
+    if any(other != key and _last_part(other) == last for other in swept):
+        return dataset_name(key)
+    return last or dataset_name(key)
+
+
+def _last_part(key: str) -> str:
+    return dataset_name(key.rpartition(".")[2])
+
+
+def dataset_name(text: str) -> str:
+    """Return a key or a variable as a name of letters, digits and `_`."""
+    return re.sub(r"\W+", "_", text, flags=re.ASCII).strip("_")

@@ -12,6 +12,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from vibroimpact.orchestrator.importer.specification import Exchange
 from vibroimpact.orchestrator.scene_errors import Rule
 from vibroimpact.orchestrator.sweep import Path
 
@@ -145,17 +146,23 @@ class Record(SceneTable):
 
 
 class Execution(SceneTable):
-    """`[execution]`: how points run and when to give one up."""
+    """`[execution]`: how points run and when to give one up.
 
-    how: Annotated[Literal["auto", "fused"], Rule('"auto" or "fused"', unavailable=("coupled", "batch"))] = (
-        "auto"
-    )
+    `macro_step`, `exchange` and `guard` are for coupled runs.
+    """
+
+    how: Annotated[
+        Literal["auto", "coupled", "fused"], Rule('"auto", "coupled" or "fused"', unavailable=("batch",))
+    ] = "auto"
     impact_limit: Annotated[
         int,
         Field(ge=1, le=MOST_IMPACTS_PER_POINT),
         Rule(f"a whole number from 1 to {MOST_IMPACTS_PER_POINT}"),
     ] = DEFAULT_IMPACT_LIMIT
     deadline: Annotated[Positive | None, Rule("a number > 0", "s")] = None
+    macro_step: Annotated[Positive | None, Rule("a number > 0", "s")] = None
+    exchange: Annotated[Exchange, Rule('"jacobi", "gauss_seidel" or "iterated"')] = "gauss_seidel"
+    guard: Switch = False
 
 
 class AxisTable(SceneTable):

@@ -8,7 +8,7 @@ the worst corner holds everywhere.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,6 +30,7 @@ MOST_STOPS = 2
 FREQUENCY_KEYS = frozenset({"angular_frequency", "frequency"})
 PERIOD_KEYS = ("transient_periods", "recorded_periods")
 TIME_KEYS = ("transient_time", "recorded_time")
+COUPLING_KEYS = ("macro_step", "exchange", "guard")
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +83,20 @@ def rule_problems(draft: Draft) -> list[Problem]:
         _start_is_on_the_free_side,
         _record_counts_what_there_is,
         _samples_fit,
-        _sweep_fits,
+        _coupling_is_asked_for,
     )
-    return [problem for rule in rules for problem in rule(draft)]
+    return [problem for rule in rules for problem in rule(draft)] + sweep_problems(draft.axes)
+
+
+def _coupling_is_asked_for(draft: Draft) -> Iterator[Problem]:
+    execution = draft.written("execution")
+    how = execution.get("how", "auto")
+    if how not in ("auto", "fused"):
+        return
+    for key in COUPLING_KEYS:
+        if key in execution:
+            hint = f'Remove {key}, or run the scene coupled: how = "coupled".'
+            yield Problem(f"execution.{key}", 'how = "coupled" beside it', f"how = {quoted(how)}", hint)
 
 
 def _damping_is_given_once(draft: Draft) -> Iterator[Problem]:
@@ -236,11 +248,16 @@ def _samples_fit(draft: Draft) -> Iterator[Problem]:
         )
 
 
-def _sweep_fits(draft: Draft) -> Iterator[Problem]:
-    count = run_count(draft.axes)
+def sweep_problems(axes: Sequence[SweepAxis]) -> list[Problem]:
+    """Return what is wrong between the axes of a sweep, of any form of scene."""
+    return list(_sweep_fits(axes))
+
+
+def _sweep_fits(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
+    count = run_count(axes)
     if count > MOST_POINTS:
         yield Problem("sweep", f"at most {MOST_POINTS} points in all", str(count), "Lower points of an axis.")
-    carried = [axis.key for axis in draft.axes if axis.continuation]
+    carried = [axis.key for axis in axes if axis.continuation]
     if len(carried) > 1:
         hint = 'Make the others "independent": they span the branches.'
         yield Problem("sweep", "at most one key with a path up, down or up-down", ", ".join(carried), hint)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any
 
-from pydantic import BaseModel, ValidationError
-
-from vibroimpact.orchestrator.scene_errors import Problem, problems_of, quoted, unknown_key, value_problem
+from vibroimpact.orchestrator.general_scene import GeneralScene
+from vibroimpact.orchestrator.scene_errors import Problem, quoted, unknown_key, value_problem
 from vibroimpact.orchestrator.scene_keys import parse_key
 from vibroimpact.orchestrator.scene_models import (
     BODY_MODELS,
@@ -23,34 +23,37 @@ from vibroimpact.orchestrator.scene_models import (
 from vibroimpact.orchestrator.scene_rules import Draft, rule_problems
 from vibroimpact.orchestrator.sweep import SweepAxis
 from vibroimpact.orchestrator.sweep_table import read_sweep
+from vibroimpact.orchestrator.table_reader import Table, read_table
 
-_TABLES = ("scene", "body", "forcing", "stop", "record", "sweep", "execution")
+_SHORT_TABLES = ("body", "forcing", "stop")
 _GENERAL_TABLES = ("component", "connection", "event")
+_COMMON_TABLES = ("record", "sweep", "execution")
 _OPTIONAL_TABLES = ("sensor", "load_cell", "exciter", "noise", "daq", "replay")
-
-Table = TypeVar("Table", bound=BaseModel)
 
 
 @dataclass(frozen=True, slots=True)
 class Tables:
-    """All tables of a scene, valid by themselves and together."""
+    """All tables of a scene, valid by themselves and together; it has a body or is a general scene."""
 
     header: SceneHeader
-    body: OscillatorBody
+    body: OscillatorBody | None
     forcing: Forcing | None
     stops: tuple[RestitutionStop, ...]
     record: Record
     sweep: tuple[SweepAxis, ...]
     execution: Execution
+    general: GeneralScene | None = None
 
 
-def read_tables(document: Mapping[str, Any]) -> tuple[Tables | None, list[Problem]]:
+def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[Tables | None, list[Problem]]:
     """Validate the tables of a document.
 
     Parameters
     ----------
     document : mapping
         A parsed TOML document, whatever is in it.
+    folder : Path
+        The folder of the scene file, from which the paths in it count.
 
     Returns
     -------
@@ -60,11 +63,35 @@ def read_tables(document: Mapping[str, Any]) -> tuple[Tables | None, list[Proble
         All of them, in the order of the tables.
     """
     general = [name for name in _GENERAL_TABLES if name in document]
-    if general:
-        return None, [_general_problem(general)]
+    short = [name for name in _SHORT_TABLES if name in document]
+    if general and short:
+        return None, [_mixed_problem(general, short)]
+    return _read_general(document, folder) if general else _read_short(document)
+
+
+def _mixed_problem(general: list[str], short: list[str]) -> Problem:
+    expected = "[component.NAME], [[connection]] and [[event]], or [body], [forcing] and [[stop]]"
+    got = " beside ".join(", ".join(f"[{name}]" for name in names) for names in (general, short))
+    hint = 'Remove those of one form; the body of the short form is fmu = "Oscillator" in the general one.'
+    return Problem(general[0], expected, got, hint)
+
+
+def _read_general(document: Mapping[str, Any], folder: Path) -> tuple[Tables | None, list[Problem]]:
+    # What reads model descriptions takes time to load, and the short form does not need it.
+    from vibroimpact.orchestrator.general_tables import read_general
+
+    unknown = list(_table_problems(document, ("scene", *_GENERAL_TABLES, *_COMMON_TABLES)))
+    tables, problems = read_general(document, folder)
+    if tables is None or unknown:
+        return None, unknown + problems
+    general, record = tables.general, tables.record
+    return Tables(tables.header, None, None, (), record, tables.sweep, tables.execution, general), []
+
+
+def _read_short(document: Mapping[str, Any]) -> tuple[Tables | None, list[Problem]]:
     axes, sweep_problems = read_sweep(document)
     reader = _Reader(_with_swept_keys(document, axes))
-    reader.problems += _table_problems(document)
+    reader.problems += _table_problems(document, ("scene", *_SHORT_TABLES, *_COMMON_TABLES))
     header, body, forcing = reader.header(), reader.body(), reader.forcing()
     stops, record, execution = reader.stops(), reader.record(), reader.execution()
     draft = Draft(reader.document, header, body, forcing, stops, record, axes)
@@ -75,19 +102,13 @@ def read_tables(document: Mapping[str, Any]) -> tuple[Tables | None, list[Proble
     return Tables(header, body, forcing, whole, _applicable(record), axes, execution), []
 
 
-def _general_problem(tables: list[str]) -> Problem:
-    got = " and ".join(f"[{name}]" for name in tables)
-    hint = "General scenes ([component.NAME], [[connection]], [[event]]) are not available in this version."
-    return Problem(tables[0], "a scene of [body], [forcing] and [[stop]] tables", got, hint)
-
-
-def _table_problems(document: Mapping[str, Any]) -> Iterator[Problem]:
+def _table_problems(document: Mapping[str, Any], known: tuple[str, ...]) -> Iterator[Problem]:
     for name, value in document.items():
         if name in _OPTIONAL_TABLES:
             hint = f"[{name}] is not available in this version: remove it."
             yield Problem(name, f"a scene without [{name}]", "one", hint)
-        elif name not in _TABLES:
-            problem = unknown_key((name,), _TABLES)
+        elif name not in known:
+            problem = unknown_key((name,), known)
             what = "table" if isinstance(value, dict | list) else "key outside any table"
             yield Problem(problem.key, "a known table", f"the unknown {what} {quoted(name)}", problem.hint)
 
@@ -177,17 +198,4 @@ class _Reader:
         return None
 
     def _table(self, model: type[Table], raw: object, path: tuple[str | int, ...]) -> Table | None:
-        if not isinstance(raw, dict):
-            name = str(path[0])
-            brackets = (
-                f"[[{name}]], with two brackets"
-                if name == "stop"
-                else f"[{name}], with single brackets, once"
-            )
-            self.problems.append(Problem(name, "a table", quoted(raw), f"Write {brackets}."))
-            return None
-        try:
-            return model.model_validate(raw)
-        except ValidationError as error:
-            self.problems += problems_of(error, model, path)
-            return None
+        return read_table(model, raw, path, self.problems)

@@ -45,19 +45,24 @@ def read_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list
     problems : list of Problem
         Everything that is wrong with the others.
     """
-    table = document.get("sweep", {})
-    if not isinstance(table, dict):
-        return (), [Problem("sweep", "a table", quoted(table), f"Write [sweep] and below it KEY = {_FORMS}.")]
+    entries, problems = sweep_entries(document)
     axes: list[SweepAxis] = []
-    problems: list[Problem] = []
-    for key, entry in table.items():
+    for key, entry in entries.items():
         found = list(_key_problems(key, entry, document))
         if not found:
-            axis, found = _read_axis(key, entry)
+            axis, found = read_axis(key, entry)
             found += _value_problems(axis) if axis else []
             axes += [axis] if axis and not found else []
         problems += found
     return tuple(axes), problems
+
+
+def sweep_entries(document: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Problem]]:
+    """Return the entries of the sweep of any form of scene, and what is wrong with the table itself."""
+    table = document.get("sweep", {})
+    if isinstance(table, dict):
+        return table, []
+    return {}, [Problem("sweep", "a table", quoted(table), f"Write [sweep] and below it KEY = {_FORMS}.")]
 
 
 def _key_problems(text: str, entry: object, document: Mapping[str, Any]) -> Iterator[Problem]:
@@ -101,7 +106,8 @@ def _structural(table: str) -> list[str]:
     return [key for key in keys if key not in SWEEPABLE[table]]
 
 
-def _read_axis(key: str, entry: object) -> tuple[SweepAxis | None, list[Problem]]:
+def read_axis(key: str, entry: object) -> tuple[SweepAxis | None, list[Problem]]:
+    """Return the axis of one entry of a sweep, or what is wrong with its values and path."""
     path = ("sweep", key)
     if not isinstance(entry, dict):
         return None, [Problem(key_path(path), "a table", quoted(entry), f"Write {_FORMS}.")]

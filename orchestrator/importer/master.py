@@ -362,10 +362,11 @@ class Importer:
         return target
 
     def _watched(self, watch: Watch, time: float, target: float) -> float:
-        located = watch.find(time, target - time)
+        size = target - time
+        located = watch.find(time, size)
         if located is None:
             return target
-        if time + located >= target:
+        if located >= size:
             self._at_event.append(watch.component)
             return target
         return time + located

@@ -7,6 +7,7 @@ its own state at the end of a step sees the event there.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ PRECISION = 2e-13
 #: Events of one watch closer than this times (1 + |time|), s, have accumulated; they are no longer followed.
 SHORTEST_SPACING = 1e-9
 MOST_EVALUATIONS = 200
+#: A distance below this is on the level: some FMUs put a bounced ball at the smallest number instead of 0.
+NEGLIGIBLE = 1e-300
 #: How often a step is halved to find the variable on the near side of its level.
 MOST_HALVINGS = 30
 
@@ -54,7 +57,8 @@ class Watch:
     def begin(self) -> None:
         """Forget the run before."""
         self.accumulated = False
-        self._last_time = -float("inf")
+        self._last_time = -math.inf
+        self._agreed = -math.inf
         self._start = 0.0
 
     def distance(self) -> float:
@@ -69,37 +73,46 @@ class Watch:
     def find(self, time: float, size: float) -> float | None:
         """Return the seconds into the step just made at which the first crossing seen lies; None without one.
 
-        The component is left somewhere in the step; the caller restores it.
+        The component is left somewhere in the step, and the caller repeats it to the crossing. Of that repeated step
+        the crossing is the end; the component is then left there.
         """
         if self.accumulated:
             return None
         self.component.note_inputs()
         sign = -1.0 if self.event.direction == "either" and self._start < 0.0 else 1.0
-        end = sign * self.distance()
-        if end > 0.0:
+        if sign * self.distance() > NEGLIGIBLE:
             return None
+        if abs(time + size - self._agreed) <= PRECISION:
+            self._accept(self._agreed)
+            return size
         near = self._near_side(time, size, sign)
         if near is None:
+            self._value_at(time, size)  # back to the end of the step
             return None
         bracket = Bracket(near[0], near[1], size)
-        located = refine(bracket, lambda u: sign * self._value_at(time, u), PRECISION * (1.0 + abs(time)))
-        return self._spaced(time, located)
+        precision = PRECISION * (1.0 + abs(time))
+        # a little further, so that the FMU's own test sees the crossing too, whatever it does with an exact zero
+        located = precision + refine(bracket, lambda u: sign * self._value_at(time, u), precision)
+        if located >= size:
+            self._value_at(time, size)
+            self._accept(time + size)
+            return size
+        self._agreed = time + located
+        return located
 
-    def _spaced(self, time: float, located: float) -> float | None:
-        instant = time + located
+    def _accept(self, instant: float) -> None:
         self.accumulated = instant - self._last_time < SHORTEST_SPACING * (1.0 + abs(instant))
         self._last_time = instant
-        return None if self.accumulated else located
 
     def _near_side(self, time: float, size: float, sign: float) -> tuple[float, float] | None:
         """A point of the step on the near side: its start, or (after an event) a moment later."""
-        if sign * self._start > 0.0:
+        if sign * self._start > NEGLIGIBLE:
             return 0.0, sign * self._start
         u = size
         for _ in range(MOST_HALVINGS):
             u *= 0.5
             value = sign * self._value_at(time, u)
-            if value > 0.0:
+            if value > NEGLIGIBLE:
                 return u, value
         return None
 
@@ -155,7 +168,7 @@ def _probe(
     if not bracket.near < u < bracket.far:
         return
     found = value(u)
-    if found > 0.0:
+    if found > NEGLIGIBLE:
         bracket.near, bracket.near_value = u, found
         points.append((u, found))
         del points[:-3]

@@ -1,0 +1,115 @@
+"""What a general scene asks of the importer, after validation."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec, Exchange
+
+_GAIN_KEY = re.compile(r"connection\[([1-9][0-9]{0,8})\]\.gain")
+
+
+def gain_place(key: str) -> int | None:
+    """Return the 0-based place of the connection whose gain a key names; None when it names none.
+
+    Examples
+    --------
+    >>> gain_place("connection[1].gain"), gain_place("ball.e")
+    (0, None)
+    """
+    match = _GAIN_KEY.fullmatch(key)
+    return int(match[1]) - 1 if match else None
+
+
+@dataclass(frozen=True, slots=True)
+class GeneralScene:
+    """Components of any FMU files, how they are connected, and what of them is recorded.
+
+    Attributes
+    ----------
+    components : tuple of ComponentSpec
+        In the order of the file. Start values have the type of their variable: float, int (also for
+        enumerations), bool or str. A swept start value that the file leaves out has its first swept value.
+    connections : tuple of ConnectionSpec
+        In the order of the file.
+    events : tuple of EventSpec
+        Crossings to be found by step revision.
+    variables : tuple of str
+        Recorded variables, `component.variable`.
+    rate : float or None
+        Samples of them per s; None when nothing is sampled.
+    macro_step : float
+        Time between two exchanges, s; the whole run when nothing is exchanged.
+    exchange : {"jacobi", "gauss_seidel", "iterated"}
+        In which order values are exchanged.
+    guard : bool
+        Whether points run in a child process that may crash or hang.
+    units : mapping of str to str
+        Unit of each recorded variable and swept key as the description writes it; `1` where it has none.
+    """
+
+    components: tuple[ComponentSpec, ...]
+    connections: tuple[ConnectionSpec, ...]
+    events: tuple[EventSpec, ...]
+    variables: tuple[str, ...]
+    rate: float | None
+    macro_step: float
+    exchange: Exchange
+    guard: bool
+    units: Mapping[str, str]
+
+    def value(self, key: str) -> float:
+        """Return the number that `COMPONENT.VARIABLE` or `connection[N].gain` has.
+
+        Raises
+        ------
+        UsageError
+            When the scene gives no such number.
+        """
+        place = gain_place(key)
+        if place is not None:
+            return self._connection(place, key).gain
+        component, variable = self._start_value(key)
+        return float(self.components[component].parameters[variable])
+
+    def with_values(self, values: Mapping[str, float]) -> GeneralScene:
+        """Return this scene with other start values and gains, without validating it again.
+
+        Raises
+        ------
+        UsageError
+            For a key that is neither swept nor given in the scene.
+        """
+        components, connections = list(self.components), list(self.connections)
+        for key, value in values.items():
+            place = gain_place(key)
+            if place is not None:
+                self._connection(place, key)
+                connections[place] = replace(connections[place], gain=float(value))
+                continue
+            index, variable = self._start_value(key)
+            before = components[index].parameters
+            typed = float(value) if isinstance(before[variable], float) else int(value)
+            components[index] = replace(components[index], parameters={**before, variable: typed})
+        return replace(self, components=tuple(components), connections=tuple(connections))
+
+    def _connection(self, place: int, key: str) -> ConnectionSpec:
+        if place < len(self.connections):
+            return self.connections[place]
+        raise UsageError(f"{key}: expected one of {len(self.connections)} connections, got an absent one.")
+
+    def _start_value(self, key: str) -> tuple[int, str]:
+        """Return the place of the component and the variable that a key names."""
+        name, _, variable = key.partition(".")
+        for place, component in enumerate(self.components):
+            if component.name == name and isinstance(component.parameters.get(variable), int | float):
+                if isinstance(component.parameters[variable], bool):
+                    break
+                return place, variable
+        raise UsageError(
+            f"{key}: expected a number that this scene gives or sweeps, got none. "
+            "Write it in the parameters of its component."
+        )

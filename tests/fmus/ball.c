@@ -1,0 +1,58 @@
+/* A bouncing ball as many write it: flight is exact, but the ground is looked at only where a step ends.
+ *
+ * Inside a step the ball flies through the ground. If it then is on or below it and falls, it bounces, at the end
+ * of the step: too late, and too fast, by up to g times the step. */
+#include <float.h>
+
+#include "model.h"
+
+enum { H = 1, V, G, E, LANDING, BOUNCES };
+enum { LANDING_ZERO, LANDING_KEPT, LANDING_ABOVE };
+
+const bool model_has_state = true;
+const bool model_has_event_mode = false;
+
+void model_start(model *m)
+{
+    *m = (model){.value = {[H] = 1.0, [G] = -9.81, [E] = 0.7}};
+}
+
+bool model_begin(model *m, void *instance)
+{
+    (void)m;
+    (void)instance;
+    return true;
+}
+
+void model_calculate(model *m)
+{
+    (void)m;
+}
+
+static void bounce(double *x)
+{
+    const int landing = (int)x[LANDING];
+    if (landing != LANDING_KEPT) {
+        x[H] = landing == LANDING_ABOVE ? DBL_MIN : 0.0;
+    }
+    x[V] = -x[E] * x[V];
+    x[BOUNCES] += 1.0;
+}
+
+step_answer model_step(model *m, double size, void *instance)
+{
+    double *x = m->value;
+    (void)instance;
+    x[H] += size * (x[V] + 0.5 * x[G] * size);
+    x[V] += size * x[G];
+    if (x[H] <= 0.0 && x[V] < 0.0) {
+        bounce(x);
+    }
+    return STEP_DONE;
+}
+
+bool model_update(model *m)
+{
+    (void)m;
+    return false;
+}

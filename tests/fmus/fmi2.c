@@ -1,0 +1,270 @@
+/* FMI 2.0 co-simulation of the model that it is compiled with. Strict where importers get it wrong: the
+ * communication point must be where the FMU is, and steps go forward. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi2Functions.h"
+#include "model.h"
+#include "token.h"
+
+/* Largest distance of a communication point from the FMU's own time, as a part of 1 + |time|. */
+#define TIME_TOLERANCE 1e-9
+
+typedef struct {
+    model m;
+    fmi2CallbackFunctions callbacks;
+    bool terminated;
+    char name[64];
+} instance2;
+
+static instance2 *of(fmi2Component c)
+{
+    return c;
+}
+
+void say(void *instance, const char *word, int number, double value)
+{
+    instance2 *i = instance;
+    if (i->callbacks.logger != NULL) {
+        i->callbacks.logger(i->callbacks.componentEnvironment, i->name, fmi2Error, "logStatusError", "%s %d %g", word,
+                            number, value);
+    }
+}
+
+static fmi2Status status(bool good)
+{
+    return good ? fmi2OK : fmi2Error;
+}
+
+/* ---- life ---- */
+
+const char *fmi2GetTypesPlatform(void)
+{
+    return fmi2TypesPlatform;
+}
+
+const char *fmi2GetVersion(void)
+{
+    return fmi2Version;
+}
+
+fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t count, const fmi2String categories[])
+{
+    (void)c, (void)on, (void)count, (void)categories;
+    return fmi2OK;
+}
+
+fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
+                              const fmi2CallbackFunctions *callbacks, fmi2Boolean visible, fmi2Boolean logging)
+{
+    (void)resources, (void)visible, (void)logging;
+    if (type != fmi2CoSimulation || strcmp(guid, TOKEN) != 0) {
+        return NULL;
+    }
+    instance2 *i = calloc(1, sizeof *i);
+    if (i != NULL) {
+        i->callbacks = *callbacks;
+        strncpy(i->name, name, sizeof i->name - 1);
+        model_start(&i->m);
+    }
+    return i;
+}
+
+void fmi2FreeInstance(fmi2Component c)
+{
+    free(c);
+}
+
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, fmi2Real tolerance, fmi2Real start,
+                               fmi2Boolean stop_defined, fmi2Real stop)
+{
+    (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
+    of(c)->m.time = start;
+    return fmi2OK;
+}
+
+fmi2Status fmi2EnterInitializationMode(fmi2Component c)
+{
+    (void)c;
+    return fmi2OK;
+}
+
+fmi2Status fmi2ExitInitializationMode(fmi2Component c)
+{
+    return status(model_begin(&of(c)->m, c));
+}
+
+fmi2Status fmi2Terminate(fmi2Component c)
+{
+    (void)c;
+    return fmi2OK;
+}
+
+fmi2Status fmi2Reset(fmi2Component c)
+{
+    model_start(&of(c)->m);
+    of(c)->terminated = false;
+    return fmi2OK;
+}
+
+/* ---- values ---- */
+
+static double *place(fmi2Component c, fmi2ValueReference reference)
+{
+    return reference < MODEL_VALUES ? &of(c)->m.value[reference] : NULL;
+}
+
+fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2Real values[])
+{
+    model_calculate(&of(c)->m);
+    for (size_t k = 0; k < count; k++) {
+        const double *from = place(c, references[k]);
+        if (from == NULL) {
+            return fmi2Error;
+        }
+        values[k] = *from;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, const fmi2Real values[])
+{
+    for (size_t k = 0; k < count; k++) {
+        double *to = place(c, references[k]);
+        if (to == NULL) {
+            return fmi2Error;
+        }
+        *to = values[k];
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2Integer values[])
+{
+    for (size_t k = 0; k < count; k++) {
+        double value;
+        if (fmi2GetReal(c, &references[k], 1, &value) != fmi2OK) {
+            return fmi2Error;
+        }
+        values[k] = (fmi2Integer)value;
+    }
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference references[], size_t count,
+                          const fmi2Integer values[])
+{
+    for (size_t k = 0; k < count; k++) {
+        const double value = values[k];
+        if (fmi2SetReal(c, &references[k], 1, &value) != fmi2OK) {
+            return fmi2Error;
+        }
+    }
+    return fmi2OK;
+}
+
+/* ---- states ---- */
+
+fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    if (!model_has_state) {
+        return fmi2Error;
+    }
+    if (*state == NULL) {
+        *state = malloc(sizeof(model));
+    }
+    if (*state == NULL) {
+        return fmi2Error;
+    }
+    memcpy(*state, &of(c)->m, sizeof(model));
+    return fmi2OK;
+}
+
+fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
+{
+    if (!model_has_state || state == NULL) {
+        return fmi2Error;
+    }
+    memcpy(&of(c)->m, state, sizeof(model));
+    of(c)->terminated = false;
+    return fmi2OK;
+}
+
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state)
+{
+    (void)c;
+    free(*state);
+    *state = NULL;
+    return fmi2OK;
+}
+
+fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size)
+{
+    (void)c, (void)state;
+    *size = sizeof(model);
+    return status(model_has_state);
+}
+
+fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate state, fmi2Byte bytes[], size_t size)
+{
+    (void)c;
+    if (!model_has_state || size < sizeof(model)) {
+        return fmi2Error;
+    }
+    memcpy(bytes, state, sizeof(model));
+    return fmi2OK;
+}
+
+fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size_t size, fmi2FMUstate *state)
+{
+    if (size != sizeof(model) || fmi2GetFMUstate(c, state) != fmi2OK) {
+        return fmi2Error;
+    }
+    memcpy(*state, bytes, sizeof(model));
+    return fmi2OK;
+}
+
+/* ---- steps ---- */
+
+fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean no_state_before)
+{
+    model *m = &of(c)->m;
+    (void)no_state_before;
+    if (fabs(time - m->time) > TIME_TOLERANCE * (1.0 + fabs(time)) || !(size > 0.0)) {
+        say(c, "wrong communication point or step size", 0, time);
+        return fmi2Error;
+    }
+    m->time = time;
+    const step_answer answer = model_step(m, size, c);
+    of(c)->terminated = answer == STEP_TERMINATES;
+    switch (answer) {
+    case STEP_FAILS:
+        return fmi2Error;
+    case STEP_FATAL:
+        return fmi2Fatal;
+    case STEP_STALLS:
+        return fmi2Discard;
+    case STEP_DISCARDS:
+        m->time = time + size / 2;
+        return fmi2Discard;
+    case STEP_TERMINATES:
+        m->time = time + size;
+        return fmi2Discard;
+    default:
+        m->time = time + size;
+        return fmi2OK;
+    }
+}
+
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
+{
+    *value = of(c)->m.time;
+    return kind == fmi2LastSuccessfulTime ? fmi2OK : fmi2Discard;
+}
+
+fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
+{
+    *value = of(c)->terminated;
+    return kind == fmi2Terminated ? fmi2OK : fmi2Discard;
+}

@@ -1,0 +1,47 @@
+/* What a model of these FMUs is: a flat struct, and what happens in a step. The adapters fmi2.c and fmi3.c do the
+ * rest, and are compiled once for each model. */
+#ifndef TEST_MODEL_H
+#define TEST_MODEL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+enum { MODEL_VALUES = 9 };
+
+/* A state: copying it saves it. Integers and enumerations are kept as doubles too. */
+typedef struct {
+    double time;                /* s */
+    double value[MODEL_VALUES]; /* by value reference; 0 is the time in FMI 3.0 and unused in FMI 2.0 */
+} model;
+
+typedef enum {
+    STEP_DONE,
+    STEP_NEEDS_EVENT, /* done; FMI 3.0 asks for event mode */
+    STEP_TERMINATES,  /* done; asks for the end of the simulation (FMI 2.0: discard, and terminated) */
+    STEP_STALLS,      /* the time stays where it is (FMI 3.0: early return, FMI 2.0: discard) */
+    STEP_DISCARDS,    /* half of the step is done, then discard */
+    STEP_FAILS,
+    STEP_FATAL
+} step_answer;
+
+/* ---- each model has these ---- */
+
+extern const bool model_has_state;      /* get, set and serialize state */
+extern const bool model_has_event_mode; /* FMI 3.0 */
+
+void model_start(model *m);
+/* False: the parameters are refused. */
+bool model_begin(model *m, void *instance);
+/* Outputs from inputs and states; called before every get. */
+void model_calculate(model *m);
+/* Advance by `size` (s, > 0); the adapter moves the time. */
+step_answer model_step(model *m, double size, void *instance);
+/* One event iteration; true: another one is needed. */
+bool model_update(model *m);
+
+/* ---- each adapter has this ---- */
+
+/* Log "<word> <number> <value>", as an error: in FMI 2.0 through the variadic logger. */
+void say(void *instance, const char *word, int number, double value);
+
+#endif
