@@ -13,10 +13,12 @@ from vibroimpact.fmus import component_name, components, fmu_path
 from vibroimpact.fmus.archive import platforms, unpack
 from vibroimpact.fmus.build import BUILT, build, read_components, update_readmes
 from vibroimpact.fmus.check import check_fmu
-from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.export import export_fmu
+from vibroimpact.fmus.python_fmus import build_user_contact_law
 
 VERSIONS = ("3.0", "2.0")
+USER_CONTACT_LAW = "user-contact-law"
 commands = typer.Typer(no_args_is_help=True, help="List, build, check and export the FMUs of the package.")
 
 
@@ -75,16 +77,32 @@ def check_files(
     typer.echo(f"{len(paths)} FMU{'s' if len(paths) != 1 else ''} checked: no problems.")
 
 
+def _export_user_law(law: Path | None, output: Path | None, contacts: int | None) -> Path:
+    if law is None:
+        raise UsageError("--law: expected the Python file of your law, got nothing. Add --law my_law.py.")
+    if contacts is not None:
+        raise UsageError("--contacts: a contact law has no contacts of its own; leave the option out.")
+    return build_user_contact_law(law, output or law.with_suffix(".fmu"))
+
+
 @commands.command("export")
 def export_component(
     component: Annotated[str, typer.Argument(help="Component, for example oscillator.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
     contacts: Annotated[int | None, typer.Option(help="Contacts in its description; default: all.")] = None,
     fmi: Annotated[str, typer.Option(help="FMI version, 3.0 or 2.0.")] = "3.0",
+    law: Annotated[Path | None, typer.Option(help="user-contact-law: the Python file of your law.")] = None,
 ) -> None:
     """Write an FMU for another tool, with as many contacts as wanted. Needs no compiler.
 
     Example: vibroimpact fmu export oscillator --contacts 1 -o Oscillator1.fmu
+
+    A contact law of your own in Python: vibroimpact fmu export user-contact-law --law my_law.py -o my_law.fmu
     """
+    if component == USER_CONTACT_LAW:
+        typer.echo(str(_export_user_law(law, output, contacts)))
+        return
+    if law is not None:
+        raise UsageError(f"--law: expected the component {USER_CONTACT_LAW} with it, got {component}.")
     path = output or Path(f"{component_name(component)}.fmu")
     typer.echo(str(export_fmu(component, path, contacts=contacts, fmi=fmi)))
