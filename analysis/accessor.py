@@ -1,4 +1,4 @@
-"""`ds.vibroimpact`: the impacts, sticks and samples of one run, under the coordinates of the dataset."""
+"""`ds.vibroimpact`: the impacts, sticks, samples and events of one run, under the dataset's coordinates."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.schema import RAGGED, Direction, names_list
 from vibroimpact.fmus.errors import DatasetError
 
-_RECORD_KEYS = {"impact": "impacts = true", "stick": "impacts = true", "sample": "time_series"}
+_RECORD_KEYS = {
+    "impact": "impacts = true",
+    "stick": "impacts = true",
+    "sample": "time_series (in a scene of components, variables and rate)",
+    "event": "events = true",
+}
 
 
 @xr.register_dataset_accessor("vibroimpact")
@@ -64,6 +69,13 @@ class VibroimpactAccessor:
     def samples(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
         """Return the time series of one run along `sample`; parameters as for `impacts`."""
         return self._rows("sample", exact, selection)
+
+    def events(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
+        """Return the events of one run along `event`; parameters as for `impacts`.
+
+        The attribute `flag_meanings` of `event_component` names the components 1, 2, ...
+        """
+        return self._rows("event", exact, selection)
 
     def _rows(self, dimension: str, exact: bool, selection: dict[str, Any]) -> xr.Dataset:
         """Return the rows of one run of a ragged array, with the run's coordinates as scalars."""
@@ -121,7 +133,7 @@ def _coordinates(dataset: xr.Dataset, run_id: xr.DataArray) -> dict[str, NDArray
     """Return each coordinate of the runs as one flat column."""
     columns = {"run_id": run_id.values.ravel()}
     for name, coordinate in dataset.coords.items():
-        if name not in ("run", "period") and set(coordinate.dims) <= set(run_id.dims):
+        if name not in ("run", "period", "connection") and set(coordinate.dims) <= set(run_id.dims):
             values = np.broadcast_to(
                 xr.broadcast(coordinate, run_id)[0].transpose(*run_id.dims).values, run_id.shape
             )

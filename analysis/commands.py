@@ -7,10 +7,10 @@ from typing import Annotated, Literal, cast
 
 import typer
 
-from vibroimpact.analysis.dataset import open_dataset, unreadable
+from vibroimpact.analysis.dataset import open_dataset, open_measured, unreadable
 from vibroimpact.fmus.errors import UsageError
 
-_KINDS = ("auto", "bifurcation", "run")
+_KINDS = ("auto", "bifurcation", "run", "convergence")
 
 
 def register(app: typer.Typer) -> None:
@@ -21,12 +21,14 @@ def register(app: typer.Typer) -> None:
 def plot(
     file: Annotated[Path, typer.Argument(help="Dataset file, or the folder of a campaign.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Figure to write: .png, .pdf or .svg.")],
-    kind: Annotated[str, typer.Option(help="auto, bifurcation or run.")] = "auto",
+    kind: Annotated[
+        str, typer.Option(help="auto, bifurcation, run, or convergence (of a benchmark).")
+    ] = "auto",
     run: Annotated[
         int | None, typer.Option(help="run_index of the run to draw; implies --kind run.", min=0)
     ] = None,
 ) -> None:
-    """Draw a dataset: a bifurcation diagram, maps over two parameters, or one run.
+    """Draw a dataset: a bifurcation diagram, maps over two parameters, one run, or a ladder of macro steps.
 
     Example: vibroimpact plot campaign/dataset.nc -o bifurcation.png
     """
@@ -35,9 +37,11 @@ def plot(
 
     if kind not in _KINDS:
         raise UsageError(f"--kind: expected one of {', '.join(_KINDS)}, got {kind!r}.")
-    with open_dataset(file) as dataset:
+    with open_measured(file) if kind == "convergence" else open_dataset(file) as dataset:
         try:
-            figure = figures.draw(dataset, cast(Literal["auto", "bifurcation", "run"], kind), run)
+            figure = figures.draw(
+                dataset, cast(Literal["auto", "bifurcation", "run", "convergence"], kind), run
+            )
         except (OSError, RuntimeError) as problem:
             # Values are read when first used, so a damaged file may show only here.
             raise unreadable(file, problem) from problem

@@ -1,18 +1,22 @@
 """The door to the dataset: its schema, its writers and its readers.
 
-`schema` holds the table of names, dimensions, units and meanings and the check against it; `writing`
-builds, merges and writes; `reading` opens; `accessor` adds `ds.vibroimpact`. Everything public is importable
-from here.
+`schema` holds the table of names, dimensions, units and meanings, `checking` the check against it; `writing`
+builds and writes; `merging` joins parts; `reading` opens; `accessor` adds `ds.vibroimpact`. Everything public
+is importable from here.
 """
 
 from __future__ import annotations
 
 from vibroimpact.analysis.accessor import VibroimpactAccessor
-from vibroimpact.analysis.reading import Part, open_dataset, read_flat, read_part, unreadable
+from vibroimpact.analysis.checking import check
+from vibroimpact.analysis.merging import merge_datasets
+from vibroimpact.analysis.reading import Part, open_dataset, open_measured, read_flat, read_part, unreadable
 from vibroimpact.analysis.schema import (
     CONVENTIONS,
+    EVENT_COLUMNS,
     IMPACT_COLUMNS,
     PERIOD_COLUMNS,
+    RESERVED_NAMES,
     RULES,
     STICK_COLUMNS,
     Direction,
@@ -20,16 +24,18 @@ from vibroimpact.analysis.schema import (
     RunRecord,
     UnitSystem,
     VariableRule,
-    check,
     file_name_of,
+    file_names,
     swept_names,
 )
-from vibroimpact.analysis.writing import build_dataset, merge_datasets, write_dataset
+from vibroimpact.analysis.writing import build_dataset, write_dataset
 
 __all__ = [
     "CONVENTIONS",
+    "EVENT_COLUMNS",
     "IMPACT_COLUMNS",
     "PERIOD_COLUMNS",
+    "RESERVED_NAMES",
     "RULES",
     "STICK_COLUMNS",
     "Direction",
@@ -42,8 +48,10 @@ __all__ = [
     "build_dataset",
     "check",
     "file_name_of",
+    "file_names",
     "merge_datasets",
     "open_dataset",
+    "open_measured",
     "read_flat",
     "read_part",
     "swept_names",

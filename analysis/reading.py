@@ -115,7 +115,9 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
             name: (variable.dimensions, variable[...], _attributes(variable))
             for name, variable in file.variables.items()
         }
-        linked = getattr(file.variables["outcome"], "coordinates", "").split()
+        linked = sorted(
+            {name for v in file.variables.values() for name in getattr(v, "coordinates", "").split()}
+        )
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
     return xr.Dataset(data, coords={name: data.pop(name) for name in linked}, attrs=attrs)
 
@@ -135,8 +137,9 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     Per-run variables get the dimensions `direction` (where the sweep has directions) and one for each swept
     parameter; points that no run covers are NaN, or -1 in integers. With independent runs only, `direction`
     is a scalar coordinate; one run without swept parameters has scalars only. Runs that are no grid
-    (scattered or repeated points) keep the dimension `run`. Impacts, sticks and samples stay on their own
-    dimension; `impact_run` and so on give the `run_id` each row belongs to, under any selection.
+    (scattered or repeated points) keep the dimension `run`. Impacts, sticks, samples and events stay on their
+    own dimension; `impact_run` and so on give the `run_id` each row belongs to, under any selection.
+    `energy_residual` is along `connection`, the names of the connections.
     `displacement_range` is the largest displacement minus the smallest over the recorded periods (m).
     A variable is read from the file when it is first used.
 
@@ -170,6 +173,20 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     opened.set_close(flat.close)
     opened.encoding["source"] = str(file)
     return opened
+
+
+def open_measured(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Open what a benchmark measured: any NetCDF file, as it is.
+
+    Raises
+    ------
+    DatasetError
+        If the file is missing or damaged.
+    """
+    try:
+        return xr.open_dataset(path, engine="netcdf4", decode_times=False)
+    except (OSError, RuntimeError, ValueError) as problem:
+        raise unreadable(path, problem) from problem
 
 
 def _open_flat(file: Path) -> xr.Dataset:
@@ -212,6 +229,9 @@ class _RunArray(BackendArray):
 
 def _on_grid(flat: xr.Dataset) -> xr.Dataset:
     """Return the dataset on the dimensions of its sweep, with the ragged arrays beside it."""
+    if "connection" in flat.variables:
+        # In memory names may be a dimension, and then they select.
+        flat = flat.swap_dims(interface="connection")
     axes, scalars, run_id = _grid(flat)
     dims, swept = tuple(axes), swept_names(flat)
     variables: dict[str, xr.Variable] = {}
@@ -229,6 +249,8 @@ def _on_grid(flat: xr.Dataset) -> xr.Dataset:
     if "displacement_max" in flat.variables:
         variables["displacement_range"] = _displacement_range(flat, dims, run_id)
     coordinates = {"run_index": variables.pop("run_index")}
+    if "connection" in variables:
+        coordinates["connection"] = variables.pop("connection")
     if dims == ("run",):
         coordinates |= {name: flat.variables[name] for name in swept}
         coordinates["direction"] = xr.Variable(

@@ -1,16 +1,16 @@
 """The dataset schema: every name, dimension, type, unit and meaning that a vibroimpact file may hold.
 
 This table is the only place where these facts are written. `writing` builds and writes datasets from it,
-`reading` opens them, and `docs/dataset.md` says the same in words.
+`checking` holds them to it, `reading` opens them, and `docs/dataset.md` says the same in words.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -67,6 +67,13 @@ class RunRecord:
         State (m, m/s) and forcing phase (rad) at the end, where a sweep goes on.
     seconds : float
         Wall time this run took, s.
+    events : ndarray of float, shape (event, 3), or None
+        Columns `EVENT_COLUMNS`: event_time (s), event_index (superdense: which of the events at the same
+        time, from 0), event_component (1-based, into the components of the scene).
+    energy_residual : ndarray of float, shape (connection,), or None
+        Interface energy residual of each force-displacement connection, J.
+    loop_residual : float or None
+        Largest relative residual of the algebraic loops.
     """
 
     outcome: Outcome
@@ -79,6 +86,9 @@ class RunRecord:
     final_velocity: float
     final_phase: float
     seconds: float
+    events: NDArray[np.float64] | None = None
+    energy_residual: NDArray[np.float64] | None = None
+    loop_residual: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +164,24 @@ _RULES = (
         {"sample_dimension": "sample"},
     ),
     VariableRule("time", ("sample",), np.float64, "s", "time of the sample from the start of the scene"),
+    VariableRule(
+        "event_count",
+        ("run",),
+        np.int32,
+        "1",
+        "number of events of the run",
+        {"sample_dimension": "event"},
+    ),
+    VariableRule("event_time", ("event",), np.float64, "s", "time of the event from the start of the scene"),
+    VariableRule("event_index", ("event",), np.int32, "1", "index of the event among those at the same time"),
+    VariableRule("event_component", ("event",), np.int16, "1", "component that had the event"),
+    VariableRule(
+        "connection", ("interface",), object, "1", "force-displacement connection between components"
+    ),
+    VariableRule(
+        "energy_residual", ("run", "interface"), np.float64, "J", "energy that a connection made or lost"
+    ),
+    VariableRule("loop_residual", ("run",), np.float64, "1", "largest relative residual of algebraic loops"),
 )
 RULES: Mapping[str, VariableRule] = {rule.name: rule for rule in _RULES}
 
@@ -166,8 +194,20 @@ def _columns(dims: tuple[str, ...]) -> tuple[str, ...]:
 PERIOD_COLUMNS = _columns(("run", "period"))
 IMPACT_COLUMNS = _columns(("impact",))
 STICK_COLUMNS = _columns(("stick",))
-RAGGED = {"impact": "impact_count", "stick": "stick_count", "sample": "sample_count"}
-RUN_COLUMNS = tuple(name for name in _columns(("run",)) if name not in RAGGED.values())
+EVENT_COLUMNS = _columns(("event",))
+RAGGED = {
+    "impact": "impact_count",
+    "stick": "stick_count",
+    "sample": "sample_count",
+    "event": "event_count",
+}
+# What every file has; the other per-run variables are there where they were recorded.
+RUN_COLUMNS = tuple(name for name in _columns(("run",)) if name not in (*RAGGED.values(), "loop_residual"))
+RESERVED_NAMES = frozenset(
+    {*RULES, *(dim for rule in _RULES for dim in rule.dims), *(f"{dim}_run" for dim in RAGGED)}
+    | {"run_id", "displacement_range"}
+)
+"""Names that mean something in a stored or opened dataset; nothing else may take them."""
 
 # Units of swept parameters and sampled variables, found by the end of their name.
 _QUANTITY_UNITS = {
@@ -216,6 +256,41 @@ def file_name_of(quantity: str) -> str:
     return re.sub(r"[^A-Za-z0-9]+", "_", quantity).strip("_")
 
 
+def file_names(quantities: Sequence[str], taken: Collection[str] = RESERVED_NAMES) -> tuple[str, ...]:
+    """Return a name of its own in a file for each quantity, in order.
+
+    A name that is taken already is numbered, also where it differs in case only, as CF advises.
+
+    Parameters
+    ----------
+    quantities : sequence of str
+        Each once.
+    taken : collection of str
+        Names that are not free.
+
+    Raises
+    ------
+    DatasetError
+        If a quantity is given twice.
+
+    >>> file_names(["ball.h", "ball[h]", "BALL.h", "2.time", "time"])
+    ('ball_h', 'ball_h_2', 'BALL_h_3', 'variable_2_time', 'time_2')
+    """
+    used = {name.lower() for name in taken}
+    found: dict[str, str] = {}
+    for quantity in quantities:
+        if quantity in found:
+            raise DatasetError(f"dataset: {quantity}: expected each quantity once, got it twice.")
+        plain = file_name_of(quantity)
+        # CF wants a letter first.
+        wanted = plain if plain[:1].isalpha() else f"variable_{plain}".strip("_")
+        choices = (wanted, *(f"{wanted}_{number}" for number in range(2, len(used) + 3)))
+        name = next(choice for choice in choices if choice.lower() not in used)
+        used.add(name.lower())
+        found[quantity] = name
+    return tuple(found.values())
+
+
 def unit_in(system: UnitSystem, unit: str) -> str:
     """Return the unit that an SI unit becomes in a system of units; angles stay radians.
 
@@ -236,16 +311,21 @@ def quantity_unit(name: str, system: UnitSystem) -> str:
     >>> quantity_unit("stop_1_position", "SI"), quantity_unit("angular_frequency", "SI")
     ('m', 'rad s-1')
     """
+    unit = known_unit(name)
+    if unit is None:
+        raise DatasetError(
+            f"dataset: {name}: expected a quantity whose unit is known, got an unknown name. "
+            "Give its unit to build_dataset."
+        )
+    return unit_in(system, unit)
+
+
+def known_unit(name: str) -> str | None:
+    """Return the SI unit of a quantity by the end of its name, or None if no known quantity ends it."""
     # The number of one of several alike (damping_ratio_2) does not change what it is.
     words = name.rstrip("0123456789_").split("_")
-    for start in range(len(words)):
-        unit = _QUANTITY_UNITS.get("_".join(words[start:]))
-        if unit is not None:
-            return unit_in(system, unit)
-    raise DatasetError(
-        f"dataset: {name}: expected a quantity whose unit is known, got an unknown name. "
-        "Give its unit to build_dataset."
-    )
+    ends = ("_".join(words[start:]) for start in range(len(words)))
+    return next((_QUANTITY_UNITS[end] for end in ends if end in _QUANTITY_UNITS), None)
 
 
 def attributes_of(name: str, system: UnitSystem) -> dict[str, Any]:
@@ -261,163 +341,8 @@ def swept_names(dataset: xr.Dataset) -> tuple[str, ...]:
     return tuple(
         str(name)
         for name, coordinate in dataset.coords.items()
-        if name not in RULES and coordinate.dtype.kind == "f" and name not in ("run", "period")
+        if name not in RESERVED_NAMES and coordinate.dtype.kind == "f"
     )
-
-
-def check(dataset: xr.Dataset) -> None:
-    """Check a one-dimensional dataset against the schema; every writer calls this before it writes.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        A dataset along `run`, as `build_dataset` makes it.
-
-    Raises
-    ------
-    DatasetError
-        With all problems, one on each line.
-    """
-    problems = _structure_problems(dataset)
-    # The contents mean nothing while a variable is missing or has another shape.
-    if not problems:
-        problems = _content_problems(dataset)
-    if problems:
-        raise DatasetError("\n".join(f"dataset: {problem}" for problem in problems))
-
-
-def _structure_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with names, dimensions, types and attributes."""
-    problems = [f"{name}: expected this variable, got none." for name in _missing_names(dataset)]
-    if dataset.attrs.get("Conventions") != CONVENTIONS:
-        problems.append(f"Conventions: expected {CONVENTIONS!r}, got {dataset.attrs.get('Conventions')!r}.")
-    if dataset.attrs.get("units_system") not in get_args(UnitSystem):
-        problems.append(
-            f"units_system: expected {' or '.join(get_args(UnitSystem))}, "
-            f"got {dataset.attrs.get('units_system')!r}."
-        )
-    for name, variable in dataset.variables.items():
-        problems += _variable_problems(str(name), variable)
-    return problems
-
-
-# What a scene asks for together is stored together.
-_GROUPS = (
-    ("displacement_max", "displacement_min"),
-    ("strobe_displacement", "strobe_velocity"),
-    ("impact_count", *IMPACT_COLUMNS),
-    ("stick_count", *STICK_COLUMNS),
-)
-
-
-def _missing_names(dataset: xr.Dataset) -> list[str]:
-    """Return the names that must be there: those of every run, and each recorded group as a whole."""
-    present = set(map(str, dataset.variables))
-    required = set(RUN_COLUMNS)
-    for group in _GROUPS:
-        if present.intersection(group):
-            required.update(group)
-    if "sample" in dataset.dims or "sample_count" in present:
-        required.update(("sample_count", "time"))
-    return sorted(required - present)
-
-
-def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
-    """Return what is wrong with one variable."""
-    rule = RULES.get(name)
-    problems = []
-    if rule is None:
-        if variable.dims not in (("run",), ("sample",)):
-            problems.append(
-                f"{name}: expected dimensions of a swept parameter or a sample, got {variable.dims}."
-            )
-        if variable.dtype != np.float64:
-            problems.append(f"{name}: expected float64, got {variable.dtype}.")
-    else:
-        if variable.dims != rule.dims:
-            problems.append(f"{name}: expected dimensions {rule.dims}, got {variable.dims}.")
-        if variable.dtype != rule.dtype:
-            problems.append(f"{name}: expected {np.dtype(rule.dtype)}, got {variable.dtype}.")
-    return problems + [
-        f"{name}: expected the attribute {key}, got none."
-        for key in ("long_name", "units")
-        if not variable.attrs.get(key)
-    ]
-
-
-def _content_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with the values of a dataset whose structure is right."""
-    problems = []
-    for name, kind in (("outcome", Outcome), ("direction", Direction)):
-        values = dataset.variables[name].values
-        if values.size and (values.min() < 0 or values.max() >= len(kind)):
-            problems.append(f"{name}: expected 0 to {len(kind) - 1}, got {values.min()} to {values.max()}.")
-    index = dataset.variables["run_index"].values
-    if np.unique(index).size != index.size or (index.size and index.min() < 0):
-        problems.append(
-            "run_index: expected each index once and none below 0, got a repeated or negative index."
-        )
-    for name in swept_names(dataset):
-        if not np.isfinite(dataset.variables[name].values).all():
-            problems.append(f"{name}: expected finite values of a swept parameter, got NaN or infinity.")
-    for dimension, count_name in RAGGED.items():
-        if count_name in dataset.variables:
-            problems += _ragged_problems(dataset, dimension, count_name)
-    return problems + _impact_problems(dataset) + _stick_problems(dataset)
-
-
-_CLOCKS = {"impact": "impact_time", "stick": "stick_start", "sample": "time"}
-
-
-def _ragged_problems(dataset: xr.Dataset, dimension: str, count_name: str) -> list[str]:
-    """Return what is wrong with the rows of a ragged array: their number and their order in time."""
-    count = dataset.variables[count_name].values
-    rows = dataset.sizes[dimension]
-    if (count < 0).any() or int(count.sum(dtype=np.int64)) != rows:
-        return [
-            f"{count_name}: expected counts that sum to the {rows} rows of {dimension}, got {count.sum()}."
-        ]
-    clock = _CLOCKS[dimension]
-    time = dataset.variables[clock].values
-    if not np.isfinite(time).all():
-        return [f"{clock}: expected finite times, got NaN or infinity."]
-    backwards = np.diff(time) < 0
-    first_rows = np.cumsum(count, dtype=np.int64)[:-1]
-    # The first row of a run may be earlier than the last row of the run before it.
-    backwards[first_rows[(first_rows > 0) & (first_rows < rows)] - 1] = False
-    if backwards.any():
-        row = int(np.argmax(backwards)) + 1
-        return [
-            f"{clock}: expected times that do not decrease in a run, got {time[row - 1]} then {time[row]}."
-        ]
-    return []
-
-
-def _impact_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with recorded impacts."""
-    if "impact" not in dataset.dims:
-        return []
-    problems = []
-    phase = dataset.variables["impact_phase"].values
-    if ((phase < 0) | (phase >= 2 * np.pi)).any():
-        problems.append("impact_phase: expected 0 <= phase < 2 pi rad or NaN, got a phase outside.")
-    if not (dataset.variables["impact_velocity"].values >= 0).all():
-        problems.append("impact_velocity: expected a speed of approach >= 0, got a negative or missing one.")
-    if (dataset.variables["impact_contact"].values < 1).any():
-        problems.append("impact_contact: expected stops numbered from 1, got a smaller number.")
-    return problems
-
-
-def _stick_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with recorded sticking phases."""
-    if "stick" not in dataset.dims:
-        return []
-    problems = []
-    if (dataset.variables["stick_end"].values < dataset.variables["stick_start"].values).any():
-        problems.append("stick_end: expected an end that is not before its start, got an earlier one.")
-    if (dataset.variables["stick_contact"].values < 1).any():
-        problems.append("stick_contact: expected stops numbered from 1, got a smaller number.")
-    return problems
 
 
 def flat_order(first_rows: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:

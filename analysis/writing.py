@@ -1,10 +1,11 @@
-"""Build datasets from runs, merge them, and write them so that a file is whole or not there at all."""
+"""Build datasets from runs, and write them so that a file is whole or not there at all."""
 
 from __future__ import annotations
 
 import os
 import struct
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import netCDF4
@@ -13,12 +14,14 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.atomic import write_atomically
-from vibroimpact.analysis.reading import read_flat
+from vibroimpact.analysis.checking import check
 from vibroimpact.analysis.schema import (
     CONVENTIONS,
+    EVENT_COLUMNS,
     IMPACT_COLUMNS,
     PERIOD_COLUMNS,
     RAGGED,
+    RESERVED_NAMES,
     RULES,
     SCHEMA_VERSION,
     STICK_COLUMNS,
@@ -26,9 +29,8 @@ from vibroimpact.analysis.schema import (
     RunRecord,
     UnitSystem,
     attributes_of,
-    check,
-    file_name_of,
-    flat_order,
+    file_names,
+    known_unit,
     names_list,
     quantity_unit,
     swept_names,
@@ -54,6 +56,8 @@ def build_dataset(
     attrs: Mapping[str, Any] | None = None,
     unit_of: Mapping[str, str] | None = None,
     omit: Collection[str] = (),
+    event_components: Sequence[str] = (),
+    connections: Sequence[str] = (),
 ) -> xr.Dataset:
     """Build the one-dimensional dataset of some runs, as it is written to a file.
 
@@ -67,20 +71,28 @@ def build_dataset(
     run_index : ndarray of int, shape (run,)
         Index of each run in its campaign.
     sample_variables : sequence of str
-        Names of the sampled variables, columns 1 on of `RunRecord.samples`.
+        Names of the sampled variables, columns 1 on of `RunRecord.samples`; `component.variable` in a
+        general scene. In the file they have the names that `file_names` gives.
     units : {"SI", "nondimensional"}
         Units of the scene.
     attrs : mapping, optional
         Provenance: scene text, versions, hashes; written as global attributes.
     unit_of : mapping of str to str, optional
-        SI units of swept parameters or sampled variables whose name does not tell.
+        SI units of swept parameters or sampled variables whose name does not tell; a variable of one of
+        the `event_components` that is not here has the unit 1.
     omit : collection of str
         Per-period variables that the scene does not record; they are not stored.
+    event_components : sequence of str, optional
+        Names of all components of a general scene, in the order that `RunRecord.events` counts them.
+    connections : sequence of str, optional
+        Force-displacement connections, as "body.displacement -> other.force", in the order of
+        `RunRecord.energy_residual`. A run without residuals has NaN.
 
     Returns
     -------
     xarray.Dataset
-        Dimensions `run`, and `period`, `impact`, `stick`, `sample` where recorded. Not checked yet: `check`.
+        Dimensions `run`, and `period`, `impact`, `stick`, `sample`, `event`, `interface` where recorded.
+        Not checked yet: `check`.
 
     Raises
     ------
@@ -100,7 +112,10 @@ def build_dataset(
     variables |= _period_variables(runs, units, omit)
     variables |= _ragged_variables("impact", [run.impacts for run in runs], IMPACT_COLUMNS, units)
     variables |= _ragged_variables("stick", [run.sticks for run in runs], STICK_COLUMNS, units)
-    variables |= _sample_variables(runs, sample_variables, units, unit_of or {})
+    samples = _Samples(sample_variables, event_components, frozenset(coordinates), unit_of or {}, units)
+    variables |= _sample_variables(runs, samples)
+    variables |= _event_variables(runs, event_components, units)
+    variables |= _coupling_variables(runs, connections, units)
     swept: _Variables = {
         name: (
             ("run",),
@@ -115,8 +130,9 @@ def build_dataset(
         "units_system": units,
         "history": "simulated by vibroimpact",
     }
-    on_run = {name: variables.pop(name) for name in ("run_index", "direction")}
-    return xr.Dataset(variables, coords=on_run | swept, attrs=described | dict(attrs or {}))
+    named = ("run_index", "direction", *(("connection",) if connections else ()))
+    coords = {name: variables.pop(name) for name in named} | swept
+    return xr.Dataset(variables, coords=coords, attrs=described | dict(attrs or {}))
 
 
 def _check_lengths(
@@ -136,7 +152,7 @@ def _check_lengths(
     problems += [
         f"dataset: {name}: expected a swept parameter with a name of its own, got that of a variable."
         for name in coordinates
-        if name in RULES
+        if name in RESERVED_NAMES
     ]
     if problems:
         raise DatasetError("\n".join(problems))
@@ -196,26 +212,88 @@ def _ragged_variables(
     return variables
 
 
-def _sample_variables(
-    runs: Sequence[RunRecord], names: Sequence[str], units: UnitSystem, unit_of: Mapping[str, str]
-) -> _Variables:
+@dataclass(frozen=True, slots=True)
+class _Samples:
+    """What is known of the sampled variables beside their values."""
+
+    names: Sequence[str]
+    components: Collection[str]
+    swept: Collection[str]
+    unit_of: Mapping[str, str]
+    units: UnitSystem
+
+    def attributes(self, name: str, stored: str) -> dict[str, Any]:
+        """Return the attributes of a variable that is stored under another name than its component's."""
+        unit = self.unit_of.get(name) or self.unit_of.get(stored)
+        owner, dot, _ = name.partition(".")
+        if not unit and (owner in self.components or (dot and known_unit(stored) is None)):
+            # What other people's FMUs say of their units is all that is known: names would only mislead.
+            unit = "1"
+        attributes = _quantity_attributes(stored, self.units, {stored: unit} if unit else {})
+        return attributes if stored == name else attributes | {"long_name": name, "component_variable": name}
+
+
+def _sample_variables(runs: Sequence[RunRecord], known: _Samples) -> _Variables:
     """Return the time series: `time` and the sampled variables."""
     tables = [run.samples for run in runs]
-    variables = _ragged_variables("sample", tables, ("time",), units)
+    variables = _ragged_variables("sample", tables, ("time",), known.units)
     if not variables:
         return {}
     rows = np.concatenate([table for table in tables if table is not None])
-    if rows.shape[1] != 1 + len(names):
+    if rows.shape[1] != 1 + len(known.names):
         raise DatasetError(
-            f"dataset: samples: expected time and {len(names)} variables ({names_list(names)}), "
+            f"dataset: samples: expected time and {len(known.names)} variables ({names_list(known.names)}), "
             f"got {rows.shape[1]} columns."
         )
-    for column, name in enumerate(names, start=1):
-        variables[file_name_of(name)] = (
-            ("sample",),
-            np.ascontiguousarray(rows[:, column]),
-            _quantity_attributes(file_name_of(name), units, unit_of),
+    stored_names = file_names(known.names, RESERVED_NAMES | set(known.swept))
+    for column, (name, stored) in enumerate(zip(known.names, stored_names, strict=True), start=1):
+        values = np.ascontiguousarray(rows[:, column])
+        variables[stored] = (("sample",), values, known.attributes(name, stored))
+    return variables
+
+
+def _event_variables(runs: Sequence[RunRecord], components: Sequence[str], units: UnitSystem) -> _Variables:
+    """Return the located events; the components are named by flags."""
+    variables = _ragged_variables("event", [run.events for run in runs], EVENT_COLUMNS, units)
+    if not variables:
+        return {}
+    if not components:
+        raise DatasetError(
+            "dataset: event_components: expected the names of the components that have the events, got none."
         )
+    variables["event_component"][2].update(
+        flag_values=np.arange(1, len(components) + 1, dtype=RULES["event_component"].dtype),
+        flag_meanings=" ".join(file_names(components, ())),
+    )
+    return variables
+
+
+def _coupling_variables(
+    runs: Sequence[RunRecord], connections: Sequence[str], units: UnitSystem
+) -> _Variables:
+    """Return the residuals that the coupling of components left."""
+    variables: _Variables = {}
+    for run in runs:
+        if run.energy_residual is not None and len(run.energy_residual) != len(connections):
+            raise DatasetError(
+                f"dataset: energy_residual: expected one value for each of {len(connections)} connections "
+                f"({names_list(connections)}), got {len(run.energy_residual)}."
+            )
+    if connections:
+        missing = np.full(len(connections), np.nan)
+        rows = [missing if run.energy_residual is None else run.energy_residual for run in runs]
+        values = np.array(rows, dtype=np.float64).reshape(len(runs), len(connections))
+        names = np.array(connections, dtype=object)
+        # CF wants numbers in a variable with the name of its dimension, so the dimension has another one.
+        variables["connection"] = (("interface",), names, attributes_of("connection", units))
+        variables["energy_residual"] = (
+            ("run", "interface"),
+            values,
+            attributes_of("energy_residual", units),
+        )
+    if any(run.loop_residual is not None for run in runs):
+        loops = [np.nan if run.loop_residual is None else run.loop_residual for run in runs]
+        variables["loop_residual"] = (("run",), np.array(loops), attributes_of("loop_residual", units))
     return variables
 
 
@@ -223,80 +301,6 @@ def _quantity_attributes(name: str, units: UnitSystem, unit_of: Mapping[str, str
     """Return the attributes of a swept parameter or sampled variable."""
     unit = unit_in(units, unit_of[name]) if name in unit_of else quantity_unit(name, units)
     return {"long_name": name.replace("_", " "), "units": unit}
-
-
-def merge_datasets(paths: Sequence[str | os.PathLike[str]]) -> xr.Dataset:
-    """Merge dataset files of one campaign into one dataset, ordered by `run_index`.
-
-    Parameters
-    ----------
-    paths : sequence of path
-        One-dimensional files with the same variables, in any order.
-
-    Returns
-    -------
-    xarray.Dataset
-        In memory; the global attributes are those of the file with the lowest run index.
-
-    Raises
-    ------
-    DatasetError
-        If a file cannot be read, the files differ in their variables, or a run is in two files.
-    """
-    if not paths:
-        raise DatasetError("merge: expected at least one file, got none.")
-    parts = [read_flat(path) for path in paths]
-    first_index = [part.run_index.values[0] if part.sizes["run"] else -1 for part in parts]
-    order = np.argsort(first_index, kind="stable")
-    return _joined([parts[k] for k in order], [os.fspath(paths[k]) for k in order])
-
-
-def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
-    """Join parts along run and along every ragged dimension, then put the runs in order."""
-    first = parts[0]
-    for name, part in zip(names, parts, strict=True):
-        if set(part.variables) != set(first.variables):
-            different = sorted(map(str, set(part.variables) ^ set(first.variables)))
-            raise DatasetError(
-                f"{name}: expected the variables of {names[0]}, got a difference in {', '.join(different)}."
-            )
-    periods = max(part.sizes.get("period", 0) for part in parts)
-    columns = {
-        str(name): _stacked([part.variables[name].values for part in parts], variable.dims, periods)
-        for name, variable in first.variables.items()
-    }
-    index = columns["run_index"]
-    if np.unique(index).size != index.size:
-        raise DatasetError(
-            f"merge: expected each run in one file, got a run_index twice in {len(parts)} files."
-        )
-    if (np.diff(index) < 0).any():
-        columns = _ordered(columns, first, np.argsort(index))
-    data = {
-        str(name): (variable.dims, columns[str(name)], variable.attrs)
-        for name, variable in first.variables.items()
-    }
-    coords = {str(name): data.pop(str(name)) for name in first.coords}
-    return xr.Dataset(data, coords=coords, attrs=first.attrs)
-
-
-def _stacked(arrays: Sequence[NDArray[Any]], dims: tuple[Any, ...], periods: int) -> NDArray[Any]:
-    """Join the arrays of one variable; runs with fewer periods than the longest end in NaN."""
-    if "period" in dims and any(array.shape[1] < periods for array in arrays):
-        arrays = [np.pad(a, ((0, 0), (0, periods - a.shape[1])), constant_values=np.nan) for a in arrays]
-    return np.concatenate(arrays)
-
-
-def _ordered(
-    columns: dict[str, NDArray[Any]], like: xr.Dataset, order: NDArray[np.intp]
-) -> dict[str, NDArray[Any]]:
-    """Return all columns with the runs, and the ragged rows of each run, in this order."""
-    rows = {"run": order}
-    for dimension, count_name in RAGGED.items():
-        if count_name in columns:
-            count = columns[count_name].astype(np.int64)
-            rows[dimension] = flat_order((np.cumsum(count) - count)[order], count[order])
-    return {name: values[rows[str(like.variables[name].dims[0])]] for name, values in columns.items()}
 
 
 def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compression: int = 0) -> None:
@@ -336,7 +340,8 @@ def _image(dataset: xr.Dataset, compression: int) -> memoryview:
         file.createDimension(str(name), size)
     for name, variable in dataset.variables.items():
         is_data = variable.dims[0] == "run" and name not in dataset.coords
-        _store(file, str(name), variable, compression, linked if is_data else None)
+        labels = " connection" if "interface" in variable.dims else ""
+        _store(file, str(name), variable, compression, linked + labels if is_data else None)
     return _without_padding(memoryview(file.close()))
 
 

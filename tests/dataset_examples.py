@@ -85,3 +85,61 @@ def up_down(points: int = 3) -> xr.Dataset:
         coordinates={"angular_frequency": np.concatenate([up, up[::-1]])},
         direction=[Direction.up] * points + [Direction.down] * points,
     )
+
+
+COMPONENTS = ["body", "stop"]
+CONNECTIONS = ["body.displacement -> stop.force", "stop.displacement -> body.contact[1].force"]
+COUPLED_UNITS = {"body.displacement": "m", "body.velocity": "m/s"}
+
+
+def coupled_record(value: float, events: int = 0, samples: int = 0) -> RunRecord:
+    """Return a run of a coupled scene whose every number can be traced back to `value`.
+
+    Two events at a time: of component 1 with index 0, then of component 2 with index 1.
+    """
+    place = np.arange(events)
+    return RunRecord(
+        outcome=Outcome.ok,
+        message="",
+        periods=None,
+        impacts=None,
+        sticks=None,
+        samples=np.column_stack(
+            [value + np.arange(samples), *(np.full(samples, value + k) for k in range(3))]
+        ),
+        final_displacement=np.nan,
+        final_velocity=np.nan,
+        final_phase=np.nan,
+        seconds=1e-3,
+        events=np.column_stack([value + place // 2, place % 2, 1 + place % 2]),
+        energy_residual=np.array([1e-9 * value, -1e-9 * value]),
+        loop_residual=1e-12 * value,
+    )
+
+
+def coupled_dataset(runs: list[RunRecord], **changes: Any) -> xr.Dataset:
+    """Return a dataset of runs of a coupled scene that sweeps a mass."""
+    arguments: dict[str, Any] = {
+        "coordinates": {"mass": np.arange(len(runs), dtype=np.float64)},
+        "sample_variables": ["body.displacement", "body.velocity", "stop.contact[1].law"],
+        "unit_of": COUPLED_UNITS,
+        "event_components": COMPONENTS,
+        "connections": CONNECTIONS,
+    }
+    return dataset_of(runs, **(arguments | changes))
+
+
+def everything(**changes: Any) -> xr.Dataset:
+    """Return a dataset with every variable of the schema, and a failed run that has no rows."""
+    runs = [record(1.0, impacts=2, sticks=1, samples=3), record(2.0), failed("no convergence")]
+    coupled = coupled_record(1.0, events=3)
+    runs[0].events, runs[0].energy_residual = coupled.events, coupled.energy_residual
+    runs[0].loop_residual = coupled.loop_residual
+    return dataset_of(
+        runs,
+        sample_variables=["body.displacement", "stop.contact[1].force"],
+        unit_of={"stop.contact[1].force": "N"},
+        event_components=COMPONENTS,
+        connections=CONNECTIONS,
+        **changes,
+    )

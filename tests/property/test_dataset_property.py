@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from dataset_examples import dataset_of, failed, record
+from dataset_examples import CONNECTIONS, coupled_dataset, coupled_record, dataset_of, failed, record
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vibroimpact.analysis import open_dataset
-from vibroimpact.analysis.dataset import Direction, RunRecord, merge_datasets, write_dataset
+from vibroimpact.analysis.dataset import Direction, RunRecord, file_names, merge_datasets, write_dataset
 
 Lengths = st.lists(st.tuples(*(st.integers(0, 4),) * 3), min_size=1, max_size=8)
 
@@ -72,3 +72,43 @@ def part_of(runs: list[RunRecord], chosen: list[int]) -> xr.Dataset:
         coordinates={"angular_frequency": np.array(chosen, dtype=np.float64)},
         direction=[Direction(k % 3) for k in chosen],
     )
+
+
+Sizes = st.lists(st.tuples(st.integers(0, 5), st.integers(0, 3)), min_size=1, max_size=8)
+
+
+@settings(max_examples=40, deadline=None)
+@given(Sizes, st.data())
+def test_events_and_residuals_of_parts_in_any_order_come_back_run_by_run(
+    sizes: list[tuple[int, int]], data: st.DataObject
+) -> None:
+    runs = [coupled_record(float(k), *both) for k, both in enumerate(sizes)]
+    order = data.draw(st.permutations(range(len(runs))))
+    cut = data.draw(st.integers(0, len(runs)))
+    with tempfile.TemporaryDirectory() as folder:
+        paths = []
+        for chosen in filter(None, (order[:cut], order[cut:])):
+            places = {"mass": np.array(chosen, dtype=np.float64)}
+            part = coupled_dataset([runs[k] for k in chosen], run_index=chosen, coordinates=places)
+            paths.append(Path(folder, f"{len(paths)}.nc"))
+            write_dataset(part, paths[-1])
+        merged = merge_datasets(paths)
+        xr.testing.assert_identical(merged, coupled_dataset(runs))
+        write_dataset(merged, Path(folder, "merged.nc"))
+        with open_dataset(Path(folder, "merged.nc")) as opened:
+            shuffled = opened.isel(mass=order)
+            for k, run in enumerate(runs):
+                assert run.events is not None
+                assert run.energy_residual is not None
+                found = shuffled.vibroimpact.events(mass=k)
+                columns = [found.event_time, found.event_index, found.event_component]
+                np.testing.assert_array_equal(np.column_stack(columns), run.events)
+                residual = shuffled.energy_residual.sel(mass=k, connection=CONNECTIONS)
+                np.testing.assert_array_equal(residual, run.energy_residual)
+
+
+@given(st.lists(st.text("aA1_[.é", max_size=4), unique=True, max_size=12))
+def test_different_quantities_have_different_names_that_cf_allows(quantities: list[str]) -> None:
+    names = file_names(quantities)
+    assert len({name.lower() for name in names}) == len(quantities)
+    assert all(name[0].isalpha() and name.isascii() and name.isidentifier() for name in names)

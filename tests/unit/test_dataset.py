@@ -11,16 +11,28 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from dataset_examples import dataset_of, failed, impact_rows, record, up_down
+from dataset_examples import (
+    CONNECTIONS,
+    coupled_dataset,
+    coupled_record,
+    dataset_of,
+    everything,
+    failed,
+    impact_rows,
+    record,
+    up_down,
+)
 
 from vibroimpact.analysis import atomic, open_dataset
 from vibroimpact.analysis.dataset import (
     RULES,
     Direction,
     Outcome,
+    RunRecord,
     build_dataset,
     check,
     file_name_of,
+    file_names,
     merge_datasets,
     read_flat,
     read_part,
@@ -48,8 +60,7 @@ def written(dataset: xr.Dataset, folder: Path, name: str = "runs.nc") -> Path:
 def test_a_dataset_with_every_variable_has_nothing_for_the_cf_checker_to_say(
     units: str, tmp_path: Path
 ) -> None:
-    runs = [record(1.0, impacts=2, sticks=1, samples=3), failed("no convergence")]
-    path = written(dataset_of(runs, units=units), tmp_path)
+    path = written(everything(units=units), tmp_path)
     report = tmp_path / "report.json"
     # In its own process: the checker's own warnings are not ours.
     done = subprocess.run(
@@ -69,8 +80,7 @@ def test_a_dataset_with_every_variable_has_nothing_for_the_cf_checker_to_say(
 def test_every_variable_of_the_schema_is_stored_with_its_dimensions_type_units_and_long_name(
     tmp_path: Path,
 ) -> None:
-    path = written(dataset_of([record(1.0, impacts=2, sticks=1, samples=3)]), tmp_path)
-    with netCDF4.Dataset(path) as file:
+    with netCDF4.Dataset(written(everything(), tmp_path)) as file:
         assert set(RULES) <= set(file.variables)
         for name, variable in file.variables.items():
             assert variable.units
@@ -88,6 +98,18 @@ def test_outcomes_are_flags_with_the_six_meanings(tmp_path: Path) -> None:
         assert file["impact_count"].sample_dimension == "impact"
         assert file["stick_count"].sample_dimension == "stick"
         assert file["sample_count"].sample_dimension == "sample"
+
+
+def test_event_components_are_flags_with_the_names_of_the_components(tmp_path: Path) -> None:
+    run = coupled_record(1.0, events=2)
+    path = written(coupled_dataset([run], event_components=["left mass", "stop"]), tmp_path)
+    with netCDF4.Dataset(path) as file:
+        component = file["event_component"]
+        assert component.flag_values.tolist() == [1, 2]
+        assert component.flag_values.dtype == component.dtype
+        assert component.flag_meanings == "left_mass stop"
+        assert component[:].tolist() == [1, 2]
+        assert file["event_count"].sample_dimension == "event"
 
 
 @pytest.mark.parametrize(
@@ -117,6 +139,13 @@ def test_the_documentation_names_every_variable_with_its_unit() -> None:
 def test_what_is_written_is_what_is_read(tmp_path: Path) -> None:
     dataset = up_down()
     xr.testing.assert_identical(read_flat(written(dataset, tmp_path)), dataset)
+
+
+def test_what_is_written_of_a_coupled_scene_is_what_is_read(tmp_path: Path) -> None:
+    dataset = coupled_dataset([coupled_record(float(k), events=k, samples=2) for k in range(4)])
+    xr.testing.assert_identical(read_flat(written(dataset, tmp_path)), dataset)
+    whole = everything()
+    xr.testing.assert_identical(read_flat(written(whole, tmp_path)), whole)
 
 
 def test_compression_changes_the_size_and_nothing_else(tmp_path: Path) -> None:
@@ -239,6 +268,33 @@ def test_sticks_and_samples_are_given_like_impacts(tmp_path: Path) -> None:
         assert opened.vibroimpact.samples(run_index=2).displacement.values.tolist() == [2.0, 2.0]
 
 
+def test_events_are_given_run_by_run_with_their_component_and_superdense_index(tmp_path: Path) -> None:
+    runs = [coupled_record(float(k), events=k) for k in range(5)]
+    with open_dataset(written(coupled_dataset(runs), tmp_path)) as opened:
+        found = opened.vibroimpact.events(mass=2.9)
+        assert found.event_time.values.tolist() == [3.0, 3.0, 4.0]
+        assert found.event_index.values.tolist() == [0, 1, 0]
+        assert found.event_component.values.tolist() == [1, 2, 1]
+        assert found.event_component.attrs["flag_meanings"] == "body stop"
+        assert float(found.mass) == 3.0
+        part = opened.isel(mass=slice(None, None, -1), event=opened.event_index.values == 0)
+        assert part.vibroimpact.events(mass=4.0).event_time.values.tolist() == [4.0, 5.0]
+        assert opened.vibroimpact.events(mass=0.0).sizes["event"] == 0
+
+
+def test_energy_residuals_are_selected_by_the_name_of_their_connection(tmp_path: Path) -> None:
+    runs = [coupled_record(float(k)) for k in range(3)]
+    runs[1] = RunRecord(Outcome.crash, "gone", *[None] * 3, runs[1].samples, *[np.nan] * 3, 0.0)
+    with open_dataset(written(coupled_dataset(runs), tmp_path)) as opened:
+        assert opened.energy_residual.dims == ("mass", "connection")
+        assert opened.connection.values.tolist() == CONNECTIONS
+        lost = opened.energy_residual.sel(connection=CONNECTIONS[1])
+        np.testing.assert_array_equal(lost, [0.0, np.nan, -2e-9])
+        np.testing.assert_array_equal(opened.loop_residual, [0.0, np.nan, 2e-12])
+        assert opened.sel(connection=CONNECTIONS[0]).vibroimpact.samples(mass=2.0).sizes["sample"] == 0
+        assert opened.vibroimpact.runs.energy_residual.dims == ("run", "connection")
+
+
 def test_the_accessor_serves_a_dataset_that_was_never_written() -> None:
     hits = up_down().vibroimpact.impacts(direction="up", angular_frequency=1.0)
     assert hits.impact_time.values.tolist() == [1.0, 2.0]
@@ -275,8 +331,15 @@ def test_a_selection_that_is_not_one_run_says_what_is_needed(
 def test_asking_for_what_was_not_recorded_names_the_setting() -> None:
     run = record(1.0)
     run.samples = None
-    with pytest.raises(DatasetError, match="Set time_series under"):
+    with pytest.raises(DatasetError, match="Set time_series "):
         dataset_of([run]).vibroimpact.samples()
+
+
+def test_asking_for_events_that_were_not_recorded_names_the_setting() -> None:
+    dataset = dataset_of([record(1.0)])
+    assert {"event_count", "energy_residual", "connection", "loop_residual"}.isdisjoint(dataset.variables)
+    with pytest.raises(DatasetError, match="Set events = true under"):
+        dataset.vibroimpact.events()
 
 
 def test_parts_merge_into_the_order_of_the_campaign(tmp_path: Path) -> None:
@@ -287,6 +350,37 @@ def test_parts_merge_into_the_order_of_the_campaign(tmp_path: Path) -> None:
     early = dataset_of(runs[1::-1], run_index=[1, 0], coordinates={"angular_frequency": np.array([1.0, 0.0])})
     merged = merge_datasets([written(late, tmp_path, "late.nc"), written(early, tmp_path, "early.nc")])
     xr.testing.assert_identical(merged, whole)
+
+
+def test_parts_of_a_coupled_scene_merge_with_their_connections_once(tmp_path: Path) -> None:
+    runs = [coupled_record(float(k), events=k + 1, samples=1) for k in range(4)]
+    paths = []
+    for chosen in ([3, 2], [1], [0]):
+        places = {"mass": np.array(chosen, dtype=np.float64)}
+        part = coupled_dataset([runs[k] for k in chosen], run_index=chosen, coordinates=places)
+        paths.append(written(part, tmp_path, f"{chosen[0]}.nc"))
+    xr.testing.assert_identical(merge_datasets(paths), coupled_dataset(runs))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"event_components": ["stop", "body"]}, "flag_meanings 'body stop' as in .*, got 'stop body'"),
+        ({"connections": CONNECTIONS[::-1]}, "connection: expected those of"),
+        (
+            {"sample_variables": ["body_displacement", "body.velocity", "stop.contact[1].law"]},
+            "body_displacement: expected component_variable 'body.displacement'",
+        ),
+        ({"units": "nondimensional"}, "expected units 'm' as in .*, got '1'"),
+    ],
+)
+def test_merging_parts_in_which_the_same_number_means_something_else_is_refused(
+    changes: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    first = written(coupled_dataset([coupled_record(1.0, events=2)]), tmp_path, "a.nc")
+    other = coupled_dataset([coupled_record(2.0, events=2)], run_index=[1], **changes)
+    with pytest.raises(DatasetError, match=message):
+        merge_datasets([first, written(other, tmp_path, "b.nc")])
 
 
 def test_a_part_of_failed_runs_merges_with_the_others(tmp_path: Path) -> None:
@@ -369,6 +463,43 @@ def test_check_refuses_impossible_contents(name: str, row: int, value: float, me
         check(dataset)
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("event_time", -1.0, "event_time: expected times that do not decrease in a run"),
+        ("event_index", -1, "event_index: expected events at the same time numbered from 0"),
+        ("event_component", 3, "event_component: expected components numbered 1 to 2"),
+        ("event_count", 1, "event_count: expected counts that sum to the 4 rows of event, got 3"),
+        ("loop_residual", -1.0, "loop_residual: expected a residual >= 0"),
+    ],
+)
+def test_check_refuses_impossible_events_and_residuals(name: str, value: float, message: str) -> None:
+    dataset = coupled_dataset([coupled_record(1.0, events=2), coupled_record(1.0, events=2)])
+    check(dataset)
+    dataset[name].values[1] = value
+    with pytest.raises(DatasetError, match=message):
+        check(dataset)
+
+
+def test_check_refuses_events_whose_components_have_no_names_and_a_connection_given_twice() -> None:
+    dataset = coupled_dataset([coupled_record(1.0, events=2)])
+    dataset["event_component"].attrs.pop("flag_values")
+    with pytest.raises(DatasetError, match="event_component: expected flag_values 1 to 2"):
+        check(dataset)
+    dataset["event_component"].attrs.pop("flag_meanings")
+    with pytest.raises(DatasetError, match="expected the attribute flag_meanings, got none"):
+        check(dataset.drop_vars("event_index"))
+    with pytest.raises(DatasetError, match="connection: expected each connection once"):
+        check(coupled_dataset([coupled_record(1.0)], connections=CONNECTIONS[:1] * 2))
+
+
+def test_residuals_and_events_need_the_names_of_what_they_belong_to() -> None:
+    with pytest.raises(DatasetError, match=r"energy_residual: expected .* 1 connections .*, got 2"):
+        coupled_dataset([coupled_record(1.0)], connections=CONNECTIONS[:1])
+    with pytest.raises(DatasetError, match="event_components: expected the names"):
+        coupled_dataset([coupled_record(1.0)], event_components=())
+
+
 def test_time_may_start_again_with_the_next_run_even_after_runs_without_impacts() -> None:
     runs = [record(5.0, impacts=2), record(0.0), record(0.0), record(1.0, impacts=2), record(0.0)]
     check(dataset_of(runs))
@@ -401,6 +532,57 @@ def test_variables_of_a_component_get_names_that_cf_allows() -> None:
     assert file_name_of("damping_ratio[2]") == "damping_ratio_2"
     places = {"damping_ratio_2": np.array([1.0])}
     assert dataset_of([record(1.0)], coordinates=places)["damping_ratio_2"].attrs["units"] == "1"
+
+
+def test_sampled_variables_of_components_keep_their_own_names_as_attributes() -> None:
+    dataset = coupled_dataset([coupled_record(1.0, samples=1)])
+    assert dataset["body_velocity"].attrs == {
+        "long_name": "body.velocity",
+        "component_variable": "body.velocity",
+        "units": "m/s",
+    }
+    # Of a component's variable only its component knows the unit, whatever its name.
+    unknown = coupled_dataset([coupled_record(1.0, samples=1)], unit_of={})
+    assert unknown["body_velocity"].attrs["units"] == "1"
+    assert unknown["stop_contact_1_law"].attrs["units"] == "1"
+
+
+def test_names_that_would_clash_in_a_file_are_numbered_and_all_their_values_kept(tmp_path: Path) -> None:
+    names = ["body.x[1]", "body.x.1", "Body.X_1"]
+    run = coupled_record(1.0, samples=1)
+    with open_dataset(written(coupled_dataset([run], sample_variables=names), tmp_path)) as opened:
+        found = {
+            variable.attrs["component_variable"]: (str(name), float(variable[0]))
+            for name, variable in opened.data_vars.items()
+            if "component_variable" in variable.attrs
+        }
+    assert found == {
+        "body.x[1]": ("body_x_1", 1.0),
+        "body.x.1": ("body_x_1_2", 2.0),
+        "Body.X_1": ("Body_X_1_3", 3.0),
+    }
+
+
+def test_sampled_variables_take_no_name_of_the_schema_or_of_a_swept_parameter() -> None:
+    names = ["impact.time", "body.mass", "event.run"]
+    dataset = coupled_dataset(
+        [coupled_record(1.0, samples=1)],
+        sample_variables=names,
+        coordinates={"body_mass": np.array([7.0])},
+    )
+    assert [float(dataset[name][0]) for name in ("impact_time_2", "body_mass_2", "event_run_2")] == [1, 2, 3]
+    assert dataset["body_mass"].dims == ("run",)
+
+
+def test_a_variable_sampled_twice_is_refused() -> None:
+    with pytest.raises(DatasetError, match=r"body\.x: expected each quantity once, got it twice"):
+        file_names(["body.x", "body.y", "body.x"])
+
+
+@pytest.mark.parametrize("name", ["run_id", "period", "connection", "impact_run"])
+def test_a_swept_parameter_with_a_name_of_the_schema_is_refused(name: str) -> None:
+    with pytest.raises(DatasetError, match="expected a swept parameter with a name of its own"):
+        dataset_of([record(1.0)], coordinates={name: np.array([1.0])})
 
 
 def test_a_dataset_that_breaks_the_schema_is_not_written(tmp_path: Path) -> None:

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 import typer
 import xarray as xr
-from dataset_examples import dataset_of, record, up_down
+from dataset_examples import coupled_dataset, coupled_record, dataset_of, record, up_down
 from impact_sweep import SCENE, Oscillator
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
 from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
+from vibroimpact.analysis.orders import observed_order
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
 PNG = b"\x89PNG\r\n"
@@ -42,6 +43,51 @@ def sampled_run() -> xr.Dataset:
         Outcome.ok, "", None, np.array(impacts[:1]), np.empty((0, 3)), np.array(rows), 0.0, 0.0, 0.0, 1e-3
     )
     return dataset_of([run], coordinates={}, units="nondimensional", attrs={"scene": SCENE})
+
+
+BOUNCES = np.sqrt(2.0 / 9.81) * np.array([1.0, 2.4, 3.38])
+
+
+def bouncing_ball() -> xr.Dataset:
+    """A ball dropped from 1 m that loses 30 % of its velocity at each bounce, sampled; another rests."""
+    rows = []
+    for t in np.linspace(0.0, BOUNCES[-1], 300):
+        bounce = int(np.searchsorted(BOUNCES, t, side="right"))
+        begin = BOUNCES[bounce - 1] if bounce else -BOUNCES[0]
+        up = 0.7**bounce * 9.81 * BOUNCES[0]
+        age = t - begin
+        rows.append([t, up * age - 9.81 * age**2 / 2, up - 9.81 * age, 0.2, 0.1])
+    events = np.column_stack([BOUNCES[:2], np.zeros(2), np.ones(2)])
+    run = RunRecord(
+        Outcome.ok, "", None, None, None, np.array(rows), np.nan, np.nan, np.nan, 1e-3, events=events
+    )
+    names = ["ball.h", "ball.v", "other.h", "other.energy[1].kinetic"]
+    return coupled_dataset(
+        [run],
+        coordinates={},
+        sample_variables=names,
+        unit_of=dict(zip(names, ["m", "m/s", "m", "J"], strict=True)),
+        event_components=["ball", "other"],
+        connections=(),
+    )
+
+
+def ladder() -> xr.Dataset:
+    """Errors of first, second and fourth order, as a benchmark of coupling would measure them."""
+    step = 0.1 * 0.5 ** np.arange(7)
+    error = np.stack([0.8 * step, 0.3 * step**2, 0.2 * step**4])
+    drift = np.stack([0.5 * step, -0.1 * step**2, np.zeros(7)])
+    return xr.Dataset(
+        {
+            "error": (("exchange", "macro_step"), error, {"units": "m"}),
+            "energy_drift": (("exchange", "macro_step"), drift, {"units": "1"}),
+        },
+        coords={
+            "exchange": ["jacobi", "gauss_seidel", "iterated"],
+            "macro_step": ("macro_step", step, {"units": "s"}),
+        },
+        attrs={"title": "Two coupled oscillators"},
+    )
 
 
 def texts(figure: Figure) -> list[str]:
@@ -139,6 +185,71 @@ def test_a_run_without_time_series_shows_its_periods(tmp_path: Path) -> None:
     assert "impact velocity (m/s)" in texts(figure)
 
 
+def test_variables_of_components_have_a_panel_for_each_unit_and_a_line_at_each_event(tmp_path: Path) -> None:
+    figure = figures.draw(opened(bouncing_ball(), tmp_path))
+    heights, speeds, energy = figure.axes
+    assert texts(figure) == ["(m)", "ball.v (m/s)", "time (s)", "(J)"]
+    assert [line.get_label() for line in heights.get_lines()] == ["ball.h", "other.h"]
+    assert len({line.get_color() for line in heights.get_lines()}) == 2
+    for axis in (heights, speeds, energy):
+        (events,) = axis.collections
+        assert [segment[0, 0] for segment in events.get_segments()] == pytest.approx(BOUNCES[:2])
+    legends = [
+        [text.get_text() for text in axis.get_legend().get_texts()] if axis.get_legend() else []
+        for axis in figure.axes
+    ]
+    # What is too long for the axis is named above it.
+    assert legends == [["ball.h", "other.h", "event"], [], ["other.energy[1].kinetic"]]
+    assert smallest_font(figure) >= 7
+
+
+def test_variables_without_any_event_are_drawn_alone(tmp_path: Path) -> None:
+    dataset = bouncing_ball().drop_dims("event").drop_vars("event_count")
+    figure = figures.draw(opened(dataset, tmp_path), "run")
+    assert [len(axis.collections) for axis in figure.axes] == [0, 0, 0]
+    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["ball.h", "other.h"]
+
+
+def test_one_run_of_a_sweep_over_components_is_drawn_by_its_index() -> None:
+    runs = [coupled_record(float(k), events=k, samples=4) for k in range(3)]
+    with pytest.raises(DatasetError, match="expected one run, got 3"):
+        figures.draw(coupled_dataset(runs), "run")
+    figure = figures.draw(coupled_dataset(runs), run=2)
+    assert figure.axes[0].get_lines()[0].get_xdata().tolist() == [2.0, 3.0, 4.0, 5.0]
+    assert len(figure.axes[0].collections[0].get_segments()) == 2
+
+
+def test_a_ladder_of_macro_steps_shows_the_order_of_each_exchange() -> None:
+    figure = figures.convergence(ladder())
+    above, below = figure.axes
+    orders = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in figure.axes]
+    assert orders == [
+        ["Jacobi 1.00", "Gauss-Seidel 2.00", "iterated 4.00"],
+        ["Jacobi 1.00", "Gauss-Seidel 2.00", "iterated (none)"],
+    ]
+    assert (above.get_xscale(), above.get_yscale(), below.get_yscale()) == ("log", "log", "log")
+    # A drift may have either sign; its magnitude is what falls.
+    assert (below.get_lines()[1].get_ydata() > 0).all()
+    assert texts(figure) == ["error (m)", "macro step (s)", "energy drift (-)"]
+    assert figure.get_suptitle() == "Two coupled oscillators"
+    assert figure.get_figwidth() == pytest.approx(85 / 25.4)
+    assert smallest_font(figure) >= 7
+
+
+def test_the_order_of_an_error_is_not_led_astray_by_rounding_or_by_one_step_that_is_too_large() -> None:
+    step = 0.1 * 0.5 ** np.arange(9)
+    error = 0.3 * step**2
+    error[0] *= 10
+    error[-2:] = 3e-6, 0.0
+    assert observed_order(step[::-1], error[::-1]) == pytest.approx(2.0)
+    assert np.isnan(observed_order(step[:1], error[:1]))
+
+
+def test_what_is_no_ladder_is_refused_by_name() -> None:
+    with pytest.raises(DatasetError, match="got no such energy_drift"):
+        figures.draw(ladder().drop_vars("energy_drift"), "convergence")
+
+
 @pytest.mark.parametrize(
     ("kind", "run", "message"),
     [("run", None, "expected one run, got 6"), ("run", 99, "expected one run, got")],
@@ -177,6 +288,14 @@ def test_plot_writes_the_figure_and_nothing_else(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["dataset.nc", "figure.png"]
 
 
+def test_plot_draws_what_a_benchmark_measured(tmp_path: Path) -> None:
+    ladder().to_netcdf(tmp_path / "ladder.nc")
+    arguments = ["plot", str(tmp_path / "ladder.nc"), "-o", str(tmp_path / "a.png"), "--kind", "convergence"]
+    done = CliRunner().invoke(command_line(), arguments)
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "a.png").read_bytes().startswith(PNG)
+
+
 def test_plot_help_has_an_example() -> None:
     done = CliRunner().invoke(command_line(), ["plot", "--help"])
     assert "Example: vibroimpact plot" in done.output
@@ -191,12 +310,27 @@ def test_plot_help_has_an_example() -> None:
             "missing.nc: expected a dataset file, got no such file",
         ),
         (["corrupt.nc", "-o", "a.png"], DatasetError, "corrupt.nc: expected a readable NetCDF dataset"),
+        (
+            ["corrupt.nc", "-o", "a.png", "--kind", "convergence"],
+            DatasetError,
+            "expected a readable NetCDF dataset",
+        ),
+        (
+            ["none.nc", "-o", "a.png", "--kind", "convergence"],
+            DatasetError,
+            "expected a dataset file, got no such file",
+        ),
+        (
+            ["runs.nc", "-o", "a.png", "--kind", "convergence"],
+            DatasetError,
+            "got no such error, energy_drift",
+        ),
         (["runs.nc", "-o", "a.docx"], UsageError, "expected a name ending in .png, .pdf, .svg, got '.docx'"),
         (["runs.nc", "-o", "none/a.png"], UsageError, "could not be written: No such file or directory"),
         (
             ["runs.nc", "-o", "a.png", "--kind", "pie"],
             UsageError,
-            "expected one of auto, bifurcation, run, got 'pie'",
+            "expected one of auto, bifurcation, run, convergence, got 'pie'",
         ),
     ],
 )

@@ -1,0 +1,78 @@
+"""Figures for one journal column: sweeps, single runs, and how coupling errors fall with the step.
+
+The only package that imports matplotlib; it draws without a display.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from vibroimpact.analysis.figures.ladder import convergence
+from vibroimpact.analysis.figures.page import COLUMN_WIDTH, FORMATS, label, page_style, save
+from vibroimpact.analysis.figures.runs import draw_run
+from vibroimpact.analysis.figures.series import draw_series
+from vibroimpact.analysis.figures.sweeps import (
+    draw_bifurcation,
+    draw_map,
+    largest_impact_velocity,
+    varied,
+)
+from vibroimpact.fmus.errors import DatasetError
+
+__all__ = [
+    "COLUMN_WIDTH",
+    "FORMATS",
+    "Kind",
+    "convergence",
+    "draw",
+    "draw_bifurcation",
+    "draw_map",
+    "draw_run",
+    "draw_series",
+    "label",
+    "largest_impact_velocity",
+    "save",
+]
+
+Kind = Literal["auto", "bifurcation", "run", "convergence"]
+
+
+def draw(dataset: xr.Dataset, kind: Kind = "auto", run: int | None = None) -> Figure:
+    """Draw a dataset as `open_dataset` gives it, or what a benchmark measured.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    kind : {"auto", "bifurcation", "run", "convergence"}
+        `auto` draws a single run where nothing is swept or a run is named, else a bifurcation diagram, or
+        colour maps over two swept parameters. `convergence`: see `convergence`.
+    run : int, optional
+        `run_index` of the run to draw.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One column (85 mm) wide.
+
+    Raises
+    ------
+    DatasetError
+        If the dataset does not hold what the figure shows.
+    """
+    if kind == "convergence":
+        return convergence(dataset)
+    swept = varied(dataset)
+    with page_style():
+        if kind == "run" or (kind == "auto" and (run is not None or not swept)):
+            return draw_run(dataset, run)
+        if len(swept) == 1:
+            return draw_bifurcation(dataset)
+        if len(swept) == 2:
+            return draw_map(dataset)
+    raise DatasetError(
+        f"figure: expected one or two swept parameters, got {len(swept)} ({', '.join(swept) or 'none'}). "
+        "Select some in Python before drawing, or draw one run."
+    )

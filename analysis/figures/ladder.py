@@ -1,0 +1,110 @@
+"""Figures of a ladder of macro steps: how the errors of a coupling fall with its step."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vibroimpact.analysis.figures.page import COLOURS, canvas, label, page_style
+from vibroimpact.analysis.orders import observed_order
+from vibroimpact.fmus.errors import DatasetError
+
+_QUANTITIES = ("error", "energy_drift")
+_MARKERS = "os^Dvx"
+_WORDS = {"gauss_seidel": "Gauss-Seidel", "jacobi": "Jacobi"}
+
+
+def convergence(dataset: xr.Dataset) -> Figure:
+    """Draw error and energy drift of each exchange against the macro step, with the observed orders.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        `error` and `energy_drift` on `exchange` (names) and `macro_step` (numbers, with `units`), as a
+        benchmark measures them; magnitudes are drawn. The attribute `title` is written above.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One column (85 mm) wide.
+
+    Raises
+    ------
+    DatasetError
+        If a variable or dimension is missing.
+
+    Examples
+    --------
+    >>> step = np.array([0.01, 0.1])
+    >>> error = xr.DataArray([step, step**2], dims=("exchange", "macro_step"))
+    >>> axes = {"exchange": ["jacobi", "iterated"], "macro_step": step}
+    >>> figure = convergence(xr.Dataset({"error": error, "energy_drift": error}, coords=axes))
+    >>> [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    ['Jacobi 1.00', 'iterated 2.00']
+    """
+    _refuse_other(dataset)
+    with page_style():
+        figure = canvas(120)
+        axes = figure.subplots(2, 1, sharex=True)
+        for axis, name in zip(axes, _QUANTITIES, strict=True):
+            _draw_ladder(axis, dataset[name].transpose("exchange", "macro_step"))
+        axes[-1].set_xlabel(label(dataset["macro_step"]))
+        figure.suptitle(str(dataset.attrs.get("title", "")), fontsize=8)
+    return figure
+
+
+def _refuse_other(dataset: xr.Dataset) -> None:
+    """Refuse a dataset that is no ladder of macro steps."""
+    missing = [
+        name
+        for name in (*_QUANTITIES, "exchange", "macro_step")
+        if name not in dataset.variables
+        or (name in _QUANTITIES and set(dataset[name].dims) != {"exchange", "macro_step"})
+    ]
+    if missing:
+        raise DatasetError(
+            "figure: expected error and energy_drift on exchange and macro_step, "
+            f"got no such {', '.join(missing)}. Draw what a benchmark of coupling measured."
+        )
+
+
+def _draw_ladder(axis: Axes, quantity: xr.DataArray) -> None:
+    """Draw one quantity, a line for each exchange."""
+    step = quantity["macro_step"].values
+    order = np.argsort(step)
+    for place, exchange in enumerate(quantity["exchange"].values):
+        values = quantity.values[place]
+        # A logarithm shows no zero: what is exact leaves a gap.
+        shown = np.where(values == 0.0, np.nan, np.abs(values))
+        axis.plot(
+            step[order],
+            shown[order],
+            color=COLOURS[place % len(COLOURS)],
+            marker=_MARKERS[place % len(_MARKERS)],
+            markersize=3,
+            fillstyle="none",
+            label=_entry(str(exchange), observed_order(step, values)),
+        )
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_ylabel(label(quantity))
+    axis.legend(
+        title="observed order",
+        title_fontsize=7.5,
+        frameon=False,
+        ncols=3,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        borderaxespad=0.1,
+        columnspacing=0.8,
+        handletextpad=0.4,
+        handlelength=1.4,
+    )
+
+
+def _entry(exchange: str, order: float) -> str:
+    """Return the legend of one exchange; where there are no errors to compare it has no order."""
+    name = _WORDS.get(exchange, exchange.replace("_", " "))
+    return f"{name} {order:.2f}" if np.isfinite(order) else f"{name} (none)"

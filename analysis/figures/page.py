@@ -1,0 +1,106 @@
+"""The page all figures share: one journal column wide, its style, its labels, and how a figure is saved."""
+
+from __future__ import annotations
+
+import io
+import os
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any, cast
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from vibroimpact.analysis.atomic import write_atomically
+from vibroimpact.fmus.errors import UsageError
+
+Floats = npt.NDArray[np.float64]
+
+_MM = 1 / 25.4
+COLUMN_WIDTH = 85 * _MM
+FORMATS = (".png", ".pdf", ".svg")
+_DPI = 300
+_STYLE: dict[str, Any] = {
+    "font.size": 8,
+    "axes.labelsize": 8,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7.5,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 0.7,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "svg.hashsalt": "vibroimpact",
+}
+LINE = "#20567D"
+MARK = "#D55E00"
+STOP = "0.45"
+# Told apart with every kind of colour vision (Okabe and Ito).
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_UNIT_SYMBOLS = {
+    "1": "-",
+    "m s-1": "m/s",
+    "rad s-1": "rad/s",
+    "m s-2": "m/s²",
+    "N m-1": "N/m",
+    "N s m-1": "N s/m",
+}
+
+
+def page_style() -> AbstractContextManager[None]:
+    """Return the context in which figures are drawn and saved."""
+    return mpl.rc_context(cast(Any, _STYLE))
+
+
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
+    """Write a figure, whole or not at all; the ending of the name chooses the format (png, pdf, svg).
+
+    Raises
+    ------
+    UsageError
+        If the ending is none of these.
+    OSError
+        If the file cannot be written.
+    """
+    ending = Path(path).suffix.lower()
+    if ending not in FORMATS:
+        raise UsageError(
+            f"{os.fspath(path)}: expected a name ending in {', '.join(FORMATS)}, got {ending or 'none'!r}."
+        )
+    content = io.BytesIO()
+    with page_style():
+        figure.savefig(content, format=ending[1:], dpi=_DPI)
+    write_atomically(path, content.getvalue())
+
+
+def label(variable: xr.DataArray) -> str:
+    """Return the axis label of a variable: its name, in words if it is the schema's, and its unit.
+
+    >>> label(xr.DataArray(0.0, name="angular_frequency", attrs={"units": "rad s-1"}))
+    'angular frequency (rad/s)'
+    """
+    return f"{title(variable)} ({unit_symbol(variable)})"
+
+
+def title(variable: xr.DataArray) -> str:
+    """Return what to call a variable: the name its component gives it, or its own name in words."""
+    return str(variable.attrs.get("component_variable") or str(variable.name).replace("_", " "))
+
+
+def unit_symbol(variable: xr.DataArray) -> str:
+    """Return the unit of a variable as people write it."""
+    unit = str(variable.attrs.get("units", "1"))
+    return _UNIT_SYMBOLS.get(unit, unit)
+
+
+def canvas(height_mm: float, width: float = COLUMN_WIDTH) -> Figure:
+    """Return an empty figure that needs no display."""
+    figure = Figure(figsize=(width, height_mm * _MM), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure

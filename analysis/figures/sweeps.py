@@ -1,0 +1,133 @@
+"""Figures of sweeps: bifurcation diagrams and maps over two parameters."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label
+from vibroimpact.analysis.schema import swept_names
+from vibroimpact.fmus.errors import DatasetError
+
+# Where both sweeps agree the small dark crosses lie inside the large light rings, and both stay visible.
+_SWEEPS: dict[str, dict[str, Any]] = {
+    "up": {"marker": "o", "color": "#56A5DC", "markersize": 2.6, "markeredgewidth": 0.5, "fillstyle": "none"},
+    "down": {"marker": "x", "color": "#B5410B", "markersize": 1.5, "markeredgewidth": 0.5},
+    "independent": {"marker": ".", "color": "#20567D", "markersize": 1.6, "markeredgewidth": 0.0},
+}
+
+
+def varied(dataset: xr.Dataset) -> list[str]:
+    """Return the swept parameters that take more than one value."""
+    return [name for name in swept_names(dataset) if dataset[name].size > 1]
+
+
+def draw_bifurcation(dataset: xr.Dataset) -> Figure:
+    """Draw displacement range and impact velocity against the swept parameter, up and down told apart."""
+    (name,) = varied(dataset)
+    runs = dataset.vibroimpact.runs
+    panels = [q for q in ("displacement_range", "impact_velocity") if q in dataset.variables]
+    if not panels:
+        raise DatasetError(
+            "figure: expected extrema or impacts in the dataset, got neither. "
+            "Set extrema = true or impacts = true in [record]."
+        )
+    figure = canvas(15 + 45 * len(panels))
+    axes = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
+    directions = [d for d in _SWEEPS if d in np.unique(runs["direction"].values)]
+    for axis, quantity in zip(axes, panels, strict=True):
+        for direction in directions:
+            x, y = _points(dataset, runs, name, quantity, direction)
+            axis.plot(
+                x, y, linestyle="none", rasterized=True, label=f"{direction} sweep", **_SWEEPS[direction]
+            )
+        axis.set_ylabel(label(dataset[quantity]))
+        axis.set_ylim(bottom=0)
+    axes[-1].set_xlabel(label(dataset[name]))
+    axes[-1].margins(x=0.02)
+    if len(directions) > 1:
+        handles, labels = axes[0].get_legend_handles_labels()
+        # Above the panels, where it cannot cover a point.
+        figure.legend(handles, labels, loc="outside upper center", ncols=2, markerscale=2.2, frameon=False)
+    return figure
+
+
+def _points(
+    dataset: xr.Dataset, runs: xr.Dataset, name: str, quantity: str, direction: str
+) -> tuple[Any, Any]:
+    """Return the points of one branch: one for each run, or one for each impact of its runs."""
+    chosen = runs["direction"].values == direction
+    parameter = runs[name].values
+    if quantity != "impact_velocity":
+        return parameter[chosen], runs[quantity].values[chosen]
+    # Positions of the runs in the file lead from each impact to the parameter of its run.
+    at = np.full(int(dataset["impact_run"].values.max(initial=-1)) + 1, np.nan)
+    ids = runs["run_id"].values
+    inside = chosen & (ids < at.size)
+    at[ids[inside]] = parameter[inside]
+    x = at[dataset["impact_run"].values]
+    kept = np.isfinite(x)
+    return x[kept], dataset["impact_velocity"].values[kept]
+
+
+def draw_map(dataset: xr.Dataset) -> Figure:
+    """Draw displacement range and largest impact velocity as colours over two swept parameters."""
+    quantities = []
+    if "displacement_range" in dataset.variables:
+        quantities.append((dataset["displacement_range"], label(dataset["displacement_range"])))
+    if "impact_velocity" in dataset.variables:
+        quantities.append((largest_impact_velocity(dataset), f"largest {label(dataset['impact_velocity'])}"))
+    if not quantities or "run" in dataset["run_id"].dims:
+        raise DatasetError(
+            "figure: expected extrema or impacts on a grid of two parameters, got none or scattered runs. "
+            "Set extrema = true in [record], and sweep each parameter over its own values."
+        )
+    directions = np.atleast_1d(dataset["direction"].values).tolist()
+    figure = canvas(5 + 60 * len(quantities), COLUMN_WIDTH * len(directions))
+    axes = np.asarray(
+        figure.subplots(len(quantities), len(directions), sharex=True, sharey=True, squeeze=False)
+    )
+    for row, (values, text) in zip(axes, quantities, strict=True):
+        for axis, direction in zip(row, directions, strict=True):
+            branch = values.sel(direction=direction) if "direction" in values.dims else values
+            _colours(axis, branch.squeeze(), text, (float(values.min()), float(values.max())))
+            if len(directions) > 1:
+                axis.set_title(f"{direction} sweep", fontsize=8)
+    return figure
+
+
+def largest_impact_velocity(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the largest impact velocity of each run (m/s); NaN where a run has no impact."""
+    largest = np.full(int(dataset["run_id"].values.max(initial=0)) + 1, -np.inf)
+    owner = dataset["impact_run"].values
+    inside = owner < largest.size
+    np.maximum.at(largest, owner[inside], dataset["impact_velocity"].values[inside])
+    values = np.where(dataset["run_id"].values >= 0, largest[dataset["run_id"].values], -np.inf)
+    return dataset["run_id"].copy(data=np.where(np.isfinite(values), values, np.nan))
+
+
+def _colours(axis: Axes, values: xr.DataArray, text: str, limits: tuple[float, float]) -> None:
+    """Draw one colour map with its bar."""
+    across, along = values.dims
+    mesh = axis.pcolormesh(
+        values[along].values,
+        values[across].values,
+        values.values,
+        shading="nearest",
+        cmap="viridis",
+        vmin=limits[0],
+        vmax=limits[1],
+        rasterized=True,
+    )
+    # Long numbers of small distances would run into each other.
+    axis.xaxis.set_major_locator(MaxNLocator(4))
+    axis.set_xlabel(label(values[along]))
+    axis.set_ylabel(label(values[across]))
+    axis.label_outer()
+    bar = axis.figure.colorbar(mesh, ax=axis)
+    bar.set_label(text)

@@ -1,0 +1,114 @@
+"""Merge the parts of a campaign into one dataset."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.reading import read_flat
+from vibroimpact.analysis.schema import RAGGED, flat_order
+from vibroimpact.fmus.errors import DatasetError
+
+# Not along run, the same in all parts.
+_SHARED = frozenset({"connection"})
+# Attributes that say what the values are: parts that differ in them cannot be joined.
+_MEANING = ("units", "component_variable", "flag_meanings")
+
+
+def merge_datasets(paths: Sequence[str | os.PathLike[str]]) -> xr.Dataset:
+    """Merge dataset files of one campaign into one dataset, ordered by `run_index`.
+
+    Parameters
+    ----------
+    paths : sequence of path
+        One-dimensional files with the same variables, in any order.
+
+    Returns
+    -------
+    xarray.Dataset
+        In memory; the global attributes are those of the file with the lowest run index.
+
+    Raises
+    ------
+    DatasetError
+        If a file cannot be read, the files differ in their variables, or a run is in two files.
+    """
+    if not paths:
+        raise DatasetError("merge: expected at least one file, got none.")
+    parts = [read_flat(path) for path in paths]
+    first_index = [part.run_index.values[0] if part.sizes["run"] else -1 for part in parts]
+    order = np.argsort(first_index, kind="stable")
+    return _joined([parts[k] for k in order], [os.fspath(paths[k]) for k in order])
+
+
+def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
+    """Join parts along run and along every ragged dimension, then put the runs in order."""
+    first = parts[0]
+    for name, part in zip(names, parts, strict=True):
+        if set(part.variables) != set(first.variables):
+            different = sorted(map(str, set(part.variables) ^ set(first.variables)))
+            raise DatasetError(
+                f"{name}: expected the variables of {names[0]}, got a difference in {', '.join(different)}."
+            )
+        _refuse_other_meaning(name, part, names[0], first)
+    periods = max(part.sizes.get("period", 0) for part in parts)
+    columns = {
+        str(name): _stacked([part.variables[name].values for part in parts], variable.dims, periods)
+        for name, variable in first.variables.items()
+        if name not in _SHARED
+    }
+    index = columns["run_index"]
+    if np.unique(index).size != index.size:
+        raise DatasetError(
+            f"merge: expected each run in one file, got a run_index twice in {len(parts)} files."
+        )
+    if (np.diff(index) < 0).any():
+        columns = _ordered(columns, first, np.argsort(index))
+    columns |= {name: first.variables[name].values for name in _SHARED if name in first.variables}
+    data = {
+        str(name): (variable.dims, columns[str(name)], variable.attrs)
+        for name, variable in first.variables.items()
+    }
+    coords = {str(name): data.pop(str(name)) for name in first.coords}
+    return xr.Dataset(data, coords=coords, attrs=first.attrs)
+
+
+def _refuse_other_meaning(name: str, part: xr.Dataset, first_name: str, first: xr.Dataset) -> None:
+    """Refuse a part whose equal names or numbers mean something else than those of the first part."""
+    for variable, meaning in first.variables.items():
+        for key in _MEANING:
+            wanted, got = meaning.attrs.get(key), part.variables[variable].attrs.get(key)
+            if wanted != got:
+                raise DatasetError(
+                    f"{name}: {variable}: expected {key} {wanted!r} as in {first_name}, got {got!r}."
+                )
+    for label in _SHARED.intersection(map(str, first.variables)):
+        if not np.array_equal(part.variables[label].values, first.variables[label].values):
+            raise DatasetError(
+                f"{name}: {label}: expected those of {first_name} ({', '.join(first[label].values)}), "
+                f"got {', '.join(part[label].values)}."
+            )
+
+
+def _stacked(arrays: Sequence[NDArray[Any]], dims: tuple[Any, ...], periods: int) -> NDArray[Any]:
+    """Join the arrays of one variable; runs with fewer periods than the longest end in NaN."""
+    if "period" in dims and any(array.shape[1] < periods for array in arrays):
+        arrays = [np.pad(a, ((0, 0), (0, periods - a.shape[1])), constant_values=np.nan) for a in arrays]
+    return np.concatenate(arrays)
+
+
+def _ordered(
+    columns: dict[str, NDArray[Any]], like: xr.Dataset, order: NDArray[np.intp]
+) -> dict[str, NDArray[Any]]:
+    """Return all columns with the runs, and the ragged rows of each run, in this order."""
+    rows = {"run": order}
+    for dimension, count_name in RAGGED.items():
+        if count_name in columns:
+            count = columns[count_name].astype(np.int64)
+            rows[dimension] = flat_order((np.cumsum(count) - count)[order], count[order])
+    return {name: values[rows[str(like.variables[name].dims[0])]] for name, values in columns.items()}
