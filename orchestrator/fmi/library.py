@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +48,7 @@ class Library:
         return found
 
 
-@lru_cache(maxsize=None)
+@cache
 def _load(path: Path, source: Path) -> ctypes.CDLL:
     try:
         return ctypes.CDLL(str(path))

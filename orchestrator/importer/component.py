@@ -10,7 +10,7 @@ from pathlib import Path
 from vibroimpact.fmus.archive import unpack
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.fmpy_door import ModelDescription, ModelVariable, read_description
-from vibroimpact.orchestrator.fmi.instance import Instance, Wrapper
+from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.log import LogTail

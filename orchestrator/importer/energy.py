@@ -7,27 +7,35 @@ that connection, in joule; exact coupling has none.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.component import description_of
 from vibroimpact.orchestrator.importer.master import Importer, StepWatcher
-from vibroimpact.orchestrator.importer.specification import ConnectionSpec
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.importer.wiring import connection_name
 
 #: Inputs that are forces, by the last part of their name, with the displacement that they do work on.
 CONJUGATE = {"force": "displacement", "applied_force": "displacement"}
 
 
-def conjugate_displacement(target: Component, variable: str) -> str | None:
+def conjugate_displacement(variables: Container[str], variable: str) -> str | None:
     """Return the displacement on which a force input does work; None when the input is no such force."""
     head, _, last = variable.rpartition(".")
     if last not in CONJUGATE:
         return None
     name = f"{head}.{CONJUGATE[last]}" if head else CONJUGATE[last]
-    return name if name in target.variables else None
+    return name if name in variables else None
+
+
+def force_connections(components: Sequence[ComponentSpec], connections: Sequence[ConnectionSpec]) -> tuple[str, ...]:
+    """Return the names of the connections whose energy residual is summed."""
+    variables = {c.name: {v.name for v in description_of(c.fmu).modelVariables} for c in components}
+    return tuple(
+        connection_name(c) for c in connections if conjugate_displacement(variables[c.target[0]], c.target[1])
+    )
 
 
 class _Connection:
@@ -72,7 +80,7 @@ class InterfaceEnergy:
         found = []
         for connection in connections:
             target = importer.components[connection.target[0]]
-            displacement = conjugate_displacement(target, connection.target[1])
+            displacement = conjugate_displacement(target.variables, connection.target[1])
             if displacement is not None:
                 found.append((connection, _Connection(importer, connection, displacement)))
         self.names = tuple(connection_name(connection) for connection, _ in found)

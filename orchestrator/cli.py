@@ -1,0 +1,79 @@
+"""The command `vibroimpact`: one app; every package adds its commands through an entry point.
+
+A command is a function in the entry-point group `vibroimpact.commands` that is called with the app. So this
+module imports nothing above it, and another package can add commands of its own.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Sequence
+from importlib import metadata
+from typing import Annotated
+
+import typer
+
+from vibroimpact.fmus.errors import VibroimpactError
+
+COMMAND_GROUP = "vibroimpact.commands"
+DEBUG = "--debug"
+
+app = typer.Typer(
+    name="vibroimpact",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Dynamics of things that vibrate and hit stops.",
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"vibroimpact {metadata.version('vibroimpact')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    debug: Annotated[bool, typer.Option(DEBUG, help="Show where in the program an error arose.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Dynamics of things that vibrate and hit stops."""
+
+
+def load_commands() -> None:
+    """Let every installed package add its commands."""
+    for entry in sorted(metadata.entry_points(group=COMMAND_GROUP), key=lambda entry: entry.name):
+        entry.load()(app)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit code: 0 done, 1 failed, 2 misused, 130 interrupted."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        load_commands()
+        # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
+        typer.main.get_command(app).main(args=given, prog_name="vibroimpact")
+    except VibroimpactError as error:
+        sys.exit(_report(str(error), error.exit_code, DEBUG in given))
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except Exception as error:
+        # The last stop for what nobody foresaw: a person gets a line, a developer the place.
+        text = f"Unexpected error: {type(error).__name__}: {error}\nThis is a defect of vibroimpact."
+        hint = f" Repeat the command as `vibroimpact {DEBUG} ...` and report what it shows."
+        sys.exit(_report(text + ("" if DEBUG in given else hint), 1, DEBUG in given))
+
+
+def _report(text: str, exit_code: int, debug: bool) -> int:
+    if debug:
+        traceback.print_exc()
+    print(text, file=sys.stderr)
+    return exit_code
+
+
+if __name__ == "__main__":
+    main()

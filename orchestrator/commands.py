@@ -1,0 +1,118 @@
+"""The commands `run`, `campaign` and `demo`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.campaign import CampaignReport
+
+# Each command imports what it needs when it runs: `vibroimpact --help` loads neither xarray nor Dask.
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this package to the command line."""
+    app.command("run")(run)
+    app.command("campaign")(campaign)
+    app.command("demo")(demo)
+
+
+def run(
+    scene: Annotated[Path, typer.Argument(help="Scene file (TOML).")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Dataset to write (.nc).")],
+) -> None:
+    """Run a scene in this process, one point after the other, into one dataset.
+
+    Example: vibroimpact run examples/single_run.toml -o run.nc
+    """
+    from vibroimpact.orchestrator.progress import shown_progress
+    from vibroimpact.orchestrator.scene import load_scene
+    from vibroimpact.orchestrator.single_run import run_scene
+
+    began = time.perf_counter()
+    loaded = load_scene(scene)
+    with shown_progress() as progress:
+        outcomes = run_scene(loaded, output, progress=progress)
+    runs = sum(outcomes.values())
+    typer.echo(f"{_counted(runs, 'run')} in {time.perf_counter() - began:.1f} s: {output}")
+    _tell_failures(outcomes)
+
+
+def campaign(
+    scene: Annotated[Path, typer.Argument(help="Scene file (TOML) that sweeps something.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the campaign.")],
+    workers: Annotated[
+        int | None, typer.Option(help="Worker processes; one for each processor by default.", min=1)
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Use the workers of this Dask scheduler (tcp://host:8786) instead.")
+    ] = None,
+) -> None:
+    """Run all points of a scene's sweep with many workers; the same command resumes.
+
+    Example: vibroimpact campaign examples/bifurcation.toml -o bifurcation --workers 2
+    """
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
+    from vibroimpact.orchestrator.progress import shown_progress
+    from vibroimpact.orchestrator.scene import load_scene
+
+    if workers is not None and scheduler is not None:
+        raise UsageError(
+            "--workers and --scheduler: expected one of them, got both. A scheduler has its own workers."
+        )
+    loaded = load_scene(scene)
+    try:
+        with shown_progress() as progress:
+            report = run_campaign(loaded, output, workers=workers, scheduler=scheduler, progress=progress)
+    except CampaignInterrupted as interrupted:
+        typer.echo(str(interrupted), err=True)
+        raise typer.Exit(130) from None
+    tell(report)
+
+
+def tell(report: CampaignReport) -> None:
+    """Say what a campaign did."""
+    if report.resumed == report.runs and not report.chunks and not report.compaction_seconds:
+        typer.echo(f"Nothing to do: all {report.runs} points are in {report.dataset} already.")
+        return
+    computed = report.runs - report.resumed
+    kept = f", {report.resumed} were there" if report.resumed else ""
+    typer.echo(
+        f"{_counted(computed, 'point')} computed in {report.compute_seconds:.1f} s by "
+        f"{_counted(report.workers, 'worker')}{kept}: {report.dataset}"
+    )
+    _tell_failures(report.outcomes)
+
+
+def _tell_failures(outcomes: Mapping[str, int]) -> None:
+    failed = {name: count for name, count in outcomes.items() if name in ("error", "crash", "timeout")}
+    for name, count in failed.items():
+        told = f"{_counted(count, 'point')} ended with the outcome {name}; see their messages in the dataset."
+        typer.echo(told, err=True)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
+
+
+def demo(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("demo"),
+) -> None:
+    """Run the bifurcation of the impact oscillator: campaign, dataset, figure, and what is read off it.
+
+    Example: vibroimpact demo -o demo
+    """
+    from vibroimpact.orchestrator.campaign import CampaignInterrupted
+    from vibroimpact.orchestrator.demo import run_demo
+
+    try:
+        run_demo(output)
+    except CampaignInterrupted as interrupted:
+        typer.echo(str(interrupted), err=True)
+        raise typer.Exit(130) from None

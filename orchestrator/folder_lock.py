@@ -1,0 +1,73 @@
+"""One campaign at a time in a folder: a lock that the system releases when its holder dies."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from vibroimpact.fmus.errors import UsageError
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _try_lock(handle: int) -> None:
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+
+else:
+    import fcntl
+
+    def _try_lock(handle: int) -> None:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+@contextmanager
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Hold a folder for this process.
+
+    Raises
+    ------
+    UsageError
+        When another process holds it, or the folder cannot be written.
+    """
+    try:
+        handle = os.open(folder / ".lock", os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise not_writable(folder, error) from error
+    try:
+        try:
+            _try_lock(handle)
+        except OSError as error:
+            raise UsageError(
+                f"{folder}: expected a folder of its own, got one in which another campaign is running. "
+                "Wait for it, or choose another folder."
+            ) from error
+        yield
+    finally:
+        os.close(handle)
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and make sure that files can be written in it.
+
+    Raises
+    ------
+    UsageError
+        When that cannot be done.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        trial = folder / f".writable-{os.getpid()}"
+        trial.touch()
+        trial.unlink()
+    except OSError as error:
+        raise not_writable(folder, error) from error
+
+
+def not_writable(folder: Path, error: OSError) -> UsageError:
+    """Return the error for a folder that cannot be written."""
+    return UsageError(
+        f"{folder}: expected a folder that can be written, got {error.strerror}. Choose another with -o."
+    )

@@ -1,0 +1,135 @@
+"""What a person sees while a campaign runs: how far it is, how fast, and how long it will still take."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Protocol, TextIO
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as RichBar
+
+LINE_SECONDS = 5.0
+"""How often a line is written where the output is not a terminal, s."""
+
+REFRESHES_PER_SECOND = 2
+"""How often the bar is drawn; each drawing is taken from the workers where they use all processors."""
+
+
+class Progress(Protocol):
+    """Told by a campaign how far it is."""
+
+    def begin(self, total: int, done: int) -> None:
+        """Take note that `done` of `total` points are there already."""
+
+    def advance(self, points: int) -> None:
+        """Take note that more points are done."""
+
+    def note(self, text: str) -> None:
+        """Say something once."""
+
+
+class Silence:
+    """Shows nothing."""
+
+    def begin(self, total: int, done: int) -> None:
+        """Show nothing."""
+
+    def advance(self, points: int) -> None:
+        """Show nothing."""
+
+    def note(self, text: str) -> None:
+        """Show nothing."""
+
+
+class Lines:
+    """Writes a line now and then; for files, pipes and continuous integration."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._total = self._done = self._resumed = 0
+        self._began = self._last_line = time.monotonic()
+
+    def begin(self, total: int, done: int) -> None:
+        """Start the clock."""
+        self._total, self._done, self._resumed = total, done, done
+        self._began = self._last_line = time.monotonic()
+
+    def advance(self, points: int) -> None:
+        """Write a line when the last one is old, and at the end."""
+        self._done += points
+        now = time.monotonic()
+        if now - self._last_line >= LINE_SECONDS or self._done == self._total:
+            self._last_line = now
+            self.note(self._line(now - self._began))
+
+    def note(self, text: str) -> None:
+        """Write a line."""
+        print(text, file=self._stream, flush=True)
+
+    def _line(self, seconds: float) -> str:
+        rate = (self._done - self._resumed) / max(seconds, 1e-9)
+        remaining = clock((self._total - self._done) / rate) if rate > 0 else "?"
+        return f"{self._done} of {self._total} points, {rate:.0f} points/s, {remaining} remaining"
+
+
+class Bar:
+    """Draws a bar in a terminal."""
+
+    def __init__(self, bar: RichBar) -> None:
+        self._bar = bar
+        self._task = bar.add_task("points", total=None, rate="", remaining="")
+        self._total = self._done = self._resumed = 0
+        self._began = time.monotonic()
+
+    def begin(self, total: int, done: int) -> None:
+        """Show the bar."""
+        self._total, self._done, self._resumed = total, done, done
+        self._began = time.monotonic()
+        self._bar.update(self._task, total=total, completed=done)
+
+    def advance(self, points: int) -> None:
+        """Move the bar; it is drawn by a clock, not here."""
+        self._done += points
+        rate = (self._done - self._resumed) / max(time.monotonic() - self._began, 1e-9)
+        remaining = clock((self._total - self._done) / rate)
+        self._bar.update(self._task, completed=self._done, rate=f"{rate:.0f} points/s", remaining=remaining)
+
+    def note(self, text: str) -> None:
+        """Write a line above the bar."""
+        self._bar.console.print(text, highlight=False, markup=False)
+
+
+def clock(seconds: float) -> str:
+    """Return a duration as a person reads it.
+
+    >>> clock(59.6), clock(3725.0)
+    ('1:00', '1:02:05')
+    """
+    whole = round(seconds)
+    hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+@contextmanager
+def shown_progress(stream: TextIO | None = None) -> Iterator[Progress]:
+    """Show progress on a stream, standard error by default: a bar in a terminal, else lines."""
+    stream = stream or sys.stderr
+    if not stream.isatty():
+        yield Lines(stream)
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
+    from rich.progress import Progress as RichBar
+
+    columns = (
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("points"),
+        TextColumn("{task.fields[rate]}"),
+        TextColumn("{task.fields[remaining]} remaining"),
+    )
+    with RichBar(*columns, console=Console(file=stream), refresh_per_second=REFRESHES_PER_SECOND) as bar:
+        yield Bar(bar)

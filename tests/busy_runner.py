@@ -1,0 +1,116 @@
+"""A stand-in for the point runner: real work of a stated length, results that depend on every input.
+
+It lets the campaign engine be tested and timed without any component. `BusyRunner` is a map with carried
+state; each of its points costs about the number of milliseconds in `body.mass`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import signal
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.scene import Scene
+
+ROUNDS_PER_MILLISECOND = 4400
+"""Rounds of a hash that take about 1 ms; the work is fixed, so timings compare."""
+
+
+def burn(milliseconds: float) -> None:
+    """Do work of a fixed amount outside the interpreter lock, as a component does."""
+    hashlib.pbkdf2_hmac("sha256", b"point", b"salt", max(1, round(milliseconds * ROUNDS_PER_MILLISECOND)))
+
+
+class BusyRunner:
+    """Burns `body.mass` milliseconds for a point and returns a record of three impacts."""
+
+    execution = "busy"
+    instruction_set = "none"
+
+    def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
+        self.fmu_hashes = {"Busy": "0" * 64}
+        self.scene = scene
+        self.periods = scene.record.recorded_periods or 1
+
+    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+        """Run one point: a contraction towards a point that the swept values decide."""
+        began = time.perf_counter()
+        scene = self.scene.with_values(values)
+        burn(scene.body.mass)
+        displacement, velocity = start if start is not None else (scene.body.displacement_start, 0.0)
+        target = math.fsum(values.values())
+        displacement = 0.9 * displacement + math.sin(target)
+        velocity = 0.7 * velocity + displacement * 0.1
+        periods = np.full((self.periods, 5), displacement)
+        impacts = np.array([[k, 0.5, abs(velocity), abs(velocity), 1] for k in range(3)], dtype=float)
+        return RunRecord(
+            Outcome.ok,
+            "",
+            periods,
+            impacts,
+            np.empty((0, 3)),
+            None,
+            displacement,
+            velocity,
+            0.0,
+            time.perf_counter() - began,
+        )
+
+    def close(self) -> None:
+        """Hold nothing."""
+
+
+class BrittleRunner(BusyRunner):
+    """Fails, with a message, at every point whose forcing amplitude is negative."""
+
+    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+        """Run one point, or raise."""
+        if self.scene.with_values(values).value("forcing.amplitude") < 0:
+            raise ComponentError("oscillator: the step failed; expected a step that ends, got none.")
+        return super().run(values, start)
+
+
+class DeadlyRunner(BusyRunner):
+    """Kills its own process at every point whose forcing amplitude is negative."""
+
+    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+        """Run one point, or die."""
+        if self.scene.with_values(values).value("forcing.amplitude") < 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().run(values, start)
+
+
+class OtherMachineRunner(BusyRunner):
+    """The same on another kind of processor."""
+
+    instruction_set = "other"
+
+
+class UnlikeRunner(BusyRunner):
+    """Says another instruction set in every process."""
+
+    def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
+        super().__init__(scene, execution=execution)
+        self.instruction_set = f"process {os.getpid()}"
+
+
+class OnceDeadlyRunner(BusyRunner):
+    """Kills its process once, at the first point after the file named by VIBROIMPACT_TEST_KILL appeared."""
+
+    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+        """Run one point, or die if the file is there and this process is the one to take it away."""
+        wish = Path(os.environ["VIBROIMPACT_TEST_KILL"])
+        try:
+            wish.unlink()
+        except FileNotFoundError:
+            return super().run(values, start)
+        os.kill(os.getpid(), signal.SIGKILL)
+        raise AssertionError("unreachable")

@@ -1,0 +1,19 @@
+"""The command line with a point runner from `busy_runner`: `python busy_command.py RUNNER ARGUMENTS...`."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import vibroimpact.orchestrator.campaign as campaign
+from vibroimpact.orchestrator.cli import main
+
+
+def run_with(runner: str, arguments: list[str]) -> None:
+    """Run the command line with another default runner."""
+    campaign.run_campaign.__kwdefaults__["runner"] = runner
+    main(arguments)
+
+
+if __name__ == "__main__":
+    run_with(f"busy_runner:{sys.argv[1]}", sys.argv[2:])

@@ -1,0 +1,88 @@
+"""A campaign as a person starts it: a process of its own, in a session of its own, that can be killed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+
+COMMAND = Path(__file__).with_name("busy_command.py")
+WAIT_SECONDS = 60.0
+
+
+class CampaignProcess:
+    """`vibroimpact campaign SCENE -o FOLDER` with a runner from `busy_runner`."""
+
+    def __init__(
+        self, scene: Path, folder: Path, *options: str, runner: str = "BusyRunner", **environment: str
+    ) -> None:
+        self.folder = folder
+        command = [sys.executable, str(COMMAND), runner, "campaign", str(scene), "-o", str(folder), *options]
+        self.process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env=os.environ | environment,
+        )
+
+    def members(self) -> list[psutil.Process]:
+        """Return the living processes of the session."""
+        found = []
+        for process in psutil.process_iter():
+            try:
+                if os.getsid(process.pid) == self.process.pid and process.status() != psutil.STATUS_ZOMBIE:
+                    found.append(process)
+            except (ProcessLookupError, psutil.NoSuchProcess):
+                continue
+        return found
+
+    def workers(self) -> list[psutil.Process]:
+        """Return the worker processes."""
+        return [
+            process
+            for process in self.members()
+            if process.ppid() == self.process.pid and "spawn_main" in " ".join(process.cmdline())
+        ]
+
+    def parts(self) -> list[Path]:
+        """Return the complete parts."""
+        return sorted((self.folder / "parts").glob("branch-*.nc"))
+
+    def wait_for_parts(self, count: int) -> None:
+        """Wait until so many parts are there."""
+        wait_until(lambda: len(self.parts()) >= count or self.process.poll() is not None)
+        assert self.process.poll() is None, self.process.communicate()
+
+    def end(self) -> tuple[int, str, str]:
+        """Wait for the end; return exit code, standard output and standard error."""
+        out, err = self.process.communicate(timeout=WAIT_SECONDS)
+        return self.process.returncode, out, err
+
+    def assert_nothing_lives(self) -> None:
+        """Assert that no process of the session outlives the command by more than moments."""
+        wait_until(lambda: not self.members(), seconds=5.0)
+        assert not self.members()
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = WAIT_SECONDS) -> None:
+    """Wait until something is so, or the time is over."""
+    deadline = time.monotonic() + seconds
+    while not condition() and time.monotonic() < deadline:
+        time.sleep(0.02)
+
+
+def run_campaign_process(
+    scene: Path, folder: Path, *options: str, runner: str = "BusyRunner"
+) -> tuple[int, str, str]:
+    """Run a campaign to its end; return exit code, standard output and standard error."""
+    campaign = CampaignProcess(scene, folder, *options, runner=runner)
+    ended = campaign.end()
+    campaign.assert_nothing_lives()
+    return ended

@@ -1,0 +1,358 @@
+"""Whatever happens to a campaign: one clear message, complete parts, no orphans, and it can be resumed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from campaign_scenes import amplitude_text, assert_same_rows, frequency_text
+
+from vibroimpact.analysis.dataset import Outcome, read_flat
+
+sys.path.insert(0, str(Path(__file__).parent))
+from campaign_process import CampaignProcess, run_campaign_process, wait_until
+
+POINTS = 1500
+TWO = ("--workers", "2")
+PATHS = ("independent", "up-down")
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and sessions")
+
+
+@pytest.fixture(scope="module", params=PATHS)
+def uninterrupted(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Path]:
+    """Return a scene and the dataset of its campaign that nothing disturbed."""
+    folder = tmp_path_factory.mktemp(request.param)
+    scene = folder / "scene.toml"
+    points = POINTS if request.param == "independent" else POINTS // 2
+    scene.write_text(frequency_text(points, request.param, 2.0))
+    code, out, err = run_campaign_process(scene, folder / "campaign", *TWO)
+    assert code == 0, err
+    assert f"{POINTS} points computed" in out
+    return scene, folder / "campaign" / "dataset.nc"
+
+
+def assert_one_clear_message(err: str) -> None:
+    assert "Traceback" not in err
+    lines = [line for line in err.splitlines() if "points/s" not in line]
+    assert len(lines) == 1, err
+
+
+def resume(scene: Path, folder: Path) -> str:
+    code, out, err = run_campaign_process(scene, folder, *TWO)
+    assert code == 0, err
+    assert not list(folder.rglob("*.tmp"))
+    return out
+
+
+def test_a_campaign_survives_a_worker_that_is_killed(
+    uninterrupted: tuple[Path, Path], tmp_path: Path
+) -> None:
+    scene, expected = uninterrupted
+    campaign = CampaignProcess(scene, tmp_path / "campaign", *TWO)
+    campaign.wait_for_parts(3)
+    campaign.workers()[0].send_signal(signal.SIGKILL)
+    code, out, err = campaign.end()
+    assert code == 0, err
+    assert "Traceback" not in err
+    assert f"{POINTS} points computed" in out
+    assert_same_rows(tmp_path / "campaign" / "dataset.nc", expected)
+    campaign.assert_nothing_lives()
+
+
+@pytest.mark.parametrize("everyone", [True, False], ids=["from a terminal", "to the command alone"])
+def test_after_ctrl_c_the_same_command_resumes_bit_identically(
+    uninterrupted: tuple[Path, Path], tmp_path: Path, everyone: bool
+) -> None:
+    scene, expected = uninterrupted
+    folder = tmp_path / "campaign"
+    campaign = CampaignProcess(scene, folder, *TWO)
+    campaign.wait_for_parts(3)
+    began = time.monotonic()
+    (os.killpg if everyone else os.kill)(campaign.process.pid, signal.SIGINT)
+    code, _, err = campaign.end()
+    assert code == 130
+    assert time.monotonic() - began < 10.0
+    assert_one_clear_message(err)
+    assert f"of {POINTS} points are complete" in err
+    assert "The same command resumes." in err
+    campaign.assert_nothing_lives()
+    assert campaign.parts()
+    assert "were there" in resume(scene, folder)
+    assert_same_rows(folder / "dataset.nc", expected)
+
+
+def test_ctrl_c_while_the_workers_start_leaves_nothing_behind(
+    uninterrupted: tuple[Path, Path], tmp_path: Path
+) -> None:
+    scene, _ = uninterrupted
+    for delay in (0.3, 0.8, 1.3, 1.8):
+        campaign = CampaignProcess(scene, tmp_path / "campaign", *TWO)
+        time.sleep(delay)
+        os.killpg(campaign.process.pid, signal.SIGINT)
+        code, _, err = campaign.end()
+        # Before the command itself runs, Python answers the signal.
+        assert code in (130, -signal.SIGINT)
+        if (tmp_path / "campaign").exists():
+            assert "Traceback" not in err, (delay, err)
+        campaign.assert_nothing_lives()
+
+
+def test_after_kill_9_the_workers_end_and_the_same_command_resumes_bit_identically(
+    uninterrupted: tuple[Path, Path], tmp_path: Path
+) -> None:
+    scene, expected = uninterrupted
+    folder = tmp_path / "campaign"
+    campaign = CampaignProcess(scene, folder, *TWO)
+    campaign.wait_for_parts(3)
+    campaign.process.kill()
+    campaign.end()
+    campaign.assert_nothing_lives()
+    assert "were there" in resume(scene, folder)
+    assert_same_rows(folder / "dataset.nc", expected)
+
+
+def test_damaged_parts_are_noticed_and_computed_again(
+    uninterrupted: tuple[Path, Path], tmp_path: Path
+) -> None:
+    scene, expected = uninterrupted
+    folder = tmp_path / "campaign"
+    campaign = CampaignProcess(scene, folder, *TWO)
+    campaign.wait_for_parts(4)
+    campaign.process.kill()
+    campaign.end()
+    campaign.assert_nothing_lives()
+    cut, garbled = campaign.parts()[:2]
+    cut.write_bytes(cut.read_bytes()[:1000])
+    garbled.write_bytes(b"not a dataset")
+    (folder / "parts" / ".left-over.nc.1.tmp").write_bytes(b"half")
+    code, _, err = run_campaign_process(scene, folder, *TWO)
+    assert code == 0
+    assert f"{cut.name} was damaged and is removed" in err
+    assert f"{garbled.name} was damaged and is removed" in err
+    assert_same_rows(folder / "dataset.nc", expected)
+
+
+def test_a_finished_campaign_has_nothing_left_to_do(uninterrupted: tuple[Path, Path]) -> None:
+    scene, dataset = uninterrupted
+    before = dataset.stat().st_mtime_ns
+    code, out, _ = run_campaign_process(scene, dataset.parent, *TWO)
+    assert code == 0
+    assert f"Nothing to do: all {POINTS} points are in" in out
+    assert dataset.stat().st_mtime_ns == before
+
+
+def test_a_changed_scene_is_refused_with_the_key_that_changed(
+    uninterrupted: tuple[Path, Path], tmp_path: Path
+) -> None:
+    scene, dataset = uninterrupted
+    changed = tmp_path / "changed.toml"
+    changed.write_text(scene.read_text().replace("restitution = 0.7", "restitution = 0.8"))
+    code, _, err = run_campaign_process(changed, dataset.parent, *TWO)
+    assert code == 2
+    assert_one_clear_message(err)
+    assert "stop[1].restitution was 0.7, is 0.8" in err
+
+
+def test_a_changed_comment_is_the_same_scene(uninterrupted: tuple[Path, Path], tmp_path: Path) -> None:
+    scene, dataset = uninterrupted
+    changed = tmp_path / "changed.toml"
+    changed.write_text("# the same\n" + scene.read_text().replace("restitution = 0.7", "restitution = 0.70"))
+    code, out, _ = run_campaign_process(changed, dataset.parent, *TWO)
+    assert code == 0
+    assert "Nothing to do" in out
+
+
+def test_another_kind_of_machine_is_refused(tmp_path: Path) -> None:
+    scene, folder = tmp_path / "scene.toml", tmp_path / "campaign"
+    scene.write_text(frequency_text(POINTS, milliseconds=2.0))
+    campaign = CampaignProcess(scene, folder, *TWO)
+    campaign.wait_for_parts(2)
+    campaign.process.kill()
+    campaign.end()
+    campaign.assert_nothing_lives()
+    code, _, err = run_campaign_process(scene, folder, *TWO, runner="OtherMachineRunner")
+    assert code == 2
+    assert_one_clear_message(err)
+    assert 'instruction_set was "none", is "other"' in err
+
+
+def test_workers_of_different_kinds_are_refused(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(frequency_text(10))
+    code, _, err = run_campaign_process(scene, tmp_path / "campaign", *TWO, runner="UnlikeRunner")
+    assert code == 2
+    assert_one_clear_message(err)
+    assert "one kind of runner" in err
+
+
+def test_a_failed_point_is_a_row_with_its_message(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(amplitude_text(61, start=-0.3))
+    code, out, err = run_campaign_process(scene, tmp_path / "campaign", *TWO, runner="BrittleRunner")
+    assert code == 0
+    assert "61 points computed" in out
+    assert "15 points ended with the outcome error" in err
+    rows = read_flat(tmp_path / "campaign" / "dataset.nc")
+    failed = rows["amplitude"].values < 0
+    assert (rows["outcome"].values == failed * Outcome.error).all()
+    assert all("the step failed" in message for message in rows["message"].values[failed])
+    assert (rows["impact_count"].values[~failed] == 3).all()
+
+
+def test_a_point_that_kills_its_process_is_a_row_that_says_so(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(amplitude_text(60, start=-0.005))
+    code, _, err = run_campaign_process(scene, tmp_path / "campaign", *TWO, runner="DeadlyRunner")
+    assert code == 0, err
+    rows = read_flat(tmp_path / "campaign" / "dataset.nc")
+    assert (rows["outcome"].values == (rows["amplitude"].values < 0) * Outcome.crash).all()
+    assert "kills the process" in rows["message"].values[0]
+    assert rows.sizes["run"] == 60
+
+
+def test_two_campaigns_do_not_share_a_folder(uninterrupted: tuple[Path, Path], tmp_path: Path) -> None:
+    scene, _ = uninterrupted
+    folder = tmp_path / "campaign"
+    first = CampaignProcess(scene, folder, *TWO)
+    first.wait_for_parts(1)
+    code, _, err = run_campaign_process(scene, folder, *TWO)
+    assert code == 2
+    assert_one_clear_message(err)
+    assert "another campaign is running" in err
+    assert first.end()[0] == 0
+
+
+@pytest.mark.parametrize("below", ["file", "file/deeper"])
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path, below: str) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(frequency_text(10))
+    (tmp_path / "file").write_text("not a folder")
+    code, _, err = run_campaign_process(scene, tmp_path / below / "campaign", *TWO)
+    assert code == 2
+    assert_one_clear_message(err)
+    assert "expected a folder that can be written" in err
+
+
+def test_a_folder_with_other_data_is_refused(tmp_path: Path) -> None:
+    scene, folder = tmp_path / "scene.toml", tmp_path / "campaign"
+    scene.write_text(frequency_text(10))
+    folder.mkdir()
+    (folder / "dataset.nc").write_bytes(b"of someone else")
+    code, _, err = run_campaign_process(scene, folder, *TWO)
+    assert code == 2
+    assert_one_clear_message(err)
+    assert (folder / "dataset.nc").read_bytes() == b"of someone else"
+
+
+def test_an_address_where_nothing_listens_is_refused_within_seconds(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(frequency_text(10))
+    began = time.monotonic()
+    address = f"tcp://127.0.0.1:{free_port()}"
+    code, _, err = run_campaign_process(scene, tmp_path / "campaign", "--scheduler", address)
+    assert code == 2
+    assert_one_clear_message(err)
+    assert "expected a Dask scheduler that listens there" in err
+    assert time.monotonic() - began < 20.0
+
+
+def free_port() -> int:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return int(listener.getsockname()[1])
+
+
+@pytest.fixture
+def dask_cluster() -> Iterator[str]:
+    """Start a scheduler and two workers as another command would, and return the address."""
+    address = f"tcp://127.0.0.1:{free_port()}"
+    path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
+    environment = os.environ | {"PYTHONPATH": path}
+    commands = [["scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard"]]
+    commands += [["worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]] * 2
+    processes = [
+        subprocess.Popen(
+            [sys.executable, "-m", "dask", *command],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        for command in commands
+    ]
+    yield address
+    for process in processes:
+        process.kill()
+        process.wait()
+
+
+def test_a_campaign_on_a_dask_cluster_gives_the_same_rows_and_leaves_the_workers(
+    uninterrupted: tuple[Path, Path], tmp_path: Path, dask_cluster: str
+) -> None:
+    scene, expected = uninterrupted
+    for name in ("first", "second"):
+        code, out, err = run_campaign_process(scene, tmp_path / name, "--scheduler", dask_cluster)
+        assert code == 0, err
+        assert "2 workers" in out
+        assert_same_rows(tmp_path / name / "dataset.nc", expected)
+        assert not [*(tmp_path / name).glob(".question*"), *(tmp_path / name).glob(".answer*")]
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """Mount a file system of 300 kB."""
+    if shutil.which("mount") is None:
+        pytest.skip("there is no mount command")
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(disk)]
+    mounted = subprocess.run(command, capture_output=True)
+    if mounted.returncode:
+        pytest.skip(f"this user may not mount a small disk: {mounted.stderr.decode().strip()}")
+    yield disk
+    subprocess.run(["umount", "-l", str(disk)], check=True)
+
+
+def test_a_full_disk_ends_the_campaign_with_a_message_and_room_lets_it_go_on(
+    uninterrupted: tuple[Path, Path], small_disk: Path
+) -> None:
+    scene, expected = uninterrupted
+    folder = small_disk / "campaign"
+    code, _, err = run_campaign_process(scene, folder, *TWO)
+    assert code == 1
+    assert_one_clear_message(err)
+    assert "No space left on device" in err
+    assert "the same command" in err
+    assert not list(folder.rglob("*.tmp"))
+    assert not (folder / "dataset.nc").exists()
+    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    assert "were there" in resume(scene, folder)
+    assert_same_rows(folder / "dataset.nc", expected)
+
+
+def test_a_worker_that_is_killed_again_and_again_does_not_end_the_campaign(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(frequency_text(POINTS, milliseconds=2.0))
+    wish = tmp_path / "kill"
+    campaign = CampaignProcess(
+        scene, tmp_path / "campaign", *TWO, runner="OnceDeadlyRunner", VIBROIMPACT_TEST_KILL=str(wish)
+    )
+    for parts in (2, 4):
+        campaign.wait_for_parts(parts)
+        wish.touch()
+        wait_until(lambda: not wish.exists())
+    code, out, err = campaign.end()
+    assert code == 0, err
+    assert f"{POINTS} points computed" in out
+    assert (read_flat(tmp_path / "campaign" / "dataset.nc")["outcome"].values == Outcome.ok).all()
+    campaign.assert_nothing_lives()

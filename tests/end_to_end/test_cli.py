@@ -1,0 +1,187 @@
+"""The command line as a person uses it: what it prints, where, and the exit code."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from importlib import metadata, resources
+from pathlib import Path
+
+import pytest
+import typer
+from campaign_scenes import assert_same_rows
+
+from vibroimpact.analysis.dataset import Outcome, read_flat
+from vibroimpact.orchestrator.cli import app, load_commands, main
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES = ROOT / "examples"
+ENTRY = "from vibroimpact.orchestrator.cli import main; main()"
+
+
+def vibroimpact(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", ENTRY, *map(str, arguments)]
+    return subprocess.run(
+        command, capture_output=True, text=True, cwd=cwd, timeout=120, env=os.environ | {"COLUMNS": "200"}
+    )
+
+
+def small_sweep(path: str) -> str:
+    text = (EXAMPLES / "bifurcation.toml").read_text()
+    assert 'points = 401, path = "up-down"' in text
+    text = text.replace('points = 401, path = "up-down"', f'points = 31, path = "{path}"')
+    return text.replace("transient_periods = 1000", "transient_periods = 100")
+
+
+def assert_misuse(done: subprocess.CompletedProcess[str], *told: str) -> None:
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert not done.stdout
+    for words in told:
+        assert words in done.stderr
+
+
+def test_every_command_has_help_with_an_example() -> None:
+    load_commands()
+    group = typer.main.get_command(app)
+    names = [name for name, command in group.commands.items() if not command.hidden]  # type: ignore[attr-defined]
+    names += [f"fmu {name}" for name in group.commands["fmu"].commands]  # type: ignore[attr-defined]
+    assert {"run", "campaign", "demo", "plot", "fmu"} <= set(names)
+    for name in names:
+        done = vibroimpact(*name.split(), "--help")
+        assert done.returncode == 0
+        assert name == "fmu" or f"Example: vibroimpact {name}" in done.stdout, name
+
+
+def test_help_does_not_load_dask() -> None:
+    code = (
+        "import sys\nfrom vibroimpact.orchestrator.cli import main\n"
+        "try:\n    main(['--help'])\nexcept SystemExit:\n    print('loaded:', 'distributed' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert "loaded: False" in done.stdout
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    assert vibroimpact("--version").stdout.strip() == f"vibroimpact {metadata.version('vibroimpact')}"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [("nonsense",), ("run",), ("run", "scene.toml"), ("campaign", "scene.toml", "-o", "x", "--workers", "0")],
+)
+def test_misuse_ends_with_exit_code_2(arguments: tuple[str, ...]) -> None:
+    assert_misuse(vibroimpact(*arguments))
+
+
+def test_a_missing_scene_is_one_clear_message(tmp_path: Path) -> None:
+    for command in ("run", "campaign"):
+        done = vibroimpact(command, tmp_path / "absent.toml", "-o", tmp_path / "out")
+        assert_misuse(done, "absent.toml")
+        assert len(done.stderr.splitlines()) == 1
+
+
+def test_all_problems_of_a_scene_are_told_at_once(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(small_sweep("up").replace("mass = 1.0", "mas = 1.0").replace("0.7", "1.7"))
+    done = vibroimpact("run", scene, "-o", tmp_path / "out.nc")
+    assert_misuse(done, "mass", "restitution", "1.7")
+    assert not list(tmp_path.glob("out*"))
+
+
+def test_workers_and_scheduler_exclude_each_other(tmp_path: Path) -> None:
+    scene = EXAMPLES / "bifurcation.toml"
+    both = ("--workers", "2", "--scheduler", "tcp://127.0.0.1:9")
+    done = vibroimpact("campaign", scene, "-o", tmp_path / "x", *both)
+    assert_misuse(done, "expected one of them")
+
+
+def fused_examples() -> list[str]:
+    texts = {path.name: path.read_text() for path in EXAMPLES.glob("*.toml")}
+    return sorted(name for name, text in texts.items() if "[body]" in text and '"coupled"' not in text)
+
+
+@pytest.mark.parametrize("example", fused_examples())
+def test_every_example_of_a_single_body_runs(example: str, tmp_path: Path) -> None:
+    done = vibroimpact("run", EXAMPLES / example, "-o", tmp_path / "run.nc")
+    assert done.returncode == 0, done.stderr
+    rows = read_flat(tmp_path / "run.nc")
+    assert (rows["outcome"].values <= Outcome.stuck).all()
+    assert rows.attrs["scene"] == (EXAMPLES / example).read_text()
+
+
+@pytest.mark.parametrize("path", ["independent", "up", "down", "up-down"])
+def test_run_and_campaign_give_bit_identical_rows(tmp_path: Path, path: str) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(small_sweep(path))
+    assert vibroimpact("run", scene, "-o", tmp_path / "run.nc").returncode == 0
+    done = vibroimpact("campaign", scene, "-o", tmp_path / "campaign", "--workers", "2")
+    assert done.returncode == 0, done.stderr
+    assert_same_rows(tmp_path / "run.nc", tmp_path / "campaign" / "dataset.nc")
+
+
+def test_an_up_sweep_is_not_a_down_sweep_where_motions_coexist(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(small_sweep("up-down"))
+    assert vibroimpact("run", scene, "-o", tmp_path / "run.nc").returncode == 0
+    rows = read_flat(tmp_path / "run.nc")
+    w, up = rows["angular_frequency"].values, rows["direction"].values == 1
+    # Between the upper graze at 1.219 and the fold at 1.517 the way up still impacts, the way down does not.
+    between = (w > 1.25) & (w < 1.45)
+    assert (rows["impact_count"].values[between & up] > 0).all()
+    assert (rows["impact_count"].values[between & ~up] == 0).all()
+
+
+@pytest.mark.parametrize("target", ["file/run.nc", "folder", "absent/run.nc"])
+def test_a_dataset_that_cannot_be_written_is_refused_before_anything_runs(
+    tmp_path: Path, target: str
+) -> None:
+    (tmp_path / "file").write_text("not a folder")
+    (tmp_path / "folder").mkdir()
+    done = vibroimpact("run", EXAMPLES / "bifurcation.toml", "-o", tmp_path / target)
+    assert_misuse(done, "expected a place where a dataset can be written")
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_the_demo_reads_the_known_landmarks_within_two_steps(tmp_path: Path) -> None:
+    began = time.monotonic()
+    done = vibroimpact("demo", "-o", tmp_path / "demo")
+    assert done.returncode == 0, done.stderr
+    assert time.monotonic() - began < 60.0
+    assert read_flat(tmp_path / "demo" / "dataset.nc").sizes["run"] == 802
+    assert (tmp_path / "demo" / "bifurcation.png").stat().st_size > 10_000
+    for told in ("lower graze", "upper graze", "fold", "doubling", "0.936493", "1.516611", "dataset.nc"):
+        assert told in done.stdout
+    again = vibroimpact("demo", "-o", tmp_path / "demo")
+    assert again.returncode == 0
+    assert "were there already" in again.stdout
+
+
+def test_the_demo_runs_the_example() -> None:
+    packaged = resources.files("vibroimpact.orchestrator") / "demo_scene.toml"
+    assert packaged.read_bytes() == (EXAMPLES / "bifurcation.toml").read_bytes()
+
+
+@app.command("fail-for-a-test", hidden=True)
+def fail_for_a_test() -> None:
+    """Fail as nobody foresaw."""
+    raise TypeError("an unforeseen thing")
+
+
+def test_a_defect_is_one_line_and_a_hint(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["fail-for-a-test"])
+    assert left.value.code == 1
+    err = capsys.readouterr().err
+    assert "Unexpected error: TypeError: an unforeseen thing" in err
+    assert "--debug" in err
+    assert "Traceback" not in err
+
+
+def test_a_defect_shows_its_place_with_debug(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as left:
+        main(["--debug", "fail-for-a-test"])
+    assert left.value.code == 1
+    assert "in fail_for_a_test" in capsys.readouterr().err
