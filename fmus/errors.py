@@ -36,6 +36,10 @@ class SceneError(VibroimpactError):
         self.problems = tuple(problems)
         super().__init__("\n".join(self.problems))
 
+    def __reduce__(self) -> tuple[type[SceneError], tuple[tuple[str, ...]]]:
+        """Pickle the problems, not the message made of them: errors travel between processes."""
+        return type(self), (self.problems,)
+
 
 class ComponentError(VibroimpactError):
     """A component (an FMU) failed while it ran.

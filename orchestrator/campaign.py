@@ -177,8 +177,7 @@ class _Campaign:
         self._report.resumed = sum(part.chunk.count for part in parts)
         try:
             if self._report.resumed < self._report.runs:
-                with open_workers(workers=workers, scheduler=scheduler) as pool:
-                    self._compute_with(pool, parts, shared=scheduler is not None)
+                self._compute_on(parts, workers, scheduler)
             computed = [self._parts_folder / chunk.part_name for chunk in self._report.chunks]
             self._compact([part.path for part in parts] + computed)
         except KeyboardInterrupt:
@@ -191,6 +190,14 @@ class _Campaign:
             f"Interrupted: {done} of {self._report.runs} points are complete in {self._home}. "
             "The same command resumes."
         )
+
+    def _compute_on(self, parts: Sequence[StoredPart], workers: int | None, scheduler: str | None) -> None:
+        try:
+            with open_workers(workers=workers, scheduler=scheduler) as pool:
+                self._compute_with(pool, parts, shared=scheduler is not None)
+        finally:
+            # A worker that was stopped may have been writing.
+            remove_temporary_files(self._parts_folder)
 
     def _compute_with(self, pool: WorkerPool, parts: Sequence[StoredPart], *, shared: bool) -> None:
         if shared:

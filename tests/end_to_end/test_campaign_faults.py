@@ -88,8 +88,25 @@ def test_after_ctrl_c_the_same_command_resumes_bit_identically(
     assert "The same command resumes." in err
     campaign.assert_nothing_lives()
     assert campaign.parts()
+    assert not list(folder.rglob("*.tmp"))
     assert "were there" in resume(scene, folder)
     assert_same_rows(folder / "dataset.nc", expected)
+
+
+def test_ctrl_c_does_not_wait_for_a_long_point(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(frequency_text(10, milliseconds=60_000.0))
+    campaign = CampaignProcess(scene, tmp_path / "campaign", *TWO)
+    wait_until((tmp_path / "campaign" / "campaign.json").exists)
+    time.sleep(1.0)
+    began = time.monotonic()
+    os.killpg(campaign.process.pid, signal.SIGINT)
+    code, _, err = campaign.end()
+    assert code == 130
+    assert time.monotonic() - began < 10.0
+    assert_one_clear_message(err)
+    assert "0 of 10 points are complete" in err
+    campaign.assert_nothing_lives()
 
 
 def test_ctrl_c_while_the_workers_start_leaves_nothing_behind(
