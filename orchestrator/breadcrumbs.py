@@ -7,6 +7,7 @@ what it was doing.
 from __future__ import annotations
 
 import ctypes
+import math
 import mmap
 from collections.abc import Callable
 from pathlib import Path
@@ -48,8 +49,9 @@ class Breadcrumbs:
         with path.open("r+b") as file:
             self._memory = mmap.mmap(file.fileno(), SIZE)
         self._notes = _Notes.from_buffer(self._memory)
-        self._rings: list[LogTail] = []
         self._known: dict[str, int] = {}
+        self._numbers: dict[tuple[str, str], int] = {}
+        self._tails: dict[int, LogTail] = {}
 
     @staticmethod
     def create(path: Path) -> None:
@@ -59,31 +61,40 @@ class Breadcrumbs:
     # ---- written by the process that runs FMUs ----
 
     def log(self, component: str) -> LogTail:
-        """Return a log tail for a component that both processes see."""
-        index = int(self._notes.components)
-        self._known[component] = index
-        self._notes.components = index + 1
-        return self._ring(index)
+        """Return a log tail for a component that both processes see: the same one for each of its instances."""
+        index = self._known.setdefault(component, len(self._known))
+        self._notes.components = len(self._known)
+        return self._tail(index)
 
-    def _ring(self, index: int) -> LogTail:
-        start = ctypes.sizeof(_Notes) + min(index, MOST_COMPONENTS - 1) * RING_SIZE
-        return LogTail(memoryview(self._memory)[start : start + RING_SIZE])
+    def _tail(self, index: int) -> LogTail:
+        place = min(index, MOST_COMPONENTS - 1)
+        if place not in self._tails:
+            start = ctypes.sizeof(_Notes) + place * RING_SIZE
+            self._tails[place] = LogTail(memoryview(self._memory)[start : start + RING_SIZE])
+        return self._tails[place]
 
     def wrap(self, component: str) -> Wrapper:
         """Return what wraps the functions of a component: each call is noted before it is made."""
 
         def wrapper(name: str, function: Function) -> Function:
             number = self._register(component, name)
-            return self._noting_step(number, function) if name.endswith("DoStep") else self._noting(number, function)
+            return (
+                self._noting_step(number, function)
+                if name.endswith("DoStep")
+                else self._noting(number, function)
+            )
 
         return wrapper
 
     def _register(self, component: str, name: str) -> int:
         notes = self._notes
+        known = self._numbers.get((component, name))
+        if known is not None:
+            return known
         index = min(int(notes.calls), MOST_CALLS - 1)
         notes.names[index].value = f"{component}\n{name}".encode()[: NAME_LENGTH - 1]
         notes.owners[index] = self._known.get(component, 0)
-        notes.calls = index + 1
+        notes.calls = self._numbers[component, name] = index + 1
         return index + 1
 
     def _noting(self, number: int, function: Function) -> Function:
@@ -108,21 +119,24 @@ class Breadcrumbs:
     # ---- read by the other process ----
 
     def begin(self) -> None:
-        """Forget the call before."""
+        """Forget what the point before did: its last call, its time and its log lines."""
         self._notes.call = 0
+        self._notes.time = math.nan
+        for index in range(int(self._notes.components)):
+            self._tail(index).take()
 
     def last_call(self) -> tuple[str, str, float]:
         """Return instance, function and time (s) of the last call noted; empty names when there is none."""
         index = int(self._notes.call) - 1
         if index < 0:
-            return "", "", 0.0
+            return "", "", math.nan
         instance, _, function = self._notes.names[index].value.decode("utf-8", "replace").partition("\n")
         return instance, function, float(self._notes.time)
 
     def last_lines(self) -> tuple[str, ...]:
         """Return the last log lines of the component of the last call."""
         index = int(self._notes.call) - 1
-        return self._ring(self._notes.owners[index]).take() if index >= 0 else ()
+        return self._tail(self._notes.owners[index]).take() if index >= 0 else ()
 
 
 #: What gives a component its log tail, or the wrapper of its functions.

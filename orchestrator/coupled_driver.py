@@ -13,7 +13,8 @@ from vibroimpact.fmus import fmu_path
 from vibroimpact.orchestrator.body_record import DeadlineReached, ImpactLimitReached, RecordedBody
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import Value
-from vibroimpact.orchestrator.importer.master import SAME_INSTANT, Event, Importer
+from vibroimpact.orchestrator.importer.events import Event
+from vibroimpact.orchestrator.importer.master import SAME_INSTANT, Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, Exchange
 
 #: Impacts between two emptyings of the body's record: one impact writes at most two rows, of room for 512.
@@ -71,6 +72,7 @@ class CoupledDriver(RecordedBody):
         specs += [ComponentSpec(stop_name(k), fmu_path("ImpactStop")) for k in range(1, stops + 1)]
         self.importer = Importer(specs, connections_of(stops), macro_step=macro_step, exchange=exchange)
         self.importer.on_event = self._count_event
+        self.importer.on_pause = self._make_room
         super().__init__(self._group)
         self._deadline = math.inf
         self._events = 0
@@ -111,12 +113,16 @@ class CoupledDriver(RecordedBody):
             if end - self.importer.time <= SAME_INSTANT * (1.0 + abs(end)):
                 break
 
+    def _make_room(self) -> None:
+        """Empty the record; the body pauses when it is full."""
+        self.take_rows()
+        if time.perf_counter() > self._deadline:
+            raise DeadlineReached
+
     def _count_event(self, event: Event) -> None:
         self._events += 1
         if self._events % IMPACTS_PER_BLOCK == 0:
-            self.take_rows()
-            if time.perf_counter() > self._deadline:
-                raise DeadlineReached
+            self._make_room()
         if self._events > self._limit:
             raise ImpactLimitReached
 

@@ -18,7 +18,8 @@ from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.general_scene import GeneralScene
 from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
-from vibroimpact.orchestrator.importer.master import Event, Importer, StepWatcher
+from vibroimpact.orchestrator.importer.events import Event, StepWatcher
+from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.sampling import Sampler
 from vibroimpact.orchestrator.scene import Scene
 
@@ -61,7 +62,9 @@ class GeneralRunner:
         wrap: Callable[[str], Wrapper] | None = None,
     ) -> None:
         if execution not in ("auto", "coupled") or scene.general is None:
-            problem = f'{scene.source}: execution.how: expected "coupled" for a general scene, got "{execution}".'
+            problem = (
+                f'{scene.source}: execution.how: expected "coupled" for a general scene, got "{execution}".'
+            )
             raise SceneError([problem])
         self.execution = "coupled"
         self.instruction_set = platform.machine()
@@ -131,6 +134,8 @@ class GeneralRunner:
         self._limit, self._seen, self._steps = execution.impact_limit, 0, 0
         self._events, self._recording = [], False
         self._importer.keeps_start = False
+        for component in self._importer.components.values():
+            component.instance.log.take()  # what it said in the point before is no reason for this one's end
         self._set_gains(general)
         end = record.transient_time + record.recorded_time
         try:
@@ -142,18 +147,31 @@ class GeneralRunner:
                 self._sampler.begin(record.transient_time, end)
             self._importer.advance(end)
         except ImpactLimitReached:
-            return Outcome.impact_limit, f"impact_limit: {self._limit} events at time {self._importer.time:.17g}"
+            return (
+                Outcome.impact_limit,
+                f"impact_limit: {self._limit} events at time {self._importer.time:.17g}",
+            )
         except DeadlineReached:
             text = f"deadline: {execution.deadline} s passed at time {self._importer.time:.17g}"
             return Outcome.timeout, text
         self._refuse_not_finite()
+        return Outcome.ok, "; ".join(self._remarks())
+
+    def _remarks(self) -> list[str]:
+        """What a reader of the results must know of a run that went well."""
+        remarks = [
+            f"{watch.component.name}.{watch.event.variable}: its events accumulated at time {watch.last_time:.17g}; "
+            "those after it are not located"
+            for watch in self._importer.watches
+            if watch.accumulated
+        ]
         if self._importer.wants_to_end:
-            return Outcome.ok, f"a component asked for the end at time {self._importer.time:.17g}"
-        return Outcome.ok, ""
+            remarks.append(f"a component asked for the end at time {self._importer.time:.17g}")
+        return remarks
 
     def _set_gains(self, general: GeneralScene) -> None:
         changed = False
-        for transfer in self._importer.transfers:
+        for transfer in (*self._importer.transfers, *self._importer.loops.transfers):
             for connection in general.connections:
                 if transfer.carries(connection) and transfer.gain_of(connection) != connection.gain:
                     transfer.set_gain(connection, connection.gain)
@@ -203,7 +221,9 @@ class GeneralRunner:
             final_velocity=math.nan,
             final_phase=math.nan,
             seconds=seconds,
-            events=np.array(self._events, dtype=np.float64).reshape(-1, 3) if self._scene.record.impacts else None,
+            events=np.array(self._events, dtype=np.float64).reshape(-1, 3)
+            if self._scene.record.impacts
+            else None,
             energy_residual=self._energy.residuals() if self._energy.names else None,
             loop_residual=self._importer.loops.residual if self._importer.loops.names else None,
         )

@@ -16,7 +16,7 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError
@@ -44,7 +44,8 @@ class _Child:
             stderr=subprocess.DEVNULL,
         )
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
         self.say(order)
 
     def _read(self) -> None:
@@ -69,19 +70,24 @@ class _Child:
             raise TimeoutError from None
 
     def end(self) -> int:
-        """Kill the child if it still runs, and return its exit code (negative: the signal that ended it)."""
+        """End the child, by force if it does not by itself; returns its exit code (negative: the signal)."""
+        self._close(self._process.stdin)
         try:
             code = self._process.wait(0.2)
         except subprocess.TimeoutExpired:
             self._process.kill()
             code = self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                try:
-                    pipe.close()
-                except BrokenPipeError:
-                    continue  # what was still to be sent has no reader any more
+        self._reader.join()
+        self._close(self._process.stdout)
         return code
+
+    @staticmethod
+    def _close(pipe: IO[bytes] | None) -> None:
+        assert pipe is not None
+        try:
+            pipe.close()
+        except BrokenPipeError:
+            return  # what was still to be sent has no reader any more
 
 
 class GuardedRunner:
@@ -105,7 +111,11 @@ class GuardedRunner:
         self._wanted = execution
         self._folder = tempfile.TemporaryDirectory(prefix="vibroimpact-guard-")
         self._child: _Child | None = None
-        identity = self._start()
+        try:
+            identity = self._start()
+        except BaseException:
+            self._folder.cleanup()
+            raise
         self.execution = identity.execution
         self.instruction_set = identity.instruction_set
         self.fmu_hashes = dict(identity.fmu_hashes)

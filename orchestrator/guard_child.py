@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 import threading
 import time
@@ -52,6 +53,8 @@ def _open(order: Order) -> Runner:
 
 def main() -> None:
     """Serve points until standard input ends."""
+    # Ctrl-C reaches all processes of a terminal: a point must not count as crashed for it. The parent ends this one.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _die_with(os.getppid())
     answers, orders = _private_output(), sys.stdin.buffer
     order = receive(orders)

@@ -46,7 +46,9 @@ class Instance(ABC):
     is_fatal : bool
         A call returned fatal: no function of the FMU may be called any more.
     needs_event_mode, returned_early, wants_to_end : bool
-        What the last `step` said (FMI 3.0; False in FMI 2.0).
+        What the last `step` said (in FMI 2.0 only `wants_to_end`).
+    is_flagged : bool
+        Any of these three.
     """
 
     fmi_version: ClassVar[str]
@@ -59,7 +61,7 @@ class Instance(ABC):
         self.name = name
         self.log = log or LogTail()
         self.time = 0.0
-        self.needs_event_mode = self.returned_early = self.wants_to_end = False
+        self.needs_event_mode = self.returned_early = self.wants_to_end = self.is_flagged = False
         self.is_fatal = False
         self._library = Library(fmu)
         self._wrap = wrap
@@ -118,7 +120,7 @@ class Instance(ABC):
             count = len(references) if size is None else size
             values = np.zeros(count, dtype=DTYPES[self.fmi_version][kind])
         return VariableGroup(
-            kind,
+            self._type_name(kind),
             (self._function("Get" + self._type_name(kind)), self._function("Set" + self._type_name(kind))),
             self._pointer,
             references,

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
 
 from vibroimpact.fmus.archive import UnpackedFmu
-from vibroimpact.orchestrator.fmi.instance import DISCARD, WARNING, Instance, Wrapper
+from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, WARNING, Instance, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
 from vibroimpact.orchestrator.fmi.variables import FMI2_NAMES
 
 CO_SIMULATION = 1
+#: Kinds of status.
+LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3
 
 
 class _Callbacks(ctypes.Structure):
@@ -76,12 +79,25 @@ class Instance2(Instance):
         self._step_time.value = time
         self._step_size.value = size
         status = self._do_step()
+        self.wants_to_end = self.is_flagged = False
         if status > WARNING:
             if status != DISCARD:
                 self.check(status, "DoStep")
-            return status
+            if not self._ended_at(time + size):
+                return status
+            self.wants_to_end = self.is_flagged = True
+            status = OK
         self.time = time + size
         return status
+
+    def _ended_at(self, end: float) -> bool:
+        """Did a discarded step go all its way, and does the FMU ask for the end of the simulation?"""
+        terminated, reached = c_int(0), c_double(-math.inf)
+        asked = self._function("GetBooleanStatus")(self._pointer, c_int(TERMINATED), ctypes.byref(terminated))
+        told = self._function("GetRealStatus")(
+            self._pointer, c_int(LAST_SUCCESSFUL_TIME), ctypes.byref(reached)
+        )
+        return asked == OK and told == OK and bool(terminated.value) and reached.value >= end
 
     # ---- states ----
 
@@ -95,7 +111,9 @@ class Instance2(Instance):
         found = self._function("SerializedFMUstateSize")(self._pointer, slot, ctypes.byref(size))
         self.check(found, "SerializedFMUstateSize")
         buffer = ctypes.create_string_buffer(size.value)
-        self.check(self._function("SerializeFMUstate")(self._pointer, slot, buffer, size), "SerializeFMUstate")
+        self.check(
+            self._function("SerializeFMUstate")(self._pointer, slot, buffer, size), "SerializeFMUstate"
+        )
         return buffer.raw
 
     def deserialize(self, data: bytes) -> c_void_p:

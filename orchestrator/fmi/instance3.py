@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from ctypes import c_bool, c_char_p, c_double, c_size_t, c_void_p
+from ctypes import c_bool, c_char_p, c_double, c_size_t, c_uint16, c_uint32, c_void_p
 from functools import partial
 
 from vibroimpact.fmus.archive import UnpackedFmu
-from vibroimpact.orchestrator.fmi.instance import DISCARD, WARNING, Instance, Wrapper
+from vibroimpact.orchestrator.fmi.instance import DISCARD, Instance, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
 
 
@@ -26,8 +26,11 @@ class Instance3(Instance):
     ----------
     enter_event_call, enter_step_call, update_call : callable
         The bare calls, which return FMI's status: for paths that check it themselves.
+    decisions : c_uint16
+        What the last `update_call` said, both at once: 0 when the FMU needs no other event iteration and does
+        not ask for the end.
     needs_update : c_bool
-        What the last `update_call` said: does the FMU need another event iteration?
+        Of these: does the FMU need another event iteration?
     """
 
     fmi_version = "3.0"
@@ -65,12 +68,14 @@ class Instance3(Instance):
     def _bind_events(self) -> None:
         self.enter_event_call = self._bound("EnterEventMode")
         self.enter_step_call = self._bound("EnterStepMode")
-        self.needs_update = c_bool()
-        self._event_flags = tuple(c_bool() for _ in range(4))
+        self.decisions = c_uint16()
+        self.needs_update = c_bool.from_buffer(self.decisions, 0)
+        self._event_flags = (c_bool.from_buffer(self.decisions, 1), c_bool(), c_bool(), c_bool())
         self._next_event = c_double()
         flags = [ctypes.byref(flag) for flag in (self.needs_update, *self._event_flags)]
         self.update_call = self._bound("UpdateDiscreteStates", *flags, ctypes.byref(self._next_event))
-        self._needs_event, self._ends, self._early = c_bool(), c_bool(), c_bool()
+        self._flags = c_uint32()  # all three of a step at once: mostly there is none
+        self._needs_event, self._ends, self._early = (c_bool.from_buffer(self._flags, i) for i in range(3))
         self._last_time = c_double()
         outputs = [ctypes.byref(flag) for flag in (self._needs_event, self._ends, self._early)]
         outputs.append(ctypes.byref(self._last_time))
@@ -97,13 +102,20 @@ class Instance3(Instance):
         self._step_time.value = time
         self._step_size.value = size
         status = self._do_step()
-        if status > WARNING and status != DISCARD:
+        if status and status != DISCARD:
             self.check(status, "DoStep")
         self.time = self._last_time.value
+        if self._flags.value:
+            self._take_flags()
+        elif self.is_flagged:
+            self.returned_early = self.needs_event_mode = self.wants_to_end = self.is_flagged = False
+        return status
+
+    def _take_flags(self) -> None:
         self.returned_early = self._early.value
         self.needs_event_mode = self._needs_event.value
         self.wants_to_end = self._ends.value
-        return status
+        self.is_flagged = True
 
     def enter_event_mode(self) -> None:
         """Enter event mode at the present time."""

@@ -20,13 +20,15 @@ class VariableGroup:
 
     Attributes
     ----------
+    name : str
+        FMI's name of their type, in the version of the instance.
     values : ndarray
         The buffer: `get` fills it, `set` sends it. Its type is that of the variables in C.
     get_call, set_call : callable
         The bare calls, which return FMI's status: for paths that check it themselves.
     """
 
-    __slots__ = ("_check", "_name", "_references", "get_call", "set_call", "values")
+    __slots__ = ("_check", "_references", "get_call", "name", "set_call", "values")
 
     def __init__(
         self,
@@ -42,7 +44,7 @@ class VariableGroup:
         if not values.flags.c_contiguous:
             raise ValueError("values: expected a contiguous buffer")
         self.values = values
-        self._name = name
+        self.name = name
         self._check = check
         self._references = (ctypes.c_uint32 * max(1, len(references)))(*references)
         tail = (ctypes.c_size_t(values.size),) if with_value_count else ()
@@ -60,14 +62,14 @@ class VariableGroup:
         """Read the variables; returns the buffer."""
         status = self.get_call()
         if status > 1:
-            self._check(status, "Get" + self._name)
+            self._check(status, "Get" + self.name)
         return self.values
 
     def set(self) -> None:
         """Write the buffer to the variables."""
         status = self.set_call()
         if status > 1:
-            self._check(status, "Set" + self._name)
+            self._check(status, "Set" + self.name)
 
 
 #: C types of values by FMI type, for the versions that differ.

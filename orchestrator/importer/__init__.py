@@ -8,6 +8,7 @@ Any set of co-simulation FMUs, FMI 2.0 and 3.0 mixed. An event ends the step of 
 - several events in one step: the earliest wins, the others are rolled back;
 - FMUs without states are stepped last, once the end of the step is agreed.
 
-`specification` says what an importer is made of, `component` is one FMU in it, `wiring` moves values between them,
-`master` steps them, `sampling` and `energy` watch without disturbing.
+`specification` says what an importer is made of, `component` is one FMU in it, `wiring` moves values between them and
+solves algebraic loops, `order` says who is stepped first, `master` steps them, `events` resolves events, `sampling`
+and `energy` watch without disturbing.
 """

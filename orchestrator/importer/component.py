@@ -57,13 +57,17 @@ class Component:
         FMI 2.0: the variables that report the first event of the last step.
     """
 
-    def __init__(self, spec: ComponentSpec, *, log: LogTail | None = None, wrap: Wrapper | None = None) -> None:
+    def __init__(
+        self, spec: ComponentSpec, *, log: LogTail | None = None, wrap: Wrapper | None = None
+    ) -> None:
         self.spec = spec
         self.name = spec.name
         description = description_of(spec.fmu)
         interface = description.coSimulation
         if interface is None:
-            raise ComponentFileError(f"{spec.fmu}: expected an FMU with co-simulation, got model exchange only.")
+            raise ComponentFileError(
+                f"{spec.fmu}: expected an FMU with co-simulation, got model exchange only."
+            )
         self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
         self.depends = _dependencies(description)
         self.has_states = bool(interface.canGetAndSetFMUstate)

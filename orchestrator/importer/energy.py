@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.importer.component import description_of
-from vibroimpact.orchestrator.importer.master import Importer, StepWatcher
+from vibroimpact.orchestrator.importer.events import StepWatcher
+from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.importer.wiring import connection_name
 
@@ -30,7 +31,9 @@ def conjugate_displacement(variables: Container[str], variable: str) -> str | No
     return name if name in variables else None
 
 
-def force_connections(components: Sequence[ComponentSpec], connections: Sequence[ConnectionSpec]) -> tuple[str, ...]:
+def force_connections(
+    components: Sequence[ComponentSpec], connections: Sequence[ConnectionSpec]
+) -> tuple[str, ...]:
     """Return the names of the connections whose energy residual is summed."""
     variables = {c.name: {v.name for v in description_of(c.fmu).modelVariables} for c in components}
     return tuple(

@@ -3,59 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.fmi.instance import DISCARD, Wrapper
-from vibroimpact.orchestrator.fmi.instance3 import Instance3
+from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.component import Component, Value
+from vibroimpact.orchestrator.importer.events import Event, EventMode, StepWatcher
+from vibroimpact.orchestrator.importer.order import stepping_order
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec, Exchange
 from vibroimpact.orchestrator.importer.wiring import (
-    CallList,
     LoopSolver,
-    StatusCall,
     Transfer,
+    equal_values,
     moves_of,
     order_of,
     transfers_of,
 )
 
-#: Event iterations at one instant before a component is taken to change its outputs for ever.
-EVENT_ITERATIONS = 100
 #: Steps without progress before the run is given up.
 STANDSTILLS = 100
 #: A communication point closer than this times (1 + |time|), s, is reached.
 SAME_INSTANT = 1e-13
 #: Initialization ends when no connected value changes by more than this, relative.
+INITIAL_TOLERANCE = 1e-11
 INITIAL_ITERATIONS = 100
 #: Repetitions of a step with exchange "iterated", and the relative change at which they end.
 STEP_ITERATIONS = 50
 STEP_TOLERANCE = 1e-13
-SMALLEST = 1e-300
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """An event: its time (s), its index among those at the same time (superdense time), and its component."""
-
-    time: float
-    index: int
-    component: str
-
-
-@dataclass(frozen=True, slots=True)
-class StepWatcher:
-    """Looks on at steps: called before a step with (time), after it with (time, end)."""
-
-    before: Callable[[float], None]
-    after: Callable[[float, float], None]
 
 
 class Importer:
@@ -85,6 +64,8 @@ class Importer:
         By name.
     steps, repeated_steps : int
         Communication steps made, and how many of them were repeated.
+    on_event, on_pause : callable or None
+        Called at each event with it; called when the first component ended a step early without an event.
     """
 
     def __init__(
@@ -107,15 +88,17 @@ class Importer:
         self.exchange = exchange
         self.watches = [Watch(self._watchable(event), event) for event in events]
         order = order_of(connections, self.components)
-        self.transfers = transfers_of(order.connections, self.components)
+        self.transfers = transfers_of(order, self.components)
         self.loops = LoopSolver(order.loops, self.components)
         for name, component in self.components.items():
             component.watch_inputs(c.target[1] for c in connections if c.target[0] == name)
-        self._order = _stepping_order(self.components.values())
+        self._looping = [t for t in self.transfers if order.loops_back(t.connections[0])]
+        self._order = stepping_order(self.components, connections)
         self._plan()
         self.watchers: list[StepWatcher] = []
         self.keeps_start = False
         self.on_event: Callable[[Event], None] | None = None
+        self.on_pause: Callable[[], None] | None = None
         self._begun = False
         self.time = 0.0
 
@@ -133,11 +116,12 @@ class Importer:
         """Decide once what a step must do."""
         sources = [c for c in self._order if self._is_source(c)]
         alone = len(sources) == 1 and sources[0] is self._order[0] and sources[0].event_mode
-        self._saves = self.exchange == "iterated" or not (alone or not sources)
+        self._iterates = self.exchange == "iterated"
+        self._saves = self._iterates or not (alone or not sources)
+        self._prepares = self._saves or bool(self.loops.names)
+        simple = len(self._order) == 1 and not self.transfers and not self._prepares
+        self._alone = self._order[0] if simple and self._bare_step(self._order[0]) else None
         self._saved = [c for c in self._order if c.has_states]
-        self._event_components = [c for c in self._order if c.event_mode]
-        instances = [c.instance for c in self._event_components]
-        self._event_instances = [i for i in instances if isinstance(i, Instance3)]
         self._incoming = {c.name: [t for t in self.transfers if t.target is c] for c in self._order}
         self._fresh = {c.name: self._fresh_inputs(c) for c in self._order}
         self.plan_moves()
@@ -146,44 +130,39 @@ class Importer:
         """Bind the calls of all paths; again after a transfer's buffers changed."""
         refreshed = [t for ts in self._fresh.values() for t in ts]
         behind = [t for t in self.transfers if t not in refreshed]
-        self._start_moves = moves_of(behind)
-        self._paths = [(c, moves_of(self._fresh[c.name]) if self._fresh[c.name] else None) for c in self._order]
-        instances = self._event_instances
-        enter = [StatusCall(i.enter_event_call, i, "EnterEventMode") for i in instances]
-        update = [StatusCall(i.update_call, i, "UpdateDiscreteStates") for i in instances]
-        leave = [StatusCall(i.enter_step_call, i, "EnterStepMode") for i in instances]
-        # at its event a component's inputs from those stepped before it are those of that instant already
-        first = [call for t in behind if _takes_events(t.target) for call in t.calls()]
-        again = [call for t in self.transfers if _takes_events(t.target) for call in t.calls()]
-        self._enter_events = CallList(enter)
-        self._first_iteration = CallList([*first, *update])
-        self._next_iteration = CallList([*again, *update])
-        self._leave_events = CallList(leave)
+        self._start_moves = moves_of(behind) or None
+        self._moves_after_loops = moves_of(t for t in behind if t not in self._looping)
+        paths = [(c, moves_of(self._fresh[c.name]) or None, self._bare_step(c)) for c in self._order]
+        self._paths = [path for path in paths if path[0].has_states or not self._iterates]
+        self._stateless_paths = [path for path in paths if not path[0].has_states and self._iterates]
+        self._event_mode = EventMode(self._order, self.transfers, behind)
 
     def _is_source(self, component: Component) -> bool:
-        watched = any(w.component is component for w in self.watches)
-        return component.event_mode or component.event_times is not None or watched
+        return component.event_mode or self._is_looked_at(component)
+
+    def _is_looked_at(self, component: Component) -> bool:
+        """Are its events found from its outputs?"""
+        return component.event_times is not None or any(w.component is component for w in self.watches)
+
+    def _bare_step(self, component: Component) -> Callable[[float, float], int] | None:
+        """The step of a component that says all about it, if there is one."""
+        return None if self._is_looked_at(component) else component.instance.step
 
     def _fresh_inputs(self, component: Component) -> list[Transfer]:
         """Transfers made just before a component's own step, from those stepped before it.
 
         With exchange "jacobi" only a component that answers at once needs them: one without event mode whose outputs
-        depend on its inputs directly, such as an FMI 2.0 stop.
+        all depend on its inputs directly, such as a stop.
         """
         place = {c.name: i for i, c in enumerate(self._order)}
-        earlier = [
-            t for t in self._incoming[component.name] if place[t.source.name] < place[component.name]
-        ]
-        answers = not component.event_mode and (
-            not component.has_states or any(component.depends.values())
-        )
+        earlier = [t for t in self._incoming[component.name] if place[t.source.name] < place[component.name]]
+        depends = component.depends.values()
+        answers = not component.event_mode and (not component.has_states or (bool(depends) and all(depends)))
         return earlier if self.exchange != "jacobi" or answers else []
 
     # ---- beginning ----
 
-    def begin(
-        self, start_time: float = 0.0, values: Mapping[tuple[str, str], Value] | None = None
-    ) -> None:
+    def begin(self, start_time: float = 0.0, values: Mapping[tuple[str, str], Value] | None = None) -> None:
         """Start a run: reset, set start values, initialize with connected start values, enter step mode.
 
         Parameters
@@ -195,9 +174,11 @@ class Importer:
         """
         self.time = self._grid_start = start_time
         self._grid_index = 0
+        self._next_point = start_time + self.macro_step
         self.steps = self.repeated_steps = 0
         self._event_index, self._event_time = 0, -math.inf
         self._standstill = 0
+        self._at_event: list[Component] = []
         self.wants_to_end = False
         for component in self._order:
             own = {name: value for (who, name), value in (values or {}).items() if who == component.name}
@@ -208,8 +189,7 @@ class Importer:
             component.instance.exit_initialization()
         for watch in self.watches:
             watch.begin()
-        if self._event_instances:
-            self._resolve_events()
+        self.wants_to_end = self._event_mode.begin_run(start_time)
 
     def _settle_connections(self) -> None:
         """Carry start values over the connections until they no longer change: as many passes as chains are long."""
@@ -219,7 +199,7 @@ class Importer:
                 transfer.move()
             self.loops.solve(self.time)
             after = [transfer.write.values for transfer in self.transfers]
-            if all((b == a).all() for b, a in zip(before, after, strict=True)):
+            if all(equal_values(b, a, INITIAL_TOLERANCE) for b, a in zip(before, after, strict=True)):
                 return
         names = ", ".join(sorted({t.target.name for t in self.transfers}))
         raise ComponentError(
@@ -240,44 +220,100 @@ class Importer:
             A component fails, never settles at an event, or makes no progress.
         """
         while not self.wants_to_end:
-            target = self._next_point(end)
-            if target is None:
+            time = self.time
+            room = SAME_INSTANT * (1.0 + abs(time))
+            if end - time <= room:
+                if end > time:
+                    self.time = end
                 return
-            self._step(target)
+            if self._next_point - time <= room:
+                self._pass_point(room)
+            if self._alone is not None and self._next_point < end and not (self.watchers or self.keeps_start):
+                self._glide(self._alone, time, end)
+                continue
+            self._step(time, self._next_point if self._next_point < end else end)
 
-    def _next_point(self, end: float) -> float | None:
-        """Next communication point: the next multiple of the macro step, or the end."""
-        room = SAME_INSTANT * (1.0 + abs(self.time))
-        if end - self.time <= room:
-            self.time = max(self.time, end) if end - self.time > 0.0 else self.time
-            return None
-        if self.macro_step == math.inf:
-            return end
-        while self._grid_start + (self._grid_index + 1) * self.macro_step - self.time <= room:
+    def _pass_point(self, room: float) -> None:
+        """Find the next communication point, a multiple of the macro step."""
+        self._refuse_below(room)
+        while self._next_point - self.time <= room:
             self._grid_index += 1
-        return min(end, self._grid_start + (self._grid_index + 1) * self.macro_step)
+            self._next_point = self._grid_start + (self._grid_index + 1) * self.macro_step
 
-    def _step(self, target: float) -> None:
-        time = self.time
-        self._start_moves()
-        if self.exchange == "iterated":
-            for transfer in self.transfers:
-                transfer.note_begin()
-        if self.loops.names:
-            self.loops.solve(time)
-        if self._saves or self.keeps_start:
-            self._save_start()
-        for watcher in self.watchers:
+    def _refuse_below(self, room: float) -> None:
+        if self.macro_step <= room:
+            raise ComponentError(
+                f"macro_step: expected more than {room:.3g} s, so that time {self.time:.17g} advances, "
+                f"got {self.macro_step:.3g} s.",
+                function="doStep",
+                time=self.time,
+            )
+
+    def _glide(self, component: Component, time: float, end: float) -> None:
+        """Whole macro steps of a single component, for as long as it has nothing to say."""
+        instance, step, point = component.instance, component.instance.step, self._next_point
+        start, macro_step, index = self._grid_start, self.macro_step, self._grid_index
+        first = index
+        while point < end:
+            status = step(time, point - time)
+            if status != OK or instance.is_flagged:
+                self.time, self._grid_index, self._next_point = time, index, point
+                self.steps += index - first
+                self._step(time, point, status)
+                return
+            time = point
+            index += 1
+            point = start + (index + 1) * macro_step
+        self.time, self._grid_index, self._next_point = time, index, point
+        self.steps += index - first
+        self._at_event, self._paused, self._standstill = [], False, 0
+
+    def _step(self, time: float, target: float, made: int | None = None) -> None:
+        """Make a step; `made` is the status of the first component's step where it is made already."""
+        if self._start_moves is not None:
+            self._start_moves()
+        if self._prepares or self.keeps_start:
+            self._prepare(time)
+        watchers = self.watchers
+        for watcher in watchers:
             watcher.before(time)
-        end = self._agree(time, target)
-        self._guard_progress(time, end)
-        for watcher in self.watchers:
+        overtaken = self._step_all(time, target, made)
+        if overtaken is not None or self._iterates:
+            self._agree(time, overtaken)
+        end = self._reached
+        if end > time:
+            self._standstill = 0
+        else:
+            self._count_standstill(time)
+        for watcher in watchers:
             watcher.after(time, end)
         self.time = end
         self.steps += 1
         if self._at_event:
-            self._note_events()
-            self._resolve_events()
+            for watch in self.watches:
+                watch.confirm()
+            if self.on_event is not None:
+                self._note_events(self.on_event)
+            if self._event_mode.resolve(end):
+                self.wants_to_end = True
+        elif self._paused and self.on_pause is not None:
+            self.on_pause()
+
+    def _prepare(self, time: float) -> None:
+        """What the rarer kinds of step need: loops solved, inputs noted, states saved."""
+        if self.loops.names:
+            self._solve_loops(time)
+        if self._iterates:
+            for transfer in self.transfers:
+                transfer.note_begin()
+        if self._saves or self.keeps_start:
+            self._save_start()
+
+    def _solve_loops(self, time: float) -> None:
+        self.loops.solve(time)
+        for transfer in self._looping:
+            transfer.take()
+        self._moves_after_loops()
 
     def _save_start(self) -> None:
         for component in self._saved:
@@ -289,77 +325,109 @@ class Importer:
         for component in self._saved:
             component.instance.restore(component.at_start)
 
-    def _agree(self, time: float, target: float) -> float:
-        """Step all components to the first event, or to `target`; returns where they are."""
-        self._at_event: list[Component] = []
-        end = self._step_all(time, target)
-        while end is not None and end < target:
+    def _agree(self, time: float, end: float | None) -> None:
+        """Repeat a step until all components have reached one instant; `end` is where the first event was met."""
+        while end is not None or (end := self._iterate_all(time)) is not None:
             # somebody met an event earlier than the others went: all go back and step to it
             self.repeated_steps += 1
-            target = end
+            if end <= time:
+                self._stay(time)
+                return
             self._restore_start()
-            end = self._step_all(time, target)
-        if self.exchange == "iterated":
-            self._iterate(time, target)
-        if self._at_event:
-            target = self._at_event[0].instance.time
-        return target
+            end = self._step_all(time, end)
 
-    def _step_all(self, time: float, target: float) -> float | None:
+    def _iterate_all(self, time: float) -> float | None:
+        """Repeat a step that all agreed on (exchange "iterated"); returns the time of an event that came earlier."""
+        if not self._iterates:
+            return None
+        end = self._iterate(time, self._reached)
+        if end is None:
+            self._step_stateless(time, self._reached)
+        return end
+
+    def _step_all(self, time: float, target: float, made: int | None = None) -> float | None:
         """Step each component in its order; returns the time of an event that those before it have passed.
 
         The first component may return early by itself: those after it follow to its event.
         """
-        self._at_event = []
+        if self._at_event:
+            self._at_event = []
+        self.wants_to_end = self._paused = False  # what a step that was taken back said does not count
         first = True
-        for component, inputs in self._paths:
+        for component, inputs, step in self._paths:
             if inputs is not None:
                 inputs()
-            reached = self._step_one(component, time, target)
+            if step is not None:
+                # nobody looks for events here but the component itself
+                status = step(time, target - time) if made is None else made
+                if status == OK and not component.instance.is_flagged:
+                    first = False
+                    continue
+                if status == DISCARD:
+                    component.instance.check(status, "DoStep")
+                reached = self._after_step(component, time, target)
+            else:
+                reached = self._step_one(component, time, target)
             if reached < target:
-                if not (first and component.event_mode):
+                if not (first and component.event_mode and reached > time):
+                    self._stopper = component
                     return reached
                 target = reached
+                self._paused = not self._at_event
             first = False
+        self._reached = self._at_event[0].instance.time if self._at_event else target
         return None
+
+    def _stay(self, time: float) -> None:
+        """End the step where it began: no step has size 0, so all but the component at its event go back."""
+        for component, _, _ in self._paths:
+            if component is self._stopper:
+                break
+            if component.has_states:
+                component.instance.restore(component.at_start)
+        self._at_event = [c for c in self._at_event if c is self._stopper]
+        for watch in self.watches:
+            watch.forget()
+        self._reached = time
 
     def _step_one(self, component: Component, time: float, target: float) -> float:
         """Step one component; returns the time of its first event, or `target`."""
-        instance = component.instance
-        status = instance.step(time, target - time)
-        if status == DISCARD:
-            instance.check(3, "DoStep")
-        if instance.wants_to_end:
-            self.wants_to_end = True
-        if component.event_mode:
-            if instance.needs_event_mode:
-                self._at_event.append(component)
-            reached = instance.time if instance.returned_early else target
-            if not self.watches:
-                return reached
-        else:
-            reached = target
+        if component.instance.step(time, target - time) == DISCARD:
+            component.instance.check(DISCARD, "DoStep")
+        reached = self._after_step(component, time, target)
         if component.event_times is not None:
-            reached = self._reported(component, target)
+            reached = self._reported(component, time, target)
         for watch in self.watches:
             if watch.component is component:
                 reached = min(reached, self._watched(watch, time, target))
         return reached
 
-    def _reported(self, component: Component, target: float) -> float:
+    def _after_step(self, component: Component, time: float, target: float) -> float:
+        """Take what a step has said; returns where it has ended."""
+        instance = component.instance
+        if instance.wants_to_end:
+            self.wants_to_end = True
+        if not component.event_mode:
+            return target
+        if instance.needs_event_mode:
+            self._at_event.append(component)
+        return instance.time if instance.returned_early else target
+
+    def _reported(self, component: Component, time: float, target: float) -> float:
         """FMI 2.0: the event time that the component reports, when it lies in the step."""
         assert component.event_times is not None
         times = component.event_times.get()
         first = min((float(t) for t in times if not math.isnan(t)), default=math.inf)
         if first == math.inf:
             return target
-        if first <= target + SAME_INSTANT * (1.0 + abs(target)):
-            if first >= target - SAME_INSTANT * (1.0 + abs(target)):
-                component.instance.time = first
-                self._at_event.append(component)
-                return target
-            return first
-        return target
+        room = SAME_INSTANT * (1.0 + abs(target))
+        if first > target + room:
+            return target
+        if first >= target - room or first <= time:
+            # at the end of the step; or where it began, and the component has stayed there
+            component.instance.time = first
+            self._at_event.append(component)
+        return target if first >= target - room else first
 
     def _watched(self, watch: Watch, time: float, target: float) -> float:
         size = target - time
@@ -371,101 +439,64 @@ class Importer:
             return target
         return time + located
 
-    def _guard_progress(self, time: float, end: float) -> None:
-        self._standstill = self._standstill + 1 if end <= time else 0
+    def _count_standstill(self, time: float) -> None:
+        self._standstill += 1
         if self._standstill > STANDSTILLS:
-            names = ", ".join(c.name for c in self._at_event) or ", ".join(self.components)
+            instance = self._stopper.instance
             raise ComponentError(
-                f"{names}: expected steps that advance, got {STANDSTILLS} without progress at time {time:.17g}.",
-                instance=names,
-                function="doStep",
+                f"{instance.name}: {instance.prefix}DoStep: expected steps that advance, got {STANDSTILLS} without "
+                f"progress at time {time:.17g}.",
+                instance=instance.name,
+                function=f"{instance.prefix}DoStep",
                 time=time,
+                log=instance.log.take(),
             )
 
     # ---- events ----
 
-    def _note_events(self) -> None:
-        if self.on_event is None:
-            return
+    def _note_events(self, note: Callable[[Event], None]) -> None:
         for component in self._at_event:
             self._event_index = self._event_index + 1 if self.time == self._event_time else 0
             self._event_time = self.time
-            self.on_event(Event(self.time, self._event_index, component.name))
-
-    def _resolve_events(self) -> None:
-        """Event mode: carry values, update discrete states until all are settled, go back to step mode."""
-        if self.steps:
-            self._enter_events()
-        self._first_iteration()
-        for _ in range(EVENT_ITERATIONS):
-            for instance in self._event_instances:
-                if instance.needs_update.value:
-                    break
-            else:
-                break
-            self._next_iteration()
-        else:
-            self._endless_iteration()
-        for instance in self._event_instances:
-            if instance.event_wants_to_end:
-                self.wants_to_end = True
-        self._leave_events()
-
-    def _endless_iteration(self) -> None:
-        names = [i.name for i in self._event_instances if i.needs_update.value]
-        lines = [line for i in self._event_instances for line in i.log.take()]
-        raise ComponentError(
-            f"{', '.join(names)}: fmi3UpdateDiscreteStates: expected event iteration to end, got another request after "
-            f"{EVENT_ITERATIONS} iterations at time {self.time:.17g}.",
-            instance=", ".join(names),
-            function="fmi3UpdateDiscreteStates",
-            time=self.time,
-            log=lines,
-        )
+            note(Event(self.time, self._event_index, component.name))
 
     # ---- repeated steps ----
 
-    def _iterate(self, time: float, target: float) -> None:
-        """Repeat the step until the inputs over it are those that its end gives."""
+    def _iterate(self, time: float, target: float) -> float | None:
+        """Repeat the step until the inputs over it are those that its end gives.
+
+        Returns the time of an event that these inputs make earlier than `target`; None without one.
+        """
         previous: list[NDArray[Any]] | None = None
         for _ in range(STEP_ITERATIONS):
             values = [transfer.take() for transfer in self.transfers]
-            if previous is not None and _settled(values, previous):
-                return
+            if previous is not None and all(
+                equal_values(a, b, STEP_TOLERANCE) for a, b in zip(values, previous, strict=True)
+            ):
+                break
             previous = values
             self._restore_start()
             for transfer in self.transfers:
                 transfer.write_over_step(target - time)
             self.repeated_steps += 1
             self._at_event = []
-            for component in self._order:
-                self._step_one(component, time, target)
+            self.wants_to_end = False
+            for component, _, _ in self._paths:
+                reached = self._step_one(component, time, target)
+                if reached < target:
+                    self._stopper = component
+                    return reached
+        self._reached = self._at_event[0].instance.time if self._at_event else target
+        return None
+
+    def _step_stateless(self, time: float, end: float) -> None:
+        """Step the components that no step can be repeated with, once the end of the step is agreed."""
+        for component, inputs, _ in self._stateless_paths:
+            if inputs is not None:
+                inputs()
+            self._step_one(component, time, end)
 
     def free(self) -> None:
         """Free all components."""
         for component in self.components.values():
             component.free()
-
-
-def _stepping_order(components: Iterable[Component]) -> list[Component]:
-    """Components with event mode first, then others with states, those without states last."""
-
-    def rank(component: Component) -> int:
-        if not component.has_states:
-            return 2
-        return 0 if component.event_mode else 1
-
-    return sorted(components, key=rank)
-
-
-def _settled(values: Sequence[NDArray[Any]], previous: Sequence[NDArray[Any]]) -> bool:
-    """Do two passes over the connections agree to rounding?"""
-    return all(
-        np.abs(a - b).max() <= STEP_TOLERANCE * (SMALLEST + np.abs(a).max())
-        for a, b in zip(values, previous, strict=True)
-    )
-
-
-def _takes_events(component: Component) -> bool:
-    """Does an event reach this component's inputs? Others have been given theirs before their step."""
-    return component.event_mode or component.event_times is not None

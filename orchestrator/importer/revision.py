@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from vibroimpact.orchestrator.fmi.instance import DISCARD
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import EventSpec
 
@@ -46,6 +47,8 @@ class Watch:
     ----------
     accumulated : bool
         Its events came too close to be told apart and are no longer located.
+    last_time : float
+        Time of the last event located, s.
     """
 
     def __init__(self, component: Component, event: EventSpec) -> None:
@@ -57,9 +60,10 @@ class Watch:
     def begin(self) -> None:
         """Forget the run before."""
         self.accumulated = False
-        self._last_time = -math.inf
+        self.last_time = -math.inf
         self._agreed = -math.inf
         self._start = 0.0
+        self._landed: float | None = None
 
     def distance(self) -> float:
         """Signed distance to the level now, positive on the side from which a crossing is an event."""
@@ -76,6 +80,7 @@ class Watch:
         The component is left somewhere in the step, and the caller repeats it to the crossing. Of that repeated step
         the crossing is the end; the component is then left there.
         """
+        self._landed = None
         if self.accumulated:
             return None
         self.component.note_inputs()
@@ -83,7 +88,7 @@ class Watch:
         if sign * self.distance() > NEGLIGIBLE:
             return None
         if abs(time + size - self._agreed) <= PRECISION:
-            self._accept(self._agreed)
+            self._landed = self._agreed
             return size
         near = self._near_side(time, size, sign)
         if near is None:
@@ -95,14 +100,21 @@ class Watch:
         located = precision + refine(bracket, lambda u: sign * self._value_at(time, u), precision)
         if located >= size:
             self._value_at(time, size)
-            self._accept(time + size)
+            self._landed = time + size
             return size
         self._agreed = time + located
         return located
 
-    def _accept(self, instant: float) -> None:
-        self.accumulated = instant - self._last_time < SHORTEST_SPACING * (1.0 + abs(instant))
-        self._last_time = instant
+    def forget(self) -> None:
+        """The step just made was taken back."""
+        self._landed = None
+
+    def confirm(self) -> None:
+        """The step just made counts: the crossing at its end, if there is one, is an event."""
+        if self._landed is not None:
+            self.accumulated = self._landed - self.last_time < SHORTEST_SPACING * (1.0 + abs(self._landed))
+            self.last_time = self._landed
+            self._landed = None
 
     def _near_side(self, time: float, size: float, sign: float) -> tuple[float, float] | None:
         """A point of the step on the near side: its start, or (after an event) a moment later."""
@@ -118,7 +130,10 @@ class Watch:
 
     def _value_at(self, time: float, u: float) -> float:
         self.component.revisit_start()
-        self.component.instance.step(time, u)
+        instance = self.component.instance
+        status = instance.step(time, u)
+        if status == DISCARD:
+            instance.check(status, "DoStep")
         return self.distance()
 
 

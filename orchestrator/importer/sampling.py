@@ -12,9 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.orchestrator.fmi.instance import DISCARD
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import Component, kind_of
-from vibroimpact.orchestrator.importer.master import Importer, StepWatcher
+from vibroimpact.orchestrator.importer.events import StepWatcher
+from vibroimpact.orchestrator.importer.master import Importer
 
 #: A sample closer to the end of a step than this times (1 + |time|), s, is taken at the end.
 SAME_INSTANT = 1e-13
@@ -129,17 +131,20 @@ class Sampler:
         """Read a component inside the step just made, and put it back at the step's end."""
         component, instance = probe.component, probe.component.instance
         instance.save(component.at_end)
-        kept = (instance.time, instance.needs_event_mode, instance.returned_early)
+        kept = (instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end)
         component.note_inputs()
         component.revisit_start()
         now = time
         for row, instant in zip(rows, instants, strict=True):
             if instant > now:
-                instance.step(now, instant - now)
+                status = instance.step(now, instant - now)
+                if status == DISCARD:
+                    instance.check(status, "DoStep")
             probe.read(row)
             now = instant
         instance.restore(component.at_end)
-        instance.time, instance.needs_event_mode, instance.returned_early = kept
+        instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end = kept
+        instance.is_flagged = any(kept[1:])
 
     def _interpolate(
         self,

@@ -31,6 +31,10 @@ class Order:
     connections: tuple[ConnectionSpec, ...]
     loops: tuple[tuple[ConnectionSpec, ...], ...]
 
+    def loops_back(self, connection: ConnectionSpec) -> bool:
+        """Is the connection part of an algebraic loop?"""
+        return any(connection in loop for loop in self.loops)
+
 
 def order_of(connections: Connections, components: dict[str, Component]) -> Order:
     """Order connections so that each is moved after those that its output depends on directly.
@@ -104,13 +108,9 @@ class Transfer:
         inputs = [target.variables[c.target[1]].valueReference for c in connections]
         self.read: VariableGroup = source.group(self.kind, [c.source[1] for c in connections])
         self._gains = np.array([c.gain for c in connections])
-        same_type = (
-            DTYPES[target.instance.fmi_version].get(target_kind) is self.read.values.dtype.type
-        )
+        same_type = DTYPES[target.instance.fmi_version].get(target_kind) is self.read.values.dtype.type
         shared = same_type and bool(np.all(self._gains == 1.0))
-        self.write = target.instance.group(
-            target_kind, inputs, values=self.read.values if shared else None
-        )
+        self.write = target.instance.group(target_kind, inputs, values=self.read.values if shared else None)
         self.convert: Callable[[], int] | None = None if shared else self._converter()
         self._bind_rates()
 
@@ -124,11 +124,15 @@ class Transfer:
 
             return scale
 
+        def convert() -> int:
+            np.multiply(read, gains, out=write, casting="unsafe")
+            return 0
+
         def copy() -> int:
             np.copyto(write, read, casting="unsafe")
             return 0
 
-        return copy
+        return copy if bool(np.all(gains == 1.0)) else convert
 
     def _bind_rates(self) -> None:
         """Inputs that come with an input for their slope (`force`, `force_rate`) can follow a straight line."""
@@ -183,9 +187,8 @@ class Transfer:
                 kind_of(self.target.variables[connection.target[1]]),
                 [self.target.variables[c.target[1]].valueReference for c in self.connections],
             )
-            self.convert = self._converter()
-        index = [c.target for c in self.connections].index(connection.target)
-        self._gains[index] = gain
+        self._gains[[c.target for c in self.connections].index(connection.target)] = gain
+        self.convert = self._converter()
 
     def move(self) -> None:
         """Read the outputs and write the inputs."""
@@ -199,10 +202,21 @@ class Transfer:
         source, target = self.source.instance, self.target.instance
         middle = [] if self.convert is None else [StatusCall(self.convert, target, "convert")]
         return [
-            StatusCall(self.read.get_call, source, f"Get{self.kind}"),
+            StatusCall(self.read.get_call, source, f"Get{self.read.name}"),
             *middle,
-            StatusCall(self.write.set_call, target, f"Set{self.kind}"),
+            StatusCall(self.write.set_call, target, f"Set{self.write.name}"),
         ]
+
+
+#: Numbers smaller than this are 0 where values are compared.
+SMALLEST = 1e-300
+
+
+def equal_values(a: NDArray[Any], b: NDArray[Any], tolerance: float) -> bool:
+    """Are values equal, relative to the largest? Booleans and integers count as numbers; NaN equals NaN."""
+    wide_a, wide_b = a.astype(np.float64), b.astype(np.float64)
+    close = np.abs(wide_a - wide_b) <= tolerance * (SMALLEST + np.abs(wide_a).max())
+    return bool(np.all(close | (np.isnan(wide_a) & np.isnan(wide_b))))
 
 
 class CallList:
@@ -218,8 +232,12 @@ class CallList:
         """Make the calls."""
         for call in self._bare:
             status = call()
-            if status > 1:
+            if status:
                 self._explain(call, status)
+
+    def __len__(self) -> int:
+        """Return the number of calls."""
+        return len(self._bare)
 
     def _explain(self, call: Callable[[], int], status: int) -> None:
         found = next(c for c in self._calls if c.call is call)
@@ -231,11 +249,12 @@ def moves_of(transfers: Iterable[Transfer]) -> CallList:
     return CallList(call for transfer in transfers for call in transfer.calls())
 
 
-def transfers_of(connections: Connections, components: dict[str, Component]) -> tuple[Transfer, ...]:
-    """Group ordered connections into as few transfers as their order allows."""
+def transfers_of(order: Order, components: dict[str, Component]) -> tuple[Transfer, ...]:
+    """Group ordered connections into as few transfers as their order allows; loops are kept apart."""
     groups: list[list[ConnectionSpec]] = []
-    for connection in connections:
-        place = _group_for(connection, groups, components)
+    for connection in order.connections:
+        alike = [group for group in groups if order.loops_back(group[0]) == order.loops_back(connection)]
+        place = _group_for(connection, alike, components)
         if place is None:
             groups.append([connection])
         else:
@@ -272,10 +291,33 @@ def _group_for(
 #: Iteration of algebraic loops: relative change at which it ends, and most iterations.
 LOOP_TOLERANCE = 1e-12
 LOOP_ITERATIONS = 100
+#: A combination of inputs to which a loop responds by less than this, relative, is taken to have no solution.
+SMALLEST_RESPONSE = 1e-10
+
+
+def _next_step(
+    guesses: Sequence[NDArray[np.float64]], changes: Sequence[NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Anderson's step from the last guess: the straight line through the last guesses to where nothing changes."""
+    newest = changes[-1]
+    memory = min(len(changes) - 1, len(newest))
+    if memory == 0:
+        return newest
+    moved = np.diff(np.array(guesses[-memory - 1 :]), axis=0).T
+    responded = np.diff(np.array(changes[-memory - 1 :]), axis=0).T
+    size = float(np.linalg.norm(responded))
+    if size <= SMALLEST_RESPONSE * float(np.linalg.norm(moved)):
+        return newest
+    cut = min(1.0, SMALLEST_RESPONSE * float(np.linalg.norm(moved)) / size)
+    weights = np.linalg.lstsq(responded, newest, rcond=cut)[0]
+    step: NDArray[np.float64] = newest - (moved + responded) @ weights
+    return step
 
 
 class LoopSolver:
-    """Solves the algebraic loops of an exchange by fixed-point iteration with Aitken's relaxation.
+    """Solves the algebraic loops of an exchange by fixed-point iteration with Anderson's acceleration.
+
+    A linear loop of n connections settles after n + 1 iterations, whatever its gain (but 1).
 
     Attributes
     ----------
@@ -285,22 +327,24 @@ class LoopSolver:
         Iterations that the last solution took.
     """
 
-    def __init__(self, loops: tuple[tuple[ConnectionSpec, ...], ...], components: dict[str, Component]) -> None:
+    def __init__(
+        self, loops: tuple[tuple[ConnectionSpec, ...], ...], components: dict[str, Component]
+    ) -> None:
         self._loops = loops
         self.names = tuple(" , ".join(connection_name(c) for c in loop) for loop in loops)
         inside = [c for loop in loops for c in loop]
-        self._transfers = [Transfer(components[c.source[0]], components[c.target[0]], [c]) for c in inside]
+        self.transfers = [Transfer(components[c.source[0]], components[c.target[0]], [c]) for c in inside]
         self.residual = 0.0
         self.iterations = 0
 
     def _values(self) -> NDArray[np.float64]:
         values = []
-        for transfer in self._transfers:
+        for transfer in self.transfers:
             values.append(float(transfer.take()[0]))
         return np.array(values)
 
     def _write(self, values: NDArray[np.float64]) -> None:
-        for transfer, value in zip(self._transfers, values, strict=True):
+        for transfer, value in zip(self.transfers, values, strict=True):
             transfer.write.values[0] = value
             transfer.write.set()
 
@@ -312,10 +356,10 @@ class LoopSolver:
         ComponentError
             They do not settle; the message names the loop.
         """
-        if not self._transfers:
+        if not self.transfers:
             return
         guess = self._values()
-        relaxation, previous = 1.0, None
+        guesses, changes = [guess], []
         for self.iterations in range(1, LOOP_ITERATIONS + 1):
             self._write(guess)
             change = self._values() - guess
@@ -325,12 +369,9 @@ class LoopSolver:
                 return
             if not np.all(np.isfinite(change)):
                 break
-            if previous is not None:
-                step = change - previous
-                square = float(step @ step)
-                relaxation = -relaxation * float(previous @ step) / square if square > 0.0 else 1.0
-            previous = change
-            guess = guess + relaxation * change
+            changes.append(change)
+            guess = guess + _next_step(guesses, changes)
+            guesses.append(guess)
         raise ComponentError(
             f"algebraic loop {'; '.join(self.names)} at time {time:.17g}: expected an iteration that settles, "
             f"got a relative residual of {self.residual:.3g} after {self.iterations} iterations. "

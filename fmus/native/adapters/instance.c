@@ -179,7 +179,7 @@ bool vi_instance_set(vi_instance *instance, const char *function, int type, cons
 
 struct vi_saved {
     char magic[8];
-    uint64_t token_hash, data_hash;
+    uint64_t token_hash, state_hash;
     uint64_t size, capacity; /* of the data, bytes */
     int64_t mode;
     double start_time;
@@ -189,10 +189,12 @@ struct vi_saved {
 
 static const char MAGIC[8] = "vibstat1";
 
+static const uint64_t HASH_START = 1469598103934665603u;
+
 /* FNV-1a: tells a damaged or foreign state from a good one; not a defence against forgery. */
-static uint64_t hash(const unsigned char *bytes, size_t size)
+static uint64_t hash(uint64_t h, const void *data, size_t size)
 {
-    uint64_t h = 1469598103934665603u;
+    const unsigned char *bytes = data;
     for (size_t i = 0; i < size; ++i) {
         h = (h ^ bytes[i]) * 1099511628211u;
     }
@@ -201,7 +203,15 @@ static uint64_t hash(const unsigned char *bytes, size_t size)
 
 static uint64_t token_hash(void)
 {
-    return hash((const unsigned char *)component->token, strlen(component->token));
+    return hash(HASH_START, component->token, strlen(component->token));
+}
+
+/* Of all that a state says: the header from `size` on, and the data. */
+static uint64_t state_hash(const vi_saved *header, const unsigned char *data)
+{
+    const size_t first = offsetof(vi_saved, size);
+    const uint64_t h = hash(HASH_START, (const unsigned char *)header + first, sizeof(vi_saved) - first);
+    return hash(h, data, header->size);
 }
 
 bool vi_instance_save(vi_instance *instance, const char *function, vi_saved **saved)
@@ -247,8 +257,8 @@ void vi_saved_write(const vi_saved *saved, unsigned char *bytes)
 {
     vi_saved header = *saved;
     header.token_hash = token_hash();
-    header.data_hash = hash(saved->data, saved->size);
     header.capacity = saved->size;
+    header.state_hash = state_hash(&header, saved->data);
     memcpy(bytes, &header, sizeof header);
     memcpy(bytes + sizeof header, saved->data, saved->size);
 }
@@ -264,7 +274,7 @@ vi_saved *vi_saved_read(vi_instance *instance, const char *function, const unsig
     const unsigned char *data = bytes + sizeof header;
     if (memcmp(header.magic, MAGIC, sizeof MAGIC) != 0 || header.token_hash != token_hash()
         || header.size != size - sizeof header || header.size > component->struct_size
-        || header.data_hash != hash(data, header.size)) {
+        || header.state_hash != state_hash(&header, data)) {
         vi_instance_fail(instance, function, "these bytes are not an undamaged state of this component and version");
         return NULL;
     }

@@ -8,6 +8,13 @@
 
 /* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
 static const double LANDING = 1e-13;
+/* A body that within a radian does not go further from its stop than this times its other displacements is followed
+ * from where it is. */
+static const double LINGERING = 1e-6;
+/* Of a segment, in periods: more than one, so that a flight of one period does not end in two segments. */
+static const double LONGEST_SEGMENT = 1.5;
+/* A contact nearer than this over the fastest rate may be near enough to be told without another evaluation. */
+static const double NEAR_CONTACT = 1e-4;
 /* Rounding of a displacement, in units of the terms it is the sum of. */
 static const double ROUNDING = 4.0 * DBL_EPSILON;
 
@@ -36,6 +43,22 @@ void vi_body_hold(vi_body *body, double held, double held_rate)
     body->held_since = body->now;
 }
 
+static bool watched(const vi_body *body, int k)
+{
+    return body->contacts[k].law != VI_LAW_NONE && !body->passed;
+}
+
+double vi_body_within(const vi_body *body, double displacement)
+{
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        const double sign = direction(body, k), stop = body->contacts[k].position;
+        if (watched(body, k) && sign * displacement > sign * stop) {
+            displacement = stop;
+        }
+    }
+    return displacement;
+}
+
 /* ---- flight ---- */
 
 typedef enum { ENDS_ANYWHERE, ENDS_AT_TARGET, ENDS_AT_PERIOD } segment_end;
@@ -44,18 +67,14 @@ typedef enum { ENDS_ANYWHERE, ENDS_AT_TARGET, ENDS_AT_PERIOD } segment_end;
 static double segment_length(const vi_body *body, vi_instant target, segment_end *end)
 {
     const double remaining = vi_clock_elapsed(&body->clock, body->now, target);
-    const double to_period = (body->clock.period - body->now.rest) + body->clock.period_low;
+    const double to_period = vi_clock_to_period_end(&body->clock, body->now);
     if (body->record.periods && to_period <= remaining) {
         *end = ENDS_AT_PERIOD;
         return to_period;
     }
-    *end = remaining <= body->clock.period ? ENDS_AT_TARGET : ENDS_ANYWHERE;
-    return fmin(remaining, body->clock.period);
-}
-
-static bool watched(const vi_body *body, int k)
-{
-    return body->contacts[k].law != VI_LAW_NONE && !body->passed;
+    const double longest = LONGEST_SEGMENT * body->clock.period;
+    *end = remaining <= longest ? ENDS_AT_TARGET : ENDS_ANYWHERE;
+    return vi_min(remaining, longest);
 }
 
 /* Land on the contact found at clearance d and approach v: one step of the parabola that touches the motion there.
@@ -72,12 +91,25 @@ static double land(const vi_segment *segment, double sign, double clearance, vi_
     return fmax(0.0, sign * m->v);
 }
 
+/* Seconds to the contact when the parabola that touches the motion here tells it, and the speed there, to the last
+ * bit: no further evaluation is needed. HUGE_VAL otherwise. */
+static double seconds_to_landing(const vi_segment *segment, double stop, const vi_approach *p)
+{
+    if (!(p->clearance * segment->mode->fastest < NEAR_CONTACT * p->velocity)) {
+        return HUGE_VAL;
+    }
+    const double s = vi_parabola_root(p->clearance, p->velocity, p->acceleration), cube = s * s * s;
+    const bool exact = fabs(p->jerk) * cube <= DBL_EPSILON * (fabs(stop) + segment->scale)
+                       && p->bound * cube <= DBL_EPSILON * p->velocity;
+    return exact ? s : HUGE_VAL;
+}
+
 /* First contact at or after `u` in the segment: its index, with *u and the approach velocity; -1 when there is none. */
 static int locate(const vi_body *body, const vi_segment *segment, double *u, vi_motion *m, double *approach)
 {
     for (;;) {
         double step = segment->length - *u;
-        int nearest = -1;
+        int nearest = -1, landing = -1;
         for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
             if (!watched(body, k)) {
                 continue;
@@ -89,9 +121,18 @@ static int locate(const vi_body *body, const vi_segment *segment, double *u, vi_
                 return k;
             }
             const vi_approach state = {clearance, v, sign * m->a, sign * m->j, m->snap_bound};
-            const double certified = vi_certified_step(&state, step);
-            nearest = certified < step ? k : nearest;
-            step = vi_min(step, certified);
+            const double seconds = seconds_to_landing(segment, stop, &state);
+            const double certified = vi_min(seconds, vi_certified_step(&state, step));
+            if (certified < step) {
+                step = certified;
+                nearest = k;
+                landing = certified == seconds ? k : -1;
+            }
+        }
+        if (landing >= 0) {
+            *u += step;
+            *approach = direction(body, landing) * (m->v + step * (m->a + 0.5 * step * m->j));
+            return landing;
         }
         if (nearest >= 0 && *u + step == *u) {
             *approach = fmax(0.0, direction(body, nearest) * m->v);
@@ -132,7 +173,7 @@ static void move(vi_body *body, double u, double x, double v, segment_end end, v
     body->leaving = 0;
     /* a contact may be so close before a period's end that rounding puts it there */
     if (end == ENDS_AT_PERIOD || (body->record.periods && after.periods > body->now.periods)) {
-        body->now = (vi_instant){body->now.periods + 1, 0.0};
+        body->now = (vi_instant){body->now.periods + 1, 0.0, 0.0};
         vi_record_period(&body->record, vi_clock_time(&body->clock, body->now), x, v);
     } else {
         body->now = after;
@@ -180,7 +221,16 @@ static void meet(vi_body *body, int k, double approach, double remaining, const 
     }
 }
 
-/* A body about to meet a stop: how long to follow it from where it is, s; HUGE_VAL when that is not needed. */
+/* Does a body stay so close to the stop for a radian that rounding would decide where it is? */
+static bool lingers(const vi_body *body, double position, double clearance, double acceleration, double held)
+{
+    const double time = 1.0 / body->mode.fastest;
+    const double size = fabs(position) + body->mode.steady_amplitude + fabs(held) * time * time;
+    return clearance + (fabs(body->velocity) + fabs(acceleration) * time) * time < LINGERING * size;
+}
+
+/* A body about to meet a stop, or slow to leave it: how long to follow it from where it is, s; HUGE_VAL when that is
+ * not needed. */
 static double low_bounce(const vi_body *body, vi_phase phase, double held)
 {
     double free_acceleration, slope;
@@ -194,6 +244,9 @@ static double low_bounce(const vi_body *body, vi_phase phase, double held)
         const double flight = vi_parabola_root(clearance, sign * body->velocity, sign * free_acceleration);
         if (flight > 0.0 && flight * body->mode.fastest < VI_LOW_BOUNCE) {
             return 2.0 * flight;
+        }
+        if (lingers(body, body->contacts[k].position, clearance, free_acceleration, held)) {
+            return 1.0 / body->mode.fastest;
         }
     }
     return HUGE_VAL;
@@ -235,12 +288,13 @@ static void fly(vi_body *body, vi_instant target, const vi_step_request *request
         u = length; /* the room after the end was only searched */
         vi_segment_at(&segment, length, &m);
     }
+    const double end_displacement = vi_body_within(body, segment.origin + m.x);
     if (body->record.extrema) {
         vi_body_follow_extrema(body, &segment, u);
-        vi_record_extend(&body->record, k < 0 ? segment.origin + m.x : body->contacts[k].position);
+        vi_record_extend(&body->record, k < 0 ? end_displacement : body->contacts[k].position);
     }
     if (k < 0) {
-        move(body, u, segment.origin + m.x, m.v, whole ? end : ENDS_ANYWHERE, target);
+        move(body, u, end_displacement, m.v, whole ? end : ENDS_ANYWHERE, target);
     } else {
         move(body, u, body->contacts[k].position, direction(body, k) * approach, landing(end, u, length, room), target);
         meet(body, k, approach, vi_clock_elapsed(&body->clock, body->now, target), request);
@@ -266,6 +320,11 @@ static double time_to_release(const vi_body *body, int k, double length, bool *r
         const double closing = -sign * slope;
         const double bend = sign * body->mode.force * w * w * phase.cosine;
         if (closing > 0.0 && pressure <= noise) {
+            if (bend < 0.0 && closing * closing <= -2.0 * bend * (pressure + noise)) {
+                /* the pressure falls to zero and rises again: it stays */
+                u = fmin(length, u + closing / -bend + sqrt(noise / -bend));
+                continue;
+            }
             *released = true;
             return fmin(length, u + pressure / closing);
         }
@@ -298,10 +357,24 @@ static void release(vi_body *body)
     body->leaving = 1;
 }
 
+/* Have new inputs turned the contact force away from the stop at once? */
+static bool lifted(const vi_body *body, int k)
+{
+    double pressure, slope;
+    const double stop = body->contacts[k].position;
+    vi_mode_held(&body->mode, stop, vi_body_phase_now(body), vi_body_held_now(body), body->held_rate, &pressure, &slope);
+    return direction(body, k) * pressure < -vi_body_pressure_noise(body, stop);
+}
+
 static void stay(vi_body *body, vi_instant target)
 {
     const int k = body->stuck - 1;
     const double stop = body->contacts[k].position;
+    if (lifted(body, k)) {
+        release(body);
+        body->leaving = 0; /* its acceleration is not 0 */
+        return;
+    }
     if (!body->record.periods && pressed_for_ever(body, k)) {
         body->now = target;
         return;

@@ -38,19 +38,23 @@ bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, dou
     return clock->period >= DBL_MIN && clock->period <= DBL_MAX;
 }
 
+/* The instant `periods` and high + low seconds, as a sum without overlap. */
+static vi_instant instant_of(int64_t periods, double high, double low)
+{
+    const double rest = high + low;
+    return (vi_instant){periods, rest, low - (rest - high)};
+}
+
 /* Bring 0 <= rest < period; the numbers come from sums that may leave this range by one period. */
 static vi_instant normalized(const vi_clock *clock, vi_instant instant)
 {
     while (instant.rest >= clock->period) {
-        instant.rest = (instant.rest - clock->period) - clock->period_low;
-        instant.periods += 1;
+        instant = instant_of(instant.periods + 1, instant.rest - clock->period, instant.rest_low - clock->period_low);
     }
     while (instant.rest < 0.0) {
-        instant.rest = (instant.rest + clock->period) + clock->period_low;
+        instant = instant_of(instant.periods - 1, instant.rest + clock->period, instant.rest_low + clock->period_low);
         if (instant.rest >= clock->period) { /* a negative rest below the rounding of one period */
-            instant.rest = 0.0;
-        } else {
-            instant.periods -= 1;
+            instant = (vi_instant){instant.periods + 1, 0.0, 0.0};
         }
     }
     return instant;
@@ -62,15 +66,17 @@ bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant
     if (!(fabs(count) < MOST_PERIODS)) {
         return false;
     }
-    double rest = fma(-count, clock->period, high);
-    rest = (rest + clock->origin) + (low + clock->origin_low - count * clock->period_low);
+    const double whole = count * clock->period, since = high - whole, rest = since + clock->origin;
+    low += clock->origin_low - count * clock->period_low - fma(count, clock->period, -whole);
+    low += sum_error(high, -whole, since) + sum_error(since, clock->origin, rest);
     const double resolution = 2.0 * DBL_EPSILON * fabs(high);
-    if (fabs(rest) <= resolution) {
-        rest = 0.0;
-    } else if (fabs(rest - clock->period) <= resolution) {
-        rest = clock->period;
+    if (fabs(rest + low) <= resolution) {
+        *instant = (vi_instant){(int64_t)count, 0.0, 0.0};
+    } else if (fabs((rest - clock->period) + low) <= resolution) {
+        *instant = (vi_instant){(int64_t)count + 1, 0.0, 0.0};
+    } else {
+        *instant = normalized(clock, instant_of((int64_t)count, rest, low));
     }
-    *instant = normalized(clock, (vi_instant){(int64_t)count, rest});
     return true;
 }
 
@@ -78,7 +84,7 @@ double vi_clock_time(const vi_clock *clock, vi_instant instant)
 {
     const double count = (double)instant.periods;
     const double whole = count * clock->period;
-    double low = fma(count, clock->period, -whole) + count * clock->period_low - clock->origin_low;
+    double low = fma(count, clock->period, -whole) + count * clock->period_low - clock->origin_low + instant.rest_low;
     const double sum = whole + instant.rest;
     low += sum_error(whole, instant.rest, sum);
     const double shifted = sum - clock->origin;
@@ -88,18 +94,30 @@ double vi_clock_time(const vi_clock *clock, vi_instant instant)
 
 double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b)
 {
-    const double count = (double)(b.periods - a.periods);
-    return (count * clock->period + (b.rest - a.rest)) + count * clock->period_low;
+    const double rests = b.rest - a.rest, low = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, rests);
+    if (a.periods == b.periods) {
+        return rests + low;
+    }
+    const double count = (double)(b.periods - a.periods), whole = count * clock->period;
+    return (whole + rests) + (count * clock->period_low + fma(count, clock->period, -whole) + low);
+}
+
+double vi_clock_to_period_end(const vi_clock *clock, vi_instant instant)
+{
+    return (clock->period - instant.rest) + (clock->period_low - instant.rest_low);
 }
 
 vi_instant vi_clock_after(const vi_clock *clock, vi_instant instant, double seconds)
 {
-    if (seconds < 2.0 * clock->period) {
-        return normalized(clock, (vi_instant){instant.periods, instant.rest + seconds});
+    double count = 0.0, low = instant.rest_low;
+    if (seconds >= 2.0 * clock->period) {
+        count = floor(seconds / clock->period);
+        low -= count * clock->period_low;
+        seconds = fma(-count, clock->period, seconds);
     }
-    const double count = floor(seconds / clock->period);
-    const double rest = fma(-count, clock->period, seconds) - count * clock->period_low;
-    return normalized(clock, (vi_instant){instant.periods + (int64_t)count, instant.rest + rest});
+    const double rest = instant.rest + seconds;
+    low += sum_error(instant.rest, seconds, rest);
+    return normalized(clock, instant_of(instant.periods + (int64_t)count, rest, low));
 }
 
 double vi_clock_phase(const vi_clock *clock, vi_instant instant)

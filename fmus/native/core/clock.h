@@ -18,7 +18,8 @@ typedef struct {
 
 typedef struct {
     int64_t periods;
-    double rest; /* s, 0 <= rest < period */
+    double rest;     /* s, 0 <= rest < period */
+    double rest_low; /* its rounding: a short flight in a long period is timed as well as one in a short period */
 } vi_instant;
 
 /* A clock for a force of this angular frequency (rad/s, >= 0) and phase (rad) at time 0; `natural` (rad/s) is used
@@ -34,6 +35,9 @@ double vi_clock_time(const vi_clock *clock, vi_instant instant);
 
 /* Seconds from `a` to `b`. */
 double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b);
+
+/* Seconds from `instant` to the end of its period. */
+double vi_clock_to_period_end(const vi_clock *clock, vi_instant instant);
 
 /* `instant` moved by `seconds` >= 0. */
 vi_instant vi_clock_after(const vi_clock *clock, vi_instant instant, double seconds);

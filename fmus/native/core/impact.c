@@ -11,22 +11,32 @@ static const double TAIL_VELOCITY = 1e-4;
 static const double TAIL_ERROR = 1e-16;
 /* A bounce lower than this times the resolution of displacements cannot be followed: the body rests. */
 static const double LOWEST_BOUNCE = 8.0;
-/* After so many impacts far down a sequence the body rests: only restitution (almost) 1 with damping gets there, whose
- * chatter has no end (or none in reach). */
+/* After so many low impacts in a row the body rests: only restitution (almost) 1 gets there, whose chatter has no end
+ * (or none in reach). Low: far down a sequence; or not higher than this times its displacements; or this short, in
+ * radians of the fastest rate, or in periods where there is no spring. */
 static const int64_t MOST_LOW_IMPACTS = 4000000;
+static const double LOW_HEIGHT = 1e-10;
+static const double SHORT_FLIGHT = 1e-7, SHORT_FALL = 1e-12;
 /* The steady response counts in the resolution up to this multiple of what the force does within one radian. */
 static const double LARGEST_STEADY = 8.0;
+
+/* Size of the displacements that make up a motion at a stop, m. */
+static double displacement_size(const vi_body *body, double position)
+{
+    const vi_mode *mode = &body->mode;
+    if (mode->natural == 0.0) {
+        return fabs(position);
+    }
+    const double most = LARGEST_STEADY * fabs(mode->force) / (mode->fastest * mode->fastest);
+    return fabs(position) + vi_min(most, mode->steady_amplitude);
+}
 
 /* Size of displacements that double precision cannot tell apart at a contact, m. Low bounces are followed from the
  * stop: of the motion only the stop's position is rounded. */
 static double resolution(const vi_body *body, double position, double pressure, double approach)
 {
-    const vi_mode *mode = &body->mode;
-    if (pressure > 0.0 && 2.0 * approach * mode->fastest < VI_LOW_BOUNCE * pressure) {
-        return DBL_EPSILON * fabs(position);
-    }
-    const double most = LARGEST_STEADY * fabs(mode->force) / (mode->fastest * mode->fastest);
-    return DBL_EPSILON * (fabs(position) + vi_min(most, mode->steady_amplitude));
+    const bool low = pressure > 0.0 && 2.0 * approach * body->mode.fastest < VI_LOW_BOUNCE * pressure;
+    return DBL_EPSILON * (low ? fabs(position) : displacement_size(body, position));
 }
 
 double vi_body_pressure_noise(const vi_body *body, double position)
@@ -77,7 +87,16 @@ typedef struct {
     double rebound;         /* speed after it, m/s */
     double restitution;
     double resolution; /* of displacements, m */
+    bool tiny;         /* the bounce that follows */
 } touch;
+
+static bool is_tiny(const vi_body *body, double position, double pressure, double rebound)
+{
+    const vi_mode *mode = &body->mode;
+    const double height = LOW_HEIGHT * displacement_size(body, position);
+    const double flight = mode->natural > 0.0 ? SHORT_FLIGHT / mode->fastest : SHORT_FALL * body->clock.period;
+    return rebound * rebound <= 2.0 * pressure * height || 2.0 * rebound <= flight * pressure;
+}
 
 /* Rest on stop k now if the bounces still to come can be summed (or are too low, or too many, to be followed). */
 static void rest_if_summable(vi_body *body, int k, const touch *t)
@@ -92,7 +111,7 @@ static void rest_if_summable(vi_body *body, int k, const touch *t)
     }
     const bool lowest = t->rebound * t->rebound <= 2.0 * t->pressure * LOWEST_BOUNCE * t->resolution;
     const bool loses = t->restitution < 1.0 || body->mode.decay > 0.0;
-    const bool endless = loses && body->low_impacts > MOST_LOW_IMPACTS;
+    const bool endless = body->low_impacts > MOST_LOW_IMPACTS && (loses || t->tiny);
     if (t->restitution < 1.0) {
         const chatter_tail tail = sum_tail(body, t->pressure, t->slope, t->rebound, t->restitution);
         const double precise = body->mode.fastest > 0.0 ? TAIL_ERROR / body->mode.fastest : HUGE_VAL;
@@ -127,7 +146,8 @@ void vi_body_impact(vi_body *body, int k, double approach, double restitution)
     vi_mode_held(&body->mode, contact->position, vi_body_phase_now(body), vi_body_held_now(body), body->held_rate,
                  &acceleration, &slope);
     const touch t = {sign * acceleration, sign * slope, rebound, restitution,
-                     resolution(body, contact->position, sign * acceleration, approach)};
+                     resolution(body, contact->position, sign * acceleration, approach),
+                     is_tiny(body, contact->position, sign * acceleration, rebound)};
     /* below this speed a touch cannot be told from a miss: it stands for less penetration than can be resolved */
     const bool graze = approach * approach <= 2.0 * fabs(acceleration) * t.resolution;
     body->displacement = contact->position;
@@ -138,11 +158,10 @@ void vi_body_impact(vi_body *body, int k, double approach, double restitution)
         count_impact(body, k, approach, restitution);
     }
     body->fastest_impact = vi_max(body->fastest_impact, approach);
-    if (rebound <= TAIL_VELOCITY * body->fastest_impact || graze) {
-        body->low_impacts += 1;
+    const bool far_down = rebound <= TAIL_VELOCITY * body->fastest_impact || graze;
+    body->low_impacts = far_down || t.tiny ? body->low_impacts + 1 : 0;
+    if (far_down || body->low_impacts > MOST_LOW_IMPACTS) {
         rest_if_summable(body, k, &t);
-    } else {
-        body->low_impacts = 0;
     }
 }
 
@@ -160,7 +179,7 @@ void vi_body_follow_extrema(vi_body *body, const vi_segment *segment, double end
         if (closing > 0.0 && speed <= noise) {
             u = fmin(end, u + speed / closing);
             vi_segment_at(segment, u, &m);
-            vi_record_extend(&body->record, segment->origin + m.x);
+            vi_record_extend(&body->record, vi_body_within(body, segment->origin + m.x));
             m.v = 0.0;
             sign = -sign;
             continue;

@@ -14,6 +14,9 @@ vi_phase vi_body_phase_now(const vi_body *body);
  * let the body rest when the chatter that follows can be summed. equations.md 1.6, 3.1. */
 void vi_body_impact(vi_body *body, int k, double approach, double restitution);
 
+/* A displacement that is known not to be beyond a stop, without the rounding that may put it there. */
+double vi_body_within(const vi_body *body, double displacement);
+
 /* Rounding of the contact acceleration of a body held at `position`, m/s^2. */
 double vi_body_pressure_noise(const vi_body *body, double position);
 

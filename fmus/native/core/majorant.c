@@ -1,22 +1,34 @@
 #include "majorant.h"
 
+#include <stdbool.h>
+
+static const double THIRD = 1.0 / 3.0, TWELFTH = 1.0 / 12.0;
+
 /* Up to s the quartic lies below the parabola with this acceleration: a + j s/3 + bound s^2/12 is convex in s, so it
  * is largest at an end. */
 static inline double acceleration_up_to(const vi_approach *p, double s)
 {
-    return p->acceleration + vi_max(0.0, s * (p->jerk / 3.0 + s * p->bound / 12.0));
+    return p->acceleration + vi_max(0.0, s * (p->jerk * THIRD + s * (p->bound * TWELFTH)));
 }
 
 /* The longest s up to which that acceleration is not positive; 0 when there is none. A body that does not approach
  * and is not accelerated towards the stop cannot reach it before. */
 static double longest_retreat(const vi_approach *p)
 {
-    const double slope = p->jerk / 3.0, bend = p->bound / 12.0, a = p->acceleration;
+    const double slope = p->jerk * THIRD, bend = p->bound * TWELFTH, a = p->acceleration;
     if (a > 0.0 || (a == 0.0 && slope >= 0.0)) {
         return 0.0;
     }
     const double root = sqrt(slope * slope - 4.0 * bend * a);
     return slope > 0.0 ? -2.0 * a / (slope + root) : bend > 0.0 ? (root - slope) / (2.0 * bend) : HUGE_VAL;
+}
+
+/* Does the parabola with this acceleration clear the stop up to s? One that bends away from it may dip in between:
+ * the answer is then no, unless it never approaches. */
+static inline bool clears(const vi_approach *p, double acceleration, double s)
+{
+    return (acceleration >= 0.0 || p->velocity <= 0.0)
+           && p->clearance - s * (p->velocity + 0.5 * s * acceleration) >= 0.0;
 }
 
 double vi_certified_step(const vi_approach *p, double horizon)
@@ -31,13 +43,11 @@ double vi_certified_step(const vi_approach *p, double horizon)
     if (p->velocity <= 0.0) {
         certified = vi_max(certified, vi_min(horizon, longest_retreat(p)));
     }
-    for (int pass = 0; pass < 3 && limit > 1.2 * certified; ++pass) {
+    for (int pass = 0; pass < 4 && limit > 1.1 * certified; ++pass) {
         const double middle = 0.5 * (certified + limit);
-        const double root = vi_parabola_root(p->clearance, p->velocity, acceleration_up_to(p, middle));
-        if (root >= middle) {
+        if (clears(p, acceleration_up_to(p, middle), middle)) {
             certified = middle;
         } else {
-            certified = vi_max(certified, root);
             limit = middle;
         }
     }

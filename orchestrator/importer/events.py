@@ -1,0 +1,109 @@
+"""What is seen of a run from outside: its events and its steps; and event mode, which resolves them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.instance3 import Instance3
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.wiring import CallList, StatusCall, Transfer
+
+#: Event iterations at one instant before a component is taken to change its outputs for ever.
+EVENT_ITERATIONS = 100
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """An event: its time (s), its index among those at the same time (superdense time), and its component."""
+
+    time: float
+    index: int
+    component: str
+
+
+@dataclass(frozen=True, slots=True)
+class StepWatcher:
+    """Looks on at steps: called before a step with (time), after it with (time, end)."""
+
+    before: Callable[[float], None]
+    after: Callable[[float, float], None]
+
+
+class EventMode:
+    """Resolves events: carries values, updates discrete states until all are settled, goes back to step mode.
+
+    Parameters
+    ----------
+    components : sequence of Component
+        All of an importer; those of FMI 3.0 with event mode take part in it.
+    transfers, behind : sequence of Transfer
+        All of an importer, and those that a component's own step has not been preceded by.
+    """
+
+    def __init__(
+        self, components: Sequence[Component], transfers: Sequence[Transfer], behind: Sequence[Transfer]
+    ) -> None:
+        with_events = [c.instance for c in components if c.event_mode]
+        self._instances = [i for i in with_events if isinstance(i, Instance3)]
+        enter = [StatusCall(i.enter_event_call, i, "EnterEventMode") for i in self._instances]
+        update = [StatusCall(i.update_call, i, "UpdateDiscreteStates") for i in self._instances]
+        leave = [StatusCall(i.enter_step_call, i, "EnterStepMode") for i in self._instances]
+        # at its event a component's inputs from those stepped before it are those of that instant already
+        first = [call for t in behind if _takes_events(t.target) for call in t.calls()]
+        again = [call for t in transfers if _takes_events(t.target) for call in t.calls()]
+        self._begin = CallList([*enter, *first, *update])
+        self._begin_run = CallList([*first, *update])  # initialization ends in event mode
+        self._again = CallList([*again, *update])
+        self._leave = CallList(leave)
+
+    def resolve(self, time: float) -> bool:
+        """Resolve the events at `time`, s; returns whether a component asks for the end.
+
+        Raises
+        ------
+        ComponentError
+            A component fails, or never settles.
+        """
+        self._begin()
+        ends = False
+        for instance in self._instances:
+            if instance.decisions.value:
+                ends = self._iterate(time)
+                break
+        self._leave()
+        return ends
+
+    def begin_run(self, time: float) -> bool:
+        """Leave the event mode that initialization ends in, as `resolve` does."""
+        if not self._instances:
+            return False
+        self._begin_run()
+        ends = self._iterate(time)
+        self._leave()
+        return ends
+
+    def _iterate(self, time: float) -> bool:
+        for _ in range(EVENT_ITERATIONS):
+            if not any(instance.needs_update.value for instance in self._instances):
+                return any(instance.event_wants_to_end for instance in self._instances)
+            self._again()
+        raise self._endless(time)
+
+    def _endless(self, time: float) -> ComponentError:
+        endless = [i for i in self._instances if i.needs_update.value]
+        names = ", ".join(i.name for i in endless)
+        return ComponentError(
+            f"{names}: fmi3UpdateDiscreteStates: expected event iteration to end, got another request after "
+            f"{EVENT_ITERATIONS} iterations at time {time:.17g}.",
+            instance=names,
+            function="fmi3UpdateDiscreteStates",
+            time=time,
+            log=[line for i in endless for line in i.log.take()],
+        )
+
+
+def _takes_events(component: Component) -> bool:
+    """Does an event reach this component's inputs? Others have been given theirs before their step."""
+    return component.event_mode or component.event_times is not None

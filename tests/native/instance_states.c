@@ -1,0 +1,188 @@
+/* What both adapters share: instances, variables and saved states, of a small component made for this test. */
+#include "../../fmus/native/adapters/instance.c"
+
+#include "check.h"
+
+typedef struct {
+    double time, parameter, input;
+    int64_t count;
+    int32_t flag;
+    int64_t used;      /* rows */
+    double rows[1000]; /* last: saved as far as it is used */
+} thing;
+
+static const vi_variable thing_variables[] = {
+    {VI_FLOAT64, VI_READ_ONLY, 1, offsetof(thing, time)},   {VI_FLOAT64, VI_SET_INITIAL, 1, offsetof(thing, parameter)},
+    {VI_FLOAT64, VI_SET_INPUT, 1, offsetof(thing, input)},  {VI_INT64, VI_READ_ONLY, 1, offsetof(thing, count)},
+    {VI_BOOLEAN, VI_SET_TUNABLE, 1, offsetof(thing, flag)}, {VI_FLOAT64, VI_READ_ONLY, 1000, offsetof(thing, rows)},
+};
+enum { VARIABLES = sizeof thing_variables / sizeof thing_variables[0] };
+
+static void defaults(void *self)
+{
+    ((thing *)self)->parameter = 1.0;
+}
+
+static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
+{
+    thing *t = self;
+    t->time = start_time;
+    if (t->parameter > 0.0) {
+        return true;
+    }
+    /* as long a message as there may be */
+    memset(message, 'x', VI_MESSAGE_LENGTH - 1);
+    message[VI_MESSAGE_LENGTH - 1] = '\0';
+    return false;
+}
+
+static void was_set(void *self, uint32_t reference)
+{
+    ((thing *)self)->count += reference;
+}
+
+static void update_outputs(void *self)
+{
+    ((thing *)self)->rows[0] = ((thing *)self)->input;
+}
+
+static size_t used_size(const void *self)
+{
+    return offsetof(thing, rows) + (size_t)((const thing *)self)->used * sizeof(double);
+}
+
+const vi_component vi_this_component = {
+    .name = "Thing",
+    .token = "{token}",
+    .variables = thing_variables,
+    .variable_count = VARIABLES,
+    .struct_size = sizeof(thing),
+    .defaults = defaults,
+    .initialize = initialize,
+    .was_set = was_set,
+    .update_outputs = update_outputs,
+    .used_size = used_size,
+};
+
+static int lines;
+
+static void count_lines(const vi_instance *instance, int level, const char *category, const char *text)
+{
+    (void)instance;
+    CHECK(level == 3 && category != NULL && strlen(text) > 0, "level %d", level);
+    lines += 1;
+}
+
+static void move_doubles(void *field, void *values, size_t first, size_t count)
+{
+    memcpy((double *)values + first, field, count * sizeof(double));
+}
+
+static void take_doubles(void *field, void *values, size_t first, size_t count)
+{
+    memcpy(field, (const double *)values + first, count * sizeof(double));
+}
+
+static vi_instance *started(void)
+{
+    vi_instance *instance = vi_instance_new("thing");
+    CHECK(instance != NULL, "%s", "memory");
+    instance->log = count_lines;
+    instance->mode = VI_MODE_STEP;
+    return instance;
+}
+
+static void random_references_and_sizes_are_errors_or_right(uint64_t *seed)
+{
+    vi_instance *instance = started();
+    static double values[3000];
+    for (int n = 0; n < 200000; ++n) {
+        uint32_t references[3];
+        const size_t count = choice(seed, 4);
+        for (size_t i = 0; i < count; ++i) {
+            references[i] = choice(seed, 20) == 0 ? (uint32_t)next_random(seed) : choice(seed, VARIABLES + 1);
+        }
+        const int type = (int)choice(seed, 3);
+        const size_t room = choice(seed, 2) == 0 ? count : choice(seed, 3000);
+        instance->mode = (vi_mode_of_use)(1 << choice(seed, 6));
+        const int before = lines;
+        bool good;
+        if (type == VI_FLOAT64 && choice(seed, 2) == 0) {
+            good = vi_instance_set(instance, "set", type, references, count, values, room, take_doubles);
+        } else if (type == VI_FLOAT64) {
+            good = vi_instance_get(instance, "get", type, references, count, values, room, move_doubles);
+        } else {
+            continue;
+        }
+        CHECK(lines == before + (good ? 0 : 1), "%d lines for one call", lines - before);
+    }
+    vi_instance_free(instance);
+}
+
+static void states_come_back_and_damaged_ones_do_not(uint64_t *seed)
+{
+    vi_instance *instance = started();
+    thing *t = instance->self;
+    vi_saved *saved = NULL;
+    for (int n = 0; n < 20000; ++n) {
+        t->used = choice(seed, 4) == 0 ? 1000 : choice(seed, 30);
+        t->time = uniform(seed, -1.0, 1.0);
+        for (int64_t row = 0; row < t->used; ++row) {
+            t->rows[row] = t->time + (double)row;
+        }
+        if (choice(seed, 3) == 0) { /* else the slot is used again */
+            vi_saved_free(saved);
+            saved = NULL;
+        }
+        CHECK(vi_instance_save(instance, "save", &saved), "%s", "save");
+        const size_t size = vi_saved_size(saved);
+        unsigned char *bytes = malloc(size); /* of this very size: the sanitizer sees a byte too many */
+        CHECK(bytes != NULL, "%s", "memory");
+        vi_saved_write(saved, bytes);
+        const double time = t->time;
+        const int64_t used = t->used;
+        t->time = 7.0;
+        t->used = 0;
+        vi_saved *back = vi_saved_read(instance, "read", bytes, size);
+        CHECK(back != NULL && vi_instance_restore(instance, "restore", back), "%s", "restore");
+        CHECK(t->time == time && t->used == used, "%g, %lld", t->time, (long long)t->used);
+        CHECK(used == 0 || t->rows[used - 1] == time + (double)(used - 1), "%s", "rows");
+        vi_saved_free(back);
+        const size_t place = (size_t)(next_random(seed) % size);
+        bytes[place] = (unsigned char)(bytes[place] ^ (1u << choice(seed, 8)));
+        CHECK(vi_saved_read(instance, "read", bytes, size) == NULL, "byte %lu changed", (unsigned long)place);
+        CHECK(vi_saved_read(instance, "read", bytes, (size_t)(next_random(seed) % size)) == NULL, "%s", "cut");
+        for (size_t i = 0; i < size; ++i) {
+            bytes[i] = (unsigned char)next_random(seed);
+        }
+        CHECK(vi_saved_read(instance, "read", bytes, size) == NULL, "%s", "noise");
+        free(bytes);
+    }
+    CHECK(!vi_instance_restore(instance, "restore", NULL), "%s", "no state");
+    vi_saved_free(saved);
+    vi_instance_free(instance);
+}
+
+static void the_longest_message_fits(void)
+{
+    vi_instance *instance = vi_instance_new("a name that is not short at all, so that something must be cut off somewhere");
+    CHECK(instance != NULL, "%s", "memory");
+    instance->log = count_lines;
+    ((thing *)instance->self)->parameter = -1.0;
+    const int before = lines;
+    CHECK(!vi_instance_initialize(instance, "initialize"), "%s", "a bad parameter");
+    CHECK(lines == before + 1, "%d lines", lines - before);
+    vi_instance_reset(instance);
+    CHECK(vi_instance_initialize(instance, "initialize"), "%s", "good again");
+    vi_instance_free(instance);
+    vi_instance_free(NULL);
+}
+
+int main(void)
+{
+    uint64_t seed = 5;
+    random_references_and_sizes_are_errors_or_right(&seed);
+    states_come_back_and_damaged_ones_do_not(&seed);
+    the_longest_message_fits();
+    return 0;
+}

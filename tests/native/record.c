@@ -1,0 +1,78 @@
+/* The record: what an importer takes, what it forgets to take, and what it claims to have taken. */
+#include "record.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "check.h"
+
+static vi_record record;
+
+static void fill(int rows)
+{
+    for (int n = 0; n < rows; ++n) {
+        vi_record_impact(&record, n, 0.0, 1.0, 1.0, 1, 0.5);
+    }
+}
+
+static void a_full_record_drops_and_counts(void)
+{
+    memset(&record, 0, sizeof record);
+    record.impacts = 1;
+    fill(VI_RECORD_CAPACITY + 100);
+    CHECK(record.count == VI_RECORD_CAPACITY, "count %lld", (long long)record.count);
+    CHECK(record.dropped == 100, "dropped %lld", (long long)record.dropped);
+    CHECK(vi_record_full(&record), "%s", "full");
+    CHECK(vi_record_unused(&record) == 0, "%s", "nothing unused");
+}
+
+static void rows_taken_leave_the_others_in_order(void)
+{
+    const int64_t taken[] = {-5, 0, 1, 100, VI_RECORD_CAPACITY, VI_RECORD_CAPACITY + 7, INT64_MAX};
+    for (int n = 0; n < 7; ++n) {
+        memset(&record, 0, sizeof record);
+        record.impacts = 1;
+        fill(VI_RECORD_CAPACITY);
+        record.taken = taken[n];
+        vi_record_take(&record);
+        const int64_t gone = taken[n] < 0 ? 0 : taken[n] > VI_RECORD_CAPACITY ? VI_RECORD_CAPACITY : taken[n];
+        CHECK(record.count == VI_RECORD_CAPACITY - gone, "count %lld after %lld", (long long)record.count,
+              (long long)taken[n]);
+        for (int64_t row = 0; row < record.count; ++row) {
+            CHECK(record.rows[row * VI_RECORD_WIDTH + 1] == (double)(gone + row), "row %lld", (long long)row);
+        }
+    }
+}
+
+static void any_order_of_calls_keeps_it_in_its_bounds(void)
+{
+    uint64_t seed = 3;
+    memset(&record, 0, sizeof record);
+    for (int n = 0; n < 1000000; ++n) {
+        switch (choice(&seed, 9)) {
+        case 0: record.impacts = (int32_t)choice(&seed, 2); break;
+        case 1: record.extrema = (int32_t)choice(&seed, 2); break;
+        case 2: record.periods = (int32_t)choice(&seed, 2); break;
+        case 3:
+            record.taken = (int64_t)choice(&seed, 600) - 40;
+            vi_record_take(&record);
+            break;
+        case 4: vi_record_begin_step(&record, uniform(&seed, -1.0, 1.0)); break;
+        case 5: vi_record_stick(&record, n, n + 1.0, 2, 0.1); break;
+        case 6: vi_record_period(&record, n, 0.0, 0.0); break;
+        case 7: vi_record_extend(&record, uniform(&seed, -1.0, 1.0)); break;
+        default: fill((int)choice(&seed, 5)); break;
+        }
+        CHECK(record.count >= 0 && record.count <= VI_RECORD_CAPACITY, "count %lld", (long long)record.count);
+        CHECK(record.displacement_max >= record.displacement_min, "%g below %g", record.displacement_max,
+              record.displacement_min);
+    }
+}
+
+int main(void)
+{
+    a_full_record_drops_and_counts();
+    rows_taken_leave_the_others_in_order();
+    any_order_of_calls_keeps_it_in_its_bounds();
+    return 0;
+}
