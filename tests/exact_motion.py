@@ -50,7 +50,12 @@ def exact_flow(
         v = -k * first * start[0] + second * start[1]
         turn, force = mp.mpc(0, o.angular_frequency), mpf(o.amplitude) / mpf(o.mass) * mp.expj(mpf(phase))
         loads = [
-            (force, lambda a: mp.exp(a * time) * (mp.expm1((turn - a) * time) / (turn - a) if turn != a else time)),
+            (
+                force,
+                lambda a: (
+                    mp.exp(a * time) * (mp.expm1((turn - a) * time) / (turn - a) if turn != a else time)
+                ),
+            ),
             (mpf(held), lambda a: mp.expm1(a * time) / a if a else time),
             (mpf(held_rate), lambda a: (mp.expm1(a * time) - a * time) / a**2 if a else time**2 / 2),
         ]

@@ -54,12 +54,23 @@ def stop(
     }
 
 
+#: Messages of the FMI 2.0 instances, by their environment.
+MESSAGES2: dict[int, list[str]] = {}
+
+
+@fmi2CallbackLoggerTYPE
+def LOGGER2(environment: int | None, _: bytes, __: int, ___: bytes, message: bytes) -> None:
+    # FMPy's proxy keeps one logger for the whole process, and for good: so this one lives as long
+    if environment in MESSAGES2:
+        MESSAGES2[environment].append(message.decode())
+
+
 class OscillatorFmu:
     """One initialized instance; its time is that of the last step."""
 
     def __init__(
         self,
-        parameters: Mapping[str, float] = {},  # noqa: B006
+        parameters: Mapping[str, float] = {},
         *,
         version: str = "3.0",
         start_time: float = 0.0,
@@ -88,8 +99,10 @@ class OscillatorFmu:
         else:
             self.fmu = FMU2Slave(**arguments)
             self._callbacks = fmi2CallbackFunctions()
-            self._callbacks.logger = fmi2CallbackLoggerTYPE(self._log2)
+            self._callbacks.logger = LOGGER2
+            self._callbacks.componentEnvironment = id(self)
             addLoggerProxy(byref(self._callbacks))  # FMI 2.0 loggers are variadic, Python's are not
+            MESSAGES2[id(self)] = self.messages
             self.fmu.instantiate(callbacks=self._callbacks)
         for name, value in parameters.items():
             self.set(name, value)
@@ -102,9 +115,6 @@ class OscillatorFmu:
     def _log3(self, _: Any, __: int, ___: bytes, message: bytes) -> None:
         self.messages.append(message.decode())
 
-    def _log2(self, _: Any, __: bytes, ___: int, ____: bytes, message: bytes) -> None:
-        self.messages.append(message.decode())
-
     def __enter__(self) -> OscillatorFmu:
         return self
 
@@ -114,6 +124,7 @@ class OscillatorFmu:
     def free(self) -> None:
         """Give the instance's memory back."""
         self.fmu.freeInstance()
+        MESSAGES2.pop(id(self), None)
 
     def initialize(self, start_time: float = 0.0) -> None:
         if self.version == "3.0":

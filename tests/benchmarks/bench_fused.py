@@ -97,7 +97,12 @@ class Peer:
         began = time.perf_counter()
         for _ in range(PEER_IMPACTS):
             found = solve_ivp(
-                self._slope, (t, t + 10.0), state, rtol=self.tolerance, atol=self.tolerance * 1e-3, events=contact
+                self._slope,
+                (t, t + 10.0),
+                state,
+                rtol=self.tolerance,
+                atol=self.tolerance * 1e-3,
+                events=contact,
             )
             t, state = found.t[-1], np.array([STOP, -RESTITUTION * found.y[1, -1]])
         seconds = time.perf_counter() - began
@@ -159,7 +164,9 @@ def main() -> int:
     rows, host = measure(options.impacts, options.repetitions), machine()
     ratio = float(rows[1]["microseconds_per_impact"]) / float(rows[0]["microseconds_per_impact"])
     print("; ".join(f"{key} {value}" for key, value in host.items()))
-    print(f"{'':38}{'us per impact':>14}{'fastest':>10}{'slowest':>10}{'phase error':>13}{'velocity error':>16}")
+    print(
+        f"{'':38}{'us per impact':>14}{'fastest':>10}{'slowest':>10}{'phase error':>13}{'velocity error':>16}"
+    )
     for row in rows:
         print(
             f"{row['name']:38}{row['microseconds_per_impact']:14.3f}{row['fastest']:10.3f}{row['slowest']:10.3f}"
@@ -172,8 +179,14 @@ def main() -> int:
     if options.output is not None:
         options.output.mkdir(parents=True, exist_ok=True)
         result = {"machine": host, "impacts": options.impacts, "ratio": ratio, "rows": rows}
-        (options.output / "bench_fused.json").write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-    good = ratio >= 1000.0 and float(rows[0]["phase_error"]) <= 1e-13 and float(rows[0]["velocity_error"]) <= 1e-13
+        (options.output / "bench_fused.json").write_text(
+            json.dumps(result, indent=2) + "\n", encoding="utf-8"
+        )
+    good = (
+        ratio >= 1000.0
+        and float(rows[0]["phase_error"]) <= 1e-13
+        and float(rows[0]["velocity_error"]) <= 1e-13
+    )
     return 0 if good else 1
 
 

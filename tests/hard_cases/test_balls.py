@@ -17,7 +17,9 @@ def ball(height: float, floor: float, restitution: float) -> dict[str, float]:
 
 @pytest.mark.parametrize("floor", [-1e3, -0.3, 0.0, 0.7, 1e3])
 @pytest.mark.parametrize("restitution", [0.1, 0.5, 0.7, 0.9, 0.99])
-def test_a_falling_ball_meets_every_bounce_and_comes_to_rest_on_time(floor: float, restitution: float) -> None:
+def test_a_falling_ball_meets_every_bounce_and_comes_to_rest_on_time(
+    floor: float, restitution: float
+) -> None:
     height, r = 1.0, restitution
     first = math.sqrt(2.0 * height / GRAVITY)
     speed = GRAVITY * first
@@ -27,7 +29,11 @@ def test_a_falling_ball_meets_every_bounce_and_comes_to_rest_on_time(floor: floa
             o.advance(end)
             rows.append(o.rows())
         rows = np.concatenate(rows)
-        start, stuck, force = o.get("contact[1].stick_start"), o.contact("stuck")[0], o.get("contact[1].force")
+        start, stuck, force = (
+            o.get("contact[1].stick_start"),
+            o.contact("stuck")[0],
+            o.get("contact[1].force"),
+        )
     impacts = rows[rows[:, 0] == 1.0]
     n = np.arange(len(impacts))
     times = first + 2.0 * first * r * (1.0 - r**n) / (1.0 - r)
@@ -51,7 +57,10 @@ def test_slowly_varying_gravity_is_gravity(slow: float) -> None:
         constant.step(40.0)
         assert o.contact("count") == constant.contact("count")
         # gravity is less by (slow t)^2 / 2
-        assert abs(o.contact("stick_start")[0] - constant.contact("stick_start")[0]) <= 20 * (20 * slow) ** 2 + SEQUENCE
+        assert (
+            abs(o.contact("stick_start")[0] - constant.contact("stick_start")[0])
+            <= 20 * (20 * slow) ** 2 + SEQUENCE
+        )
 
 
 @pytest.mark.parametrize("gap", [1e-6, 1.0, 1e3])
@@ -64,7 +73,11 @@ def test_a_free_mass_between_two_walls_meets_them_in_turn(gap: float, restitutio
         o.advance(60.0)
         rows = o.rows()
     n = np.arange(len(rows))
-    lost = (restitution ** -(n + 1.0) - restitution**-1.0) / (1.0 / restitution - 1.0) if restitution < 1.0 else n
+    lost = (
+        (restitution ** -(n + 1.0) - restitution**-1.0) / (1.0 / restitution - 1.0)
+        if restitution < 1.0
+        else n
+    )
     times = (0.7 * gap + gap * lost) / speed
     assert np.abs(rows[:, 1] / times - 1.0).max() <= SEQUENCE
     assert np.all(rows[:, 5] == 1.0 + n % 2)
@@ -81,7 +94,9 @@ def test_an_impact_at_a_communication_point_is_resolved_once(version: str, step:
             o.step(step)
             time = i * step
             count = o.contact("count")[0]
-            assert count == math.floor((time + 1.0) / 2.0) or (time % 2.0 == 1.0 and count == (time - 1.0) / 2.0)
+            assert count == math.floor((time + 1.0) / 2.0) or (
+                time % 2.0 == 1.0 and count == (time - 1.0) / 2.0
+            )
         o.step(0.5)
         assert o.contact("count")[0] == 5
         assert abs(o.contact("last_time")[0] - 9.0) <= ROUNDING * 9.0

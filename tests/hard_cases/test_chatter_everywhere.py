@@ -42,7 +42,9 @@ def test_chatter_ends_when_the_bounces_add_up_to(zeta: float, r: float) -> None:
 @pytest.mark.parametrize("r", [0.0, 1e-12, 0.5, 0.99, 0.999, 0.999999, 1.0])
 @pytest.mark.parametrize("zeta", [0.0, 0.05, 1.0])
 @pytest.mark.parametrize("position", [-0.3, 0.0, 0.4])
-def test_every_restitution_stays_on_its_side_and_comes_to_its_end(r: float, zeta: float, position: float) -> None:
+def test_every_restitution_stays_on_its_side_and_comes_to_its_end(
+    r: float, zeta: float, position: float
+) -> None:
     parameters = forced(FORCE, 0.7, zeta, displacement_start=position - 0.5)
     switches = {"record.extrema": True, "impact_limit": 3_000_000}
     with OscillatorFmu({**parameters, **stop(position, r), **switches}) as o:
@@ -91,7 +93,10 @@ def test_a_dead_stop_catches_at_the_first_impact_when_pressed() -> None:
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize(
     ("start", "slope"),
-    [({"force": 1.0}, {"force_rate": -0.25}), ({"base_acceleration": -1.0}, {"base_acceleration_rate": 0.25})],
+    [
+        ({"force": 1.0}, {"force_rate": -0.25}),
+        ({"base_acceleration": -1.0}, {"base_acceleration_rate": 0.25}),
+    ],
     ids=["force", "base"],
 )
 def test_a_ramp_releases_the_mass_when_the_contact_force_has_gone(
@@ -110,7 +115,12 @@ def test_a_ramp_releases_the_mass_when_the_contact_force_has_gone(
 
 def test_release_under_harmonic_force_and_moving_base_together_is_at_the_zero_of_their_sum() -> None:
     # contact force: cos(.2 t) + .3 - .1 t on a stop at 0
-    parameters = {**forced(1.0, 0.2, 0.05), "base_acceleration": -0.3, "base_acceleration_rate": 0.1, **stop(0.0)}
+    parameters = {
+        **forced(1.0, 0.2, 0.05),
+        "base_acceleration": -0.3,
+        "base_acceleration_rate": 0.1,
+        **stop(0.0),
+    }
     with OscillatorFmu(parameters) as o:
         o.step(10.0)
         end = o.contact("stick_end")[0]
@@ -181,11 +191,15 @@ def test_a_slow_ramp_leads_the_mass_off_the_stop_with_its_equilibrium() -> None:
 def test_the_mirrored_scene_has_the_mirrored_motion_bit_for_bit(position: float, w: float) -> None:
     both = []
     for sign, side in ((1.0, 1), (-1.0, LOWER)):
-        parameters = forced(sign * 1.1, w, 0.03, displacement_start=sign * (position - 0.2), force=sign * 0.05)
+        parameters = forced(
+            sign * 1.1, w, 0.03, displacement_start=sign * (position - 0.2), force=sign * 0.05
+        )
         with OscillatorFmu({**parameters, **stop(sign * position, 0.8, side=side)}) as o:
             o.step(120.0)
             x, v = o.state()
-            both.append((sign * x, sign * v, *o.contact("count", "graze_count", "last_time", "last_velocity")))
+            both.append(
+                (sign * x, sign * v, *o.contact("count", "graze_count", "last_time", "last_velocity"))
+            )
     assert both[0] == both[1]
     assert both[0][2] > 5
 

@@ -88,7 +88,10 @@ def test_chatter_and_sticking_are_the_same_in_other_units(scale: float) -> None:
 @pytest.mark.parametrize("step", [1e-9, 1e-6, 1e-3])
 def test_tiny_steps_lead_where_one_step_leads(version: str, step: float) -> None:
     parameters = {**forced(displacement_start=1.0, velocity_start=0.5 * step * 1000), **stop(1.0)}
-    with OscillatorFmu(parameters, version=version) as many, OscillatorFmu(parameters, version=version) as one:
+    with (
+        OscillatorFmu(parameters, version=version) as many,
+        OscillatorFmu(parameters, version=version) as one,
+    ):
         for _ in range(3000):
             many.step(step)
         one.step(many.time)
@@ -129,7 +132,10 @@ def test_random_steps_lead_along_the_orbit_of_one_step(version: str, seed: int) 
     chance = random.Random(seed)
     parameters = {**forced(0.5, chance.uniform(0.5, 0.65), 0.1), **stop(0.4, 0.6)}
     end = 60.0
-    with OscillatorFmu(parameters, version=version) as many, OscillatorFmu(parameters, version=version) as one:
+    with (
+        OscillatorFmu(parameters, version=version) as many,
+        OscillatorFmu(parameters, version=version) as one,
+    ):
         while many.time < end - 1e-9:
             many.step(min(end - many.time, 10.0 ** chance.uniform(-6.0, 0.7)))
         one.step(end)

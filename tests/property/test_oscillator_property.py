@@ -12,7 +12,9 @@ from tolerance import DIFFERENCES, EPSILON, FLOW, ROUNDING
 
 from vibroimpact.fmus.core import Oscillator, flow, next_contact
 
-FEW = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much])
+FEW = settings(
+    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much]
+)
 FEWER = settings(FEW, max_examples=25)
 
 numbers = st.floats(-2.0, 2.0, allow_subnormal=False)
@@ -99,7 +101,9 @@ def test_the_impact_map_changes_areas_as_restitution_damping_and_velocity_say(
 
 
 @FEWER
-@given(zetas, st.floats(0.2, 3.0), restitutions, numbers, st.floats(-1.5, -0.01), st.sampled_from([UPPER, LOWER]))
+@given(
+    zetas, st.floats(0.2, 3.0), restitutions, numbers, st.floats(-1.5, -0.01), st.sampled_from([UPPER, LOWER])
+)
 def test_a_body_is_never_beyond_its_stop_and_never_gains_energy_from_it(
     zeta: float, w: float, r: float, position: float, behind: float, side: int
 ) -> None:
@@ -110,7 +114,7 @@ def test_a_body_is_never_beyond_its_stop_and_never_gains_energy_from_it(
         before = 0.0
         for i in range(1, 80):
             o.advance(0.25 * i)
-            x, v = o.state()
+            x, _ = o.state()
             assert sign * (position - x) >= 0.0
             extreme = o.get("record.displacement_max" if sign > 0 else "record.displacement_min")
             assert sign * (position - extreme) >= 0.0
@@ -155,7 +159,12 @@ def test_an_elastic_stop_conserves_energy_over_a_million_impacts() -> None:
 
 @FEW
 @given(
-    st.floats(0.0, 1.5), st.floats(0.1, 4.0), numbers, st.floats(-1.5, 0.0), st.floats(-2.0, 2.0), st.floats(0.0, 6.2)
+    st.floats(0.0, 1.5),
+    st.floats(0.1, 4.0),
+    numbers,
+    st.floats(-1.5, 0.0),
+    st.floats(-2.0, 2.0),
+    st.floats(0.0, 6.2),
 )
 def test_a_certified_search_never_passes_a_contact(
     zeta: float, w: float, position: float, behind: float, velocity: float, phase: float
@@ -178,7 +187,10 @@ def test_a_certified_search_never_passes_a_contact(
 situations = st.sampled_from(
     [
         {**forced(), **stop(1.0)},
-        {**forced(1.0, 0.2, 0.05, displacement_start=-0.1), **stop(0.0)},  # chatters until 2.5, sticks until 7.85
+        {
+            **forced(1.0, 0.2, 0.05, displacement_start=-0.1),
+            **stop(0.0),
+        },  # chatters until 2.5, sticks until 7.85
         {**forced(0.9, 0.8, 0.02), **stop(0.3, 0.9), **stop(-0.4, 0.5, side=LOWER, k=2)},
         {"force": 0.5, "stiffness": 0.0, "displacement_start": -1.0, **stop(0.0, 0.8)},
     ]
@@ -186,7 +198,12 @@ situations = st.sampled_from(
 
 
 @FEW
-@given(situations, st.floats(0.01, 12.0), st.lists(st.floats(0.001, 3.0), min_size=1, max_size=5), st.sampled_from(VERSIONS))
+@given(
+    situations,
+    st.floats(0.01, 12.0),
+    st.lists(st.floats(0.001, 3.0), min_size=1, max_size=5),
+    st.sampled_from(VERSIONS),
+)
 def test_a_state_saved_at_any_time_goes_on_bit_for_bit_also_in_another_instance(
     parameters: dict[str, float], time: float, steps: list[float], version: str
 ) -> None:

@@ -18,7 +18,9 @@ from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.archive import binary_path, unpack
 
 SCENE = {**forced(), **stop(1.0)}
-MODES = [("2.0", False, False)] + [("3.0", event, early) for event in (False, True) for early in (False, True)]
+MODES = [("2.0", False, False)] + [
+    ("3.0", event, early) for event in (False, True) for early in (False, True)
+]
 
 
 @pytest.mark.parametrize(("version", "event_mode", "early_return"), MODES)
@@ -149,7 +151,9 @@ def test_a_bad_step_is_an_error_that_leaves_the_state_as_it_was(version: str, si
 
 @pytest.mark.parametrize("version", VERSIONS)
 @pytest.mark.parametrize("point", [0.0, 6.9, 7.1, math.nan, -7.0])
-def test_a_step_from_another_time_is_an_error_that_leaves_the_state_as_it_was(version: str, point: float) -> None:
+def test_a_step_from_another_time_is_an_error_that_leaves_the_state_as_it_was(
+    version: str, point: float
+) -> None:
     with OscillatorFmu(SCENE, version=version) as o:
         o.step(7.0)
         before = o.serialized()
@@ -221,7 +225,13 @@ def test_wrong_value_references_are_errors(version: str) -> None:
 def test_too_few_and_too_many_values_are_errors_in_fmi_3() -> None:
     with OscillatorFmu(SCENE) as o:
         rows, mass = o.reference("record.rows"), o.reference("mass")
-        for references, count in (([rows], 8), ([rows], 512 * 8 + 1), ([mass], 0), ([mass], 2), ([mass, rows], 4096)):
+        for references, count in (
+            ([rows], 8),
+            ([rows], 512 * 8 + 1),
+            ([mass], 0),
+            ([mass], 2),
+            ([mass, rows], 4096),
+        ):
             with pytest.raises(FMICallException):
                 o.fmu.getFloat64(references, nValues=count)
         assert len(o.fmu.getFloat64([mass, rows], nValues=4097)) == 4097
@@ -266,7 +276,9 @@ def test_every_function_of_both_standards_resolves() -> None:
     names = set()
     for header, prefix in (("fmi2FunctionTypes.h", "fmi2"), ("fmi3FunctionTypes.h", "fmi3")):
         text = (headers / header).read_text()
-        names |= {word[: -len("TYPE")] for word in _words(text) if word.startswith(prefix) and word.endswith("TYPE")}
+        names |= {
+            word[: -len("TYPE")] for word in _words(text) if word.startswith(prefix) and word.endswith("TYPE")
+        }
     functions = {name for name in names if not name.endswith(("Callback", "CallbackFunctions"))}
     assert len(functions) > 80
     assert [name for name in sorted(functions) if not hasattr(library, name)] == []

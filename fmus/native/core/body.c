@@ -5,6 +5,7 @@
 
 #include "impact.h"
 #include "majorant.h"
+#include "rest.h"
 
 /* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
 static const double LANDING = 1e-13;
@@ -303,49 +304,6 @@ static void fly(vi_body *body, vi_instant target, const vi_step_request *request
 
 /* ---- rest on a stop ---- */
 
-/* Seconds until the contact force passes through zero, at most `length`: equations.md 3.3. */
-static double time_to_release(const vi_body *body, int k, double length, bool *released)
-{
-    const double sign = direction(body, k), w = body->clock.angular_frequency;
-    const double stop = body->contacts[k].position, held = vi_body_held_now(body);
-    const double force = fabs(body->mode.force), fourth = force * w * w * w * w;
-    const double noise = vi_body_pressure_noise(body, stop);
-    double u = 0.0;
-    *released = false;
-    while (u < length) {
-        double pressure, slope;
-        const vi_phase phase = vi_phase_of(w * (body->now.rest + u));
-        vi_mode_held(&body->mode, stop, phase, held + body->held_rate * u, body->held_rate, &pressure, &slope);
-        pressure = fmax(0.0, sign * pressure);
-        const double closing = -sign * slope;
-        const double bend = sign * body->mode.force * w * w * phase.cosine;
-        if (closing > 0.0 && pressure <= noise) {
-            if (bend < 0.0 && closing * closing <= -2.0 * bend * (pressure + noise)) {
-                /* the pressure falls to zero and rises again: it stays */
-                u = fmin(length, u + closing / -bend + sqrt(noise / -bend));
-                continue;
-            }
-            *released = true;
-            return fmin(length, u + pressure / closing);
-        }
-        const double twist = -sign * body->mode.force * w * w * w * phase.sine;
-        const vi_approach state = {pressure, closing, bend, twist, fourth};
-        const double step = vi_certified_step(&state, length - u);
-        if (u + step == u) {
-            return length; /* no pressure and no trend: it stays */
-        }
-        u = step < length - u ? u + step : length;
-    }
-    return length;
-}
-
-/* Does the pressure outlast every phase of the force? */
-static bool pressed_for_ever(const vi_body *body, int k)
-{
-    const double constant = vi_body_held_now(body) - body->mode.stiffness * body->contacts[k].position;
-    return body->held_rate == 0.0 && direction(body, k) * constant > fabs(body->mode.force);
-}
-
 static void release(vi_body *body)
 {
     vi_contact *contact = &body->contacts[body->stuck - 1];
@@ -357,32 +315,23 @@ static void release(vi_body *body)
     body->leaving = 1;
 }
 
-/* Have new inputs turned the contact force away from the stop at once? */
-static bool lifted(const vi_body *body, int k)
-{
-    double pressure, slope;
-    const double stop = body->contacts[k].position;
-    vi_mode_held(&body->mode, stop, vi_body_phase_now(body), vi_body_held_now(body), body->held_rate, &pressure, &slope);
-    return direction(body, k) * pressure < -vi_body_pressure_noise(body, stop);
-}
-
 static void stay(vi_body *body, vi_instant target)
 {
     const int k = body->stuck - 1;
     const double stop = body->contacts[k].position;
-    if (lifted(body, k)) {
+    if (vi_body_lifted(body, k)) {
         release(body);
         body->leaving = 0; /* its acceleration is not 0 */
         return;
     }
-    if (!body->record.periods && pressed_for_ever(body, k)) {
+    if (!body->record.periods && vi_body_pressed_for_ever(body, k)) {
         body->now = target;
         return;
     }
     segment_end end;
     bool released;
     const double length = segment_length(body, target, &end);
-    const double u = time_to_release(body, k, length, &released);
+    const double u = vi_body_time_to_release(body, k, length, &released);
     move(body, u, stop, 0.0, u >= length ? end : ENDS_ANYWHERE, target);
     if (released) {
         release(body);
