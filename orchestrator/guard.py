@@ -1,7 +1,8 @@
 """Runs points in a child process that an FMU may crash or hang without taking the campaign with it.
 
 The child is used again for every point; only after a crash or a missed deadline a new one is made. What the child
-was doing is read from `breadcrumbs`.
+was doing is read from `breadcrumbs`. A hanging call is seen there at no cost. To see a call that crashes, every call
+must be noted before it is made: that is done from the first crash on, and the point of that crash is repeated once.
 """
 
 from __future__ import annotations
@@ -111,6 +112,7 @@ class GuardedRunner:
         self._wanted = execution
         self._folder = tempfile.TemporaryDirectory(prefix="vibroimpact-guard-")
         self._child: _Child | None = None
+        self._noting = False
         try:
             identity = self._start()
         except BaseException:
@@ -126,7 +128,9 @@ class GuardedRunner:
         path = Path(self._folder.name) / "notes"
         Breadcrumbs.create(path)
         self._notes = Breadcrumbs(path)
-        self._child = _Child(Order(self._scene.text, self._scene.source, self._wanted, str(path)))
+        self._child = _Child(
+            Order(self._scene.text, self._scene.source, self._wanted, str(path), self._noting)
+        )
         try:
             answer = self._child.answer(START_TIME)
         except TimeoutError:
@@ -147,29 +151,56 @@ class GuardedRunner:
             The point failed in the child, which lives on.
         """
         began = time.perf_counter()
-        if self._child is None:
-            self._start()
-        assert self._child is not None
-        self._notes.begin()
-        self._child.say(Point(dict(values), start))
+        point = Point(dict(values), start)
         try:
-            answer = self._child.answer(self._deadline + GRACE)
+            answer = self._answer(point)
         except TimeoutError:
-            return self._lost(Outcome.timeout, f"no answer within {self._deadline:g} s", began)
+            return self._lost(Outcome.timeout, self._end_late(), began)
         if answer is None:
-            return self._lost(Outcome.crash, None, began)
+            return self._lost(Outcome.crash, self._end_crashed(point), began)
         if isinstance(answer, Failure):
             raise ComponentError(answer.message)
         record: RunRecord = answer
         return record
 
-    def _lost(self, outcome: Outcome, what: str | None, began: float) -> RunRecord:
-        """Give the child up and say what it was doing."""
+    def _answer(self, point: Point) -> Any:
+        """What the child, or a new one, says to a point; None when it is gone; raises TimeoutError."""
+        if self._child is None:
+            self._start()
+        assert self._child is not None
+        self._notes.begin()
+        self._child.say(point)
+        return self._child.answer(self._deadline + GRACE)
+
+    def _lost(self, outcome: Outcome, message: str, began: float) -> RunRecord:
+        return empty_record(self._scene, outcome, message, time.perf_counter() - began)
+
+    def _end_late(self) -> str:
+        """Give up a child that does not answer and say what it was doing."""
+        message = self._what_happened(f"no answer within {self._deadline:g} s")
+        self._end_child()
+        return message
+
+    def _end_crashed(self, point: Point) -> str:
+        """Give up a child that is gone and say what it was doing; where its calls were not noted, find out."""
+        ending = _ending(self._end_child())
+        if self._noting:
+            return self._what_happened(ending)
+        self._noting = True
+        try:
+            if self._answer(point) is None:
+                return self._what_happened(_ending(self._end_child()))
+        except TimeoutError:
+            return f"guard: {ending}. Repeated to find where, the point ended otherwise: {self._end_late()}"
+        except ComponentError as error:
+            return f"guard: {ending}. Repeated to find where, the components could not be loaded: {error}"
+        return f"guard: {ending}. Repeated to find where, the point did not do it again."
+
+    def _end_child(self) -> int:
         assert self._child is not None
         code = self._child.end()
         self._child = None
-        message = self._what_happened(_ending(code) if what is None else what)
-        return empty_record(self._scene, outcome, message, time.perf_counter() - began)
+        return code
 
     def _what_happened(self, what: str) -> str:
         instance, function, at = self._notes.last_call()

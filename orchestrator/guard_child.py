@@ -16,16 +16,22 @@ from vibroimpact.orchestrator.guard_pipe import Failure, Identity, Order, Point,
 from vibroimpact.orchestrator.runners import Runner, open_runner
 from vibroimpact.orchestrator.scene import parse_scene
 
-#: How often the child looks whether its parent still lives, s: a hanging FMU must not become an orphan.
-PARENT_LOOK = 0.5
+#: How often the child looks at its parent and at what it is doing itself, s.
+LOOK = 0.1
 
 
-def _die_with(parent: int) -> None:
-    """End this process when its parent is gone, whatever the FMU is doing."""
+def _look_around(parent: int, notes: Breadcrumbs) -> None:
+    """End this process when its parent is gone, whatever the FMU is doing; until then note what that is.
+
+    A hanging FMU must not become an orphan. The notes cost nothing but a look now and then; they are right for a
+    call that lasts.
+    """
+    main = threading.main_thread().ident or 0
 
     def look() -> None:
         while os.getppid() == parent:
-            time.sleep(PARENT_LOOK)
+            time.sleep(LOOK)
+            notes.note_frame(sys._current_frames().get(main))
         os._exit(1)
 
     threading.Thread(target=look, daemon=True).start()
@@ -45,23 +51,24 @@ def _answer(runner: Runner, point: Point) -> Any:
         return Failure(str(error))
 
 
-def _open(order: Order) -> Runner:
-    notes = Breadcrumbs(Path(order.notes))
+def _open(order: Order, notes: Breadcrumbs) -> Runner:
     scene = parse_scene(order.scene_text, order.source)
-    return open_runner(scene, order.execution, log=notes.log, wrap=notes.wrap)
+    return open_runner(scene, order.execution, log=notes.log, wrap=notes.wrap if order.noting else None)
 
 
 def main() -> None:
     """Serve points until standard input ends."""
     # Ctrl-C reaches all processes of a terminal: a point must not count as crashed for it. The parent ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _die_with(os.getppid())
+    parent = os.getppid()
     answers, orders = _private_output(), sys.stdin.buffer
     order = receive(orders)
     if not isinstance(order, Order):
         return
+    notes = Breadcrumbs(Path(order.notes))
+    _look_around(parent, notes)
     try:
-        runner = _open(order)
+        runner = _open(order, notes)
     except VibroimpactError as error:
         send(answers, Failure(str(error)))
         return

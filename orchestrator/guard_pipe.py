@@ -16,12 +16,13 @@ LENGTH = struct.Struct("<Q")
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """What the child shall run: a scene, its execution, and the file of notes."""
+    """What the child shall run: a scene, its execution, the file of notes, and whether to note every call there."""
 
     scene_text: str
     source: str
     execution: str
     notes: str
+    noting: bool
 
 
 @dataclass(frozen=True, slots=True)

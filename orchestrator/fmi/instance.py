@@ -125,7 +125,7 @@ class Instance(ABC):
             self._pointer,
             references,
             values,
-            self.check,
+            self,
             with_value_count=self.fmi_version == "3.0",
         )
 
@@ -170,6 +170,11 @@ class Instance(ABC):
     @abstractmethod
     def step(self, time: float, size: float) -> int:
         """Advance from `time` by `size`, s; returns OK, WARNING or DISCARD and sets `self.time`."""
+
+    @property
+    def step_start(self) -> float:
+        """Where the last step began, or the one under way, s."""
+        return self._step_time.value
 
     # ---- states ----
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: Raises when the status of a call is worse than a warning.
-Check = Callable[[int, str], None]
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.fmi.instance import Instance
+
 Call = Callable[[], int]
 
 
@@ -20,6 +21,8 @@ class VariableGroup:
 
     Attributes
     ----------
+    instance : Instance
+        The instance that they belong to.
     name : str
         FMI's name of their type, in the version of the instance.
     values : ndarray
@@ -28,16 +31,16 @@ class VariableGroup:
         The bare calls, which return FMI's status: for paths that check it themselves.
     """
 
-    __slots__ = ("_check", "_references", "get_call", "name", "set_call", "values")
+    __slots__ = ("_references", "get_call", "instance", "name", "set_call", "values")
 
     def __init__(
         self,
         name: str,
         functions: tuple[Callable[..., int], Callable[..., int]],
-        instance: ctypes.c_void_p,
+        pointer: ctypes.c_void_p,
         references: Sequence[int],
         values: NDArray[Any],
-        check: Check,
+        owner: Instance,
         *,
         with_value_count: bool,
     ) -> None:
@@ -45,11 +48,11 @@ class VariableGroup:
             raise ValueError("values: expected a contiguous buffer")
         self.values = values
         self.name = name
-        self._check = check
+        self.instance = owner
         self._references = (ctypes.c_uint32 * max(1, len(references)))(*references)
         tail = (ctypes.c_size_t(values.size),) if with_value_count else ()
         arguments = (
-            instance,
+            pointer,
             ctypes.byref(self._references),
             ctypes.c_size_t(len(references)),
             ctypes.c_void_p(values.ctypes.data),
@@ -62,14 +65,14 @@ class VariableGroup:
         """Read the variables; returns the buffer."""
         status = self.get_call()
         if status > 1:
-            self._check(status, "Get" + self.name)
+            self.instance.check(status, "Get" + self.name)
         return self.values
 
     def set(self) -> None:
         """Write the buffer to the variables."""
         status = self.set_call()
         if status > 1:
-            self._check(status, "Set" + self.name)
+            self.instance.check(status, "Set" + self.name)
 
 
 #: C types of values by FMI type, for the versions that differ.

@@ -239,8 +239,13 @@ class CallList:
         """Return the number of calls."""
         return len(self._bare)
 
+    def find(self, call: object) -> StatusCall | None:
+        """Return what is known of one of the calls; None when it is not among them."""
+        return next((c for c in self._calls if c.call is call), None)
+
     def _explain(self, call: Callable[[], int], status: int) -> None:
-        found = next(c for c in self._calls if c.call is call)
+        found = self.find(call)
+        assert found is not None
         found.instance.check(status, found.function)
 
 

@@ -339,3 +339,50 @@ def test_a_sweep_over_the_time_of_a_crash_has_all_points_that_end_before_it(
         again["outcome"].values, outcomes
     )  # points that crash are not run once more
     np.testing.assert_array_equal(again["point_seconds"].values, dataset["point_seconds"].values)
+
+
+# ---- a hang outside of a step ----
+
+HANGING_LAW = """\
+def contact_law(displacement, velocity):
+    while displacement > 0.5:
+        pass
+    return 0.7
+"""
+LAW_SCENE = """
+[scene]
+units = "SI"
+[component.body]
+fmu = "Oscillator"
+parameters = { "forcing.amplitude" = 0.5, "contact[1].law" = "external", "contact[1].position" = 0.75 }
+[component.law]
+fmu = "law.fmu"
+[[connection]]
+from = "body.contact[1].displacement"
+to = "law.displacement"
+[[connection]]
+from = "law.applied_restitution"
+to = "body.contact[1].applied_restitution"
+[record]
+recorded_time = 10.0
+[execution]
+macro_step = 100.0
+guard = true
+deadline = 0.4
+"""
+
+
+def test_a_law_in_python_that_never_answers_is_told_as_the_call_that_hangs(tmp_path: Path) -> None:
+    pytest.importorskip("pythonfmu")
+    from vibroimpact.fmus.python_fmus import build_user_contact_law
+
+    (tmp_path / "law.py").write_text(HANGING_LAW, encoding="utf-8")
+    build_user_contact_law(tmp_path / "law.py", tmp_path / "law.fmu")
+    runner = make_runner(parse_scene(LAW_SCENE, str(tmp_path / "law.toml")))
+    try:
+        record = runner.run({})
+    finally:
+        runner.close()
+    assert record.outcome is Outcome.timeout
+    assert record.message.startswith("law: fmi2GetReal at time ")
+    assert not living_children()

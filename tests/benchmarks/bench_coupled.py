@@ -1,0 +1,455 @@
+"""What coupling costs and how exact it is, beside FMPy's classes doing the same in the same process.
+
+Five tables: microseconds per coupled impact and per plain step; a black-box ball by step revision and by a plain
+loop of fixed steps; what the guard process costs; two oscillators with a spring between them over a ladder of macro
+steps, left as a dataset and a figure. Everything timed is run several times in turn with what it is compared
+to; tables show the median and the smallest.
+
+Run with `python tests/benchmarks/bench_coupled.py [FOLDER]` on a quiet machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import math
+import os
+import platform
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from coupled_parts import EXCHANGES, P11, body, contact, events_of, external, link, part, stop, values
+from fmpy.fmi3 import FMU3Slave
+from fmpy.model_description import read_model_description
+from fmu_factory import bouncing_ball
+
+from vibroimpact.analysis.orders import observed_order
+from vibroimpact.fmus import fmu_path
+from vibroimpact.fmus.archive import unpack
+from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
+from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.specification import EventSpec
+from vibroimpact.orchestrator.provenance import git_commit, versions
+from vibroimpact.orchestrator.runners import make_runner
+from vibroimpact.orchestrator.scene import parse_scene
+
+PERIOD = 2.0 * math.pi
+IMPACT_GOAL, STEP_GOAL, GUARD_GOAL = 8.0, 1.5, 5.0
+"""us per coupled impact, us per plain step, percent of a point of 10 ms."""
+REPETITIONS = 9
+
+
+def timed(*tasks: Callable[[], int], repetitions: int = REPETITIONS) -> list[list[float]]:
+    """Return the seconds per unit of work of each task, run in turn; a task returns how many units it did."""
+    seconds: list[list[float]] = [[] for _ in tasks]
+    gc.collect()
+    for _ in range(repetitions):
+        for place, task in zip(seconds, tasks, strict=True):
+            began = time.perf_counter()
+            units = task()
+            place.append((time.perf_counter() - began) / units)
+    return seconds
+
+
+def micro(seconds: Sequence[float]) -> str:
+    return f"{statistics.median(seconds) * 1e6:8.2f} {min(seconds) * 1e6:8.2f}"
+
+
+def verdict(value: float, goal: float, unit: str) -> str:
+    return f"goal <= {goal:g} {unit}: {'met' if value <= goal else 'not met'}"
+
+
+# ---- FMPy's classes ----
+
+
+def fmpy_instance(
+    name: str, *, event_mode: bool, parameters: Mapping[str, float]
+) -> tuple[Any, dict[str, int]]:
+    """Return an instantiated, not initialized FMI 3.0 instance by FMPy's class, and its references by name."""
+    folder = str(unpack(fmu_path(name)).folder)
+    description = read_model_description(folder)
+    fmu = FMU3Slave(
+        guid=description.instantiationToken,
+        unzipDirectory=folder,
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName=name,
+    )
+    fmu.instantiate(eventModeUsed=event_mode, earlyReturnAllowed=event_mode)
+    variables = {v.name: v for v in description.modelVariables}
+    for key, value in parameters.items():
+        kind = "Int64" if variables[key].type == "Enumeration" else "Float64"
+        getattr(fmu, f"set{kind}")([variables[key].valueReference], [value])
+    return fmu, {key: v.valueReference for key, v in variables.items()}
+
+
+class FmpyCoupled:
+    """Oscillator and ImpactStop by FMPy's classes, with event mode: P(1,1)."""
+
+    def __init__(self) -> None:
+        law = {"contact[1].law": 5, "contact[1].position": 1.0, "contact[1].side": 1}
+        self.body, names = fmpy_instance("Oscillator", event_mode=True, parameters={**P11, **law})
+        self.stop, stop_names = fmpy_instance("ImpactStop", event_mode=False, parameters={"restitution": 0.7})
+        for fmu in (self.body, self.stop):
+            fmu.enterInitializationMode()
+            fmu.exitInitializationMode()
+        self.body.updateDiscreteStates()
+        self.body.enterStepMode()
+        self.outputs = [names["contact[1].displacement"], names["contact[1].velocity"]]
+        self.inputs = [names["contact[1].applied_restitution"], names["contact[1].applied_force"]]
+        self.asked = [stop_names["displacement"], stop_names["velocity"]]
+        self.answers = [stop_names["applied_restitution"], stop_names["applied_force"]]
+        self.time = 0.0
+
+    def advance(self, end: float) -> int:
+        """Advance to `end`; returns the number of impacts."""
+        impacts, body, stop = 0, self.body, self.stop
+        while self.time < end:
+            body.setFloat64(self.inputs, stop.getFloat64(self.answers))
+            event, _, _, reached = body.doStep(
+                currentCommunicationPoint=self.time, communicationStepSize=end - self.time
+            )
+            stop.setFloat64(self.asked, body.getFloat64(self.outputs))
+            stop.doStep(currentCommunicationPoint=self.time, communicationStepSize=reached - self.time)
+            self.time = reached
+            if event:
+                impacts += 1
+                body.enterEventMode()
+                body.setFloat64(self.inputs, stop.getFloat64(self.answers))
+                body.updateDiscreteStates()
+                body.enterStepMode()
+        return impacts
+
+
+def impact_table() -> None:
+    """Microseconds per coupled impact and per plain step."""
+    ours = {}
+    for versions_used in (("3.0", "3.0"), ("3.0", "2.0"), ("2.0", "2.0")):
+        importer = Importer(
+            [body("body", {**P11, **external(1.0)}, versions_used[0]), stop("stop", 0.7, versions_used[1])],
+            contact("body", "stop"),
+        )
+        importer.begin()
+        ours["+".join(versions_used)] = importer
+    fmpy = FmpyCoupled()
+
+    def coupled(importer: Importer) -> Callable[[], int]:
+        def run() -> int:
+            steps = importer.steps
+            importer.advance(importer.time + 2000 * PERIOD)
+            return importer.steps - steps - 1
+
+        return run
+
+    tasks = {f"importer, FMI {name}": coupled(importer) for name, importer in ours.items()}
+    tasks["FMPy's classes, FMI 3.0+3.0"] = lambda: fmpy.advance(fmpy.time + 2000 * PERIOD)
+    for task in tasks.values():
+        task()
+    found = timed(*tasks.values())
+    print("\ncoupled impact (Oscillator + ImpactStop, P(1,1))     median      min  us")
+    for name, seconds in zip(tasks, found, strict=True):
+        print(f"  {name:48}{micro(seconds)}")
+    print(f"  {verdict(statistics.median(found[0]) * 1e6, IMPACT_GOAL, 'us')}")
+
+
+def step_table() -> None:
+    """Microseconds per plain step of one FMU."""
+    importer = Importer([body("body", {"displacement_start": 1.0})], macro_step=0.01)
+    importer.begin()
+    fmu, _ = fmpy_instance("Oscillator", event_mode=False, parameters={"displacement_start": 1.0})
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    reached = 0.0
+
+    def ours() -> int:
+        steps = importer.steps
+        importer.advance(importer.time + 100.0)
+        return importer.steps - steps
+
+    def fmpy() -> int:
+        nonlocal reached
+        for _ in range(10_000):
+            fmu.doStep(currentCommunicationPoint=reached, communicationStepSize=0.01)
+            reached += 0.01
+        return 10_000
+
+    found = timed(ours, fmpy)
+    print("\nplain doStep of one Oscillator, FMI 3.0, H = .01     median      min  us")
+    for name, seconds in zip(("importer", "FMPy's class"), found, strict=True):
+        print(f"  {name:48}{micro(seconds)}")
+    print(f"  {verdict(statistics.median(found[0]) * 1e6, STEP_GOAL, 'us')}")
+
+
+# ---- a ball that knows of no events ----
+
+
+def exact_bounces(count: int) -> np.ndarray:
+    first, n, r = math.sqrt(2.0 / 9.81), np.arange(count), 0.7
+    return np.asarray(first + 2.0 * first * r * (1.0 - r**n) / (1.0 - r))
+
+
+def fixed_step_bounces(importer: Importer, step: float, end: float) -> list[float]:
+    """Return the bounces that a plain loop sees: where the ball's speed has turned upwards."""
+    importer.begin()
+    instance, times, speed = importer.components["ball"].instance, [], 0.0
+    velocity = importer.components["ball"].group("Float64", ["v"])
+    for k in range(round(end / step)):
+        instance.step(k * step, step)
+        before, speed = speed, float(velocity.get()[0])
+        if before <= 0.0 < speed:
+            times.append((k + 1) * step)
+    return times
+
+
+def revision(fmu: Path, step: float, end: float, found: dict[str, list[float]]) -> Callable[[], int]:
+    importer = Importer([part("ball", fmu)], events=[EventSpec("ball", "h")], macro_step=step)
+    events = events_of(importer)
+
+    def run() -> int:
+        events.clear()
+        importer.begin()
+        importer.advance(end)
+        found["step revision"] = [event.time for event in events]
+        return 1
+
+    return run
+
+
+def fixed_steps(fmu: Path, step: float, end: float, found: dict[str, list[float]]) -> Callable[[], int]:
+    importer = Importer([part("ball", fmu)])
+
+    def run() -> int:
+        found["plain fixed steps"] = fixed_step_bounces(importer, step, end)
+        return 1
+
+    return run
+
+
+def ball_table(folder: Path) -> None:
+    """Bounce times and cost by step revision and by a plain loop."""
+    fmu, end = bouncing_ball(folder), 2.0
+    exact = exact_bounces(4)
+    print("\nblack-box ball (FMI 2.0), bounces up to 2 s      error of bounce 1  largest of 4  cost, ms")
+    for step in (0.1, 0.001):
+        found: dict[str, list[float]] = {}
+        revise, loop = revision(fmu, step, end, found), fixed_steps(fmu, step, end, found)
+        for name, seconds in zip(("step revision", "plain fixed steps"), timed(revise, loop), strict=True):
+            times = np.array(found[name][: len(exact)])
+            error = np.abs(times - exact[: len(times)])
+            count = "" if len(times) == len(exact) else f" (of {len(times)})"
+            cost = f"{statistics.median(seconds) * 1e3:8.2f}"
+            print(f"  {name:20} H = {step:<24g}{error[0]:13.1e}{error.max():14.1e}{count}{cost}")
+
+
+# ---- the guard ----
+
+GUARDED = """
+[scene]
+units = "SI"
+[component.b]
+fmu = "Oscillator"
+[component.b.parameters]
+damping = 0.2
+"forcing.amplitude" = 0.5
+"forcing.angular_frequency" = 1.0
+"contact[1].law" = "external"
+"contact[1].side" = "upper"
+"contact[1].position" = 1.0
+[component.s]
+fmu = "ImpactStop"
+parameters = {{ restitution = 0.7 }}
+[[connection]]
+from = "b.contact[1].displacement"
+to = "s.displacement"
+[[connection]]
+from = "b.contact[1].velocity"
+to = "s.velocity"
+[[connection]]
+from = "s.applied_restitution"
+to = "b.contact[1].applied_restitution"
+[[connection]]
+from = "s.applied_force"
+to = "b.contact[1].applied_force"
+[record]
+recorded_time = {end}
+[execution]
+guard = {guard}
+macro_step = {step}
+"""
+
+
+def guard_table() -> None:
+    """What points of about 10 ms cost in a guarded child process."""
+    print("\nguard, points of about 10 ms          alone, ms   guarded, ms   cost, % (medians)  (smallest)")
+    worst = -math.inf
+    for name, end, step in (("1000 impacts", 1000 * PERIOD, 1e9), ("steps of .01", 20.0, 0.01)):
+        texts = [GUARDED.format(end=end, step=step, guard=guard) for guard in ("false", "true")]
+        runners = [make_runner(parse_scene(text, "guard.toml")) for text in texts]
+
+        def point(runner: Any) -> Callable[[], int]:
+            def run() -> int:
+                runner.run({})
+                return 1
+
+            return run
+
+        alone, guarded = timed(*map(point, runners), repetitions=61)
+        for runner in runners:
+            runner.close()
+        medians = [statistics.median(s) * 1e3 for s in (alone, guarded)]
+        cost = (medians[1] / medians[0] - 1.0) * 100.0
+        smallest = (min(guarded) / min(alone) - 1.0) * 100.0
+        worst = max(worst, cost)
+        print(f"  {name:34}{medians[0]:11.2f}{medians[1]:14.2f}{cost:20.1f}{smallest:12.1f}")
+    print(f"  {verdict(worst, GUARD_GOAL, '%')}")
+
+
+# ---- two oscillators and a spring ----
+
+STIFFNESS, SPRING, END = 1.0, 0.1, 50.0
+ROUNDING = 1e-12
+"""An energy drift below this, J, is rounding and written as 0: it has no order."""
+STEPS = np.array([0.4, 0.2, 0.1, 0.05, 0.025, 0.0125])
+
+
+def exact_pair(t: float) -> np.ndarray:
+    """Return displacements and velocities of both masses: the normal modes 1 and sqrt(1.2) rad/s."""
+    w = math.sqrt(STIFFNESS + 2.0 * SPRING)
+    same, against = (math.cos(t), -math.sin(t)), (math.cos(w * t), -w * math.sin(w * t))
+    return 0.5 * np.array(
+        [same[0] + against[0], same[0] - against[0], same[1] + against[1], same[1] - against[1]]
+    )
+
+
+def pair_energy(state: np.ndarray) -> float:
+    """Return the energy of both masses and the three springs, J."""
+    x, v = state[:2], state[2:]
+    return float(0.5 * (v @ v + STIFFNESS * (x @ x) + SPRING * (x[0] - x[1]) ** 2))
+
+
+def exchanged(exchange: str, step: float) -> tuple[float, float, float, float]:
+    """Return largest error (m), energy drift (J), residual of the interface (J) and seconds of one run."""
+    soft = {"stiffness": STIFFNESS + SPRING}
+    links = [link("b.displacement", "a.force", SPRING), link("a.displacement", "b.force", SPRING)]
+    importer = Importer(
+        [body("a", {**soft, "displacement_start": 1.0}), body("b", soft)],
+        links,
+        exchange=exchange,  # type: ignore[arg-type]
+        macro_step=step,
+    )
+    energy = InterfaceEnergy(importer, links)
+    importer.begin()
+    energy.begin(links)
+    began, error = time.perf_counter(), 0.0
+    for t in np.arange(1.0, END + 0.5):
+        importer.advance(float(t))
+        state = np.array(
+            [v for name in ("displacement", "velocity") for c in "ab" for v in values(importer, c, name)]
+        )
+        error = max(error, float(np.abs(state - exact_pair(float(t)))[:2].max()))
+    seconds = time.perf_counter() - began
+    drift = pair_energy(state) - pair_energy(exact_pair(0.0))
+    drift = drift if abs(drift) > ROUNDING else 0.0
+    residual = float(energy.residuals().sum())
+    importer.free()
+    return error, drift, residual, seconds
+
+
+def exchange_dataset() -> xr.Dataset:
+    """Measure all exchanges on the ladder of macro steps."""
+    found = np.array([[exchanged(exchange, float(step)) for step in STEPS] for exchange in EXCHANGES])
+    axes = ("exchange", "macro_step")
+    words = {
+        "error": ("m", "largest error of a displacement"),
+        "energy_drift": ("J", "energy gained"),
+        "interface_residual": ("J", "energy residual of the connections"),
+        "wall_time": ("s", "wall time"),
+    }
+    dataset = xr.Dataset(
+        {
+            name: (axes, found[:, :, i], {"units": unit, "long_name": long_name})
+            for i, (name, (unit, long_name)) in enumerate(words.items())
+        },
+        coords={
+            "exchange": ("exchange", list(EXCHANGES), {"long_name": "exchange of values"}),
+            "macro_step": ("macro_step", STEPS, {"units": "s", "long_name": "macro step"}),
+        },
+        attrs={
+            "title": "Two oscillators as two FMUs, spring between them",
+            "Conventions": "CF-1.11",
+            "source": f"vibroimpact {versions()['vibroimpact']}, tests/benchmarks/bench_coupled.py",
+            "versions": json.dumps(versions()),
+            "git_commit": git_commit(),
+        },
+    )
+    for name in ("error", "energy_drift"):
+        orders = [observed_order(STEPS, dataset[name].values[i]) for i in range(len(EXCHANGES))]
+        dataset[f"{name}_order"] = (
+            "exchange",
+            orders,
+            {"units": "1", "long_name": f"observed order of {name}"},
+        )
+    return dataset
+
+
+def exchange_table(folder: Path) -> None:
+    """Print, write and draw the ladder."""
+    dataset = exchange_dataset()
+    print(f"\ntwo oscillators, spring {SPRING} N/m, {END:g} s: largest error, m (energy drift, J)")
+    print("  H, s    " + "".join(f"{exchange:>26}" for exchange in EXCHANGES))
+    for i, step in enumerate(STEPS):
+        cells = [
+            f"{dataset['error'].values[k, i]:14.1e} ({dataset['energy_drift'].values[k, i]:8.1e})"
+            for k in range(len(EXCHANGES))
+        ]
+        print(f"  {step:<8g}" + "".join(f"{cell:>26}" for cell in cells))
+    orders = [
+        f"{dataset['error_order'].values[k]:14.2f} ({dataset['energy_drift_order'].values[k]:8.2f})"
+        for k in range(len(EXCHANGES))
+    ]
+    print("  order   " + "".join(f"{cell:>26}" for cell in orders))
+    path = folder / "coupled_exchange.nc"
+    dataset.to_netcdf(path)
+    print(f"  dataset: {path}")
+    try:
+        from vibroimpact.analysis.figures import convergence, save
+    except ImportError as error:
+        print(f"  no figure: {error}")
+        return
+    figure = folder / "coupled_exchange.png"
+    save(convergence(dataset), figure)
+    print(f"  figure:  {figure}")
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
+    folder = parser.parse_args().folder
+    folder.mkdir(parents=True, exist_ok=True)
+    load = f", load {os.getloadavg()[0]:.2f}" if hasattr(os, "getloadavg") else ""
+    print(
+        f"{platform.processor() or platform.machine()}, {os.cpu_count()} processors{load}, {platform.system()}"
+    )
+    print(", ".join(f"{name} {version}" for name, version in versions().items()))
+    with tempfile.TemporaryDirectory() as made:
+        impact_table()
+        step_table()
+        ball_table(Path(made))
+        guard_table()
+        exchange_table(folder)
+
+
+if __name__ == "__main__":
+    main()
