@@ -8,6 +8,7 @@ must be noted before it is made: that is done from the first crash on, and the p
 from __future__ import annotations
 
 import math
+import os
 import queue
 import signal
 import subprocess
@@ -16,6 +17,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Mapping
+from multiprocessing.connection import wait
 from pathlib import Path
 from typing import IO, Any
 
@@ -30,12 +32,14 @@ from vibroimpact.orchestrator.scene import Scene
 DEFAULT_DEADLINE = 300.0
 #: What a child may take beyond the deadline to end the point by itself, s.
 GRACE = 0.5
+#: A process that can wait for a pipe itself saves the two switches to a thread that reads it.
+WAITS_ON_PIPES = os.name == "posix"
 #: Starting Python and loading the FMUs, s.
 START_TIME = 60.0
 
 
 class _Child:
-    """A running child process with a thread that reads its answers."""
+    """A running child process; there is at most one answer on its way."""
 
     def __init__(self, order: Order) -> None:
         self._process = subprocess.Popen(
@@ -45,8 +49,10 @@ class _Child:
             stderr=subprocess.DEVNULL,
         )
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
+        self._reader: threading.Thread | None = None
+        if not WAITS_ON_PIPES:
+            self._reader = threading.Thread(target=self._read, daemon=True)
+            self._reader.start()
         self.say(order)
 
     def _read(self) -> None:
@@ -61,10 +67,15 @@ class _Child:
         try:
             send(self._process.stdin, message)
         except BrokenPipeError:
-            self._answers.put(None)
+            return  # its output has ended too, which `answer` sees
 
     def answer(self, seconds: float) -> Any:
         """Return the next answer, None when the child is gone; raises TimeoutError."""
+        if self._reader is None:
+            assert self._process.stdout is not None
+            if not wait([self._process.stdout.fileno()], seconds):
+                raise TimeoutError
+            return receive(self._process.stdout)
         try:
             return self._answers.get(timeout=seconds)
         except queue.Empty:
@@ -78,7 +89,8 @@ class _Child:
         except subprocess.TimeoutExpired:
             self._process.kill()
             code = self._process.wait()
-        self._reader.join()
+        if self._reader is not None:
+            self._reader.join()
         self._close(self._process.stdout)
         return code
 
