@@ -6,6 +6,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.figures.page import COLOURS, canvas, label, page_style
 from vibroimpact.analysis.orders import observed_order
@@ -13,6 +15,8 @@ from vibroimpact.fmus.errors import DatasetError
 
 _QUANTITIES = ("error", "energy_drift")
 _MARKERS = "os^Dvx"
+#: Most steps that are all labelled in one column's width.
+MOST_LABELS = 4
 _WORDS = {"gauss_seidel": "Gauss-Seidel", "jacobi": "Jacobi"}
 
 
@@ -89,6 +93,7 @@ def _draw_ladder(axis: Axes, quantity: xr.DataArray) -> None:
         )
     axis.set_xscale("log")
     axis.set_yscale("log")
+    _mark_steps(axis, step[order])
     axis.set_ylabel(label(quantity))
     axis.legend(
         title="observed order",
@@ -102,6 +107,13 @@ def _draw_ladder(axis: Axes, quantity: xr.DataArray) -> None:
         handletextpad=0.4,
         handlelength=1.4,
     )
+
+
+def _mark_steps(axis: Axes, steps: NDArray[np.float64]) -> None:
+    """Label the steps that were measured, every other one where there are many."""
+    marked = steps[:: 1 if len(steps) <= MOST_LABELS else 2]
+    axis.set_xticks(marked, [f"{step:g}" for step in marked])
+    axis.xaxis.set_minor_locator(NullLocator())
 
 
 def _entry(exchange: str, order: float) -> str:

@@ -6,7 +6,9 @@ from vibroimpact.fmus.errors import ComponentError, SceneError
 
 
 def test_a_scene_error_keeps_its_problems_between_processes() -> None:
-    error = SceneError(["a.toml: body.mass: expected a number > 0, got 0.", "a.toml: stop: expected a table."])
+    error = SceneError(
+        ["a.toml: body.mass: expected a number > 0, got 0.", "a.toml: stop: expected a table."]
+    )
     copy = pickle.loads(pickle.dumps(error))
     assert copy.problems == error.problems
     assert str(copy) == str(error)
