@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
-from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.orchestrator.breadcrumbs import Breadcrumbs
 from vibroimpact.orchestrator.empty_record import empty_record
 from vibroimpact.orchestrator.guard_pipe import Failure, Identity, Order, Point, receive, send
@@ -151,8 +151,9 @@ class GuardedRunner:
             return answer
         code = self._child.end()
         self._child = None
-        reason = answer.message if isinstance(answer, Failure) else self._what_happened(_ending(code))
-        raise ComponentError(reason)
+        if isinstance(answer, Failure):
+            raise (ComponentFileError if answer.misuse else ComponentError)(answer.message)
+        raise ComponentError(self._what_happened(_ending(code)))
 
     def run(self, values: Mapping[str, float], start: tuple[float, float] | None = None) -> RunRecord:
         """Run one point; a crash or a missed deadline is its outcome.

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.fmus.errors import ComponentFileError, VibroimpactError
 from vibroimpact.orchestrator.breadcrumbs import Breadcrumbs
 from vibroimpact.orchestrator.guard_pipe import Failure, Identity, Order, Point, receive, send
 from vibroimpact.orchestrator.runners import Runner, open_runner
@@ -70,7 +70,7 @@ def main() -> None:
     try:
         runner = _open(order, notes)
     except VibroimpactError as error:
-        send(answers, Failure(str(error)))
+        send(answers, Failure(str(error), misuse=isinstance(error, ComponentFileError)))
         return
     send(answers, Identity.of(runner))
     while isinstance(point := receive(orders), Point):

@@ -49,9 +49,13 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """The point (or the scene) failed with this message; the child lives on."""
+    """The point (or the scene) failed with this message; the child lives on.
+
+    `misuse`: what was given is at fault (an FMU file for another machine), not the run.
+    """
 
     message: str
+    misuse: bool = False
 
 
 def send(pipe: IO[bytes], message: Any) -> None:

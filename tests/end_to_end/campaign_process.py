@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -13,6 +14,11 @@ import psutil
 
 COMMAND = Path(__file__).with_name("busy_command.py")
 WAIT_SECONDS = 60.0
+
+
+def hear_interrupts() -> None:
+    """Undo what a shell does to what it runs in the background: there Ctrl-C is ignored from the start."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 class CampaignProcess:
@@ -29,6 +35,7 @@ class CampaignProcess:
             stderr=subprocess.PIPE,
             text=True,
             start_new_session=True,
+            preexec_fn=hear_interrupts,
             env=os.environ | environment,
         )
 

@@ -6,6 +6,8 @@ import os
 import subprocess
 import sys
 import time
+import zipfile
+from collections.abc import Callable
 from importlib import metadata, resources
 from pathlib import Path
 
@@ -14,6 +16,7 @@ import typer
 from campaign_scenes import assert_same_rows
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
+from vibroimpact.fmus import fmu_path
 from vibroimpact.orchestrator.cli import app, load_commands, main
 
 ROOT = Path(__file__).parents[2]
@@ -185,3 +188,52 @@ def test_a_defect_shows_its_place_with_debug(capsys: pytest.CaptureFixture[str])
         main(["--debug", "fail-for-a-test"])
     assert left.value.code == 1
     assert "in fail_for_a_test" in capsys.readouterr().err
+
+
+def fmu_from_oscillator(path: Path, change: Callable[[str, bytes], tuple[str, bytes]]) -> Path:
+    """Write the Oscillator's FMU with its members changed."""
+    with zipfile.ZipFile(fmu_path("Oscillator")) as source, zipfile.ZipFile(path, "w") as target:
+        for name in source.namelist():
+            target.writestr(*change(name, source.read(name)))
+    return path
+
+
+def for_another_machine(name: str, data: bytes) -> tuple[str, bytes]:
+    return name.replace("x86_64-linux", "riscv64-plan9"), data
+
+
+def with_entities(name: str, data: bytes) -> tuple[str, bytes]:
+    text = b'<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><x>&b;</x>'
+    return name, text if name == "modelDescription.xml" else data
+
+
+def that_escapes(name: str, data: bytes) -> tuple[str, bytes]:
+    return ("../" + name if name.endswith(".md") else name), data
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (for_another_machine, "riscv64-plan9"),
+        (with_entities, "document type declaration"),
+        (that_escapes, "leads out of the archive"),
+        (None, "zip"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "campaign"])
+def test_a_bad_fmu_file_is_misuse_with_one_message(
+    command: str, change: Callable[[str, bytes], tuple[str, bytes]] | None, told: str, tmp_path: Path
+) -> None:
+    fmu = tmp_path / "bad.fmu"
+    if change is None:
+        fmu.write_bytes(b"PK\x03\x04 no archive")
+    else:
+        fmu_from_oscillator(fmu, change)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(
+        '[component.body]\nfmu = "bad.fmu"\n[record]\nrecorded_time = 1.0\n'
+        'variables = ["body.displacement"]\nrate = 10\n'
+    )
+    output = "x.nc" if command == "run" else "folder"
+    assert_misuse(vibroimpact(command, scene, "-o", tmp_path / output), told)
+    assert not (tmp_path / "x.nc").exists()

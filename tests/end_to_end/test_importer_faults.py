@@ -262,6 +262,8 @@ def test_a_hanging_component_does_not_outlive_its_parent(folder: Path, how: sign
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
+        # a shell that runs the tests in the background has it ignored
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     assert parent.stdout is not None
     assert parent.stdout.readline() == "ready\n"
