@@ -27,10 +27,8 @@ from vibroimpact.orchestrator.scene_models import (
 from vibroimpact.orchestrator.sweep import SweepAxis
 
 ROOT = Path(__file__).parents[2]
-FETCHED_BY_THE_USER = {"bouncing_ball"}  # needs an FMU that is not shipped
-EXAMPLES = [
-    path for path in sorted((ROOT / "examples").glob("*.toml")) if path.stem not in FETCHED_BY_THE_USER
-]
+MADE_BY_THE_USER = {"bouncing_ball", "user_contact_law"}  # need an FMU that is not shipped
+EXAMPLES = [path for path in sorted((ROOT / "examples").glob("*.toml")) if path.stem not in MADE_BY_THE_USER]
 
 FORCED = """\
 [scene]

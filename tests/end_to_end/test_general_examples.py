@@ -1,0 +1,58 @@
+"""The shipped scenes of several FMUs run from the command line; those that need an FMU get one first."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmu_factory import bouncing_ball
+
+from vibroimpact.analysis.dataset import Outcome, read_flat
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def ran(folder: Path, name: str) -> Path:
+    """Run a copy of an example in a folder and return its dataset."""
+    shutil.copy(EXAMPLES / f"{name}.toml", folder)
+    output = folder / f"{name}.nc"
+    command = [sys.executable, "-m", "vibroimpact.orchestrator.cli", "run", str(folder / f"{name}.toml")]
+    done = subprocess.run([*command, "-o", str(output)], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    return output
+
+
+def test_two_oscillators_follow_the_exact_two_mass_solution(tmp_path: Path) -> None:
+    dataset = read_flat(ran(tmp_path, "two_oscillators"))
+    t = dataset.time.values
+    exact = 0.5 * (np.cos(t) + np.cos(math.sqrt(1.2) * t))
+    assert np.abs(dataset.a_displacement.values - exact).max() < 0.01
+
+
+def test_a_body_and_a_stop_of_two_fmi_versions_keep_the_period_one_orbit(tmp_path: Path) -> None:
+    dataset = read_flat(ran(tmp_path, "mixed_versions"))
+    assert np.allclose(np.diff(dataset.event_time.values), 2.0 * math.pi, atol=1e-11)
+
+
+def test_a_ball_without_events_bounces_where_it_must(tmp_path: Path) -> None:
+    shutil.copy(bouncing_ball(tmp_path), tmp_path / "BouncingBall.fmu")
+    dataset = read_flat(ran(tmp_path, "bouncing_ball"))
+    assert dataset.outcome.values[0] == Outcome.ok
+    assert dataset.event_time.values[0] == pytest.approx(math.sqrt(2.0 / 9.81), abs=1e-10)
+
+
+def test_a_law_in_python_is_exported_by_the_command_line_and_answers(tmp_path: Path) -> None:
+    pytest.importorskip("pythonfmu", reason="needs pip install 'vibroimpact[python-fmus]'")
+    law = EXAMPLES / "user_contact_law.py"
+    command = [sys.executable, "-m", "vibroimpact.orchestrator.cli", "fmu", "export", "user-contact-law"]
+    target = tmp_path / "user_contact_law.fmu"
+    subprocess.run(
+        [*command, "--law", str(law), "-o", str(target)], check=True, capture_output=True, timeout=120
+    )
+    dataset = read_flat(ran(tmp_path, "user_contact_law"))
+    assert np.allclose(np.diff(dataset.event_time.values), 2.0 * math.pi, atol=1e-9)
