@@ -25,10 +25,10 @@ static void make(vi_body *body, uint64_t *seed)
     CHECK(vi_clock_start(&body->clock, frequency, uniform(seed, -7.0, 7.0), body->mode.natural), "%s", "clock");
     const double position = choice(seed, 4) == 0 ? 0.0 : uniform(seed, -1.0, 1.0), gap = ANY(GAPS);
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        body->contacts[k].law = k == 0 || choice(seed, 2) == 0 ? VI_LAW_RESTITUTION : VI_LAW_NONE;
+        body->contacts[k].law.law = k == 0 || choice(seed, 2) == 0 ? VI_LAW_RESTITUTION : VI_LAW_NONE;
         body->contacts[k].side = k == 0 ? VI_SIDE_UPPER : VI_SIDE_LOWER;
         body->contacts[k].position = k == 0 ? position : position - gap;
-        body->contacts[k].restitution = ANY(RESTITUTIONS);
+        body->contacts[k].law.restitution = ANY(RESTITUTIONS);
     }
     body->record.impacts = (int32_t)choice(seed, 2);
     body->record.extrema = (int32_t)choice(seed, 2);
@@ -62,7 +62,7 @@ static void check_inside(const vi_body *body, int run)
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
         const vi_contact *contact = &body->contacts[k];
         const double beyond = vi_contact_direction(contact->side) * (body->displacement - contact->position);
-        CHECK(contact->law == VI_LAW_NONE || beyond <= 0.0, "run %d: %g beyond stop %d", run, beyond, k + 1);
+        CHECK(contact->law.law == VI_LAW_NONE || beyond <= 0.0, "run %d: %g beyond stop %d", run, beyond, k + 1);
     }
 }
 
@@ -116,7 +116,7 @@ static void a_million_impacts_keep_their_phase(void)
     body.mass = 1.0;
     vi_mode_start(&body.mode, 1.0, 0.2, 1.0, 0.5, 1.0);
     vi_clock_start(&body.clock, 1.0, 0.0, 1.0);
-    body.contacts[0] = (vi_contact){.law = VI_LAW_RESTITUTION, .side = VI_SIDE_UPPER, .position = 1.0, .restitution = .7};
+    body.contacts[0] = (vi_contact){.law = {.law = VI_LAW_RESTITUTION, .restitution = .7}, .side = VI_SIDE_UPPER, .position = 1.0};
     body.contacts[1].side = VI_SIDE_UPPER;
     vi_body_start(&body, (vi_instant){0, 0.0, 0.0}, 0.0, 0.0);
     const vi_step_request request = {0.0, 1.0, false, false};

@@ -46,7 +46,7 @@ void vi_body_hold(vi_body *body, double held, double held_rate)
 
 static bool watched(const vi_body *body, int k)
 {
-    return body->contacts[k].law != VI_LAW_NONE && !body->passed;
+    return body->contacts[k].law.law != VI_LAW_NONE && !body->passed;
 }
 
 double vi_body_within(const vi_body *body, double displacement)
@@ -185,7 +185,7 @@ static double landing_room(const vi_body *body)
 {
     bool external = false;
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        external = external || body->contacts[k].law == VI_LAW_EXTERNAL;
+        external = external || body->contacts[k].law.law == VI_LAW_EXTERNAL;
     }
     return external ? LANDING * (1.0 + fabs(vi_clock_time(&body->clock, body->now))) : 0.0;
 }
@@ -214,11 +214,10 @@ static void meet_external(vi_body *body, int k, double approach, bool stop_here)
 
 static void meet(vi_body *body, int k, double approach, double remaining, const vi_step_request *request)
 {
-    if (body->contacts[k].law == VI_LAW_EXTERNAL) {
+    if (body->contacts[k].law.law == VI_LAW_EXTERNAL) {
         meet_external(body, k, approach, request->stop_at_contacts || fabs(remaining) <= landing_room(body));
     } else {
-        const vi_contact_law law = {body->contacts[k].law, body->contacts[k].restitution};
-        vi_body_impact(body, k, approach, vi_contact_law_restitution(&law, approach));
+        vi_body_impact(body, k, approach, vi_contact_law_restitution(&body->contacts[k].law, approach));
     }
 }
 
@@ -384,13 +383,8 @@ void vi_body_start(vi_body *body, vi_instant now, double displacement, double ve
     body->fastest_impact = body->tail_impulse = 0.0;
     body->low_impacts = 0;
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        vi_contact *contact = &body->contacts[k];
-        contact->mass = body->mass;
-        contact->stuck = contact->answered = 0;
-        contact->count = contact->graze_count = 0;
-        contact->force = contact->impulse = contact->last_velocity = 0.0;
-        contact->last_time = contact->last_phase = contact->stick_start = contact->stick_end = NAN;
-        contact->event_time = NAN;
+        vi_contact_clear(&body->contacts[k]);
+        body->contacts[k].mass = body->mass;
     }
 }
 

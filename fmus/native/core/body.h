@@ -9,27 +9,12 @@
 #include <stdint.h>
 
 #include "clock.h"
-#include "contact_law.h"
+#include "contact.h"
 #include "flow.h"
 #include "record.h"
 #include "step.h"
 
 enum { VI_BODY_CONTACTS = 2 };
-
-/* A contact port: where the body may meet a stop. Units: SI. */
-typedef struct {
-    /* parameters */
-    int64_t law, side;
-    double position, restitution;
-    /* the importer's answer for law external */
-    double applied_restitution, applied_force;
-    int32_t answered; /* applied_restitution was set since the pending contact was reported */
-    /* outputs */
-    int32_t stuck;
-    double displacement, velocity, mass, force, impulse;
-    int64_t count, graze_count;
-    double last_time, last_phase, last_velocity, stick_start, stick_end, event_time;
-} vi_contact;
 
 typedef struct {
     /* set up by the component */

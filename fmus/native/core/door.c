@@ -54,7 +54,7 @@ VI_DOOR int vi_door_next_contact(const vi_door_oscillator *oscillator, double ph
     if (!start(&body, oscillator, phase, state) || !isfinite(position)) {
         return -1;
     }
-    body.contacts[0].law = VI_LAW_EXTERNAL; /* stop there, resolve nothing */
+    body.contacts[0].law.law = VI_LAW_EXTERNAL; /* stop there, resolve nothing */
     body.contacts[0].side = side;
     body.contacts[0].position = position;
     const vi_instant begin = body.now;

@@ -19,7 +19,7 @@ static void defaults(void *self)
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
         vi_contact *contact = &o->body.contacts[k];
         contact->side = VI_SIDE_UPPER;
-        contact->restitution = 1.0;
+        contact->law.restitution = 1.0;
         contact->last_time = contact->last_phase = contact->stick_start = contact->stick_end = NAN;
         contact->event_time = NAN;
     }
@@ -66,18 +66,18 @@ static void check_contact(char *message, const oscillator *o, int k)
 {
     const vi_contact *contact = &o->body.contacts[k];
     const int n = k + 1;
-    if (contact->law == VI_LAW_NONE) {
+    if (contact->law.law == VI_LAW_NONE) {
         return;
     }
-    if (!vi_contact_law_known(contact->law) && contact->law != VI_LAW_EXTERNAL) {
+    if (!vi_contact_law_known(contact->law.law) && contact->law.law != VI_LAW_EXTERNAL) {
         complain(message, "contact[%d].law: expected 0 (none), 1 (restitution) or 5 (external), got %lld", n,
-                 (long long)contact->law);
+                 (long long)contact->law.law);
     }
     if (contact->side != VI_SIDE_UPPER && contact->side != VI_SIDE_LOWER) {
         complain(message, "contact[%d].side: expected 1 (upper) or 2 (lower), got %lld", n, (long long)contact->side);
     }
-    if (!(contact->restitution >= 0.0 && contact->restitution <= 1.0)) {
-        complain(message, "contact[%d].restitution: expected 0 <= r <= 1, got %.17g", n, contact->restitution);
+    if (!(contact->law.restitution >= 0.0 && contact->law.restitution <= 1.0)) {
+        complain(message, "contact[%d].restitution: expected 0 <= r <= 1, got %.17g", n, contact->law.restitution);
     }
     if (!isfinite(contact->position)) {
         complain(message, "contact[%d].position: expected a finite number, got %.17g", n, contact->position);
@@ -94,7 +94,7 @@ static void check_contact(char *message, const oscillator *o, int k)
 static void check_gap(char *message, const oscillator *o)
 {
     const vi_contact *a = &o->body.contacts[0], *b = &o->body.contacts[1];
-    if (a->law == VI_LAW_NONE || b->law == VI_LAW_NONE || a->side == b->side) {
+    if (a->law.law == VI_LAW_NONE || b->law.law == VI_LAW_NONE || a->side == b->side) {
         return;
     }
     const double sign = vi_contact_direction(a->side);
@@ -269,7 +269,7 @@ static bool event_pending(const void *self)
 static bool needs_events(const void *self)
 {
     const oscillator *o = self;
-    return o->body.contacts[0].law == VI_LAW_EXTERNAL || o->body.contacts[1].law == VI_LAW_EXTERNAL;
+    return o->body.contacts[0].law.law == VI_LAW_EXTERNAL || o->body.contacts[1].law.law == VI_LAW_EXTERNAL;
 }
 
 static double present_time(const void *self)

@@ -1,0 +1,35 @@
+/* Modes of an Euler-Bernoulli beam, in forms that keep all digits to high order. equations.md 6.1 to 6.7
+ *
+ * Shapes have unit mean square over the length: int_0^1 phi_i phi_j ds = delta_ij, with s = x / length. */
+#ifndef VIBROIMPACT_BEAM_MODES_H
+#define VIBROIMPACT_BEAM_MODES_H
+
+/* The numbers are those of the enumeration BeamBoundary. */
+typedef enum {
+    VI_CLAMPED_FREE = 1,
+    VI_CLAMPED_CLAMPED = 2,
+    VI_CLAMPED_PINNED = 3,
+    VI_PINNED_PINNED = 4
+} vi_beam_boundary;
+
+/* Eigenvalue xi_j, j = 1, 2, ...: natural angular frequency = xi^2 sqrt(E I / (mass_per_length length^4)). */
+double vi_beam_eigenvalue(vi_beam_boundary boundary, int j);
+
+/* phi_j(s), or its derivative of order 0 to 3 over s, 0 <= s <= 1. The first antinode from the clamp is positive. */
+double vi_beam_shape(vi_beam_boundary boundary, int j, double s, int derivative);
+
+/* int_0^1 phi_j ds: participation of mode j in a uniform load or in an acceleration of the base. */
+double vi_beam_participation(vi_beam_boundary boundary, int j);
+
+/* Static stiffness at s times length^3 / (E I), in closed form for all four boundaries. */
+double vi_beam_static_stiffness(vi_beam_boundary boundary, double s);
+
+/* Estimated relative error of a natural frequency by Euler-Bernoulli's theory: equations.md 6.7.
+ * slenderness = radius of gyration / length; E / G and the shear coefficient as given there. */
+double vi_beam_validity(vi_beam_boundary boundary, int j, double slenderness, double e_over_g, double shear_coefficient);
+
+/* Unit impulse at grid point `at` (0-based) of `n` points s[] by collocation, as modal velocities d_c with
+ * phi . d_c = 1 there and 0 at the other points: the thesis's rule (7.60). Returns 0 when the grid is singular. */
+int vi_beam_collocation(vi_beam_boundary boundary, int n, const double s[], int at, double direction[]);
+
+#endif
