@@ -245,6 +245,39 @@ static void series_at(const vi_segment *s, double u, vi_motion *m)
     m->snap_bound = s->series_snap_bound;
 }
 
+static void series_part(const vi_segment *s, double u, vi_part *part)
+{
+    const double *c = s->coefficient;
+    double x = c[VI_SERIES_ORDER], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
+    for (int n = VI_SERIES_ORDER - 1; n >= 0; --n) {
+        j = j * u + a;
+        a = a * u + v;
+        v = v * u + x;
+        x = x * u + c[n];
+    }
+    *part = (vi_part){x, v, 2.0 * a, 6.0 * j, s->series_snap_bound, s->scale};
+}
+
+void vi_segment_part(const vi_segment *s, double u, vi_part *part)
+{
+    if (s->series) {
+        series_part(s, u, part);
+        return;
+    }
+    const vi_mode *mode = s->mode;
+    const propagator p = propagate(mode, u);
+    part->x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
+    part->v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
+    part->a = -2.0 * mode->decay * part->v - mode->stiffness * part->x;
+    part->j = -2.0 * mode->decay * part->a - mode->stiffness * part->v;
+    part->snap_bound = homogeneous_bound(s, p.slow, p.fast, part->x, part->v);
+    if (mode->regime == VI_UNDERDAMPED && mode->rate > 0.1 * mode->natural) {
+        part->reach = s->amplitude * p.slow;
+    } else {
+        part->reach = mode->stiffness > 0.0 ? sqrt(part->x * part->x + part->v * part->v / mode->stiffness) : HUGE_VAL;
+    }
+}
+
 /* ---- the door ---- */
 
 vi_phase vi_phase_of(double angle)

@@ -40,6 +40,13 @@ typedef struct {
     double snap_bound; /* >= |x''''| from here to the end of the segment */
 } vi_motion;
 
+/* The same for the part of a motion that is not forced. */
+typedef struct {
+    double x, v, a, j;
+    double snap_bound; /* >= |fourth derivative| from here to the end of the segment */
+    double reach;      /* >= |x| likewise */
+} vi_part;
+
 /* A forcing phase, rad, with its cosine and sine. */
 typedef struct {
     double angle, cosine, sine;
@@ -79,6 +86,10 @@ void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *
 
 /* The motion `u` seconds after the start. */
 void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion);
+
+/* After `u` seconds, of a split segment its homogeneous part (without steady response and level), of a series all of it.
+ * Bodies of many modes add these up. */
+void vi_segment_part(const vi_segment *segment, double u, vi_part *part);
 
 /* Displacement and velocity after any u, the forcing phase there being known exactly (used for long free flights). */
 void vi_segment_end(const vi_segment *segment, double u, double phase, double *x, double *v);

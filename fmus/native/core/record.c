@@ -40,14 +40,20 @@ static void append(vi_record *record, const double row[VI_RECORD_WIDTH])
     record->count += 1;
 }
 
-void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
-                      double restitution)
+void vi_record_contact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
+                       double restitution, double duration)
 {
     record->period_impacts += 1;
     if (record->impacts) {
-        const double row[] = {VI_ROW_IMPACT, time, phase, velocity, impulse, (double)contact, restitution, 0.0};
+        const double row[] = {VI_ROW_IMPACT, time, phase, velocity, impulse, (double)contact, restitution, duration};
         append(record, row);
     }
+}
+
+void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
+                      double restitution)
+{
+    vi_record_contact(record, time, phase, velocity, impulse, contact, restitution, 0.0);
 }
 
 void vi_record_stick(vi_record *record, double start, double end, int contact, double tail_impulse)

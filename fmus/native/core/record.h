@@ -40,6 +40,9 @@ bool vi_record_full(const vi_record *record);
 
 void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
                       double restitution);
+/* The whole contact with a compliant stop, written when it ends; its duration in s. */
+void vi_record_contact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
+                       double restitution, double duration);
 void vi_record_stick(vi_record *record, double start, double end, int contact, double tail_impulse);
 
 /* Let the extremes know of a displacement that the body has. */

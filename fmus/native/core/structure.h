@@ -36,7 +36,8 @@ typedef struct {
     int32_t coupled;           /* the damping couples the modes: coupling[][] holds all of it */
     double coupling[VI_MODES][VI_MODES]; /* modal damping matrix, 1/s; only read when coupled */
     /* derived by vi_structure_prepare */
-    double mobility[VI_PORTS][VI_PORTS]; /* velocity of contact i for a unit impulse at contact j, 1/kg */
+    double mobility[VI_PORTS][VI_PORTS];   /* velocity of contact i for a unit impulse at contact j, 1/kg */
+    double compliance[VI_PORTS][VI_PORTS]; /* acceleration of contact i for a unit force at contact j, 1/kg */
     double fastest;                      /* largest rate of any mode, rad/s */
 } vi_structure_model;
 
@@ -45,7 +46,8 @@ typedef enum {
     VI_CONTACT_FREE = 0,
     VI_CONTACT_TOUCHING = 1, /* on the stop, neither pressed nor penetrating: the next motion decides */
     VI_CONTACT_HELD = 2,     /* rests on a rigid stop */
-    VI_CONTACT_YIELDING = 3  /* a compliant stop is pressed in */
+    VI_CONTACT_YIELDING = 3, /* a compliant stop is pressed in */
+    VI_CONTACT_RECEDING = 4  /* beyond the rest position of a compliant stop, whose surface it has left */
 } vi_contact_status;
 
 typedef struct {
@@ -53,6 +55,12 @@ typedef struct {
     double damping_loss;  /* J */
     double contact_loss;  /* work done on the stops, J */
 } vi_energies;
+
+/* The contact with a compliant stop that is going on. */
+typedef struct {
+    double time, phase, velocity; /* when and how fast it began, s, rad, m/s */
+    double impulse;               /* so far, N s */
+} vi_touch_down;
 
 typedef struct {
     vi_instant now;
@@ -67,9 +75,12 @@ typedef struct {
     double fastest_impact[VI_PORTS]; /* largest approach since the last stick, m/s */
     int64_t low_impacts[VI_PORTS];   /* impacts in a row that are far below it */
     double tail_impulse[VI_PORTS];   /* of the chatter summed at the last stick, N s */
+    int32_t leaving[VI_PORTS];       /* touching: 1 with velocity exactly 0, 2 with acceleration 0 too */
+    int32_t asking[VI_PORTS];        /* external contacts that wait for an answer at this instant */
+    vi_touch_down touch_down[VI_PORTS];
     double surface[VI_PORTS];        /* compliant stops: penetration at the last separation, m */
     vi_instant separated[VI_PORTS];  /* and when */
-    double reference_displacement[VI_PORTS], reference_velocity[VI_PORTS]; /* external force: where it was given */
+    double reference_penetration[VI_PORTS], reference_rate[VI_PORTS]; /* external force: where it was given */
 } vi_structure_state;
 
 /* The parts of one body, for the length of a call. */

@@ -1,0 +1,96 @@
+#include "complementarity.h"
+
+#include <float.h>
+#include <math.h>
+
+/* Pivots smaller than this times the largest diagonal mean that contacts are redundant. */
+static const double REDUNDANT = 1e-11;
+/* Redundant contacts share their load as if each had this times the largest mobility of its own. */
+static const double SOFTENING = 1e-9;
+
+/* Gaussian elimination with partial pivoting; 0 when a pivot is too small. */
+static int eliminate(int n, double a[VI_PORTS][VI_PORTS + 1], double smallest)
+{
+    for (int column = 0; column < n; ++column) {
+        int pivot = column;
+        for (int row = column + 1; row < n; ++row) {
+            pivot = fabs(a[row][column]) > fabs(a[pivot][column]) ? row : pivot;
+        }
+        if (!(fabs(a[pivot][column]) > smallest)) {
+            return 0;
+        }
+        for (int k = column; k <= n; ++k) {
+            const double moved = a[column][k];
+            a[column][k] = a[pivot][k];
+            a[pivot][k] = moved;
+        }
+        for (int row = 0; row < n; ++row) {
+            const double factor = row == column ? 0.0 : a[row][column] / a[column][column];
+            for (int k = column; k <= n && factor != 0.0; ++k) {
+                a[row][k] -= factor * a[column][k];
+            }
+        }
+    }
+    return 1;
+}
+
+void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], const int active[VI_PORTS],
+                     double p[VI_PORTS])
+{
+    int index[VI_PORTS], count = 0;
+    double largest = 0.0;
+    for (int k = 0; k < n; ++k) {
+        p[k] = 0.0;
+        if (active[k]) {
+            index[count++] = k;
+            largest = fmax(largest, fabs(g[k][k]));
+        }
+    }
+    for (int soft = 0; soft < 2 && largest > 0.0; ++soft) {
+        double a[VI_PORTS][VI_PORTS + 1];
+        for (int i = 0; i < count; ++i) {
+            for (int j = 0; j < count; ++j) {
+                a[i][j] = g[index[i]][index[j]] + (soft && i == j ? SOFTENING * largest : 0.0);
+            }
+            a[i][count] = b[index[i]];
+        }
+        if (eliminate(count, a, soft ? 0.0 : REDUNDANT * largest)) {
+            for (int i = 0; i < count; ++i) {
+                p[index[i]] = a[i][count] / a[i][i];
+            }
+            return;
+        }
+    }
+}
+
+/* Murty's principal pivoting: the first contact that pulls, or is passed through, changes sides. Finite for positive
+ * definite g; the bound on the turns is that of its proof. */
+void vi_complementary(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], double p[VI_PORTS])
+{
+    int active[VI_PORTS] = {0};
+    double scale = 0.0;
+    for (int k = 0; k < n; ++k) {
+        active[k] = b[k] > 0.0;
+        scale = fmax(scale, fabs(b[k]));
+    }
+    for (int turn = 0; turn < 1 << VI_PORTS; ++turn) {
+        vi_solve_active(n, g, b, active, p);
+        int wrong = -1;
+        for (int k = 0; k < n && wrong < 0; ++k) {
+            double gap = -b[k];
+            for (int l = 0; l < n; ++l) {
+                gap += g[k][l] * p[l];
+            }
+            if (active[k] ? p[k] < 0.0 : gap < -8.0 * DBL_EPSILON * scale) {
+                wrong = k;
+            }
+        }
+        if (wrong < 0) {
+            return;
+        }
+        active[wrong] = !active[wrong];
+    }
+    for (int k = 0; k < n; ++k) {
+        p[k] = fmax(0.0, p[k]);
+    }
+}

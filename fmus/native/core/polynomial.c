@@ -1,0 +1,74 @@
+#include "polynomial.h"
+
+#include <math.h>
+
+#include "majorant.h"
+
+void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4])
+{
+    double x = c[VI_ORDER], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
+    for (int n = VI_ORDER - 1; n >= 0; --n) {
+        j = j * u + a;
+        a = a * u + v;
+        v = v * u + x;
+        x = x * u + c[n];
+    }
+    value[0] = x;
+    value[1] = v;
+    value[2] = 2.0 * a;
+    value[3] = 6.0 * j;
+}
+
+double vi_polynomial_snap(const double c[VI_ORDER + 1], double length)
+{
+    double snap = 0.0;
+    for (int n = VI_ORDER; n >= 4; --n) {
+        const double k = (double)n;
+        snap = snap * length + k * (k - 1.0) * (k - 2.0) * (k - 3.0) * fabs(c[n]);
+    }
+    return snap;
+}
+
+double vi_polynomial_size(const double c[VI_ORDER + 1], double length)
+{
+    double size = 0.0;
+    for (int n = VI_ORDER; n >= 0; --n) {
+        size = size * length + fabs(c[n]);
+    }
+    return size;
+}
+
+/* The last step to a zero that is nearer than rounding can tell. */
+static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p, double length)
+{
+    const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
+    if (square < 0.0) {
+        return (vi_fall){true, vi_min(length, u - p->velocity / p->acceleration), 0.0};
+    }
+    double value[4];
+    const double root = vi_min(length, u + 2.0 * p->clearance / (p->velocity + sqrt(square)));
+    vi_polynomial_at(c, root, value);
+    return (vi_fall){true, root, vi_max(0.0, -value[1])};
+}
+
+vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double length, double noise)
+{
+    const double bound = vi_polynomial_snap(c, length);
+    double u = from;
+    for (;;) {
+        double value[4];
+        vi_polynomial_at(c, u, value);
+        const vi_approach p = {vi_max(0.0, value[0]), -value[1], -value[2], -value[3], bound};
+        if (p.velocity > 0.0 && p.clearance <= noise) {
+            return land(c, u, &p, length);
+        }
+        const double step = vi_certified_step(&p, length - u);
+        if (!(step < length - u)) {
+            return (vi_fall){false, length, 0.0};
+        }
+        if (u + step == u) {
+            return (vi_fall){true, u, vi_max(0.0, p.velocity)};
+        }
+        u += step;
+    }
+}

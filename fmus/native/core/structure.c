@@ -1,0 +1,529 @@
+#include "structure.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "majorant.h"
+#include "structure_parts.h"
+
+/* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
+static const double LANDING = 1e-13;
+/* A contact that within a radian of the fastest mode does not go further from its stop than this times its other
+ * displacements is followed from where it is. */
+static const double LINGERING = 1e-6;
+/* A bounce shorter than this over the fastest rate is followed from the stop, not from the origin. */
+static const double LOW_BOUNCE = 0.1;
+/* Of a segment, in periods: more than one, so that a flight of one period does not end in two segments. */
+static const double LONGEST_SEGMENT = 1.5;
+/* A contact nearer than this over the fastest rate may be near enough to be told without another evaluation. */
+static const double NEAR_CONTACT = 1e-4;
+
+/* ---- the model ---- */
+
+void vi_structure_mode(vi_structure_model *model, int j, double natural, double damping_ratio, double force,
+                       double angular_frequency)
+{
+    vi_mode_start(&model->mode[j], 1.0, 2.0 * damping_ratio * natural, natural * natural, force, angular_frequency);
+}
+
+double vi_structure_at(const vi_structure_model *model, const double shape[], const double vector[])
+{
+    double sum = 0.0;
+    for (int j = 0; j < model->modes; ++j) {
+        sum += shape[j] * vector[j];
+    }
+    return sum;
+}
+
+/* A bound on the rates that a full damping matrix brings. */
+static double coupling_rate(const vi_structure_model *model)
+{
+    double most = 0.0;
+    for (int i = 0; i < model->modes && model->coupled; ++i) {
+        double sum = 0.0;
+        for (int j = 0; j < model->modes; ++j) {
+            sum += fabs(model->coupling[i][j]);
+        }
+        most = vi_max(most, sum);
+    }
+    return most;
+}
+
+void vi_structure_prepare(vi_structure_model *model)
+{
+    for (int k = 0; k < model->contacts; ++k) {
+        for (int l = 0; l < model->contacts; ++l) {
+            model->mobility[k][l] = vi_structure_at(model, model->shape[k], model->impulse[l]);
+            model->compliance[k][l] = vi_structure_at(model, model->shape[k], model->shape[l]);
+        }
+    }
+    model->fastest = coupling_rate(model);
+    for (int j = 0; j < model->modes; ++j) {
+        const vi_mode *mode = &model->mode[j];
+        const double rate = model->coupled ? vi_max(mode->natural, mode->angular_frequency) : mode->fastest;
+        model->fastest = vi_max(model->fastest, rate);
+    }
+}
+
+/* ---- the present instant ---- */
+
+double vi_structure_direction(const vi_structure *s, int k)
+{
+    return vi_contact_direction(s->contacts[k].side);
+}
+
+vi_phase vi_structure_phase(const vi_structure *s)
+{
+    return vi_phase_of(s->model->clock.angular_frequency * s->state->now.rest);
+}
+
+void vi_structure_held_now(const vi_structure *s, double held[])
+{
+    const vi_structure_state *state = s->state;
+    const double elapsed = vi_clock_elapsed(&s->model->clock, state->held_since, state->now);
+    for (int j = 0; j < s->model->modes; ++j) {
+        held[j] = state->held[j] + state->held_rate[j] * elapsed;
+    }
+}
+
+double vi_structure_approach(const vi_structure *s, int k)
+{
+    return vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], s->state->p);
+}
+
+double vi_structure_clearance(const vi_structure *s, int k)
+{
+    const int32_t status = s->state->status[k];
+    if (status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD) {
+        return 0.0;
+    }
+    const double displacement = vi_structure_at(s->model, s->model->shape[k], s->state->q);
+    return vi_structure_direction(s, k) * (s->contacts[k].position - displacement);
+}
+
+static double size_at(const vi_structure_model *model, const double shape[], const double vector[])
+{
+    double sum = 0.0;
+    for (int j = 0; j < model->modes; ++j) {
+        sum += fabs(shape[j] * vector[j]);
+    }
+    return sum;
+}
+
+double vi_structure_displacement_size(const vi_structure *s, int k)
+{
+    return fabs(s->contacts[k].position) + size_at(s->model, s->model->shape[k], s->state->q);
+}
+
+double vi_structure_velocity_size(const vi_structure *s, int k)
+{
+    return size_at(s->model, s->model->shape[k], s->state->p);
+}
+
+bool vi_structure_watched(const vi_structure *s, int k)
+{
+    return s->contacts[k].law.law != VI_LAW_NONE && !s->state->passed;
+}
+
+int vi_structure_beyond(const vi_structure *s)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const bool rigid = !vi_contact_law_is_compliant(s->contacts[k].law.law);
+        const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
+        if (s->contacts[k].law.law != VI_LAW_NONE && rigid && vi_structure_clearance(s, k) < -noise) {
+            return k + 1;
+        }
+    }
+    return 0;
+}
+
+/* ---- life ---- */
+
+static void place(const vi_structure *s, int k)
+{
+    vi_structure_state *state = s->state;
+    const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k), clearance = vi_structure_clearance(s, k);
+    if (s->contacts[k].law.law == VI_LAW_NONE || clearance > noise) {
+        return;
+    }
+    state->status[k] = VI_CONTACT_TOUCHING;
+    if (clearance < -noise) { /* only a compliant stop may be pressed in at the start */
+        state->status[k] = VI_CONTACT_YIELDING;
+        vi_structure_touch_down(s, k);
+    }
+}
+
+void vi_structure_start(const vi_structure *s, vi_instant now)
+{
+    vi_structure_state *state = s->state, fresh;
+    memset(&fresh, 0, sizeof fresh);
+    memcpy(fresh.q, state->q, sizeof fresh.q);
+    memcpy(fresh.p, state->p, sizeof fresh.p);
+    memcpy(fresh.held, state->held, sizeof fresh.held);
+    memcpy(fresh.held_rate, state->held_rate, sizeof fresh.held_rate);
+    fresh.follow_energies = state->follow_energies;
+    fresh.now = fresh.held_since = now;
+    *state = fresh;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_contact_clear(&s->contacts[k]);
+        s->contacts[k].mass = s->model->mobility[k][k] > 0.0 ? 1.0 / s->model->mobility[k][k] : HUGE_VAL;
+        place(s, k);
+    }
+}
+
+void vi_structure_hold(const vi_structure *s, const double held[], const double held_rate[])
+{
+    vi_structure_state *state = s->state;
+    memcpy(state->held, held, (size_t)s->model->modes * sizeof held[0]);
+    memcpy(state->held_rate, held_rate, (size_t)s->model->modes * sizeof held_rate[0]);
+    state->held_since = state->now;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const vi_contact *contact = &s->contacts[k];
+        if (contact->law.law == VI_LAW_EXTERNAL_FORCE) {
+            state->reference_penetration[k] = -vi_structure_clearance(s, k);
+            state->reference_rate[k] = vi_structure_approach(s, k);
+            if (state->status[k] == VI_CONTACT_RECEDING && contact->applied_force > 0.0) {
+                state->status[k] = VI_CONTACT_YIELDING;
+            }
+            continue;
+        }
+        const double push = vi_structure_direction(s, k) * contact->applied_force;
+        for (int j = 0; j < s->model->modes && push != 0.0; ++j) {
+            state->held[j] -= s->model->shape[k][j] * push;
+        }
+    }
+}
+
+/* ---- segments ---- */
+
+typedef enum { ENDS_ANYWHERE, ENDS_AT_TARGET, ENDS_AT_PERIOD } segment_end;
+
+/* How long one segment may be, and what its end is. */
+static double segment_length(const vi_structure *s, vi_instant target, segment_end *end)
+{
+    const vi_clock *clock = &s->model->clock;
+    const double remaining = vi_clock_elapsed(clock, s->state->now, target);
+    const double to_period = vi_clock_to_period_end(clock, s->state->now);
+    if (s->record->periods && to_period <= remaining) {
+        *end = ENDS_AT_PERIOD;
+        return to_period;
+    }
+    const double longest = LONGEST_SEGMENT * clock->period;
+    *end = remaining <= longest ? ENDS_AT_TARGET : ENDS_ANYWHERE;
+    return vi_min(remaining, longest);
+}
+
+static void record_period(const vi_structure *s)
+{
+    const double *observed = s->model->observed;
+    vi_record_period(s->record, vi_clock_time(&s->model->clock, s->state->now),
+                     vi_structure_at(s->model, observed, s->state->q), vi_structure_at(s->model, observed, s->state->p));
+}
+
+/* Move the instant by u seconds; the two named ends are met exactly. The modal state is there already. */
+static void move(const vi_structure *s, double u, segment_end end, vi_instant target)
+{
+    vi_structure_state *state = s->state;
+    const vi_instant after = end == ENDS_AT_TARGET ? target : vi_clock_after(&s->model->clock, state->now, u);
+    for (int k = 0; k < s->model->contacts && u > 0.0; ++k) {
+        if (state->status[k] == VI_CONTACT_TOUCHING) {
+            state->status[k] = VI_CONTACT_FREE;
+        }
+        state->leaving[k] = 0;
+    }
+    /* a contact may be so close before a period's end that rounding puts it there */
+    if (end == ENDS_AT_PERIOD || (s->record->periods && after.periods > state->now.periods)) {
+        state->now = (vi_instant){state->now.periods + 1, 0.0, 0.0};
+        record_period(s);
+    } else {
+        state->now = after;
+    }
+}
+
+static double landing_room(const vi_structure *s)
+{
+    bool external = false;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        external = external || s->contacts[k].law.law >= VI_LAW_EXTERNAL;
+    }
+    return external ? LANDING * (1.0 + fabs(vi_clock_time(&s->model->clock, s->state->now))) : 0.0;
+}
+
+/* A contact found by rounding just past the end of the period or of the step is at its end. */
+static segment_end landing(segment_end end, double u, double length, double room)
+{
+    const bool past = end == ENDS_AT_PERIOD ? u >= length : u > length + room;
+    return past ? end : ENDS_ANYWHERE;
+}
+
+/* ---- flight ---- */
+
+/* Land on the contact found at this approach: one step of the parabola that touches the motion there. */
+static double land(const vi_approach *p, double u)
+{
+    const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
+    return square >= 0.0 ? u + 2.0 * p->clearance / (p->velocity + sqrt(square)) : u - p->velocity / p->acceleration;
+}
+
+/* Seconds to the contact when the parabola that touches the motion here tells it to the last bit; else HUGE_VAL. */
+static double seconds_to_landing(const vi_structure_model *model, const vi_point *point, const vi_approach *p)
+{
+    if (!(p->clearance * model->fastest < NEAR_CONTACT * p->velocity)) {
+        return HUGE_VAL;
+    }
+    const double t = vi_parabola_root(p->clearance, p->velocity, p->acceleration), cube = t * t * t;
+    const bool exact = fabs(p->jerk) * cube <= DBL_EPSILON * point->scale && p->bound * cube <= DBL_EPSILON * p->velocity;
+    return exact ? t : HUGE_VAL;
+}
+
+/* What a contact that leaves its stop does at once is known exactly. */
+static void correct_start(const vi_structure *s, int k, vi_approach *p)
+{
+    if (s->state->status[k] == VI_CONTACT_TOUCHING) {
+        p->clearance = 0.0;
+        p->velocity = s->state->leaving[k] ? 0.0 : p->velocity;
+        p->acceleration = s->state->leaving[k] == 2 ? 0.0 : p->acceleration;
+    }
+}
+
+/* First contact after the start of the flight: its index, with *u; -1 when there is none. */
+static int locate(const vi_structure *s, const vi_flight *flight, const vi_point points[], double *u)
+{
+    vi_part parts[VI_MODES];
+    for (*u = 0.0;;) {
+        double step = flight->length - *u;
+        int nearest = -1, landing_on = -1;
+        vi_flight_parts(flight, *u, parts);
+        for (int k = 0; k < s->model->contacts; ++k) {
+            if (!vi_structure_watched(s, k)) {
+                continue;
+            }
+            vi_approach p = vi_point_approach(&points[k], flight, parts, *u);
+            const bool starts = *u == 0.0 && s->state->status[k] == VI_CONTACT_TOUCHING;
+            if (starts) {
+                correct_start(s, k, &p);
+            }
+            p.clearance = vi_max(0.0, p.clearance);
+            if (p.velocity > 0.0 && p.clearance <= VI_ROUNDING * points[k].scale) {
+                *u = land(&p, *u);
+                return k;
+            }
+            const double seconds = seconds_to_landing(s->model, &points[k], &p);
+            const double certified = vi_min(seconds, starts ? vi_certified_step(&p, step)
+                                                            : vi_point_step(&points[k], flight, parts, *u, step));
+            if (certified < step) {
+                step = certified;
+                nearest = k;
+                landing_on = certified == seconds ? k : -1;
+            }
+        }
+        if (nearest < 0) {
+            *u = flight->length;
+            return -1;
+        }
+        if (landing_on >= 0 || *u + step == *u) {
+            *u += step;
+            return nearest;
+        }
+        *u += step;
+    }
+}
+
+static void start_points(const vi_structure *s, const vi_flight *flight, vi_point points[])
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_point_start(&points[k], flight, s->model->shape[k], vi_structure_direction(s, k),
+                       vi_structure_clearance(s, k));
+        points[k].scale += fabs(s->contacts[k].position);
+    }
+}
+
+/* Can no stop ever be reached again under the present input? */
+static bool free_for_ever(const vi_structure *s, const vi_flight *flight, const vi_point points[])
+{
+    if (s->record->extrema || s->record->periods || s->state->follow_energies) {
+        return false;
+    }
+    for (int j = 0; j < s->model->modes; ++j) {
+        if (flight->segment[j].series) {
+            return false;
+        }
+    }
+    for (int k = 0; k < s->model->contacts; ++k) {
+        double reach;
+        if (vi_structure_watched(s, k)
+            && (!vi_point_reach(&points[k], flight, &reach) || !(reach < points[k].sign * s->contacts[k].position))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* How long to follow the body from where it is, since a contact is about to meet its stop or slow to leave it, s;
+ * HUGE_VAL when that is not needed. */
+static double low_bounce(const vi_structure *s)
+{
+    const vi_structure_model *model = s->model;
+    double acceleration[VI_MODES], force[VI_PORTS], shortest = HUGE_VAL;
+    vi_structure_accelerate(s, acceleration, force);
+    for (int k = 0; k < model->contacts; ++k) {
+        if (!vi_structure_watched(s, k)) {
+            continue;
+        }
+        const double clearance = vi_max(0.0, vi_structure_clearance(s, k)), v = vi_structure_approach(s, k);
+        const double a = vi_structure_direction(s, k) * vi_structure_at(model, model->shape[k], acceleration);
+        const double flight = vi_parabola_root(clearance, v, a), time = 1.0 / model->fastest;
+        if (flight > 0.0 && flight * model->fastest < LOW_BOUNCE) {
+            shortest = vi_min(shortest, 2.0 * flight);
+        } else if (clearance + (fabs(v) + fabs(a) * time) * time
+                   < LINGERING * vi_structure_displacement_size(s, k)) {
+            shortest = vi_min(shortest, time);
+        }
+    }
+    return shortest;
+}
+
+/* A flight to the target over which no stop can be met: one evaluation, however long. */
+static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant target)
+{
+    const vi_clock *clock = &s->model->clock;
+    const double u = vi_clock_elapsed(clock, s->state->now, target);
+    vi_flight_end(flight, u, clock->angular_frequency * target.rest, s->state->q, s->state->p);
+    move(s, u, ENDS_AT_TARGET, target);
+}
+
+/* Fly to the next contact, the end of the segment, or the target, whichever comes first. */
+static void fly(const vi_structure *s, vi_instant target, const vi_step_request *request)
+{
+    segment_end end;
+    const double length = segment_length(s, target, &end), bounce = low_bounce(s);
+    const double room = end == ENDS_AT_TARGET ? landing_room(s) : 0.0;
+    vi_structure_state *state = s->state;
+    double held[VI_MODES], u;
+    vi_flight flight;
+    vi_point points[VI_PORTS];
+    vi_structure_held_now(s, held);
+    vi_flight_start(&flight, s->model, state->q, state->p, vi_structure_phase(s), held, state->held_rate,
+                    vi_min(length + room, bounce), bounce < HUGE_VAL);
+    start_points(s, &flight, points);
+    if (free_for_ever(s, &flight, points)) {
+        fly_free(s, &flight, target);
+        return;
+    }
+    const int k = locate(s, &flight, points, &u);
+    const bool whole = k < 0 && flight.length >= length;
+    u = whole ? length : u; /* the room after the end was only searched */
+    if (s->record->extrema) {
+        vi_extremes_of_flight(s, &flight, u);
+    }
+    if (state->follow_energies) {
+        vi_energies_of_flight(s, &flight, held, u);
+    }
+    vi_flight_end(&flight, u, flight.angle + flight.angular_frequency * u, state->q, state->p);
+    if (k < 0) {
+        move(s, u, whole ? end : ENDS_ANYWHERE, target);
+        return;
+    }
+    move(s, u, landing(end, u, length, room), target);
+    const double remaining = vi_clock_elapsed(&s->model->clock, state->now, target);
+    vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
+}
+
+/* ---- coupled motion ---- */
+
+static void drift(const vi_structure *s, vi_instant target, const vi_step_request *request)
+{
+    segment_end end;
+    vi_drift_event event;
+    int k;
+    const double length = segment_length(s, target, &end);
+    const double room = end == ENDS_AT_TARGET ? landing_room(s) : 0.0;
+    const double u = vi_structure_drift(s, length, room, &event, &k);
+    const bool whole = event == VI_DRIFT_NO_EVENT && u >= length;
+    move(s, u, whole ? end : event == VI_DRIFT_NO_EVENT ? ENDS_ANYWHERE : landing(end, u, length, room), target);
+    const double remaining = vi_clock_elapsed(&s->model->clock, s->state->now, target);
+    switch (event) {
+    case VI_DRIFT_NO_EVENT: break;
+    case VI_DRIFT_ARRIVAL:
+        vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
+        break;
+    case VI_DRIFT_RELEASE: vi_structure_release(s, k, 2); break;
+    case VI_DRIFT_SEPARATION: vi_structure_separate(s, k, true); break;
+    case VI_DRIFT_RETURN:
+        s->state->status[k] = VI_CONTACT_YIELDING;
+        vi_structure_touch_down(s, k);
+        break;
+    case VI_DRIFT_FREE: s->state->status[k] = VI_CONTACT_FREE; break;
+    }
+}
+
+bool vi_structure_is_coupled(const vi_structure *s)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->state->status[k] >= VI_CONTACT_HELD) {
+            return true;
+        }
+    }
+    return s->model->coupled;
+}
+
+/* ---- a step ---- */
+
+static int64_t impacts_so_far(const vi_structure *s)
+{
+    int64_t sum = 0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        sum += s->contacts[k].count + s->contacts[k].graze_count;
+    }
+    return sum;
+}
+
+static void begin_step(const vi_structure *s, const vi_step_request *request)
+{
+    vi_record_begin_step(s->record, vi_structure_at(s->model, s->model->observed, s->state->q));
+    for (int k = 0; k < s->model->contacts; ++k) {
+        s->contacts[k].event_time = NAN;
+    }
+    vi_structure_settle(s, request);
+    if (s->record->periods && !s->record->period_open && s->state->now.rest == 0.0) {
+        record_period(s);
+    }
+}
+
+vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, const vi_step_request *request)
+{
+    begin_step(s, request);
+    /* a record that is full already was not emptied by the importer: ending the step again would end it for ever */
+    const bool ends_when_full = request->early_return && !vi_record_full(s->record);
+    const int64_t limit = s->model->impact_limit, most = limit > 0 ? impacts_so_far(s) + limit : INT64_MAX;
+    while (!s->state->pending && vi_clock_elapsed(&s->model->clock, s->state->now, target) > 0.0) {
+        if (ends_when_full && vi_record_full(s->record)) {
+            return VI_STEP_RECORD_FULL;
+        }
+        if (impacts_so_far(s) >= most) {
+            return VI_STEP_IMPACT_LIMIT;
+        }
+        if (vi_structure_is_coupled(s)) {
+            drift(s, target, request);
+        } else {
+            fly(s, target, request);
+        }
+        vi_structure_settle(s, request);
+    }
+    return s->state->pending ? VI_STEP_CONTACT : VI_STEP_DONE;
+}
+
+void vi_structure_outputs(const vi_structure *s, double acceleration[VI_MODES])
+{
+    double force[VI_PORTS];
+    vi_structure_accelerate(s, acceleration, force);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_contact *contact = &s->contacts[k];
+        const int32_t status = s->state->status[k];
+        const bool on_stop = status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD;
+        contact->displacement = on_stop ? contact->position : vi_structure_at(s->model, s->model->shape[k], s->state->q);
+        contact->velocity = status == VI_CONTACT_HELD ? 0.0 : vi_structure_at(s->model, s->model->shape[k], s->state->p);
+        contact->force = vi_max(0.0, force[k]);
+    }
+}

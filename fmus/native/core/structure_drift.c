@@ -1,0 +1,304 @@
+/* The motion of a structure while stops hold it or yield to it: one Taylor segment at a time, up to its first event. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "majorant.h"
+#include "structure_parts.h"
+
+/* A surface that has relaxed to less than this times the displacements is at rest. */
+static const double RELAXED = 1e-16;
+
+typedef struct {
+    double at[VI_PORTS], sign[VI_PORTS]; /* penetrations, directions */
+    double held[VI_MODES];
+    vi_press press[VI_PORTS];
+    int thin[VI_PORTS]; /* of a power law: so little penetration that its force acts as an impulse */
+    double length;      /* that thin contacts allow, s */
+} situation;
+
+/* ---- thin contacts: the first and last instants of a power law, where its series does not converge ---- */
+
+/* Mobility-weighted stiffness of a power law at this rate of penetration. */
+static double thin_stiffness(const vi_structure *s, int k, double rate)
+{
+    const vi_press press = vi_structure_press(s, k);
+    return press.stiffness * vi_max(0.0, 1.0 + press.damping * rate) * s->model->compliance[k][k];
+}
+
+/* How long the force may act as that of a penetration at constant rate, within the tolerance. */
+static double thin_time(const vi_structure *s, int k, double rate, double acceleration)
+{
+    const double n = vi_structure_press(s, k).exponent, stiffness = thin_stiffness(s, k, rate);
+    const double speed = fabs(rate), pull = fabs(acceleration), tolerance = s->model->tolerance;
+    double t = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0;
+    for (int halving = 0; halving < 1000 && t > 0.0; ++halving, t *= 0.5) {
+        const double depth = speed * t + 0.5 * pull * t * t;
+        const double most = stiffness * pow(depth, n) * t, total = speed + pull * t; /* velocity change at most */
+        const double error = most * n * (pull * t + most);
+        if (most <= tolerance * total || error <= tolerance * speed * speed) {
+            return t;
+        }
+    }
+    return t;
+}
+
+/* Give the impulse of a thin contact over u seconds of constant rate, to the state at the end. */
+static void give_thin_impulse(const vi_structure *s, int k, double depth, double rate, double u)
+{
+    const vi_press press = vi_structure_press(s, k);
+    const double n = press.exponent, after = vi_max(0.0, depth + rate * u);
+    if (rate == 0.0) {
+        return;
+    }
+    const double strength = press.stiffness * vi_max(0.0, 1.0 + press.damping * rate) / ((n + 1.0) * rate);
+    const double begun = pow(depth, n + 1.0);
+    const double impulse = strength * (pow(after, n + 1.0) - begun);
+    const double moved = strength * ((pow(after, n + 2.0) - begun * depth) / ((n + 2.0) * rate) - begun * u);
+    const double sign = vi_structure_direction(s, k);
+    const double before = vi_structure_kinetic(s);
+    for (int j = 0; j < s->model->modes; ++j) {
+        s->state->p[j] -= sign * s->model->shape[k][j] * impulse;
+        s->state->q[j] -= sign * s->model->shape[k][j] * moved;
+    }
+    s->state->touch_down[k].impulse += impulse;
+    s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
+}
+
+static void look(const vi_structure *s, situation *now)
+{
+    double acceleration[VI_MODES], force[VI_PORTS];
+    bool any_power = false;
+    now->length = HUGE_VAL;
+    vi_structure_held_now(s, now->held);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        now->at[k] = -vi_structure_clearance(s, k);
+        now->sign[k] = vi_structure_direction(s, k);
+        now->press[k] = vi_structure_press(s, k);
+        now->thin[k] = 0;
+        any_power = any_power || now->press[k].kind == VI_PRESS_POWER;
+    }
+    if (!any_power) {
+        return;
+    }
+    vi_structure_accelerate(s, acceleration, force);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (now->press[k].kind != VI_PRESS_POWER) {
+            continue;
+        }
+        const double rate = vi_structure_approach(s, k), depth = vi_max(0.0, now->at[k]);
+        const double a = vi_structure_at(s->model, s->model->shape[k], acceleration);
+        const double time = thin_time(s, k, rate, a);
+        if (rate <= 0.0 ? depth <= -rate * time || depth == 0.0 : depth <= DBL_EPSILON * rate * time) {
+            now->thin[k] = 1;
+            now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
+            now->length = rate >= 0.0 ? vi_min(now->length, time) : now->length;
+        }
+    }
+}
+
+/* ---- events ---- */
+
+typedef struct {
+    double time;
+    vi_drift_event event;
+    int contact;
+} event_found;
+
+static void consider(event_found *first, const vi_fall *fall, vi_drift_event event, int contact)
+{
+    if (fall->found && fall->time < first->time) {
+        *first = (event_found){fall->time, event, contact};
+    }
+}
+
+/* Where a polynomial falls through zero; touches from above are passed over. */
+static vi_fall fall_through(const double c[VI_ORDER + 1], double length, double noise)
+{
+    vi_fall fall = vi_polynomial_fall(c, 0.0, length, noise);
+    for (int turn = 0; turn < 8 && fall.found && fall.speed == 0.0; ++turn) {
+        const double after = fall.time + vi_max(1e-3 * length, DBL_EPSILON * length);
+        if (!(after < length)) {
+            return (vi_fall){false, length, 0.0};
+        }
+        fall = vi_polynomial_fall(c, after, length, noise);
+    }
+    return fall;
+}
+
+static void arrivals(const vi_structure *s, const vi_drift *drift, int k, double length, event_found *first)
+{
+    double clearance[VI_ORDER + 1];
+    for (int n = 0; n <= VI_ORDER; ++n) {
+        clearance[n] = -drift->penetration[k][n];
+    }
+    if (s->state->status[k] == VI_CONTACT_TOUCHING) {
+        const int exact = s->state->leaving[k];
+        clearance[0] = 0.0;
+        clearance[1] = exact ? 0.0 : clearance[1];
+        clearance[2] = exact == 2 ? 0.0 : clearance[2];
+    }
+    const double noise = VI_ROUNDING * (fabs(s->contacts[k].position) + vi_polynomial_size(clearance, length));
+    const vi_fall fall = vi_polynomial_fall(clearance, 0.0, length, noise);
+    consider(first, &fall, VI_DRIFT_ARRIVAL, k);
+}
+
+static void releases(const vi_drift *drift, int k, double length, event_found *first)
+{
+    const double *force = drift->force[k], noise = VI_ROUNDING * drift->force_scale[k];
+    vi_fall fall = {true, 0.0, 1.0};
+    if (force[0] >= -noise) {
+        fall = fall_through(force, length, noise);
+    }
+    consider(first, &fall, VI_DRIFT_RELEASE, k);
+}
+
+static void separations(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double length,
+                        event_found *first)
+{
+    const double *depth = drift->penetration[k], *force = drift->force[k];
+    if (!now->thin[k]) {
+        vi_fall fall = fall_through(force, length, VI_ROUNDING * vi_polynomial_size(force, length));
+        consider(first, &fall, VI_DRIFT_SEPARATION, k);
+    }
+    if (depth[0] > 0.0 || depth[1] < 0.0) {
+        const double noise = VI_ROUNDING * (fabs(s->contacts[k].position) + vi_polynomial_size(depth, length));
+        vi_fall fall = vi_polynomial_fall(depth, 0.0, length, now->thin[k] ? VI_ROUNDING * fabs(depth[0]) : noise);
+        consider(first, &fall, VI_DRIFT_SEPARATION, k);
+    }
+}
+
+/* What must fall to zero for a receding contact to press again: minus its force or, where the surface needs time, the
+ * distance to it. */
+static void gap_to_return(const vi_structure *s, const vi_drift *drift, int k, double gap[VI_ORDER + 1])
+{
+    const vi_contact *contact = &s->contacts[k];
+    const double *depth = drift->penetration[k], tau = contact->relaxation_time;
+    const double elapsed = vi_clock_elapsed(&s->model->clock, s->state->separated[k], s->state->now);
+    double surface = tau > 0.0 ? s->state->surface[k] * exp(-elapsed / tau) : 0.0;
+    for (int n = 0; n <= VI_ORDER; ++n) {
+        const double rate = n < VI_ORDER ? (double)(n + 1) * depth[n + 1] : 0.0;
+        if (tau > 0.0) {
+            gap[n] = surface - depth[n];
+            surface *= -1.0 / (tau * (double)(n + 1));
+        } else if (contact->law.law == VI_LAW_KELVIN_VOIGT) {
+            gap[n] = -(contact->law.stiffness * depth[n] + contact->law.damping * rate);
+        } else {
+            gap[n] = -((n == 0 ? 1.0 : 0.0) + contact->law.damping * rate);
+        }
+    }
+    gap[VI_ORDER] = tau > 0.0 ? gap[VI_ORDER] : 0.0; /* the rate's last coefficient is not known */
+}
+
+static void returns(const vi_structure *s, const vi_drift *drift, int k, double length, event_found *first)
+{
+    const double *depth = drift->penetration[k], tau = s->contacts[k].relaxation_time;
+    const double noise = VI_ROUNDING * (fabs(s->contacts[k].position) + vi_polynomial_size(depth, length));
+    if (s->contacts[k].law.law != VI_LAW_EXTERNAL_FORCE) {
+        double gap[VI_ORDER + 1];
+        gap_to_return(s, drift, k, gap);
+        const double small = VI_ROUNDING * vi_polynomial_size(gap, length);
+        vi_fall fall = vi_polynomial_fall(gap, 0.0, length, small);
+        consider(first, &fall, VI_DRIFT_RETURN, k);
+        if (tau > 0.0) {
+            const double elapsed = vi_clock_elapsed(&s->model->clock, s->state->separated[k], s->state->now);
+            const bool relaxed = s->state->surface[k] * exp(-elapsed / tau) <= RELAXED * noise / VI_ROUNDING;
+            fall = (vi_fall){relaxed, 0.0, 1.0};
+            consider(first, &fall, VI_DRIFT_FREE, k);
+            return;
+        }
+    }
+    vi_fall fall = {true, 0.0, 1.0};
+    if (depth[0] > 0.0) {
+        fall = vi_polynomial_fall(depth, 0.0, length, noise);
+    }
+    consider(first, &fall, VI_DRIFT_FREE, k);
+}
+
+static event_found first_event(const vi_structure *s, const vi_drift *drift, const situation *now, double length,
+                               double searched)
+{
+    event_found first = {HUGE_VAL, VI_DRIFT_NO_EVENT, -1};
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (!vi_structure_watched(s, k) && s->state->status[k] < VI_CONTACT_HELD) {
+            continue;
+        }
+        switch (s->state->status[k]) {
+        case VI_CONTACT_FREE:
+        case VI_CONTACT_TOUCHING: arrivals(s, drift, k, searched, &first); break;
+        case VI_CONTACT_HELD: releases(drift, k, length, &first); break;
+        case VI_CONTACT_YIELDING: separations(s, drift, now, k, length, &first); break;
+        default: returns(s, drift, k, length, &first); break;
+        }
+    }
+    return first;
+}
+
+/* ---- one segment ---- */
+
+static void add_impulses(const vi_structure *s, const vi_drift *drift, const situation *now, double u)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (now->thin[k]) {
+            give_thin_impulse(s, k, vi_max(0.0, now->at[k]), drift->penetration[k][1], u);
+        } else if (s->state->status[k] == VI_CONTACT_YIELDING) {
+            double sum = 0.0;
+            for (int n = VI_ORDER; n >= 0; --n) {
+                sum = sum * u + drift->force[k][n] / (double)(n + 1);
+            }
+            s->state->touch_down[k].impulse += sum * u;
+        }
+    }
+}
+
+/* Nothing moves and nothing will: a body at rest on a stop under constant loads. */
+static bool at_rest_for_good(const vi_structure *s, const vi_drift *drift, const situation *now)
+{
+    const vi_structure_model *model = s->model;
+    if (s->record->periods) {
+        return false;
+    }
+    for (int j = 0; j < model->modes; ++j) {
+        const vi_mode *mode = &model->mode[j];
+        const bool forced = mode->force != 0.0 && model->clock.angular_frequency > 0.0;
+        const double load = fabs(now->held[j]) + fabs(mode->force) + mode->stiffness * fabs(s->state->q[j]);
+        if (forced || s->state->held_rate[j] != 0.0 || s->state->p[j] != 0.0
+            || fabs(2.0 * drift->modal[2][j]) > VI_ROUNDING * load) {
+            return false;
+        }
+    }
+    return true;
+}
+
+double vi_structure_drift(const vi_structure *s, double length, double room, vi_drift_event *event, int *k)
+{
+    vi_structure_state *state = s->state;
+    const vi_phase phase = vi_structure_phase(s);
+    situation now;
+    vi_drift drift;
+    look(s, &now);
+    const vi_drift_start start = {state->q,   state->p, phase.cosine, phase.sine, now.held, state->held_rate,
+                                  now.at, now.sign, now.press};
+    vi_drift_begin(&drift, s->model, &start, vi_min(length + room, now.length));
+    const bool to_end = drift.length >= length;
+    const double reach = to_end ? length : drift.length;
+    const event_found first = first_event(s, &drift, &now, reach, vi_max(reach, drift.length));
+    *event = first.event;
+    *k = first.contact;
+    const double u = first.event == VI_DRIFT_NO_EVENT ? reach : first.time;
+    if (first.event == VI_DRIFT_NO_EVENT && at_rest_for_good(s, &drift, &now)) {
+        return length;
+    }
+    if (s->record->extrema) {
+        vi_extremes_of_drift(s, &drift, u);
+    }
+    if (state->follow_energies) {
+        vi_energies_of_drift(s, &drift, now.held, u);
+    }
+    double q[VI_MODES];
+    memcpy(q, state->q, sizeof q);
+    vi_drift_at(&drift, u, q, state->p, state->q);
+    add_impulses(s, &drift, &now, u);
+    vi_structure_project(s);
+    return u;
+}

@@ -1,0 +1,84 @@
+/* What the files of the structure engine share: questions about the present instant, and the moments of a contact. */
+#ifndef VIBROIMPACT_STRUCTURE_PARTS_H
+#define VIBROIMPACT_STRUCTURE_PARTS_H
+
+#include "coupled_flow.h"
+#include "modal_flight.h"
+#include "structure.h"
+
+/* Rounding of a displacement, in units of the terms it is the sum of. */
+#define VI_ROUNDING (4.0 * DBL_EPSILON)
+
+/* ---- the present instant ---- */
+
+double vi_structure_direction(const vi_structure *s, int k);
+vi_phase vi_structure_phase(const vi_structure *s);
+void vi_structure_held_now(const vi_structure *s, double held[]);
+
+/* sign * shape . p: speed towards the stop, m/s */
+double vi_structure_approach(const vi_structure *s, int k);
+
+/* Clearance of contact k, m: exactly 0 where it is known to touch. */
+double vi_structure_clearance(const vi_structure *s, int k);
+
+/* Size of the terms that a displacement, or a velocity, of contact k is the sum of. */
+double vi_structure_displacement_size(const vi_structure *s, int k);
+double vi_structure_velocity_size(const vi_structure *s, int k);
+
+/* Is this contact looked for? */
+bool vi_structure_watched(const vi_structure *s, int k);
+
+/* How contact k presses now. */
+vi_press vi_structure_press(const vi_structure *s, int k);
+
+/* Modal accelerations now, and the forces of held and yielding contacts; held ones may come out negative (they pull). */
+void vi_structure_accelerate(const vi_structure *s, double acceleration[], double force[]);
+
+/* ---- moments ---- */
+
+/* Contact k has arrived at its stop (others may have, too): resolve it, or wait for an answer, or pass (FMI 2.0). */
+void vi_structure_meet(const vi_structure *s, int k, bool stop_here);
+
+/* Joint impulses of all contacts that touch with an approach; answers of external laws are used where `answered`. */
+void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS]);
+
+/* What the contacts that touch do now, after inputs or states changed: hit, rest, yield or leave. */
+void vi_structure_settle(const vi_structure *s, const vi_step_request *request);
+
+void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_impulse);
+void vi_structure_release(const vi_structure *s, int k, int leaving);
+void vi_structure_touch_down(const vi_structure *s, int k);
+void vi_structure_separate(const vi_structure *s, int k, bool receding);
+
+/* Put the held contacts back on their stops, at rest: takes off what rounding has added. */
+void vi_structure_project(const vi_structure *s);
+
+/* Follow the coupled motion to its next event, the end of a segment or `length`, whichever is first; returns the time
+ * moved. *k is the contact of the event, or -1. The state (q, p) is moved, the instant is not. Arrivals up to `room`
+ * after the length count as at it. */
+typedef enum {
+    VI_DRIFT_NO_EVENT,
+    VI_DRIFT_ARRIVAL,
+    VI_DRIFT_RELEASE,
+    VI_DRIFT_SEPARATION,
+    VI_DRIFT_RETURN, /* to a compliant surface that it had left */
+    VI_DRIFT_FREE    /* a receding contact is out, or its surface has relaxed */
+} vi_drift_event;
+
+double vi_structure_drift(const vi_structure *s, double length, double room, vi_drift_event *event, int *k);
+
+/* Is any contact held, yielding or receding, or is the damping coupled? */
+bool vi_structure_is_coupled(const vi_structure *s);
+
+/* ---- energies, when they are followed ---- */
+
+void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const double held[], double u);
+void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], double u);
+double vi_structure_kinetic(const vi_structure *s);
+
+/* ---- extremes of the observed point ---- */
+
+void vi_extremes_of_flight(const vi_structure *s, const vi_flight *flight, double u);
+void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u);
+
+#endif
