@@ -280,22 +280,24 @@ class Structure:
         self._read()
         end = self.time + duration
         result = RECORD_FULL
-        remaining = duration
+        remaining, left = duration, most_impacts
         while result == RECORD_FULL:
             elapsed = duration - remaining
             result = self._library.vi_door_structure_advance(
-                self._handle, remaining, _pointer(force + slope * elapsed), _pointer(slope), most_impacts
+                self._handle, remaining, _pointer(force + slope * elapsed), _pointer(slope), left
             )
             self._read()
-            self._take_rows()
+            taken = self._take_rows()
+            left = max(1.0, left - taken) if left else 0
             remaining = end - self.time
         return int(result)
 
-    def _take_rows(self) -> None:
+    def _take_rows(self) -> int:
         rows = np.empty((ROW_CAPACITY, ROW_WIDTH))
         count = self._library.vi_door_structure_rows(self._handle, _pointer(rows), ROW_CAPACITY)
         if count:
             self._rows.blocks.append(rows[:count].copy())
+        return int((rows[:count, 0] == ROW_IMPACT).sum())
 
     @property
     def impacts(self) -> Array:

@@ -5,8 +5,10 @@
 
 /* Pivots smaller than this times the largest diagonal mean that contacts are redundant. */
 static const double REDUNDANT = 1e-11;
-/* Redundant contacts share their load as if each had this times the largest mobility of its own. */
-static const double SOFTENING = 1e-9;
+/* Redundant contacts share their load as if each had this times the largest mobility of its own; what that leaves over is
+ * solved for again, so many times. */
+static const double SOFTENING = 1e-6;
+enum { REFINEMENTS = 4 };
 
 /* Gaussian elimination with partial pivoting; 0 when a pivot is too small. */
 static int eliminate(int n, double a[VI_PORTS][VI_PORTS + 1], double smallest)
@@ -34,32 +36,71 @@ static int eliminate(int n, double a[VI_PORTS][VI_PORTS + 1], double smallest)
     return 1;
 }
 
+/* Solve for the contacts in `index`, softened or not, with right-hand side b; 0 when they are redundant. */
+static int solve(int count, double g[VI_PORTS][VI_PORTS], const int index[], const double b[], double softening,
+                 double smallest, double p[])
+{
+    double a[VI_PORTS][VI_PORTS + 1];
+    for (int i = 0; i < count; ++i) {
+        for (int j = 0; j < count; ++j) {
+            a[i][j] = g[index[i]][index[j]] + (i == j ? softening : 0.0);
+        }
+        a[i][count] = b[i];
+    }
+    if (!eliminate(count, a, smallest)) {
+        return 0;
+    }
+    for (int i = 0; i < count; ++i) {
+        p[i] = a[i][count] / a[i][i];
+    }
+    return 1;
+}
+
+/* Redundant contacts: softened, and what that leaves over solved for again. */
+static void share(int count, double g[VI_PORTS][VI_PORTS], const int index[], const double b[], double largest,
+                  double p[])
+{
+    double left[VI_PORTS], more[VI_PORTS] = {0.0};
+    for (int i = 0; i < count; ++i) {
+        p[i] = 0.0;
+    }
+    for (int turn = 0; turn < REFINEMENTS; ++turn) {
+        for (int i = 0; i < count; ++i) {
+            left[i] = b[i];
+            for (int j = 0; j < count; ++j) {
+                left[i] -= g[index[i]][index[j]] * p[j];
+            }
+        }
+        if (!solve(count, g, index, left, SOFTENING * largest, 0.0, more)) {
+            return;
+        }
+        for (int i = 0; i < count; ++i) {
+            p[i] += more[i];
+        }
+    }
+}
+
 void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], const int active[VI_PORTS],
                      double p[VI_PORTS])
 {
     int index[VI_PORTS], count = 0;
-    double largest = 0.0;
+    double largest = 0.0, wanted[VI_PORTS], found[VI_PORTS];
     for (int k = 0; k < n; ++k) {
         p[k] = 0.0;
         if (active[k]) {
+            wanted[count] = b[k];
             index[count++] = k;
             largest = fmax(largest, fabs(g[k][k]));
         }
     }
-    for (int soft = 0; soft < 2 && largest > 0.0; ++soft) {
-        double a[VI_PORTS][VI_PORTS + 1];
-        for (int i = 0; i < count; ++i) {
-            for (int j = 0; j < count; ++j) {
-                a[i][j] = g[index[i]][index[j]] + (soft && i == j ? SOFTENING * largest : 0.0);
-            }
-            a[i][count] = b[index[i]];
-        }
-        if (eliminate(count, a, soft ? 0.0 : REDUNDANT * largest)) {
-            for (int i = 0; i < count; ++i) {
-                p[index[i]] = a[i][count] / a[i][i];
-            }
-            return;
-        }
+    if (count == 0 || !(largest > 0.0)) {
+        return;
+    }
+    if (!solve(count, g, index, wanted, 0.0, REDUNDANT * largest, found)) {
+        share(count, g, index, wanted, largest, found);
+    }
+    for (int i = 0; i < count; ++i) {
+        p[index[i]] = found[i];
     }
 }
 

@@ -339,17 +339,9 @@ static void start_points(const vi_structure *s, const vi_flight *flight, vi_poin
     }
 }
 
-/* Can no stop ever be reached again under the present input? */
-static bool free_for_ever(const vi_structure *s, const vi_flight *flight, const vi_point points[])
+/* Can no stop ever be reached again under the present input? Their envelopes prove it. */
+static bool out_of_reach(const vi_structure *s, const vi_flight *flight, const vi_point points[])
 {
-    if (s->record->extrema || s->record->periods || s->state->follow_energies) {
-        return false;
-    }
-    for (int j = 0; j < s->model->modes; ++j) {
-        if (flight->segment[j].series) {
-            return false;
-        }
-    }
     for (int k = 0; k < s->model->contacts; ++k) {
         double reach;
         if (vi_structure_watched(s, k)
@@ -358,6 +350,17 @@ static bool free_for_ever(const vi_structure *s, const vi_flight *flight, const 
         }
     }
     return true;
+}
+
+/* Is nothing wanted of the motion before the target, and one evaluation enough however far that is? */
+static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
+{
+    for (int j = 0; j < s->model->modes; ++j) {
+        if (flight->segment[j].series) {
+            return false;
+        }
+    }
+    return !s->record->extrema && !s->record->periods && !s->state->follow_energies;
 }
 
 /* How long to follow the body from where it is, since a contact is about to meet its stop or slow to leave it, s;
@@ -407,11 +410,13 @@ static void fly(const vi_structure *s, vi_instant target, const vi_step_request 
     vi_flight_start(&flight, s->model, state->q, state->p, vi_structure_phase(s), held, state->held_rate,
                     vi_min(length + room, bounce), bounce < HUGE_VAL);
     start_points(s, &flight, points);
-    if (free_for_ever(s, &flight, points)) {
+    const bool unreachable = out_of_reach(s, &flight, points);
+    if (unreachable && only_end_matters(s, &flight)) {
         fly_free(s, &flight, target);
         return;
     }
-    const int k = locate(s, &flight, points, &u);
+    u = flight.length;
+    const int k = unreachable ? -1 : locate(s, &flight, points, &u);
     const bool whole = k < 0 && flight.length >= length;
     u = whole ? length : u; /* the room after the end was only searched */
     if (s->record->extrema) {
