@@ -314,7 +314,10 @@ class Structure:
 
     @property
     def periods(self) -> Array:
-        """Whole forcing periods, shape (periods, 8): 3, start, max, min, strobe displacement and velocity, impacts, 0."""
+        """Whole forcing periods, shape (periods, 8).
+
+        Columns: 3, start, largest and smallest displacement, strobe displacement and velocity, impacts, 0.
+        """
         return self._rows.of_kind(ROW_PERIOD)
 
     @property

@@ -1,6 +1,7 @@
-/* Modes of an Euler-Bernoulli beam, in forms that keep all digits to high order. equations.md 6.1 to 6.7
+/* Modes of an Euler-Bernoulli beam, in forms that keep all digits to high order. equations.md 6.1 to 6.8
  *
- * Shapes have unit mean square over the length: int_0^1 phi_i phi_j ds = delta_ij, with s = x / length. */
+ * Shapes have unit mean square over the length: int_0^1 phi_i phi_j ds = delta_ij, with s = x / length, 0 at the first
+ * of the two ends of the boundary's name. Modes are counted from j = 1. */
 #ifndef VIBROIMPACT_BEAM_MODES_H
 #define VIBROIMPACT_BEAM_MODES_H
 
@@ -12,24 +13,29 @@ typedef enum {
     VI_PINNED_PINNED = 4
 } vi_beam_boundary;
 
-/* Eigenvalue xi_j, j = 1, 2, ...: natural angular frequency = xi^2 sqrt(E I / (mass_per_length length^4)). */
+/* Eigenvalue xi_j: natural angular frequency = xi^2 sqrt(E I / (mass_per_length length^4)). To one rounding. */
 double vi_beam_eigenvalue(vi_beam_boundary boundary, int j);
 
-/* phi_j(s), or its derivative of order 0 to 3 over s, 0 <= s <= 1. The first antinode from the clamp is positive. */
+/* phi_j(s), or its derivative of order 0 to 3 over s, 0 <= s <= 1. The first antinode from s = 0 is positive. What
+ * the ends prescribe is exact there (0; tip of the clamped-free beam 2 (-1)^(j+1)); elsewhere the error is some 1e-15
+ * xi^derivative, for every j. */
 double vi_beam_shape(vi_beam_boundary boundary, int j, double s, int derivative);
 
 /* int_0^1 phi_j ds: participation of mode j in a uniform load or in an acceleration of the base. */
 double vi_beam_participation(vi_beam_boundary boundary, int j);
 
-/* Static stiffness at s times length^3 / (E I), in closed form for all four boundaries. */
+/* Static stiffness at s times length^3 / (E I), in closed form for all four boundaries; infinite at a support. */
 double vi_beam_static_stiffness(vi_beam_boundary boundary, double s);
 
-/* Estimated relative error of a natural frequency by Euler-Bernoulli's theory: equations.md 6.7.
- * slenderness = radius of gyration / length; E / G and the shear coefficient as given there. */
-double vi_beam_validity(vi_beam_boundary boundary, int j, double slenderness, double e_over_g, double shear_coefficient);
+/* Estimated relative error of a natural frequency by Euler-Bernoulli's theory: equations.md 6.7, Timoshenko's drop to
+ * leading order (that of the pinned-pinned beam; of the others to about the same).
+ * slenderness = radius of gyration / length; E / G and the shear coefficient (5/6 for a rectangle) as given there. */
+double vi_beam_validity(vi_beam_boundary boundary, int j, double slenderness, double e_over_g,
+                        double shear_coefficient);
 
-/* Unit impulse at grid point `at` (0-based) of `n` points s[] by collocation, as modal velocities d_c with
- * phi . d_c = 1 there and 0 at the other points: the thesis's rule (7.60). Returns 0 when the grid is singular. */
+/* Unit impulse at grid point `at` (0-based) of `n` points s[] by collocation, as modal velocities d_c of modes 1 to n
+ * with phi . d_c = 1 there and 0 at the other points: the thesis's rule (7.60). Returns 0 when the grid is singular
+ * (a point twice, a point on a support) or n is not within 1 to VI_MODES; direction is then unchanged. */
 int vi_beam_collocation(vi_beam_boundary boundary, int n, const double s[], int at, double direction[]);
 
 #endif

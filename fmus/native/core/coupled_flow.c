@@ -7,8 +7,9 @@
 #include "complementarity.h"
 #include "majorant.h"
 
-/* Length of a segment times the fastest rate: the first term left out is below 1e-17 of the motion. */
-static const double REACH = 1.0;
+/* Length of a segment times the fastest rate: the first term left out is below 1e-17 of the motion, and the largest
+ * terms are 12 times it. While a stop yields, less: its contact is short anyway, and keeps all digits. */
+static const double REACH = 2.5, REACH_YIELDING = 1.0;
 /* Of a power law the terms must fall by this over a segment: it has a singularity where the contact ends. */
 static const double SMALLEST_TERM = 0.01;
 
@@ -154,9 +155,10 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
     double power[VI_PORTS][VI_ORDER + 1], load[VI_MODES];
     const double w = model->clock.angular_frequency;
     double drive[2] = {start->cosine, -w * start->sine};
-    int any_held = 0;
+    int any_held = 0, any_yielding = 0;
     for (int k = 0; k < model->contacts; ++k) {
         any_held |= start->press[k].kind == VI_PRESS_HOLD;
+        any_yielding |= start->press[k].kind >= VI_PRESS_LINEAR;
     }
     drift->model = model;
     memset(drift->force, 0, sizeof drift->force);
@@ -189,7 +191,7 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
     }
     scale_of_holding(drift, start);
     const double fastest = fastest_rate(model, start);
-    drift->length = fastest > 0.0 ? vi_min(length, REACH / fastest) : length;
+    drift->length = fastest > 0.0 ? vi_min(length, (any_yielding ? REACH_YIELDING : REACH) / fastest) : length;
     shorten(drift, start);
 }
 

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 
 /* Order of the Taylor polynomials of a coupled motion. */
-enum { VI_ORDER = 18 };
+enum { VI_ORDER = 26 };
 
 /* Value, and the first three derivatives, of c[0] + c[1] u + ... + c[VI_ORDER] u^VI_ORDER. */
 void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4]);
