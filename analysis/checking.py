@@ -10,7 +10,7 @@ import xarray as xr
 from vibroimpact.analysis.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,
-    IMPACT_COLUMNS,
+    NEEDED_IMPACT_COLUMNS,
     RAGGED,
     RULES,
     RUN_COLUMNS,
@@ -63,7 +63,7 @@ def _structure_problems(dataset: xr.Dataset) -> list[str]:
 _GROUPS = (
     ("displacement_max", "displacement_min"),
     ("strobe_displacement", "strobe_velocity"),
-    ("impact_count", *IMPACT_COLUMNS),
+    ("impact_count", *NEEDED_IMPACT_COLUMNS),
     ("stick_count", *STICK_COLUMNS),
     ("event_count", *EVENT_COLUMNS),
     ("connection", "energy_residual"),
@@ -171,6 +171,9 @@ def _impact_problems(dataset: xr.Dataset) -> list[str]:
         problems.append("impact_phase: expected 0 <= phase < 2 pi rad or NaN, got a phase outside.")
     if not (dataset.variables["impact_velocity"].values >= 0).all():
         problems.append("impact_velocity: expected a speed of approach >= 0, got a negative or missing one.")
+    for name in ("impact_restitution", "impact_duration"):
+        if name in dataset.variables and (dataset.variables[name].values < 0).any():
+            problems.append(f"{name}: expected a number >= 0 or NaN, got a negative one.")
     if (dataset.variables["impact_contact"].values < 1).any():
         problems.append("impact_contact: expected stops numbered from 1, got a smaller number.")
     return problems

@@ -220,7 +220,8 @@ class _RunArray(BackendArray):
 
     @cached_property
     def _values(self) -> NDArray[Any]:
-        values = self._read()[self._run_id]
+        # one run alone is a bare value: text would stay so
+        values = np.array(self._read()[self._run_id], dtype=self.dtype)
         missing = self._run_id < 0
         if missing.any():
             values[missing] = {"f": np.nan, "i": -1}.get(values.dtype.kind, "")

@@ -56,9 +56,10 @@ class RunRecord:
     periods : ndarray of float, shape (period, 5), or None
         Columns `PERIOD_COLUMNS`: displacement_max, displacement_min, strobe_displacement (m),
         strobe_velocity (m/s), impacts_per_period.
-    impacts : ndarray of float, shape (impact, 5), or None
+    impacts : ndarray of float, shape (impact, 7), or None
         Columns `IMPACT_COLUMNS`: impact_time (s), impact_phase (rad), impact_velocity (m/s),
-        impact_impulse (N s), impact_contact (1-based).
+        impact_impulse (N s), impact_contact (1-based), impact_restitution, impact_duration (s). The last two
+        may be left out, and are NaN then.
     sticks : ndarray of float, shape (stick, 3), or None
         Columns `STICK_COLUMNS`: stick_start, stick_end (s; NaN: still stuck at the end), stick_contact.
     samples : ndarray of float, shape (sample, 1 + variables), or None
@@ -74,6 +75,9 @@ class RunRecord:
         Interface energy residual of each force-displacement connection, J.
     loop_residual : float or None
         Largest relative residual of the algebraic loops.
+    final_state : ndarray of float, shape (2 N,), or None
+        Whole state of a chain or beam at the end: N displacements (m), then N velocities (m/s), of its masses
+        or modes.
     """
 
     outcome: Outcome
@@ -89,6 +93,7 @@ class RunRecord:
     events: NDArray[np.float64] | None = None
     energy_residual: NDArray[np.float64] | None = None
     loop_residual: float | None = None
+    final_state: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +125,13 @@ _RULES = (
     VariableRule("final_displacement", ("run",), np.float64, "m", "displacement at the end of the run"),
     VariableRule("final_velocity", ("run",), np.float64, "m s-1", "velocity at the end of the run"),
     VariableRule("final_phase", ("run",), np.float64, "rad", "forcing phase at the end of the run"),
+    VariableRule(
+        "final_state",
+        ("run", "state"),
+        np.float64,
+        "1",
+        "displacements (m), then velocities (m s-1), of all masses or modes at the end of the run",
+    ),
     VariableRule("displacement_max", ("run", "period"), np.float64, "m", "largest displacement in a period"),
     VariableRule("displacement_min", ("run", "period"), np.float64, "m", "smallest displacement in a period"),
     VariableRule(
@@ -142,6 +154,12 @@ _RULES = (
     ),
     VariableRule("impact_impulse", ("impact",), np.float64, "N s", "impulse of the stop on the body"),
     VariableRule("impact_contact", ("impact",), np.int8, "1", "number of the stop that was hit, from 1"),
+    VariableRule(
+        "impact_restitution", ("impact",), np.float64, "1", "speed of separation over speed of approach"
+    ),
+    VariableRule(
+        "impact_duration", ("impact",), np.float64, "s", "duration of the contact, 0 for a rigid stop"
+    ),
     VariableRule(
         "stick_count",
         ("run",),
@@ -193,6 +211,8 @@ def _columns(dims: tuple[str, ...]) -> tuple[str, ...]:
 
 PERIOD_COLUMNS = _columns(("run", "period"))
 IMPACT_COLUMNS = _columns(("impact",))
+NEEDED_IMPACT_COLUMNS = IMPACT_COLUMNS[:5]
+"""Columns of impacts that every file has; the others came later."""
 STICK_COLUMNS = _columns(("stick",))
 EVENT_COLUMNS = _columns(("event",))
 RAGGED = {
@@ -212,6 +232,11 @@ RESERVED_NAMES = frozenset(
 # Units of swept parameters and sampled variables, found by the end of their name.
 _QUANTITY_UNITS = {
     "mass": "kg",
+    "masses": "kg",
+    "stiffnesses": "N m-1",
+    "dampings": "N s m-1",
+    "flexural_rigidity": "N m2",
+    "mass_per_length": "kg m-1",
     "stiffness": "N m-1",
     "damping": "N s m-1",
     "damping_ratio": "1",
@@ -236,6 +261,8 @@ _QUANTITY_UNITS = {
     "impulse": "N s",
     "kinetic": "J",
     "potential": "J",
+    "work": "J",
+    "loss": "J",
     "length": "m",
     "width": "m",
     "thickness": "m",
@@ -245,6 +272,50 @@ _QUANTITY_UNITS = {
     "stuck": "1",
     "count": "1",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class SampleRule:
+    """What the schema says of a sampled variable of a body; `unit` is its SI unit.
+
+    `pattern` matches its name in a file; its group, where there is one, is the number in `long_name`.
+    """
+
+    pattern: str
+    unit: str
+    long_name: str
+
+
+_SAMPLE_RULES = (
+    SampleRule(r"displacement_(\d+)", "m", "displacement of mass {}"),
+    SampleRule(r"velocity_(\d+)", "m s-1", "velocity of mass {}"),
+    SampleRule(r"acceleration_(\d+)", "m s-2", "acceleration of mass {}"),
+    SampleRule(r"forcing_(\d+)", "N", "force on mass {}"),
+    SampleRule(r"modal_displacement_(\d+)", "m", "displacement of mode {}"),
+    SampleRule(r"modal_velocity_(\d+)", "m s-1", "velocity of mode {}"),
+    SampleRule(r"modal_energy_(\d+)", "J", "energy of mode {}"),
+    SampleRule(r"contact_force_(\d+)", "N", "force of stop {}"),
+    SampleRule(r"contact_displacement_(\d+)", "m", "displacement of the body at stop {}"),
+    SampleRule(r"contact_velocity_(\d+)", "m s-1", "velocity of the body at stop {}"),
+    SampleRule("energy_kinetic", "J", "kinetic energy of the body"),
+    SampleRule("energy_potential", "J", "elastic energy of the body"),
+    SampleRule("energy_forcing_work", "J", "work of the forcing since recording began"),
+    SampleRule("energy_damping_loss", "J", "energy lost to damping since recording began"),
+    SampleRule("energy_contact_loss", "J", "work done on the stops since recording began"),
+)
+
+
+def sample_rule(stored: str) -> SampleRule | None:
+    """Return the rule of a sampled variable by its name in a file, with its number in words; None without one.
+
+    >>> sample_rule("modal_energy_3").long_name
+    'energy of mode 3'
+    """
+    for rule in _SAMPLE_RULES:
+        match = re.fullmatch(rule.pattern, stored)
+        if match:
+            return SampleRule(rule.pattern, rule.unit, rule.long_name.format(*match.groups()))
+    return None
 
 
 def file_name_of(quantity: str) -> str:

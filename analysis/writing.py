@@ -33,6 +33,7 @@ from vibroimpact.analysis.schema import (
     known_unit,
     names_list,
     quantity_unit,
+    sample_rule,
     swept_names,
     unit_in,
 )
@@ -91,7 +92,7 @@ def build_dataset(
     Returns
     -------
     xarray.Dataset
-        Dimensions `run`, and `period`, `impact`, `stick`, `sample`, `event`, `interface` where recorded.
+        Dimensions `run`, and `state`, `period`, `impact`, `stick`, `sample`, `event`, `interface` where recorded.
         Not checked yet: `check`.
 
     Raises
@@ -109,6 +110,7 @@ def build_dataset(
     """
     _check_lengths(len(runs), coordinates, direction, run_index)
     variables = _run_variables(runs, direction, run_index, units)
+    variables |= _state_variables(runs, units)
     variables |= _period_variables(runs, units, omit)
     variables |= _ragged_variables("impact", [run.impacts for run in runs], IMPACT_COLUMNS, units)
     variables |= _ragged_variables("stick", [run.sticks for run in runs], STICK_COLUMNS, units)
@@ -180,6 +182,21 @@ def _run_variables(
     return {name: (("run",), array, attributes_of(name, units)) for name, array in values.items()}
 
 
+def _state_variables(runs: Sequence[RunRecord], units: UnitSystem) -> _Variables:
+    """Return the whole state at the end of each run, where it is more than that of the observed point."""
+    states = [run.final_state for run in runs]
+    sizes = {state.size for state in states if state is not None}
+    if not sizes:
+        return {}
+    if len(sizes) > 1:
+        raise DatasetError(
+            f"dataset: final_state: expected states of one size, got {', '.join(map(str, sorted(sizes)))}."
+        )
+    missing = np.full(sizes.pop(), np.nan)
+    values = np.array([missing if state is None else state for state in states], dtype=np.float64)
+    return {"final_state": (("run", "state"), values, attributes_of("final_state", units))}
+
+
 def _period_variables(runs: Sequence[RunRecord], units: UnitSystem, omit: Collection[str]) -> _Variables:
     """Return the per-period variables; a run that recorded fewer periods than the others ends in NaN."""
     tables = [run.periods for run in runs]
@@ -204,7 +221,7 @@ def _ragged_variables(
     if all(table is None for table in tables):
         return {}
     count = np.array([0 if table is None else len(table) for table in tables], dtype=np.int32)
-    rows = np.concatenate([table for table in tables if table is not None])
+    rows = np.concatenate([_with_columns(table, len(columns)) for table in tables if table is not None])
     variables: _Variables = {RAGGED[dimension]: (("run",), count, attributes_of(RAGGED[dimension], units))}
     for column, name in enumerate(columns):
         values = rows[:, column].astype(RULES[name].dtype)
@@ -224,6 +241,9 @@ class _Samples:
 
     def attributes(self, name: str, stored: str) -> dict[str, Any]:
         """Return the attributes of a variable that is stored under another name than its component's."""
+        rule = None if self.components or stored == name else sample_rule(stored)
+        if rule is not None:
+            return {"long_name": rule.long_name, "units": unit_in(self.units, rule.unit)}
         unit = self.unit_of.get(name) or self.unit_of.get(stored)
         owner, dot, _ = name.partition(".")
         if not unit and (owner in self.components or (dot and known_unit(stored) is None)):
@@ -250,6 +270,12 @@ def _sample_variables(runs: Sequence[RunRecord], known: _Samples) -> _Variables:
         values = np.ascontiguousarray(rows[:, column])
         variables[stored] = (("sample",), values, known.attributes(name, stored))
     return variables
+
+
+def _with_columns(table: NDArray[np.float64], number: int) -> NDArray[np.float64]:
+    """Return a table with so many columns; those that its run does not know are NaN."""
+    known = table[:, :number]
+    return np.hstack([known, np.full((len(known), number - known.shape[1]), np.nan)])
 
 
 def _event_variables(runs: Sequence[RunRecord], components: Sequence[str], units: UnitSystem) -> _Variables:

@@ -36,6 +36,8 @@ NATIVE = HERE / "native"
 BUILT = HERE / "built"
 VERSIONS = {"fmi3": "3.0", "fmi2": "2.0"}
 CORE_LIBRARY = "libvibroimpact_core"
+#: In arrays of one element gcc warns of loops over the others, though they never run.
+SMALLEST_ARRAY = 2
 #: Name of the file that says from which sources the folder was built.
 FINGERPRINT = "sources.sha256"
 
@@ -134,11 +136,19 @@ def _build_component(component: Component, output: Path, native: Path, strict: b
         generated = Path(folder)
         (generated / header_name(component)).write_text(c_header(component), encoding="utf-8")
         library = generated / f"{component.name}{library_suffix()}"
-        compile_library(library, sources, [*shared, own, generated, fmi_headers()], strict=strict)
+        include = [*shared, own, generated, fmi_headers()]
+        compile_library(library, sources, include, definitions=_sizes(component), strict=strict)
         binary = library.read_bytes()
     return [
         _write_component(component, binary, output / folder, version) for folder, version in VERSIONS.items()
     ]
+
+
+def _sizes(component: Component) -> dict[str, int]:
+    # as sizes.h names them: what a component has no use for is no part of its saved states
+    blocks = component.repeats
+    sizes = {"VI_MODES": blocks.get("mode", blocks.get("mass", 0)), "VI_PORTS": blocks.get("contact", 0)}
+    return {name: max(size, SMALLEST_ARRAY) for name, size in sizes.items()}
 
 
 def _write_component(component: Component, binary: bytes, folder: Path, version: str) -> Path:

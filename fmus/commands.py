@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -77,11 +78,12 @@ def check_files(
     typer.echo(f"{len(paths)} FMU{'s' if len(paths) != 1 else ''} checked: no problems.")
 
 
-def _export_user_law(law: Path | None, output: Path | None, contacts: int | None) -> Path:
+def _export_user_law(law: Path | None, output: Path | None, counts: Mapping[str, int | None]) -> Path:
     if law is None:
         raise UsageError("--law: expected the Python file of your law, got nothing. Add --law my_law.py.")
-    if contacts is not None:
-        raise UsageError("--contacts: a contact law has no contacts of its own; leave the option out.")
+    for option, count in counts.items():
+        if count is not None:
+            raise UsageError(f"--{option}: a contact law has no {option} of its own; leave the option out.")
     return build_user_contact_law(law, output or law.with_suffix(".fmu"))
 
 
@@ -90,19 +92,23 @@ def export_component(
     component: Annotated[str, typer.Argument(help="Component, for example oscillator.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
     contacts: Annotated[int | None, typer.Option(help="Contacts in its description; default: all.")] = None,
+    modes: Annotated[int | None, typer.Option(help="Beam: modes in its description; default: all.")] = None,
+    masses: Annotated[int | None, typer.Option(help="Chain: masses, likewise.")] = None,
+    sensors: Annotated[int | None, typer.Option(help="Beam: sensors, likewise.")] = None,
     fmi: Annotated[str, typer.Option(help="FMI version, 3.0 or 2.0.")] = "3.0",
     law: Annotated[Path | None, typer.Option(help="user-contact-law: the Python file of your law.")] = None,
 ) -> None:
-    """Write an FMU for another tool, with as many contacts as wanted. Needs no compiler.
+    """Write an FMU for another tool, with as many contacts, modes, ... as wanted. Needs no compiler.
 
-    Example: vibroimpact fmu export oscillator --contacts 1 -o Oscillator1.fmu
+    Example: vibroimpact fmu export beam --modes 8 --contacts 2 -o beam8.fmu
 
     A contact law of your own in Python: vibroimpact fmu export user-contact-law --law my_law.py -o my_law.fmu
     """
+    counts = {"contacts": contacts, "modes": modes, "masses": masses, "sensors": sensors}
     if component == USER_CONTACT_LAW:
-        typer.echo(str(_export_user_law(law, output, contacts)))
+        typer.echo(str(_export_user_law(law, output, counts)))
         return
     if law is not None:
         raise UsageError(f"--law: expected the component {USER_CONTACT_LAW} with it, got {component}.")
     path = output or Path(f"{component_name(component)}.fmu")
-    typer.echo(str(export_fmu(component, path, contacts=contacts, fmi=fmi)))
+    typer.echo(str(export_fmu(component, path, **counts, fmi=fmi)))

@@ -9,9 +9,10 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.platform_names import library_suffix, system
@@ -57,6 +58,7 @@ def compile_library(
     sources: Sequence[Path],
     include: Sequence[Path],
     *,
+    definitions: Mapping[str, int] = MappingProxyType({}),
     export_all: bool = False,
     strict: bool = True,
 ) -> None:
@@ -68,6 +70,8 @@ def compile_library(
         The library to write.
     sources, include : sequence of Path
         The C files and the folders of their headers.
+    definitions : mapping of str to int
+        Macros and their values.
     export_all : bool
         Export every function, not only those marked for export.
     strict : bool
@@ -81,6 +85,7 @@ def compile_library(
     compiler = find_compiler()
     options = [*LANGUAGE, *WARNINGS, *(["-Werror"] if strict else []), *_platform_options(compiler)]
     options += [] if export_all else ["-fvisibility=hidden"]
+    options += [f"-D{name}={value}" for name, value in definitions.items()]
     folders = [f"-I{folder}" for folder in include]
     command = [*compiler, *options, *folders, "-o", str(target), *map(str, sources), "-lm"]
     result = subprocess.run(command, capture_output=True, text=True)

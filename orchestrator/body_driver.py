@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.importer.component import description_of
 
 
 class BodyDriver(RecordedBody):
-    """Drives one instance of the Oscillator FMU (FMI 3.0), which is used again for every run.
+    """Drives one instance of a body FMU (FMI 3.0), which is used again for every run.
 
     Parameters
     ----------
@@ -25,10 +25,14 @@ class BodyDriver(RecordedBody):
         Real parameters of the first run; later runs may change their values, not their names.
     integers : mapping of str to int
         Integer and enumeration parameters, the same for all runs.
+    body : str
+        Name of the FMU: `Oscillator`, `Chain` or `Beam`.
     """
 
-    def __init__(self, floats: Mapping[str, float], integers: Mapping[str, int]) -> None:
-        path = fmu_path("Oscillator", "3.0")
+    def __init__(
+        self, floats: Mapping[str, float], integers: Mapping[str, int], body: str = "Oscillator"
+    ) -> None:
+        path = fmu_path(body, "3.0")
         self.fmu = unpack(path)
         self._references = {v.name: v.valueReference for v in description_of(path).modelVariables}
         self.instance = Instance3(self.fmu, "body", early_return=True)

@@ -18,17 +18,8 @@ from vibroimpact.orchestrator.fmi.variables import VariableGroup
 ROW_WIDTH = 8
 ROW_CAPACITY = 512
 ROW_IMPACT, ROW_STICK, ROW_PERIOD = 1.0, 2.0, 3.0
-OUTPUTS = (
-    "displacement",
-    "velocity",
-    "acceleration",
-    "record.displacement_max",
-    "record.displacement_min",
-    "contact[1].force",
-    "contact[2].force",
-    "contact[1].stick_start",
-    "contact[2].stick_start",
-)
+_NOTHING: NDArray[np.float64] = np.empty(0)
+OBSERVED = ("displacement", "velocity")
 
 
 class ImpactLimitReached(Exception):
@@ -62,14 +53,50 @@ class RecordedBody(ABC):
     """
 
     def __init__(self, group: Callable[[str, Sequence[str], int | None], VariableGroup]) -> None:
-        self._outputs = group("Float64", OUTPUTS, None)
+        self._group_of = group
+        self._observed = group("Float64", OBSERVED, None)
         self._switches = group("Boolean", ("record.impacts", "record.extrema", "record.periods"), None)
-        self._stuck = group("Boolean", ("contact[1].stuck", "contact[2].stuck"), None)
         self._count = group("Int64", ("record.count",), None)
         self._taken = group("Int64", ("record.taken",), None)
         self._rows = group("Float64", ("record.rows",), ROW_CAPACITY * ROW_WIDTH)
         self._table = self._rows.values.reshape(ROW_CAPACITY, ROW_WIDTH)
         self.rows = Rows()
+        self.watch(contacts=0)
+
+    def watch(
+        self,
+        *,
+        contacts: int,
+        sampled: Sequence[str] = (),
+        state: Sequence[str] = (),
+        energies: bool = False,
+        slowest: bool = False,
+    ) -> None:
+        """Say what of the body is read; nothing else costs a call.
+
+        Parameters
+        ----------
+        contacts : int
+            Contact ports in use.
+        sampled : sequence of str
+            Variables of a time series.
+        state : sequence of str
+            Variables that are the whole state, where it is more than the observed point.
+        energies : bool
+            Whether the body follows its energies while it records.
+        slowest : bool
+            Whether the body can tell its lowest natural frequency.
+        """
+        ports = [f"contact[{k}]" for k in range(1, contacts + 1)]
+        self._stuck = self._some("Boolean", [f"{port}.stuck" for port in ports])
+        self._stick_starts = self._some("Float64", [f"{port}.stick_start" for port in ports])
+        self._sampled = self._some("Float64", sampled)
+        self._state = self._some("Float64", state)
+        self._energies = self._some("Boolean", ["record.energies"] if energies else [])
+        self._slowest = self._some("Float64", ["natural_angular_frequency[1]"] if slowest else [])
+
+    def _some(self, kind: str, names: Sequence[str]) -> VariableGroup | None:
+        return self._group_of(kind, names, None) if names else None
 
     @property
     @abstractmethod
@@ -100,9 +127,12 @@ class RecordedBody(ABC):
         """Free what is driven."""
 
     def record(self, *, impacts: bool, extrema: bool, periods: bool) -> None:
-        """Say what the body records from now on."""
+        """Say what the body records from now on; its energies count from here."""
         self._switches.values[:] = (impacts, extrema, periods)
         self._switches.set()
+        if self._energies is not None:
+            self._energies.values[:] = True
+            self._energies.set()
 
     def take_rows(self) -> None:
         """Take the rows that the body has recorded since the last time."""
@@ -113,12 +143,26 @@ class RecordedBody(ABC):
             self._taken.values[0] = count
             self._taken.set()
 
-    def outputs(self) -> NDArray[np.float64]:
-        """Return the present values of `OUTPUTS`; the buffer is used again at the next call."""
-        return self._outputs.get()
+    def observed(self) -> tuple[float, float]:
+        """Return displacement (m) and velocity (m/s) of the observed point."""
+        displacement, velocity = self._observed.get()
+        return float(displacement), float(velocity)
+
+    def sampled(self) -> NDArray[np.float64]:
+        """Return the present values of the sampled variables; the buffer is used again at the next call."""
+        return _NOTHING if self._sampled is None else self._sampled.get()
+
+    def whole_state(self) -> NDArray[np.float64] | None:
+        """Return the whole state; None where the observed point is all of it."""
+        return None if self._state is None else self._state.get().copy()
+
+    def slowest(self) -> float:
+        """Return the lowest natural angular frequency, rad/s; 0 where the body does not tell it."""
+        return 0.0 if self._slowest is None else float(self._slowest.get()[0])
 
     def sticks_open(self) -> list[tuple[int, float]]:
         """Return the contacts (1-based) that the body rests on, with the time it came to rest, s."""
-        stuck = self._stuck.get()
-        starts = self._outputs.get()[-2:]
-        return [(k + 1, float(starts[k])) for k in range(2) if stuck[k]]
+        if self._stuck is None or self._stick_starts is None:
+            return []
+        stuck, starts = self._stuck.get(), self._stick_starts.get()
+        return [(k + 1, float(starts[k])) for k in range(len(stuck)) if stuck[k]]

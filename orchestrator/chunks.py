@@ -17,6 +17,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset import (
@@ -35,13 +36,14 @@ DEFAULT_RUNNER = "vibroimpact.orchestrator.runners:make_runner"
 """The class that runs one point, as `module:name`, so that a worker can find it by itself."""
 
 CARRIED = ("carried_displacement", "carried_velocity")
-"""Attributes of a part: the state that the next run of its branch starts from."""
+CARRIED_STATE = "carried_state"
+"""Attributes of a part: the state that the next run of its branch starts from; two numbers, or an array."""
 
 CARRYING = (Outcome.ok, Outcome.stuck)
 """Outcomes whose final state is handed on along a branch: the run came to its end, at forcing phase 0."""
 
-State = tuple[float, float]
-"""Displacement (m) and velocity (m/s)."""
+State = tuple[float, ...]
+"""Displacement (m) and velocity (m/s) of an oscillator; of a structure N displacements, then N velocities."""
 
 
 class Runner(Protocol):
@@ -105,8 +107,8 @@ class Work:
 class Chunk:
     """Runs `first` to `stop - 1`; the first is in branch `branch` and starts from `start`.
 
-    Either a stretch of one branch, or several whole branches. `start` is the displacement (m) and velocity
-    (m/s) carried from the run before; None is the scene's own start state. A chunk that takes longer than
+    Either a stretch of one branch, or several whole branches. `start` is the state (m, m/s) carried from the
+    run before; None is the scene's own start state. A chunk that takes longer than
     `most_seconds` ends early, after a point; the rest is left to other chunks.
     """
 
@@ -136,7 +138,7 @@ class ChunkResult:
     chunk : Chunk
         The runs that the part holds: those asked for, or the first of them.
     carried : tuple of float or None
-        Displacement (m) and velocity (m/s) that the next run of the branch starts from.
+        The state (m, m/s) that the next run of the branch starts from.
     outcomes : mapping of str to int
         How many runs ended in each way.
     compute_seconds, write_seconds : float
@@ -280,7 +282,9 @@ def run_points(
 
 
 def _next_start(record: RunRecord, start: State | None) -> State | None:
-    end = (record.final_displacement, record.final_velocity)
+    end: State = (record.final_displacement, record.final_velocity)
+    if record.final_state is not None:
+        end = tuple(record.final_state.tolist())
     usable = record.outcome in CARRYING and all(map(math.isfinite, end))
     return end if usable else start
 
@@ -315,6 +319,21 @@ def dataset_of(
     )
 
 
+def carried_attributes(state: State) -> dict[str, Any]:
+    """Return the attributes of a part that keep the state its branch goes on from."""
+    if len(state) == len(CARRIED):
+        return dict(zip(CARRIED, state, strict=True))
+    return {CARRIED_STATE: np.array(state)}
+
+
+def carried_state(attrs: Mapping[str, Any]) -> State | None:
+    """Return the state that the attributes of a part keep; None where there is none."""
+    if CARRIED_STATE in attrs:
+        return tuple(np.asarray(attrs[CARRIED_STATE], dtype=np.float64).tolist())
+    displacement, velocity = (attrs.get(name) for name in CARRIED)
+    return None if displacement is None or velocity is None else (float(displacement), float(velocity))
+
+
 def write_part(
     work: Work,
     scene: Scene,
@@ -326,7 +345,7 @@ def write_part(
     """Write the part of a chunk: it is there as a whole or not at all."""
     attrs: dict[str, Any] = {"scene_hash": work.scene_hash}
     if carried is not None:
-        attrs |= dict(zip(CARRIED, carried, strict=True))
+        attrs |= carried_attributes(carried)
     path = Path(work.parts_folder, chunk.part_name)
     try:
         write_dataset(dataset_of(scene, points, records, attrs), path)

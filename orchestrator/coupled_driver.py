@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from vibroimpact.fmus import fmu_path
 from vibroimpact.orchestrator.body_record import DeadlineReached, ImpactLimitReached, RecordedBody
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
-from vibroimpact.orchestrator.importer.component import Value
+from vibroimpact.orchestrator.importer.component import Value, description_of
 from vibroimpact.orchestrator.importer.events import Event
 from vibroimpact.orchestrator.importer.master import SAME_INSTANT, Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, Exchange
@@ -20,6 +20,12 @@ from vibroimpact.orchestrator.importer.specification import ComponentSpec, Conne
 #: Impacts between two emptyings of the body's record: one impact writes at most two rows, of room for 512.
 IMPACTS_PER_BLOCK = 200
 BODY = "body"
+#: Contact laws by their numbers in the FMUs. A body leaves those of its stops to them: an impulse, or a force.
+RESTITUTION, EXTERNAL, EXTERNAL_FORCE = 1, 5, 6
+COMPLIANT = (2, 3, 4)
+#: What of a contact port is its stop's own too.
+LAW_PARAMETERS = ("position", "restitution", "yield_velocity", "stiffness", "damping", "exponent")
+ANSWERS = ("applied_restitution", "applied_force", "applied_stiffness", "applied_damping")
 
 
 def stop_name(k: int) -> str:
@@ -33,12 +39,21 @@ def connections_of(stops: int) -> list[ConnectionSpec]:
     for k in range(1, stops + 1):
         port, stop = f"contact[{k}]", stop_name(k)
         found += [
-            ConnectionSpec((BODY, f"{port}.displacement"), (stop, "displacement")),
-            ConnectionSpec((BODY, f"{port}.velocity"), (stop, "velocity")),
-            ConnectionSpec((stop, "applied_restitution"), (BODY, f"{port}.applied_restitution")),
-            ConnectionSpec((stop, "applied_force"), (BODY, f"{port}.applied_force")),
+            ConnectionSpec((BODY, f"{port}.{name}"), (stop, name)) for name in ("displacement", "velocity")
         ]
+        found += [ConnectionSpec((stop, name), (BODY, f"{port}.{name}")) for name in ANSWERS]
     return found
+
+
+def body_integers(integers: Mapping[str, int]) -> dict[str, int]:
+    """Return a body's integer parameters for stops that are FMUs of their own: their laws become external."""
+
+    def law_of(law: int) -> int:
+        if law in COMPLIANT:
+            return EXTERNAL_FORCE
+        return EXTERNAL if law == RESTITUTION else law
+
+    return {name: law_of(v) if name.endswith("].law") else v for name, v in integers.items()}
 
 
 class CoupledDriver(RecordedBody):
@@ -47,13 +62,16 @@ class CoupledDriver(RecordedBody):
     Parameters
     ----------
     floats, integers : mapping
-        Parameters of the body, as for `BodyDriver`; the laws of its contacts must be `external`.
+        Parameters of the body, as for `BodyDriver`, with the laws of its stops as they are in a scene: each stop
+        gets its own, and the body is told that they are external. Numbers of laws that are external already stay.
     stops : int
         Number of stops.
     macro_step : float
         Longest communication step, s.
     exchange : str
         How values are exchanged; the contacts do not depend on it.
+    body : str
+        Name of the body's FMU: `Oscillator`, `Chain` or `Beam`.
     """
 
     def __init__(
@@ -64,18 +82,37 @@ class CoupledDriver(RecordedBody):
         *,
         macro_step: float = math.inf,
         exchange: Exchange = "gauss_seidel",
+        body: str = "Oscillator",
     ) -> None:
-        self._integers = dict(integers)
-        self._limit = self._integers.pop("impact_limit")
-        self._stops = stops
-        specs = [ComponentSpec(BODY, fmu_path("Oscillator"), self._integers)]
-        specs += [ComponentSpec(stop_name(k), fmu_path("ImpactStop")) for k in range(1, stops + 1)]
+        self._limit = integers["impact_limit"]
+        own = {name: value for name, value in integers.items() if name != "impact_limit"}
+        self._stops = [self._stop(k, own) for k in range(1, stops + 1)]
+        specs = [ComponentSpec(BODY, fmu_path(body), body_integers(own)), *self._stops]
         self.importer = Importer(specs, connections_of(stops), macro_step=macro_step, exchange=exchange)
         self.importer.on_event = self._count_event
         self.importer.on_pause = self._make_room
+        self._stop_floats = self._stop_parameters(floats)
         super().__init__(self._group)
         self._deadline = math.inf
         self._events = 0
+
+    @staticmethod
+    def _stop(k: int, integers: Mapping[str, int]) -> ComponentSpec:
+        """A stop with its law and side."""
+        law, side = integers.get(f"contact[{k}].law", RESTITUTION), integers.get(f"contact[{k}].side", 1)
+        known = law if law in (RESTITUTION, *COMPLIANT) else RESTITUTION
+        return ComponentSpec(stop_name(k), fmu_path("ImpactStop"), {"law": known, "side": side})
+
+    def _stop_parameters(self, floats: Mapping[str, float]) -> dict[tuple[str, str], str]:
+        """Parameters of the stops, with the names of the body's parameters that they come from."""
+        known = {v.name for v in description_of(fmu_path("ImpactStop")).modelVariables}
+        ports = [(stop.name, f"contact[{k}]") for k, stop in enumerate(self._stops, 1)]
+        return {
+            (stop, name): f"{port}.{name}"
+            for stop, port in ports
+            for name in LAW_PARAMETERS
+            if f"{port}.{name}" in floats and name in known
+        }
 
     def _group(self, kind: str, names: Sequence[str], size: int | None = None) -> VariableGroup:
         body = self.importer.components[BODY]
@@ -98,8 +135,7 @@ class CoupledDriver(RecordedBody):
         self._events = 0
         self.rows.blocks = []
         values: dict[tuple[str, str], Value] = {(BODY, name): value for name, value in floats.items()}
-        for k in range(1, self._stops + 1):
-            values[stop_name(k), "restitution"] = floats[f"contact[{k}].restitution"]
+        values |= {target: floats[source] for target, source in self._stop_floats.items()}
         self.importer.begin(0.0, values)
 
     def advance(self, end: float, slice_length: float = math.inf) -> None:

@@ -13,6 +13,7 @@ from vibroimpact.analysis.dataset import (
     Outcome,
     RunRecord,
 )
+from vibroimpact.orchestrator.body_parameters import state_variables
 from vibroimpact.orchestrator.scene import Scene
 
 
@@ -37,6 +38,7 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
     """
     record, names = scene.record, sample_variables(scene)
     general = scene.general is not None
+    states = state_variables(scene)
     periods = scene.period is not None and (record.extrema or record.strobe) and not general
     return RunRecord(
         outcome=outcome,
@@ -49,5 +51,6 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
         final_velocity=math.nan,
         final_phase=math.nan,
         seconds=seconds,
+        final_state=np.full(len(states), math.nan) if states else None,
         events=np.empty((0, 3)) if record.impacts and general else None,
     )

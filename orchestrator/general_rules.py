@@ -234,6 +234,10 @@ def _samples_fit(draft: GeneralDraft) -> Iterator[Problem]:
 
 
 def _runs_coupled(draft: GeneralDraft) -> Iterator[Problem]:
+    if draft.execution and draft.execution.contact_tolerance is not None:
+        hint = "Give it to the component: parameters = { contact_tolerance = 1e-8 }."
+        got = quoted(draft.execution.contact_tolerance)
+        yield Problem("execution.contact_tolerance", "no contact_tolerance in a general scene", got, hint)
     if draft.execution and draft.execution.how == "fused":
         hint = "Only the short form ([body] and [[stop]]) runs fused."
         yield Problem("execution.how", '"auto" or "coupled" in a general scene', '"fused"', hint)

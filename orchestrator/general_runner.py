@@ -109,7 +109,7 @@ class GeneralRunner:
         """The components, in the order that events name them by."""
         return self._names
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None = None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point from the scene's start values; a general scene carries no state over.
 
         Raises

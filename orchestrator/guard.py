@@ -155,7 +155,7 @@ class GuardedRunner:
             raise (ComponentFileError if answer.misuse else ComponentError)(answer.message)
         raise ComponentError(self._what_happened(_ending(code)))
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None = None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point; a crash or a missed deadline is its outcome.
 
         Raises

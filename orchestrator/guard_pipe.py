@@ -44,7 +44,7 @@ class Point:
     """One point to run."""
 
     values: Mapping[str, float]
-    start: tuple[float, float] | None
+    start: tuple[float, ...] | None
 
 
 @dataclass(frozen=True, slots=True)

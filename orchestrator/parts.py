@@ -16,7 +16,7 @@ import numpy as np
 
 from vibroimpact.analysis.dataset import merge_datasets, read_flat, read_part, write_dataset
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.orchestrator.chunks import CARRIED, Chunk, State
+from vibroimpact.orchestrator.chunks import CARRIED, CARRIED_STATE, Chunk, State, carried_state
 
 _NAME = re.compile(r"branch-(\d{6,})_runs-(\d{10,})-(\d{10,})\.nc")
 _TEMPORARY = re.compile(r"\..*\.tmp")
@@ -81,12 +81,7 @@ def _read(path: Path, chunk: Chunk, scene_hash: str) -> StoredPart:
         raise DatasetError(f"{path}: expected runs {chunk.first} to {chunk.stop - 1}, got others.")
     if part.attrs.get("scene_hash") != scene_hash:
         raise DatasetError(f"{path}: expected a part of this scene, got one of another.")
-    return StoredPart(path, chunk, _carried(part.attrs))
-
-
-def _carried(attrs: Mapping[str, Any]) -> State | None:
-    displacement, velocity = (attrs.get(name) for name in CARRIED)
-    return None if displacement is None or velocity is None else (float(displacement), float(velocity))
+    return StoredPart(path, chunk, carried_state(part.attrs))
 
 
 def compact(parts: Sequence[Path], target: Path, attrs: Mapping[str, Any]) -> None:
@@ -100,7 +95,8 @@ def compact(parts: Sequence[Path], target: Path, attrs: Mapping[str, Any]) -> No
         When the dataset cannot be written.
     """
     dataset = merge_datasets(parts)
-    kept = {name: value for name, value in dataset.attrs.items() if name not in (*CARRIED, "scene_hash")}
+    own = (*CARRIED, CARRIED_STATE, "scene_hash")
+    kept = {name: value for name, value in dataset.attrs.items() if name not in own}
     write_dataset(dataset.assign_attrs(kept | dict(attrs)), target)
 
 

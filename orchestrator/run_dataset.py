@@ -11,10 +11,11 @@ import xarray as xr
 from vibroimpact.analysis.dataset import Direction, RunRecord, build_dataset, file_names
 from vibroimpact.orchestrator.empty_record import sample_variables
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene_keys import parse_key
 
 EXTREMA = ("displacement_max", "displacement_min")
 STROBE = ("strobe_displacement", "strobe_velocity")
-BASE_ACCELERATION_UNIT = "m s-2"
+FORCING_UNITS = {"force": "N", "base_acceleration": "m s-2", "uniform": "N m-1", "mode": "N"}
 
 
 def dataset_of_runs(
@@ -42,7 +43,7 @@ def dataset_of_runs(
     """
     keys = [axis.key for axis in scene.sweep]
     names = dict(zip(keys, file_names([scene.sweep_coordinate_name(key) for key in keys]), strict=True))
-    return build_dataset(
+    dataset = build_dataset(
         records,
         coordinates={
             name: np.array([point[key] for point in values], dtype=np.float64) for key, name in names.items()
@@ -57,6 +58,9 @@ def dataset_of_runs(
         event_components=[c.name for c in scene.general.components] if scene.general is not None else (),
         connections=_energy_connections(scene),
     )
+    for file, long_name in _long_names(scene, names).items():
+        dataset[file].attrs["long_name"] = long_name
+    return dataset
 
 
 def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
@@ -66,11 +70,37 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
     if scene.general is not None:
         units = dict(scene.general.units)
         return units | {file: units[key] for key, file in names.items() if key in units}
-    if scene.forcing is not None and scene.forcing.kind == "base_acceleration":
-        file = names.get("forcing.amplitude")
-        swept = {file: BASE_ACCELERATION_UNIT} if file is not None else {}
-        return {"forcing": BASE_ACCELERATION_UNIT} | swept
-    return {}
+    swept = {file: unit for key, file in names.items() if (unit := _unit_of_key(scene, key))}
+    forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
+    return forcing | swept
+
+
+def _unit_of_key(scene: Scene, key: str) -> str | None:
+    """Return the unit of a swept key where it depends on its table; None where the name says it."""
+    if key == "forcing.amplitude" and scene.forcing is not None:
+        return FORCING_UNITS[scene.forcing.kind]
+    parts = parse_key(key)
+    if parts is None or parts.place is None:
+        return None
+    law = scene.stops[parts.place].law
+    if law == "hunt_crossley" and parts.name == "damping":
+        return "s m-1"
+    # UDUNITS has no broken exponents, and a wrong unit would be worse than none
+    return "1" if parts.name == "stiffness" and law in ("hertz", "hunt_crossley") else None
+
+
+def _long_names(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
+    """Names of swept keys whose unit cannot be said otherwise."""
+    if scene.general is not None or scene.units != "SI":
+        return {}
+    exponents = {"hertz": "1.5", "hunt_crossley": "exponent"}
+    found = {}
+    for key, file in names.items():
+        parts = parse_key(key)
+        law = scene.stops[parts.place].law if parts is not None and parts.place is not None else ""
+        if parts is not None and parts.name == "stiffness" and law in exponents:
+            found[file] = f"{file.replace('_', ' ')} in N/m^{exponents[law]}"
+    return found
 
 
 def _omitted(scene: Scene) -> tuple[str, ...]:

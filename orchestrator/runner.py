@@ -15,8 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
-from vibroimpact.fmus.errors import SceneError
+from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.body_driver import BodyDriver
+from vibroimpact.orchestrator.body_parameters import (
+    FMU_NAMES,
+    float_parameters,
+    integer_parameters,
+    state_variables,
+)
 from vibroimpact.orchestrator.body_record import (
     ROW_IMPACT,
     ROW_PERIOD,
@@ -26,13 +32,11 @@ from vibroimpact.orchestrator.body_record import (
     RecordedBody,
 )
 from vibroimpact.orchestrator.coupled_driver import CoupledDriver
-from vibroimpact.orchestrator.oscillator_parameters import float_parameters, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene_models import OscillatorBody
+from vibroimpact.orchestrator.time_series import TimeSeriesPlan
 
 TWO_PI = 2.0 * math.pi
-#: Columns of `body_record.OUTPUTS` that a time series can name.
-SAMPLED = {"displacement": 0, "velocity": 1, "acceleration": 2}
-FORCES = slice(5, 7)
 #: A run with a deadline looks at the clock at least every so many forcing periods.
 PERIODS_PER_SLICE = 64.0
 
@@ -61,10 +65,18 @@ class PointRunner:
         self.execution = "fused" if execution == "auto" else execution
         self.instruction_set = platform.machine()
         self._scene = scene
+        self._plan = TimeSeriesPlan(scene)
         self._driver = _driver_of(scene, self.execution)
+        self._driver.watch(
+            contacts=len(scene.stops),
+            sampled=self._plan.variables,
+            state=state_variables(scene),
+            energies=self._plan.energies,
+            slowest=not isinstance(scene.body, OscillatorBody),
+        )
         self.fmu_hashes = self._driver.hashes
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None = None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point.
 
         Parameters
@@ -72,7 +84,8 @@ class PointRunner:
         values : mapping of str to float
             Values of the swept keys.
         start : tuple of float or None
-            Displacement and velocity carried over at forcing phase 0; None for the scene's start state.
+            State carried over at forcing phase 0, see `body_parameters.float_parameters`; None for the
+            scene's start state.
 
         Raises
         ------
@@ -81,7 +94,7 @@ class PointRunner:
         """
         began = time.perf_counter()
         scene = self._scene.with_values(values) if values else self._scene
-        run = _Run(scene, self._driver, start)
+        run = _Run(scene, self._driver, self._plan, start)
         outcome, message = run.run()
         return run.record(outcome, message, time.perf_counter() - began)
 
@@ -91,17 +104,19 @@ class PointRunner:
 
 
 def _driver_of(scene: Scene, execution: str) -> RecordedBody:
-    floats = float_parameters(scene, None)
+    floats, integers = float_parameters(scene, None), integer_parameters(scene)
+    fmu = FMU_NAMES[scene.body.kind]
     if execution == "fused":
-        return BodyDriver(floats, integer_parameters(scene))
+        return BodyDriver(floats, integers, fmu)
     if execution == "coupled":
         step = scene.execution.macro_step
         return CoupledDriver(
             floats,
-            integer_parameters(scene, law="external"),
+            integers,
             len(scene.stops),
             macro_step=math.inf if step is None else step,
             exchange=scene.execution.exchange,
+            body=fmu,
         )
     raise SceneError([f'{scene.source}: execution.how: expected "fused" or "coupled", got "{execution}".'])
 
@@ -109,9 +124,12 @@ def _driver_of(scene: Scene, execution: str) -> RecordedBody:
 class _Run:
     """One run: when its recording begins and ends, and what it records."""
 
-    def __init__(self, scene: Scene, driver: RecordedBody, start: tuple[float, float] | None) -> None:
+    def __init__(
+        self, scene: Scene, driver: RecordedBody, plan: TimeSeriesPlan, start: tuple[float, ...] | None
+    ) -> None:
         self.scene = scene
         self.driver = driver
+        self.plan = plan
         self.parameters = float_parameters(scene, start)
         self.samples: list[tuple[float, ...]] = []
         self.begin_time, self.end_time = self._window()
@@ -162,38 +180,38 @@ class _Run:
         count = math.floor((self.end_time - self.begin_time) * series.rate * (1.0 + 1e-12)) + 1
         for i in range(count):
             self.driver.advance(min(self.begin_time + i / series.rate, self.end_time), self.slice_length)
-            self.samples.append((self.driver.time, *self._sample(series.variables)))
+            row = self.plan.row(self.driver.sampled(), self.scene.forcing, self._angle())
+            self.samples.append((self.driver.time, *row))
 
-    def _sample(self, names: tuple[str, ...]) -> list[float]:
-        outputs = self.driver.outputs()
-        forcing = self._forcing()
-        based = self.scene.forcing is not None and self.scene.forcing.kind == "base_acceleration"
-        values = {name: float(outputs[column]) for name, column in SAMPLED.items()}
-        values["contact_force"] = float(outputs[FORCES].sum())
-        values["forcing"] = forcing
-        if based:
-            values["acceleration"] += forcing  # the body's own output knows only the inertial force
-        return [values[name] for name in names]
-
-    def _forcing(self) -> float:
-        """Force, N (base acceleration, m/s^2) at the present time."""
-        forcing = self.scene.forcing
-        if forcing is None:
+    def _angle(self) -> float:
+        """Phase angle of the forcing at the present time, rad."""
+        if self.scene.forcing is None:
             return 0.0
-        angle = forcing.angular_frequency * self.driver.time + self.parameters["forcing.phase"]
-        return forcing.amplitude * math.cos(angle)
+        return self.scene.forcing.angular_frequency * self.driver.time + self.parameters["forcing.phase"]
 
     # ---- what was recorded ----
 
     def _rests_for_ever(self) -> bool:
-        """Does the body rest on a stop that no phase of the force can lift it from?"""
+        """Does the body rest on a stop for good?
+
+        An oscillator: no phase of the force can lift it. A structure, whose other modes go on: an observation.
+        The contact force has not reached zero over the whole recording or, without a period, over one of the
+        slowest mode, within which every mode of the held body has pulled at its strongest.
+        """
         resting = self.driver.sticks_open()
         if not resting:
             return False
-        stop = self.scene.stops[resting[0][0] - 1]
+        if isinstance(self.scene.body, OscillatorBody):
+            return self._is_pressed(self.scene.body, resting[0][0])
+        slowest = self.driver.slowest() if self.scene.period is None else 0.0
+        long_enough = TWO_PI / slowest if slowest > 0.0 else self.end_time - self.begin_time
+        return self.driver.time - min(start for _, start in resting) >= long_enough
+
+    def _is_pressed(self, body: OscillatorBody, contact: int) -> bool:
+        stop = self.scene.stops[contact - 1]
         sign = 1.0 if stop.side == "upper" else -1.0
         amplitude = self.parameters.get("forcing.amplitude", 0.0)
-        spring = -sign * self.scene.body.stiffness * stop.position
+        spring = -sign * body.stiffness * stop.position
         if self.scene.period is None:
             return True
         return spring > abs(amplitude)
@@ -202,18 +220,22 @@ class _Run:
         """Return the record of the run."""
         self.driver.take_rows()
         wanted, rows = self.scene.record, self.driver.rows
-        outputs = self.driver.outputs()
+        displacement, velocity = self.driver.observed()
+        if not math.isfinite(displacement):
+            where = f"displacement: expected a finite number, got {displacement}"
+            raise ComponentError(f"body: {where} at time {self.driver.time:.17g}.", instance="body")
         return RunRecord(
             outcome=outcome,
             message=message,
             periods=self._period_rows(),
-            impacts=rows.of_kind(ROW_IMPACT)[:, 1:6] if wanted.impacts else None,
+            impacts=rows.of_kind(ROW_IMPACT)[:, 1:8] if wanted.impacts else None,
             sticks=self._stick_rows() if wanted.impacts else None,
             samples=self._sample_rows(),
-            final_displacement=float(outputs[0]),
-            final_velocity=float(outputs[1]),
+            final_displacement=displacement,
+            final_velocity=velocity,
             final_phase=self._final_phase(outcome),
             seconds=seconds,
+            final_state=self.driver.whole_state(),
         )
 
     def _final_phase(self, outcome: Outcome) -> float:

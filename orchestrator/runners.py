@@ -19,7 +19,7 @@ class Runner(Protocol):
     instruction_set: str
     fmu_hashes: dict[str, str]
 
-    def run(self, values: Mapping[str, float], start: tuple[float, float] | None = None) -> RunRecord:
+    def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point."""
 
     def close(self) -> None:

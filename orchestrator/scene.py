@@ -18,8 +18,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_serializer
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.general_scene import GeneralScene
 from vibroimpact.orchestrator.scene_file import parse_toml, read_text
-from vibroimpact.orchestrator.scene_keys import coordinate_name, numeric_key, replacement
-from vibroimpact.orchestrator.scene_models import Execution, Forcing, OscillatorBody, Record, RestitutionStop
+from vibroimpact.orchestrator.scene_keys import Key, coordinate_name, number_of, numeric_key, replacement
+from vibroimpact.orchestrator.scene_models import Body, Execution, Forcing, Record, Sensor, Stop
 from vibroimpact.orchestrator.scene_tables import read_tables
 from vibroimpact.orchestrator.sweep import SweepAxis
 
@@ -39,14 +39,16 @@ class Scene(BaseModel):
         What the scene is called; may be empty.
     units : {"SI", "nondimensional"}
         The meaning of all numbers.
-    body : OscillatorBody
+    body : OscillatorBody, ChainBody or BeamBody
         The body that moves; a general scene has none.
     general : GeneralScene or None
         What a scene of `[component.NAME]` tables asks of the importer; None in the short form.
     forcing : Forcing or None
         What drives it; None without a `[forcing]` table.
-    stops : tuple of RestitutionStop
-        Zero, one or two stops in the order of the file.
+    stops : tuple of RestitutionStop, KelvinVoigtStop, HertzStop or HuntCrossleyStop
+        The stops in the order of the file.
+    sensor : Sensor or None
+        Where a beam is observed; None without a `[sensor]` table.
     record : Record
         What is recorded; periods in a forced scene, times in any other. In a general scene `impacts` says
         whether located events are recorded.
@@ -62,9 +64,10 @@ class Scene(BaseModel):
     text: str = Field(repr=False)
     title: str
     units: Literal["SI", "nondimensional"]
-    body_given: OscillatorBody | None = Field(alias="body")
+    body_given: Body | None = Field(alias="body")
     forcing: Forcing | None
-    stops: tuple[RestitutionStop, ...]
+    stops: tuple[Stop, ...]
+    sensor: Sensor | None = None
     record: Record
     sweep: tuple[SweepAxis, ...]
     execution: Execution
@@ -81,7 +84,7 @@ class Scene(BaseModel):
         return document
 
     @property
-    def body(self) -> OscillatorBody:
+    def body(self) -> Body:
         """The body of a scene of the short form.
 
         Raises
@@ -110,11 +113,14 @@ class Scene(BaseModel):
         """
         if self.general is not None:
             return self.general.value(key)
-        table, place, name = numeric_key(key)
-        number = getattr(self._numbered_tables().get(table if place is None else place), name, None)
+        parts = numeric_key(key)
+        return self._number(key, parts, self._numbered_tables().get(_slot(parts)))
+
+    def _number(self, key: str, parts: Key, owner: BaseModel | None) -> float:
+        number = number_of(owner, parts)
         if number is None:
             raise UsageError(f"{self.source}: {key}: expected a number of this scene, got nothing.")
-        return float(number)
+        return number
 
     def with_values(self, values: Mapping[str, float]) -> Scene:
         """Return this scene with other numbers, without validating it again.
@@ -136,15 +142,16 @@ class Scene(BaseModel):
             return self.model_copy(update={"general": self.general.with_values(values)})
         tables = self._numbered_tables()
         for key, value in values.items():
-            table, place, name = numeric_key(key)
-            slot = table if place is None else place
-            owner = tables.get(slot)
+            parts = numeric_key(key)
+            owner = tables.get(_slot(parts))
             if owner is None:
                 raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent table.")
-            tables[slot] = owner.model_copy(update=replacement(type(owner), name, value))
+            if parts.element is not None:
+                self._number(key, parts, owner)
+            tables[_slot(parts)] = owner.model_copy(update=replacement(owner, parts, value))
         stops = tuple(tables[place] for place in range(len(self.stops)))
-        changed = {"body_given": tables["body"], "forcing": tables["forcing"], "stops": stops}
-        return self.model_copy(update=changed)
+        changed = {name: tables[name] for name in ("forcing", "sensor")}
+        return self.model_copy(update={"body_given": tables["body"], "stops": stops, **changed})
 
     def sweep_coordinate_name(self, key: str) -> str:
         """Return the name that a swept key has as a coordinate of the dataset."""
@@ -152,7 +159,12 @@ class Scene(BaseModel):
 
     def _numbered_tables(self) -> dict[str | int, BaseModel | None]:
         """Return the tables that hold numbers; a stop has its 0-based place for a name."""
-        return {"body": self.body_given, "forcing": self.forcing, **dict(enumerate(self.stops))}
+        tables: dict[str | int, BaseModel | None] = dict(enumerate(self.stops))
+        return tables | {"body": self.body_given, "forcing": self.forcing, "sensor": self.sensor}
+
+
+def _slot(key: Key) -> str | int:
+    return key.table if key.place is None else key.place
 
 
 def load_scene(path: str | PathLike[str]) -> Scene:
@@ -198,6 +210,7 @@ def parse_scene(text: str, source: str) -> Scene:
         body=tables.body,
         forcing=tables.forcing,
         stops=tables.stops,
+        sensor=tables.sensor,
         record=tables.record,
         sweep=tables.sweep,
         execution=tables.execution,

@@ -18,6 +18,9 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+NUMBER_TAG, ARRAY_TAG = "number alone", "array of numbers"
+"""Which form of a field "a number, or an array of them" was read; part of pydantic's location, not of the key."""
+
 LONGEST_QUOTE = 60
 MOST_WORDS_LISTED = 12
 
@@ -176,8 +179,16 @@ def problems_of(
     table : tuple
         Where the table is, for example ("stop", 0).
     """
-    entries = error.errors(include_url=False, include_context=False)
+    entries = [
+        {**entry, "loc": _as_written(entry["loc"])}
+        for entry in error.errors(include_url=False, include_context=False)
+    ]
     return [_problem_of(entry, model, table) for entry in entries if not _is_an_echo(entry, entries, model)]
+
+
+def _as_written(location: Sequence[str | int]) -> tuple[str | int, ...]:
+    """Return a location without what only pydantic knows of."""
+    return (*location[:1], *(part for part in location[1:] if part not in (NUMBER_TAG, ARRAY_TAG)))
 
 
 def _is_an_echo(entry: Any, entries: Sequence[Any], model: type[BaseModel]) -> bool:
@@ -220,6 +231,16 @@ def value_problem(path: Sequence[str | int], field: FieldInfo, value: object) ->
     rule = rule_of(field)
     expected = rule.item if rule.item and isinstance(path[-1], int) else rule.expected
     return Problem(key_path(path), expected, quoted(value), _value_hint(rule, field, value))
+
+
+def choice_problem(
+    path: Sequence[str | int], field: FieldInfo, value: object, choices: Iterable[str]
+) -> Problem:
+    """Return the problem of a word that chooses a kind of table, and is none of these."""
+    rule = rule_of(field)
+    near = _nearest_word(value, list(choices))
+    hint = f'Did you mean "{near}"?' if near else _value_hint(rule, field, value)
+    return Problem(key_path(path), rule.expected, quoted(value), hint)
 
 
 def _value_hint(rule: Rule, field: FieldInfo, value: object) -> str:

@@ -5,30 +5,41 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
 
 SWEEPABLE: dict[str, tuple[str, ...]] = {
-    "body": ("mass", "stiffness", "damping", "damping_ratio", "displacement_start", "velocity_start"),
-    "forcing": ("amplitude", "angular_frequency", "frequency", "phase"),
-    "stop": ("position", "restitution"),
+    "body": (
+        *("mass", "stiffness", "damping", "damping_ratio", "displacement_start", "velocity_start"),
+        *("masses", "stiffnesses", "dampings", "far_stiffness", "far_damping"),
+        *("length", "width", "thickness", "youngs_modulus", "density"),
+        *("flexural_rigidity", "mass_per_length"),
+    ),
+    "forcing": ("amplitude", "angular_frequency", "frequency", "phase", "location"),
+    "sensor": ("location",),
+    "stop": (
+        *("position", "restitution", "yield_velocity"),
+        *("stiffness", "damping", "exponent", "relaxation_time", "location"),
+    ),
 }
 START_STATE = ("body.displacement_start", "body.velocity_start")
 
 # The second of each pair has the last word in its model, so that giving the first must clear it.
 _OVERRIDDEN_BY = {"damping": "damping_ratio", "angular_frequency": "frequency"}
-_KEY = re.compile(r"(?:(body|forcing)|(stop)\[([1-9][0-9]{0,8})\])\.([a-z_]+)")
+_NUMBER = r"\[([1-9][0-9]{0,8})\]"
+_KEY = re.compile(rf"(?:(body|forcing|sensor)|(stop){_NUMBER})\.([a-z_]+)(?:{_NUMBER})?")
 
 
 class Key(NamedTuple):
-    """A key taken apart; `place` is 0-based and None where the table is not an array."""
+    """A key taken apart; `place` and `element` are 0-based, None where table or value are not an array."""
 
     table: str
     place: int | None
     name: str
+    element: int | None = None
 
 
 @lru_cache(maxsize=256)
@@ -38,15 +49,19 @@ def parse_key(text: str) -> Key | None:
     Examples
     --------
     >>> parse_key("stop[1].position")
-    Key(table='stop', place=0, name='position')
+    Key(table='stop', place=0, name='position', element=None)
+    >>> parse_key("body.masses[2]")
+    Key(table='body', place=None, name='masses', element=1)
     >>> parse_key("stop.position") is None
     True
     """
     match = _KEY.fullmatch(text)
     if match is None:
         return None
-    table, stop, number, name = match.groups()
-    return Key(table or stop, int(number) - 1 if number else None, name)
+    table, stop, number, name, element = match.groups()
+    return Key(
+        table or stop, int(number) - 1 if number else None, name, int(element) - 1 if element else None
+    )
 
 
 def numeric_key(text: str) -> Key:
@@ -70,11 +85,26 @@ def field_name(model: type[BaseModel], key: str) -> str:
     return next(name for name, field in model.model_fields.items() if key in (field.alias, name))
 
 
-def replacement(model: type[BaseModel], key: str, value: float) -> dict[str, float | None]:
+def number_of(owner: object, key: Key) -> float | None:
+    """Return the number that a key names in its table; None where there is none."""
+    value = getattr(owner, key.name, None)
+    if key.element is not None:
+        array = isinstance(value, tuple) and key.element < len(value)
+        return float(value[key.element]) if array and value is not None else None
+    return float(value) if isinstance(value, int | float) else None
+
+
+def replacement(owner: BaseModel, key: Key, value: float) -> dict[str, Any]:
     """Return the attributes to change so that a key has a value, whichever of two related keys was given."""
-    update: dict[str, float | None] = {field_name(model, key): value}
-    if key in _OVERRIDDEN_BY:
-        update[_OVERRIDDEN_BY[key]] = None
+    model = type(owner)
+    attribute = field_name(model, key.name)
+    if key.element is not None:
+        numbers = getattr(owner, attribute)
+        return {attribute: (*numbers[: key.element], value, *numbers[key.element + 1 :])}
+    update: dict[str, Any] = {attribute: value}
+    other = _OVERRIDDEN_BY.get(key.name)
+    if other in model.model_fields:
+        update[str(other)] = None
     return update
 
 
@@ -90,6 +120,8 @@ def coordinate_name(key: str, swept: Sequence[str]) -> str:
     'position'
     >>> coordinate_name("stop[1].position", ["stop[1].position", "stop[2].position"])
     'stop_1_position'
+    >>> coordinate_name("body.masses[2]", ["body.masses[2]"])
+    'masses_2'
     >>> coordinate_name("chain.mass[2]", ["chain.mass[2]", "connection[1].gain"])
     'mass_2'
     """

@@ -8,68 +8,20 @@ the worst corner holds everywhere.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Sequence
 
+from vibroimpact.orchestrator.body_rules import BODY_RULES
+from vibroimpact.orchestrator.scene_draft import FREQUENCY_KEYS, Draft
 from vibroimpact.orchestrator.scene_errors import Problem, key_path, quoted
-from vibroimpact.orchestrator.scene_keys import START_STATE, parse_key
-from vibroimpact.orchestrator.scene_models import (
-    MOST_SAMPLES_PER_RUN,
-    Forcing,
-    OscillatorBody,
-    Record,
-    RestitutionStop,
-    SceneHeader,
-)
+from vibroimpact.orchestrator.scene_keys import START_STATE
+from vibroimpact.orchestrator.scene_models import MOST_SAMPLES_PER_RUN, OscillatorBody
+from vibroimpact.orchestrator.stop_rules import STOP_RULES
 from vibroimpact.orchestrator.sweep import SweepAxis, run_count
 
 MOST_POINTS = 10**8
-MOST_STOPS = 2
-
-FREQUENCY_KEYS = frozenset({"angular_frequency", "frequency"})
 PERIOD_KEYS = ("transient_periods", "recorded_periods")
 TIME_KEYS = ("transient_time", "recorded_time")
 COUPLING_KEYS = ("macro_step", "exchange", "guard")
-
-
-@dataclass(frozen=True, slots=True)
-class Draft:
-    """A scene on its way: the document, and those of its tables that are valid by themselves (else None)."""
-
-    document: Mapping[str, Any]
-    header: SceneHeader | None
-    body: OscillatorBody | None
-    forcing: Forcing | None
-    stops: tuple[RestitutionStop | None, ...]
-    record: Record | None
-    axes: tuple[SweepAxis, ...]
-
-    def written(self, table: str) -> Mapping[str, Any]:
-        """Return a table as written, or an empty one."""
-        raw = self.document.get(table)
-        return raw if isinstance(raw, dict) else {}
-
-    def span(self, text: str) -> tuple[float, float] | None:
-        """Return the lowest and highest value of a key over all points; None where its table is not valid."""
-        for axis in self.axes:
-            if axis.key == text:
-                return min(axis.values), max(axis.values)
-        key = parse_key(text)
-        assert key is not None
-        owner = self.stops[key.place] if key.place is not None else getattr(self, key.table)
-        return None if owner is None else (getattr(owner, key.name), getattr(owner, key.name))
-
-    def angular_frequency_span(self) -> tuple[float, float] | None:
-        """Return the lowest and highest angular frequency: 0 unforced, None where it is not valid."""
-        if "forcing" not in self.document:
-            return 0.0, 0.0
-        if self.forcing is None or not FREQUENCY_KEYS & self.written("forcing").keys():
-            return None
-        if self.forcing.frequency is None:
-            return self.span("forcing.angular_frequency")
-        span = self.span("forcing.frequency")
-        return span and (2.0 * math.pi * span[0], 2.0 * math.pi * span[1])
 
 
 def rule_problems(draft: Draft) -> list[Problem]:
@@ -79,8 +31,8 @@ def rule_problems(draft: Draft) -> list[Problem]:
         _damping_ratio_has_a_spring,
         _frequency_is_given_once,
         _units_agree,
-        _stops_leave_room,
-        _start_is_on_the_free_side,
+        *BODY_RULES,
+        *STOP_RULES,
         _record_counts_what_there_is,
         _samples_fit,
         _coupling_is_asked_for,
@@ -101,15 +53,16 @@ def _coupling_is_asked_for(draft: Draft) -> Iterator[Problem]:
 
 def _damping_is_given_once(draft: Draft) -> Iterator[Problem]:
     body = draft.written("body")
-    if "damping" in body and "damping_ratio" in body:
+    if body.get("kind", "oscillator") == "oscillator" and {"damping", "damping_ratio"} <= body.keys():
         yield Problem(
             "body.damping", "damping or damping_ratio", "both", f"Remove one{_swept_counts(draft)}."
         )
 
 
 def _damping_ratio_has_a_spring(draft: Draft) -> Iterator[Problem]:
-    stiffness = draft.span("body.stiffness")
-    if draft.body and draft.body.damping_ratio is not None and stiffness and stiffness[0] == 0.0:
+    body, stiffness = draft.body, draft.span("body.stiffness")
+    ratio = body.damping_ratio if isinstance(body, OscillatorBody) else None
+    if ratio is not None and stiffness and stiffness[0] == 0.0:
         hint = "The ratio is to 2 sqrt(stiffness mass); give damping instead."
         yield Problem(
             "body.damping_ratio", "a stiffness > 0 beside a damping_ratio", "a stiffness of 0", hint
@@ -136,58 +89,6 @@ def _units_agree(draft: Draft) -> Iterator[Problem]:
     if draft.header and draft.header.units == "nondimensional" and "frequency" in draft.written("forcing"):
         hint = 'Hz is an SI unit: give angular_frequency in radians per unit of time, or units = "SI".'
         yield Problem("forcing.frequency", "no frequency in Hz in a nondimensional scene", "one", hint)
-
-
-def _stops_leave_room(draft: Draft) -> Iterator[Problem]:
-    if len(draft.stops) > MOST_STOPS:
-        yield Problem("stop", f"at most {MOST_STOPS} stops", str(len(draft.stops)), "Remove [[stop]] tables.")
-        return
-    sides = [stop.side for stop in draft.stops if stop]
-    if len(sides) < MOST_STOPS:
-        return
-    if sides[0] == sides[1]:
-        hint = "Motion never reaches the farther of two stops on one side: remove it."
-        yield Problem("stop[2].side", "one upper and one lower stop", f"two {sides[0]} stops", hint)
-        return
-    upper, lower = sides.index("upper"), sides.index("lower")
-    lowest_upper, highest_lower = _position(draft, upper)[0], _position(draft, lower)[1]
-    if lowest_upper <= highest_lower:
-        expected = f"the upper stop[{upper + 1}] above the lower stop[{lower + 1}]"
-        got = f"upper {quoted(lowest_upper)} and lower {quoted(highest_lower)}{_worst(draft, 'stop')}"
-        yield Problem(
-            f"stop[{upper + 1}].position", expected, got, "Leave room for motion between the stops."
-        )
-
-
-def _position(draft: Draft, index: int) -> tuple[float, float]:
-    span = draft.span(f"stop[{index + 1}].position")
-    assert span is not None
-    return span
-
-
-def _worst(draft: Draft, *tables: str) -> str:
-    """Return a note for a number that may be the worst of a sweep."""
-    swept = any(axis.key.startswith(tables) for axis in draft.axes)
-    return " (the worst of the swept values)" if swept else ""
-
-
-def _start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
-    start = draft.span("body.displacement_start")
-    for index, stop in enumerate(draft.stops):
-        if start is None or stop is None:
-            continue
-        upper = stop.side == "upper"
-        limit, displacement = (
-            (_position(draft, index)[0], start[1]) if upper else (_position(draft, index)[1], start[0])
-        )
-        if displacement > limit if upper else displacement < limit:
-            relation = "<=" if upper else ">="
-            expected = (
-                f"a start on the free side of stop[{index + 1}] (displacement {relation} {quoted(limit)})"
-            )
-            got = f"{quoted(displacement)}{_worst(draft, 'stop', 'body.displacement_start')}"
-            hint = "Start on the stop or away from it, or move the stop."
-            yield Problem("body.displacement_start", expected, got, hint)
 
 
 def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:
@@ -262,7 +163,7 @@ def _sweep_fits(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
         hint = 'Make the others "independent": they span the branches.'
         yield Problem("sweep", "at most one key with a path up, down or up-down", ", ".join(carried), hint)
     for key in carried:
-        if key in START_STATE:
+        if key.partition("[")[0] in START_STATE:  # an element of it too
             where = key_path(("sweep", key, "path"))
             hint = "Along a continuation each point starts from the state of the one before."
             yield Problem(where, '"independent" for a start state', "a continuation", hint)

@@ -8,27 +8,29 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.general_scene import GeneralScene
-from vibroimpact.orchestrator.scene_errors import Problem, quoted, unknown_key, value_problem
+from vibroimpact.orchestrator.scene_draft import Draft
+from vibroimpact.orchestrator.scene_errors import Problem, choice_problem, quoted, unknown_key
 from vibroimpact.orchestrator.scene_keys import parse_key
 from vibroimpact.orchestrator.scene_models import (
     BODY_MODELS,
     STOP_MODELS,
+    Body,
     Execution,
     Forcing,
-    OscillatorBody,
     Record,
-    RestitutionStop,
     SceneHeader,
+    Sensor,
+    Stop,
 )
-from vibroimpact.orchestrator.scene_rules import Draft, rule_problems
+from vibroimpact.orchestrator.scene_rules import rule_problems
 from vibroimpact.orchestrator.sweep import SweepAxis
 from vibroimpact.orchestrator.sweep_table import read_sweep
 from vibroimpact.orchestrator.table_reader import Table, read_table
 
-_SHORT_TABLES = ("body", "forcing", "stop")
+_SHORT_TABLES = ("body", "forcing", "stop", "sensor")
 _GENERAL_TABLES = ("component", "connection", "event")
 _COMMON_TABLES = ("record", "sweep", "execution")
-_OPTIONAL_TABLES = ("sensor", "load_cell", "exciter", "noise", "daq", "replay")
+_OPTIONAL_TABLES = ("load_cell", "exciter", "noise", "daq", "replay")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,13 +38,14 @@ class Tables:
     """All tables of a scene, valid by themselves and together; it has a body or is a general scene."""
 
     header: SceneHeader
-    body: OscillatorBody | None
+    body: Body | None
     forcing: Forcing | None
-    stops: tuple[RestitutionStop, ...]
+    stops: tuple[Stop, ...]
     record: Record
     sweep: tuple[SweepAxis, ...]
     execution: Execution
     general: GeneralScene | None = None
+    sensor: Sensor | None = None
 
 
 def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[Tables | None, list[Problem]]:
@@ -94,12 +97,13 @@ def _read_short(document: Mapping[str, Any]) -> tuple[Tables | None, list[Proble
     reader.problems += _table_problems(document, ("scene", *_SHORT_TABLES, *_COMMON_TABLES))
     header, body, forcing = reader.header(), reader.body(), reader.forcing()
     stops, record, execution = reader.stops(), reader.record(), reader.execution()
-    draft = Draft(reader.document, header, body, forcing, stops, record, axes)
+    sensor = reader.sensor()
+    draft = Draft(reader.document, header, body, forcing, stops, record, axes, sensor)
     problems = reader.problems + sweep_problems + rule_problems(draft)
     if problems or header is None or body is None or record is None or execution is None:
         return None, problems
     whole = tuple(stop for stop in stops if stop is not None)
-    return Tables(header, body, forcing, whole, _applicable(record), axes, execution), []
+    return Tables(header, body, forcing, whole, _applicable(record), axes, execution, None, sensor), []
 
 
 def _table_problems(document: Mapping[str, Any], known: tuple[str, ...]) -> Iterator[Problem]:
@@ -146,7 +150,7 @@ class _Reader:
     def header(self) -> SceneHeader | None:
         return self._table(SceneHeader, self.document.get("scene", {}), ("scene",))
 
-    def body(self) -> OscillatorBody | None:
+    def body(self) -> Body | None:
         if "body" not in self.document:
             hint = "Add [body] with mass, stiffness and damping."
             self.problems.append(Problem("body", "one [body] table", "nothing", hint))
@@ -156,15 +160,14 @@ class _Reader:
     def forcing(self) -> Forcing | None:
         if "forcing" not in self.document:
             return None
-        return self._variant(
-            {"force": Forcing, "base_acceleration": Forcing},
-            "kind",
-            "force",
-            self.document["forcing"],
-            ("forcing",),
-        )
+        return self._table(Forcing, self.document["forcing"], ("forcing",))
 
-    def stops(self) -> tuple[RestitutionStop | None, ...]:
+    def sensor(self) -> Sensor | None:
+        if "sensor" not in self.document:
+            return None
+        return self._table(Sensor, self.document["sensor"], ("sensor",))
+
+    def stops(self) -> tuple[Stop | None, ...]:
         stops = self.document.get("stop", [])
         if not isinstance(stops, list):
             hint = "Write [[stop]], with two brackets, for each stop."
@@ -194,7 +197,7 @@ class _Reader:
         if isinstance(kind, str) and kind in models:
             return self._table(models[kind], raw, path)
         model = models[default]
-        self.problems.append(value_problem((*path, tag), model.model_fields[tag], kind))
+        self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, models))
         return None
 
     def _table(self, model: type[Table], raw: object, path: tuple[str | int, ...]) -> Table | None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Annotated, Any, get_origin
 
 import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -16,17 +17,13 @@ from vibroimpact.orchestrator.scene_errors import (
     nearest,
     problems_of,
     quoted,
+    rule_of,
     value_problem,
 )
 from vibroimpact.orchestrator.scene_keys import SWEEPABLE, field_name, parse_key
-from vibroimpact.orchestrator.scene_models import BODY_MODELS, STOP_MODELS, AxisTable, Forcing
+from vibroimpact.orchestrator.scene_models import BODY_MODELS, STOP_MODELS, AxisTable, Forcing, Sensor
 from vibroimpact.orchestrator.sweep import SweepAxis
 
-_MODELS: dict[str, type[BaseModel]] = {
-    "body": BODY_MODELS["oscillator"],
-    "forcing": Forcing,
-    "stop": STOP_MODELS["restitution"],
-}
 _FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
 
 
@@ -51,7 +48,7 @@ def read_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list
         found = list(_key_problems(key, entry, document))
         if not found:
             axis, found = read_axis(key, entry)
-            found += _value_problems(axis) if axis else []
+            found += _value_problems(axis, document) if axis else []
             axes += [axis] if axis and not found else []
         problems += found
     return tuple(axes), problems
@@ -74,11 +71,43 @@ def _key_problems(text: str, entry: object, document: Mapping[str, Any]) -> Iter
 
 def _sweepable_keys(document: Mapping[str, Any]) -> list[str]:
     """Return the keys that a sweep of this scene may vary; a table that is absent has none."""
-    keys = [
-        f"{table}.{name}" for table in ("body", "forcing") if table in document for name in SWEEPABLE[table]
-    ]
-    stops = range(1, _stop_count(document) + 1)
-    return keys + [f"stop[{number}].{name}" for number in stops for name in SWEEPABLE["stop"]]
+    return [key for name, table in _tables(document) for key in _keys_in(name, table)]
+
+
+def _tables(document: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the tables with numbers, an array `stop` as `stop[1]`, `stop[2]`, ..."""
+    for name in ("body", "forcing", "sensor"):
+        if name in document:
+            yield name, document[name]
+    for number in range(1, _stop_count(document) + 1):
+        yield f"stop[{number}]", document["stop"][number - 1]
+
+
+def _keys_in(name: str, table: Any) -> Iterator[str]:
+    model = _model_of(name, table)
+    for word in SWEEPABLE[name.partition("[")[0]]:
+        if model is not None and word not in known_keys(model):
+            continue
+        written = table.get(word) if isinstance(table, dict) else None
+        if isinstance(written, list):
+            yield from (f"{name}.{word}[{number}]" for number in range(1, len(written) + 1))
+        elif model is None or not _is_array(model, word):
+            yield f"{name}.{word}"
+
+
+def _model_of(name: str, table: Any) -> type[BaseModel] | None:
+    """Return the model of a table; None where the word that chooses it is not known."""
+    written = table if isinstance(table, dict) else {}
+    if name == "body":
+        return BODY_MODELS.get(str(written.get("kind", "oscillator")))
+    if name.startswith("stop"):
+        return STOP_MODELS.get(str(written.get("law", "restitution")))
+    return Forcing if name == "forcing" else Sensor
+
+
+def _is_array(model: type[BaseModel], word: str) -> bool:
+    """Whether a key takes an array and nothing else."""
+    return get_origin(model.model_fields[field_name(model, word)].annotation) is tuple
 
 
 def _stop_count(document: Mapping[str, Any]) -> int:
@@ -96,14 +125,24 @@ def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list
             return f'Indices start at 1 and this scene has {count} [[stop]]: for example "stop[1].position".'
     if table in SWEEPABLE and table not in document:
         return f"This scene has no {'[[stop]]' if table == 'stop' else f'[{table}]'}."
-    if text.rpartition(".")[2] in _structural(table):
+    return _element_hint(text, document, known) or nearest(text, known)
+
+
+def _element_hint(text: str, document: Mapping[str, Any], known: list[str]) -> str:
+    """Return the advice for a key whose table is there: of an array, an element is swept."""
+    where, _, name = text.rpartition(".")
+    model = next((_model_of(own, table) for own, table in _tables(document) if own == where), None)
+    word = name.partition("[")[0]
+    if model is None or word not in known_keys(model):
+        return ""
+    if word not in SWEEPABLE[where.partition("[")[0]]:
         return f"{text} is part of the structure of the scene and cannot be swept."
-    return nearest(text, known)
-
-
-def _structural(table: str) -> list[str]:
-    keys = known_keys(_MODELS[table]) if table in _MODELS else []
-    return [key for key in keys if key not in SWEEPABLE[table]]
+    elements = [key for key in known if key.startswith(f"{where}.{word}[")]
+    if elements:
+        return f'It is an array of {len(elements)}: sweep an element of it, such as "{elements[0]}".'
+    if "[" in name or _is_array(model, word):
+        return f"Write {word} as an array first, then its elements can be swept."
+    return ""
 
 
 def read_axis(key: str, entry: object) -> tuple[SweepAxis | None, list[Problem]]:
@@ -168,20 +207,24 @@ def _distinct_problem(key: str, values: tuple[float, ...]) -> Problem | None:
     )
 
 
-def _value_problems(axis: SweepAxis) -> list[Problem]:
+def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Problem]:
     """Return the swept value that breaks the rule of its field.
 
     All rules of sweepable fields are intervals, so the lowest and the highest value speak for the rest.
     """
     key = parse_key(axis.key)
     assert key is not None
-    model = _MODELS[key.table]
+    where = key.table if key.place is None else f"{key.table}[{key.place + 1}]"
+    model = next(_model_of(name, table) for name, table in _tables(document) if name == where)
+    if model is None:
+        return []
     field = model.model_fields[field_name(model, key.name)]
     annotated: Any = Annotated
     rule = TypeAdapter(annotated[(field.annotation, *field.metadata)])
     for value in (min(axis.values), max(axis.values)):
         try:
-            rule.validate_python(value, strict=True)
+            rule.validate_python(value if key.element is None else (value,), strict=True)
         except ValidationError:
-            return [value_problem(("sweep", axis.key), field, value)]
+            problem = value_problem(("sweep", axis.key), field, value)
+            return [problem if key.element is None else replace(problem, expected=rule_of(field).item)]
     return []

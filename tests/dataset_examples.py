@@ -15,11 +15,13 @@ PERIODS = 3
 
 def impact_rows(number: int, start: float) -> NDArray[np.float64]:
     """Return impacts that follow each other from a time on; velocities tell them apart."""
-    rows = np.ones((number, 5))
+    rows = np.ones((number, 7))
     rows[:, 0] = start + np.arange(number)
     rows[:, 1] = np.linspace(0.0, 6.0, number)
     rows[:, 2] = start + 0.01 * np.arange(number)
     rows[:, 3] = 1.7 * rows[:, 2]
+    rows[:, 5] = 0.7
+    rows[:, 6] = 0.0
     return rows
 
 
@@ -135,6 +137,7 @@ def everything(**changes: Any) -> xr.Dataset:
     coupled = coupled_record(1.0, events=3)
     runs[0].events, runs[0].energy_residual = coupled.events, coupled.energy_residual
     runs[0].loop_residual = coupled.loop_residual
+    runs[0].final_state, runs[1].final_state = np.array([1.0, -1.0, 0.5, 0.25]), np.zeros(4)
     return dataset_of(
         runs,
         sample_variables=["body.displacement", "stop.contact[1].force"],

@@ -78,7 +78,7 @@ class OscillatorFmu:
         early_return: bool = False,
         initialize: bool = True,
     ) -> None:
-        folder, description = unpacked(version)
+        folder, description = self.described(version)
         self.version = version
         self.time = start_time
         self.messages: list[str] = []
@@ -111,6 +111,10 @@ class OscillatorFmu:
             if event_mode:
                 self.fmu.updateDiscreteStates()
                 self.fmu.enterStepMode()
+
+    def described(self, version: str) -> tuple[Path, ModelDescription]:
+        """Return the folder of the unpacked FMU and its description."""
+        return unpacked(version)
 
     def _log3(self, _: Any, __: int, ___: bytes, message: bytes) -> None:
         self.messages.append(message.decode())

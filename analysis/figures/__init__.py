@@ -11,7 +11,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.ladder import convergence
+from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, FORMATS, label, page_style, save
+from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait
 from vibroimpact.analysis.figures.runs import draw_run
 from vibroimpact.analysis.figures.series import draw_series
 from vibroimpact.analysis.figures.sweeps import (
@@ -29,15 +31,26 @@ __all__ = [
     "convergence",
     "draw",
     "draw_bifurcation",
+    "draw_energies",
+    "draw_impact_map",
     "draw_map",
+    "draw_portrait",
     "draw_run",
     "draw_series",
+    "draw_shapes",
     "label",
     "largest_impact_velocity",
     "save",
 ]
 
-Kind = Literal["auto", "bifurcation", "run", "convergence"]
+Kind = Literal["auto", "bifurcation", "run", "convergence", "portrait", "impact-map", "energies", "shapes"]
+
+_DRAWERS = {
+    "portrait": draw_portrait,
+    "impact-map": draw_impact_map,
+    "energies": draw_energies,
+    "shapes": draw_shapes,
+}
 
 
 def draw(dataset: xr.Dataset, kind: Kind = "auto", run: int | None = None) -> Figure:
@@ -46,9 +59,10 @@ def draw(dataset: xr.Dataset, kind: Kind = "auto", run: int | None = None) -> Fi
     Parameters
     ----------
     dataset : xarray.Dataset
-    kind : {"auto", "bifurcation", "run", "convergence"}
+    kind : {"auto", "bifurcation", "run", "convergence", "portrait", "impact-map", "energies", "shapes"}
         `auto` draws a single run where nothing is swept or a run is named, else a bifurcation diagram, or
-        colour maps over two swept parameters. `convergence`: see `convergence`.
+        colour maps over two swept parameters. `convergence`: see `convergence`. `portrait`, `impact-map`: one
+        run in the phase plane, and its impacts by phase and velocity. `energies`, `shapes`: of the modes.
     run : int, optional
         `run_index` of the run to draw.
 
@@ -68,6 +82,8 @@ def draw(dataset: xr.Dataset, kind: Kind = "auto", run: int | None = None) -> Fi
     with page_style():
         if kind == "run" or (kind == "auto" and (run is not None or not swept)):
             return draw_run(dataset, run)
+        if kind in _DRAWERS:
+            return _DRAWERS[kind](dataset, run)
         if len(swept) == 1:
             return draw_bifurcation(dataset)
         if len(swept) == 2:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,13 +20,15 @@ from vibroimpact.fmus.errors import DatasetError
 def draw_run(dataset: xr.Dataset, run: int | None = None) -> Figure:
     """Draw one run: time series with the stop and the impacts, and the phase portrait.
 
-    Variables of components are drawn as time series with the events. Where no time series was recorded, the
-    extremes of each period and the strobe points stand in for it.
+    Variables of components, and of a body where more than displacement and velocity was sampled, are drawn as
+    time series with the events or impacts. Where no time series was recorded, the extremes of each period and
+    the strobe points stand in for it.
     """
     selection = {} if run is None else {"run_index": run}
-    if {"displacement", "velocity"} <= set(map(str, dataset.variables)):
+    sampled = sampled_names(dataset)
+    if set(sampled) == {"displacement", "velocity"}:
         return _draw_samples(dataset, selection)
-    if sampled_names(dataset):
+    if sampled:
         return draw_series(dataset, selection)
     if "displacement_max" in dataset.variables or "impact_velocity" in dataset.variables:
         return _draw_periods(dataset, selection)
@@ -59,6 +62,7 @@ def _draw_samples(dataset: xr.Dataset, selection: dict[str, int]) -> Figure:
     above.set_ylabel(label(samples["displacement"]))
     middle.set_ylabel(label(samples["velocity"]))
     middle.set_xlabel(label(samples["time"]))
+    below.xaxis.set_major_locator(MaxNLocator(5))  # long numbers of small displacements would run together
     below.set_xlabel(label(samples["displacement"]))
     below.set_ylabel(label(samples["velocity"]))
     _legend_above(figure, below, has_marks=len(marks) > 0)
@@ -76,15 +80,35 @@ def _legend_above(figure: Figure, axis: Axes, *, has_marks: bool) -> None:
 
 
 def _stops(dataset: xr.Dataset) -> list[tuple[float, float]]:
-    """Return position and side (+1 upper, -1 lower) of each stop of the scene; none where it is not known."""
-    if any(name.endswith(("position", "side")) for name in swept_names(dataset)):
+    """Return position and side (+1 upper, -1 lower) of each stop of the scene; none where it is not known.
+
+    Nor where one is at another point than the observed one: there its position says nothing.
+    """
+    if any(name.endswith(("position", "side", "location")) for name in swept_names(dataset)):
         return []
     try:
-        stops = tomllib.loads(str(dataset.attrs.get("scene", ""))).get("stop", [])
+        scene = tomllib.loads(str(dataset.attrs.get("scene", "")))
+        stops = scene.get("stop", [])
+        if not _at_observed_point(scene, stops):
+            return []
         return [(float(s["position"]), -1.0 if s.get("side") == "lower" else 1.0) for s in stops]
     except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError, AttributeError):
         # The scene text is only provenance here: a figure without the line of the stop is still right.
         return []
+
+
+def _at_observed_point(scene: dict[str, Any], stops: list[dict[str, Any]]) -> bool:
+    """Whether all stops limit the motion of the point whose displacement is recorded."""
+    body = scene.get("body", {})
+    if body.get("kind") == "chain":
+        masses = [stop.get("mass", len(body["masses"])) for stop in stops]
+        return set(masses) <= {body.get("observed_mass", masses[0] if masses else 0)}
+    if body.get("kind") == "beam":
+        tip = body.get("boundary", "clamped-free") == "clamped-free"
+        places = [stop.get("location", 1.0) for stop in stops]
+        default = 1.0 if tip or not places else places[0]
+        return set(places) <= {scene.get("sensor", {}).get("location", default)}
+    return True
 
 
 def _impact_points(hits: xr.Dataset | None, stops: list[tuple[float, float]]) -> Floats:

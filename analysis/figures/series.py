@@ -1,4 +1,4 @@
-"""Figures of the variables of components over time, with the events of the run."""
+"""Figures of sampled variables over time, with the events or impacts of the run."""
 
 from __future__ import annotations
 
@@ -35,6 +35,8 @@ def sampled_names(dataset: xr.Dataset) -> list[str]:
 def draw_series(dataset: xr.Dataset, selection: dict[str, Any]) -> Figure:
     """Draw all sampled variables of one run against time: a panel for each unit, lines at the events.
 
+    Energies of modes have a panel of their own.
+
     Parameters
     ----------
     dataset : xarray.Dataset
@@ -43,9 +45,10 @@ def draw_series(dataset: xr.Dataset, selection: dict[str, Any]) -> Figure:
         What names the run, as for `dataset.vibroimpact.samples`.
     """
     samples = dataset.vibroimpact.samples(**selection)
-    panels: dict[str, list[xr.DataArray]] = {}
+    panels: dict[tuple[str, bool], list[xr.DataArray]] = {}
     for name in sampled_names(samples):
-        panels.setdefault(unit_symbol(samples[name]), []).append(samples[name])
+        place = (unit_symbol(samples[name]), name.startswith("modal_energy_"))
+        panels.setdefault(place, []).append(samples[name])
     kind, instants = _instants(dataset, selection)
     rows = sum(-(-len(variables) // _columns(variables)) for variables in panels.values())
     figure = canvas(8 + _PANEL_MM * len(panels) + _ROW_MM * rows)

@@ -7,7 +7,14 @@ README come from the same file. Imports the standard library only: the package's
 from vibroimpact.fmus.description.c_header import c_header, header_name
 from vibroimpact.fmus.description.fmi2_xml import fmi2_xml
 from vibroimpact.fmus.description.fmi3_xml import fmi3_xml
-from vibroimpact.fmus.description.model import Component, Enumeration, EnumerationItem, Unit, Variable
+from vibroimpact.fmus.description.model import (
+    Component,
+    Enumeration,
+    EnumerationItem,
+    Unit,
+    Variable,
+    plural,
+)
 from vibroimpact.fmus.description.reading import read_component
 from vibroimpact.fmus.description.readme_table import readme_table, with_table
 
@@ -21,6 +28,7 @@ __all__ = [
     "fmi2_xml",
     "fmi3_xml",
     "header_name",
+    "plural",
     "read_component",
     "readme_table",
     "with_table",

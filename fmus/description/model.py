@@ -9,6 +9,12 @@ from pathlib import Path
 
 Number = float | int | bool
 
+
+def plural(block: str) -> str:
+    """Return what several of a repeated block are called: `contacts`, `masses`."""
+    return f"{block}es" if block.endswith("s") else f"{block}s"
+
+
 #: FMI's default of `initial` for each (causality, variability); absent pairs have none.
 DEFAULT_INITIAL = {
     ("parameter", "fixed"): "exact",
@@ -78,6 +84,8 @@ class Variable:
         Name of the block it repeats in (`contact`), empty for a single variable.
     repeat_index : int
         1-based index in that block, 0 for a single variable.
+    counts : str
+        Name of the block of which it says how many are in use (`mode`); an export gives it that start value.
     shown_name, shown_description : str
         For a reader: with the letter k in place of the index.
     """
@@ -101,6 +109,7 @@ class Variable:
     versions: tuple[int, ...] = (2, 3)
     repeat: str = ""
     repeat_index: int = 0
+    counts: str = ""
     shown_name: str = ""
     shown_description: str = ""
 
@@ -151,7 +160,14 @@ class Component:
         return tuple(name for name in variable.dependencies or () if name in inputs)
 
     def with_repeats(self, repeats: Mapping[str, int]) -> Component:
-        """Return the component with fewer repeated blocks; the value references that stay are unchanged."""
+        """Return the component with fewer repeated blocks; the value references that stay are unchanged.
+
+        A variable that counts such a block starts with that number, its largest value.
+        """
         counts = {**self.repeats, **repeats}
-        kept = tuple(v for v in self.variables if not v.repeat or v.repeat_index <= counts[v.repeat])
-        return replace(self, repeats=counts, variables=kept)
+        kept = (v for v in self.variables if not v.repeat or v.repeat_index <= counts[v.repeat])
+        counted = (
+            replace(v, start=repeats[v.counts], maximum=repeats[v.counts]) if v.counts in repeats else v
+            for v in kept
+        )
+        return replace(self, repeats=counts, variables=tuple(counted))

@@ -1,10 +1,15 @@
-"""Reads `variables.toml`; every problem of the file is reported at once."""
+"""Reads `variables.toml`; every problem of the file is reported at once.
+
+`[component] include` names files whose units, enumerations and variables follow the component's own: what several
+components have in common is written once. There a dependency that a component does not have is left out.
+"""
 
 from __future__ import annotations
 
 import tomllib
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -16,6 +21,7 @@ from vibroimpact.fmus.description.model import (
     EnumerationItem,
     Unit,
     Variable,
+    plural,
 )
 from vibroimpact.fmus.errors import ComponentFileError
 
@@ -27,8 +33,10 @@ BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 REQUIRED_KEYS = {"name", "description", "causality", "variability", "type", "field", "code"}
 OPTIONAL_KEYS = {
     *("unit", "enumeration", "start", "min", "max", "initial"),
-    *("repeat", "dimensions", "fmi", "dependencies"),
+    *("repeat", "dimensions", "fmi", "dependencies", "counts"),
 }
+#: Stands in a dependency for every index of a repeated block, as `{k}` stands for the variable's own.
+ALL = "{*}"
 
 
 def read_component(path: Path) -> Component:
@@ -49,15 +57,45 @@ def read_component(path: Path) -> Component:
     ComponentFileError
         With all problems of the file, one a line.
     """
-    content = path.read_bytes()
-    try:
-        table = tomllib.loads(content.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise ComponentFileError(f"{path}: expected a TOML file, got one with: {error}.") from error
+    table, content = _table(path)
+    included = [_table(path.parent / name) for name in table.get("component", {}).get("include", ())]
+    table = _merged(table, [part for part, _ in included])
+    content += b"".join(more for _, more in included)
     problems = list(_problems_of_table(table)) or list(_problems_of_variables(table))
     if problems:
         raise ComponentFileError("\n".join(f"{path}: {problem}" for problem in problems))
     return _component(table, path, str(uuid.uuid5(TOKEN_NAMESPACE, content.hex())))
+
+
+def _table(path: Path) -> tuple[dict[str, Any], bytes]:
+    try:
+        content = path.read_bytes()
+        return tomllib.loads(content.decode("utf-8")), content
+    except OSError as error:
+        raise ComponentFileError(f"{path}: expected a file, got: {error.strerror}.") from error
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ComponentFileError(f"{path}: expected a TOML file, got one with: {error}.") from error
+
+
+def _merged(table: Mapping[str, Any], included: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    lists = {
+        key: [entry for part in (table, *included) for entry in part.get(key, ())]
+        for key in ("unit", "enumeration", "variable")
+    }
+    names = {entry.get("name") for entry in lists["variable"]}
+    own = len(table.get("variable", ()))
+    rest = (_with_known_dependencies(entry, names) for entry in lists["variable"][own:])
+    return {**table, **lists, "variable": [*lists["variable"][:own], *rest]}
+
+
+def _with_known_dependencies(entry: Mapping[str, Any], names: set[Any]) -> Mapping[str, Any]:
+    if "dependencies" not in entry:
+        return entry
+    return {**entry, "dependencies": [d for d in entry["dependencies"] if _entry_name(d) in names]}
+
+
+def _entry_name(dependency: str) -> str:
+    return dependency.replace(ALL, "{k}")
 
 
 def _component(table: Mapping[str, Any], path: Path, token: str) -> Component:
@@ -89,14 +127,29 @@ def _repeat_names(table: Mapping[str, Any]) -> list[str]:
 
 
 def _repeat_count(head: Mapping[str, Any], repeat: str) -> int | None:
-    # the plural is the key: `contacts = 2` counts the block `contact`, `masses` the block `mass`
-    count: int | None = head.get(f"{repeat}s", head.get(f"{repeat}es"))
+    # `contacts = 2` counts the block `contact`, `masses` the block `mass`
+    count: int | None = head.get(plural(repeat))
     return count
 
 
 def _numbered(entries: list[Mapping[str, Any]], repeats: Mapping[str, int]) -> Iterator[Variable]:
+    blocks = {entry["name"]: entry.get("repeat", "") for entry in entries}
     for reference, (entry, index) in enumerate(_written_out(entries, repeats)):
-        yield _variable(entry, index, reference)
+        variable = _variable(entry, index, reference)
+        if variable.dependencies is not None:
+            written = (_dependency(d, index, blocks, repeats) for d in entry["dependencies"])
+            variable = replace(variable, dependencies=tuple(name for names in written for name in names))
+        yield variable
+
+
+def _dependency(
+    text: str, index: int, blocks: Mapping[str, str], repeats: Mapping[str, int]
+) -> Iterator[str]:
+    if ALL not in text:
+        yield _indexed(text, index)
+        return
+    for other in range(1, repeats[blocks[_entry_name(text)]] + 1):
+        yield text.replace(ALL, str(other))
 
 
 def _written_out(
@@ -129,10 +182,11 @@ def _variable(entry: Mapping[str, Any], index: int, reference: int) -> Variable:
         minimum=entry.get("min"),
         maximum=entry.get("max"),
         dimensions=dimensions,
-        dependencies=None if dependencies is None else tuple(_indexed(d, index) for d in dependencies),
+        dependencies=None if dependencies is None else tuple(dependencies),
         versions=_versions(entry),
         repeat=entry.get("repeat", ""),
         repeat_index=index,
+        counts=entry.get("counts", ""),
         shown_name=entry["name"].replace("{k}", "k"),
         shown_description=entry["description"].replace("{k}", "k"),
     )
@@ -217,7 +271,16 @@ def _rules(table: Mapping[str, Any]) -> tuple[Rule, ...]:
             "a start value for each parameter and input, and for none that is calculated",
             _start_is_right,
         ),
-        ("dependencies", "names of variables of the file", lambda e: set(e.get("dependencies", ())) <= names),
+        (
+            "dependencies",
+            "names of variables of the file",
+            lambda e: {_entry_name(d) for d in e.get("dependencies", ())} <= names,
+        ),
+        (
+            "counts",
+            "a repeated block of the file",
+            lambda e: "counts" not in e or e["counts"] in _repeat_names(table),
+        ),
         ("repeat", "a count in [component]", lambda e: _repeat_is_counted(table["component"], e)),
     )
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from ctypes import c_void_p
 from functools import lru_cache
 from pathlib import Path
@@ -10,7 +12,7 @@ from pathlib import Path
 from vibroimpact.fmus.archive import unpack
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.fmpy_door import ModelDescription, ModelVariable, read_description
-from vibroimpact.orchestrator.fmi.instance import Wrapper
+from vibroimpact.orchestrator.fmi.instance import DISCARD, Wrapper
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.log import LogTail
@@ -113,6 +115,11 @@ class Component:
         group.values[0] = _item_value(self.name, variable, value) if isinstance(value, str) else value
         group.set()
 
+    def first_event(self) -> float:
+        """Return the time of the first event of the last step, s, as one of ours in FMI 2.0 reports it; or inf."""
+        times = () if self.event_times is None else self.event_times.get()
+        return min((float(t) for t in times if not math.isnan(t)), default=math.inf)
+
     def watch_inputs(self, names: Iterable[str]) -> None:
         """Say which inputs are connected; their slopes belong to them."""
         wanted = [n for name in names for n in (name, f"{name}_rate") if n in self.variables]
@@ -131,6 +138,28 @@ class Component:
         self.instance.restore(self.at_start)
         for group in self._inputs:
             group.set()
+
+    @contextmanager
+    def taken_back(self) -> Iterator[None]:
+        """Leave what is done inside undone: the component may be taken back into the step it has just made."""
+        instance = self.instance
+        instance.save(self.at_end)
+        kept = (instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end)
+        self.note_inputs()
+        try:
+            yield
+        finally:
+            if not instance.is_fatal:
+                instance.restore(self.at_end)
+            instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end = kept
+            instance.is_flagged = any(kept[1:])
+
+    def step_from_start(self, time: float, size: float) -> None:
+        """Go back to the start of the step just made, at `time`, and `size` s into it again."""
+        self.revisit_start()
+        status = self.instance.step(time, size)
+        if status == DISCARD:
+            self.instance.check(status, "DoStep")
 
     def free(self) -> None:
         """Give back its saved states and its instance."""

@@ -3,16 +3,21 @@
 A force that is held over a step is not the force that the other side has: over the step it does the work
 (mean force applied - mean force connected) * displacement of the receiver too much. The sum is the residual of
 that connection, in joule; exact coupling has none.
+
+At a contact with a stop that yields the body follows a force that is a straight line in penetration and rate; the
+residual is the integral of (that force - the force that the stop's law has on the body's way) * velocity.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.importer.component import description_of
+from vibroimpact.orchestrator.importer.contact_bond import ContactBond
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
@@ -41,7 +46,24 @@ def force_connections(
     )
 
 
+def _points_of_a_way() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points of a way, as fractions of it, and their weights: Gauss's in s, at u = s^2 (3 - 2 s).
+
+    Where a contact begins or ends at an end of the way, a force like penetration^1.5 is smooth in s, not in u.
+    """
+    points, weights = np.polynomial.legendre.leggauss(8)
+    s = 0.5 * (points + 1.0)
+    return s * s * (3.0 - 2.0 * s), 3.0 * s * (1.0 - s) * weights
+
+
+_POINTS, _WEIGHTS = _points_of_a_way()
+#: Where a body separates within a step is found to this fraction of it.
+SEPARATION = 1e-12
+
+
 class _Connection:
+    """A force that is given once a step, and perhaps its slope over time."""
+
     def __init__(self, importer: Importer, connection: ConnectionSpec, displacement: str) -> None:
         source = importer.components[connection.source[0]]
         target = importer.components[connection.target[0]]
@@ -61,13 +83,96 @@ class _Connection:
         self._force_start = self._gain * self._source.get()[0]
         self._displacement_start = float(self._displacement.get()[0])
 
-    def after(self, size: float) -> None:
+    def after(self, time: float, end: float) -> None:
         applied = float(self._applied.get()[0])
         if self._slope is not None:
-            applied += 0.5 * size * float(self._slope.get()[0])
+            applied += 0.5 * (end - time) * float(self._slope.get()[0])
         connected = 0.5 * (self._force_start + self._gain * float(self._source.get()[0]))
         moved = float(self._displacement.get()[0]) - self._displacement_start
         self.residual += (applied - connected) * moved
+
+
+class _Contact:
+    """The force of a stop that yields: what the body felt through a step, against the stop's own law on its way.
+
+    The body is taken back into the step to a few points of it, and the stop is asked for its force at each.
+    """
+
+    def __init__(self, bond: ContactBond) -> None:
+        self._bond = bond
+        port = bond.port
+        self._motion = bond.body.group(
+            "Float64", [f"{port}.{x}" for x in ("displacement", "velocity", "force")]
+        )
+        self.residual = 0.0
+
+    def begin(self, gain: float) -> None:
+        self.residual = 0.0
+
+    def before(self) -> None:
+        pass
+
+    def after(self, time: float, end: float) -> None:
+        bond = self._bond
+        if not (bond.active and bond.body.has_states and end > time):
+            return
+        self._last_force = bond.look().force
+        with bond.body.taken_back():
+            kinks = [0.0, *self._kinks(time, end - time), end - time]
+            parts = [(a, b) for a, b in pairwise(kinks) if b > a]
+            ways = [self._way(time, begin, finish) for begin, finish in parts]
+        for (begin, finish), way in zip(parts, ways, strict=True):
+            self.residual += (finish - begin) * float(np.sum(_WEIGHTS * self._power(time, end, way)))
+
+    def _kinks(self, time: float, size: float) -> list[float]:
+        """Seconds into the step at which the body lets go of the stop, and at which it is back at its surface."""
+        bond = self._bond
+        kinks = []
+        if bond.start.force > 0.0 and not self._felt(time, size)[3] > 0.0:
+            kinks.append(self._last(time, size, lambda felt: felt[3] > 0.0))
+        if bond.start.penetration > 0.0 and not self._penetration(self._felt(time, size)) > 0.0:
+            kinks.append(self._last(time, size, lambda felt: self._penetration(felt) > 0.0))
+        return sorted(kinks)
+
+    def _penetration(self, felt: tuple[float, float, float, float]) -> float:
+        return self._bond.penetration_at(felt[1])
+
+    def _last(
+        self, time: float, size: float, holds: Callable[[tuple[float, float, float, float]], bool]
+    ) -> float:
+        """The last moment at which something holds that does at the start of the step and not at its end."""
+        near, far = 0.0, size
+        while far - near > SEPARATION * size:
+            middle = 0.5 * (near + far)
+            near, far = (middle, far) if holds(self._felt(time, middle)) else (near, middle)
+        return far
+
+    def _way(self, time: float, begin: float, finish: float) -> NDArray[np.float64]:
+        """Seconds from the start, displacement, velocity and force felt at the points of a part; one row each."""
+        return np.array([self._felt(time, begin + float(u) * (finish - begin)) for u in _POINTS])
+
+    def _felt(self, time: float, size: float) -> tuple[float, float, float, float]:
+        self._bond.body.step_from_start(time, size)
+        displacement, velocity, force = (float(v) for v in self._motion.get())
+        return size, displacement, velocity, force
+
+    def _power(self, time: float, end: float, way: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Power that the body gets too much at the points of a part, W."""
+        bond = self._bond
+        if bond.stop.has_states:
+            with bond.stop.taken_back():
+                answered = np.array([self._answered(time, *map(float, row[:3])) for row in way])
+        else:
+            answered = bond.start.force + (self._last_force - bond.start.force) * way[:, 0] / (end - time)
+        # a force that presses the body away from the stop works against its velocity into the stop
+        return np.asarray((way[:, 3] - answered) * -bond.sign * way[:, 2])
+
+    def _answered(self, time: float, size: float, displacement: float, velocity: float) -> float:
+        stop = self._bond.stop
+        stop.instance.restore(stop.at_start)
+        self._bond.show_stop(displacement, velocity)
+        stop.instance.step(time, size)
+        return self._bond.force_of_stop()
 
 
 class InterfaceEnergy:
@@ -80,11 +185,15 @@ class InterfaceEnergy:
     """
 
     def __init__(self, importer: Importer, connections: Sequence[ConnectionSpec]) -> None:
-        found = []
+        bonds = {f"{bond.name}.applied_force": bond for bond in importer.contacts.all}
+        found: list[tuple[ConnectionSpec, _Connection | _Contact]] = []
         for connection in connections:
             target = importer.components[connection.target[0]]
             displacement = conjugate_displacement(target.variables, connection.target[1])
-            if displacement is not None:
+            bond = bonds.get(".".join(connection.target))
+            if bond is not None:
+                found.append((connection, _Contact(bond)))
+            elif displacement is not None:
                 found.append((connection, _Connection(importer, connection, displacement)))
         self.names = tuple(connection_name(connection) for connection, _ in found)
         self._connections = [watched for _, watched in found]
@@ -108,4 +217,4 @@ class InterfaceEnergy:
 
     def _after(self, time: float, end: float) -> None:
         for watched in self._connections:
-            watched.after(end - time)
+            watched.after(time, end)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.instance import Instance
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.wiring import CallList, StatusCall, Transfer
@@ -102,6 +103,18 @@ class EventMode:
             time=time,
             log=[line for i in endless for line in i.log.take()],
         )
+
+
+def standstill_error(instance: Instance, steps: int, time: float) -> ComponentError:
+    """Return the error of a run that makes no progress, for the component that ends its steps."""
+    return ComponentError(
+        f"{instance.name}: {instance.prefix}DoStep: expected steps that advance, got {steps} without "
+        f"progress at time {time:.17g}.",
+        instance=instance.name,
+        function=f"{instance.prefix}DoStep",
+        time=time,
+        log=instance.log.take(),
+    )
 
 
 def _takes_events(component: Component) -> bool:

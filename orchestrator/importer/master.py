@@ -11,8 +11,14 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
+from vibroimpact.orchestrator.importer.beginning import settle_connections
 from vibroimpact.orchestrator.importer.component import Component, Value
-from vibroimpact.orchestrator.importer.events import Event, EventMode, StepWatcher
+from vibroimpact.orchestrator.importer.contact_bond import (
+    CONTACT_STEPS,
+    MOST_REPETITIONS,
+    ContactBonds,
+)
+from vibroimpact.orchestrator.importer.events import Event, EventMode, StepWatcher, standstill_error
 from vibroimpact.orchestrator.importer.order import stepping_order
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec, Exchange
@@ -29,9 +35,6 @@ from vibroimpact.orchestrator.importer.wiring import (
 STANDSTILLS = 100
 #: A communication point closer than this times (1 + |time|), s, is reached.
 SAME_INSTANT = 1e-13
-#: Initialization ends when no connected value changes by more than this, relative.
-INITIAL_TOLERANCE = 1e-11
-INITIAL_ITERATIONS = 100
 #: Repetitions of a step with exchange "iterated", and the relative change at which they end.
 STEP_ITERATIONS = 50
 STEP_TOLERANCE = 1e-13
@@ -53,6 +56,9 @@ class Importer:
         outputs of those stepped before it. `iterated`: steps are repeated until the inputs at their end agree.
     macro_step : float
         Longest communication step, s.
+    contact_steps : float
+        Communication steps that a contact with a stop that yields is divided into (its law is another FMU's); the
+        macro step may divide it further.
     log, wrap : callable or None
         Given a component's name: where its log lines go, and what wraps the functions of its FMU.
 
@@ -62,6 +68,8 @@ class Importer:
         Time reached, s.
     components : dict of str to Component
         By name.
+    contacts : ContactBonds
+        The contacts with stops that yield.
     steps, repeated_steps : int
         Communication steps made, and how many of them were repeated.
     on_event, on_pause : callable or None
@@ -76,6 +84,7 @@ class Importer:
         *,
         exchange: Exchange = "gauss_seidel",
         macro_step: float = math.inf,
+        contact_steps: float = CONTACT_STEPS,
         log: Callable[[str], LogTail] | None = None,
         wrap: Callable[[str], Wrapper] | None = None,
     ) -> None:
@@ -86,10 +95,11 @@ class Importer:
             )
         self.macro_step = macro_step
         self.exchange = exchange
-        self.watches = [Watch(self._watchable(event), event) for event in events]
+        self.watches = [Watch(self.components[event.component], event) for event in events]
         order = order_of(connections, self.components)
         self.transfers = transfers_of(order, self.components)
         self.loops = LoopSolver(order.loops, self.components)
+        self.contacts = ContactBonds(self.components, self.transfers, connections, contact_steps)
         for name, component in self.components.items():
             component.watch_inputs(c.target[1] for c in connections if c.target[0] == name)
         self._looping = [t for t in self.transfers if order.loops_back(t.connections[0])]
@@ -101,16 +111,6 @@ class Importer:
         self.on_pause: Callable[[], None] | None = None
         self._begun = False
         self.time = 0.0
-
-    def _watchable(self, event: EventSpec) -> Component:
-        component = self.components[event.component]
-        if not component.has_states:
-            raise ComponentError(
-                f"{event.component}.{event.variable}: expected a watched component that can save its state, "
-                f"got one that cannot. Its events can be located only to a communication step.",
-                instance=event.component,
-            )
-        return component
 
     def _plan(self) -> None:
         """Decide once what a step must do."""
@@ -133,8 +133,10 @@ class Importer:
         self._start_moves = moves_of(behind) or None
         self._moves_after_loops = moves_of(t for t in behind if t not in self._looping)
         paths = [(c, moves_of(self._fresh[c.name]) or None, self._bare_step(c)) for c in self._order]
-        self._paths = [path for path in paths if path[0].has_states or not self._iterates]
-        self._stateless_paths = [path for path in paths if not path[0].has_states and self._iterates]
+        # a step may be repeated: those that cannot go back wait for the last repetition
+        repeats = self._iterates or bool(self.contacts.all)
+        self._paths = [path for path in paths if path[0].has_states or not repeats]
+        self._stateless_paths = [path for path in paths if not path[0].has_states and repeats]
         self._event_mode = EventMode(self._order, self.transfers, behind)
 
     def _is_source(self, component: Component) -> bool:
@@ -184,30 +186,13 @@ class Importer:
             own = {name: value for (who, name), value in (values or {}).items() if who == component.name}
             component.begin(own, start_time, first=not self._begun)
         self._begun = True
-        self._settle_connections()
+        settle_connections(self.transfers, self.loops, start_time)
         for component in self._order:
             component.instance.exit_initialization()
         for watch in self.watches:
             watch.begin()
         self.wants_to_end = self._event_mode.begin_run(start_time)
-
-    def _settle_connections(self) -> None:
-        """Carry start values over the connections until they no longer change: as many passes as chains are long."""
-        for _ in range(INITIAL_ITERATIONS):
-            before = [transfer.write.values.copy() for transfer in self.transfers]
-            for transfer in self.transfers:
-                transfer.move()
-            self.loops.solve(self.time)
-            after = [transfer.write.values for transfer in self.transfers]
-            if all(equal_values(b, a, INITIAL_TOLERANCE) for b, a in zip(before, after, strict=True)):
-                return
-        names = ", ".join(sorted({t.target.name for t in self.transfers}))
-        raise ComponentError(
-            f"initialization: expected connected start values that settle, got values that still change after "
-            f"{INITIAL_ITERATIONS} passes over the inputs of {names}.",
-            function="initialization",
-            time=self.time,
-        )
+        self.contacts.begin()
 
     # ---- advancing ----
 
@@ -270,9 +255,14 @@ class Importer:
 
     def _step(self, time: float, target: float, made: int | None = None) -> None:
         """Make a step; `made` is the status of the first component's step where it is made already."""
+        contacts = self.contacts
+        if contacts.all:
+            target = contacts.begin_step(time, target)
         if self._start_moves is not None:
             self._start_moves()
-        if self._prepares or self.keeps_start:
+        if contacts.active:
+            contacts.apply()
+        if self._prepares or self.keeps_start or contacts.active:
             self._prepare(time)
         watchers = self.watchers
         for watcher in watchers:
@@ -280,6 +270,12 @@ class Importer:
         overtaken = self._step_all(time, target, made)
         if overtaken is not None or self._iterates:
             self._agree(time, overtaken)
+        if contacts.active:
+            self._settle_contacts(time)
+        if self._stateless_paths and self._reached > time:
+            self._step_stateless(time, self._reached)
+        if contacts.active:
+            contacts.end_step(self._reached - time)
         end = self._reached
         if end > time:
             self._standstill = 0
@@ -306,7 +302,7 @@ class Importer:
         if self._iterates:
             for transfer in self.transfers:
                 transfer.note_begin()
-        if self._saves or self.keeps_start:
+        if self._saves or self.keeps_start or self.contacts.active:
             self._save_start()
 
     def _solve_loops(self, time: float) -> None:
@@ -340,10 +336,21 @@ class Importer:
         """Repeat a step that all agreed on (exchange "iterated"); returns the time of an event that came earlier."""
         if not self._iterates:
             return None
-        end = self._iterate(time, self._reached)
-        if end is None:
-            self._step_stateless(time, self._reached)
-        return end
+        return self._iterate(time, self._reached)
+
+    def _settle_contacts(self, time: float) -> None:
+        """Repeat a step until the stops that yield agree with what their bodies made of their forces."""
+        for _ in range(MOST_REPETITIONS):
+            end = self.contacts.revised_end(time, self._reached)
+            if end is None or self._reached <= time:
+                return
+            self.repeated_steps += 1
+            self._restore_start()
+            self.contacts.apply()
+            self._save_start()
+            overtaken = self._step_all(time, end)
+            if overtaken is not None or self._iterates:
+                self._agree(time, overtaken)
 
     def _step_all(self, time: float, target: float, made: int | None = None) -> float | None:
         """Step each component in its order; returns the time of an event that those before it have passed.
@@ -415,11 +422,7 @@ class Importer:
 
     def _reported(self, component: Component, time: float, target: float) -> float:
         """FMI 2.0: the event time that the component reports, when it lies in the step."""
-        assert component.event_times is not None
-        times = component.event_times.get()
-        first = min((float(t) for t in times if not math.isnan(t)), default=math.inf)
-        if first == math.inf:
-            return target
+        first = component.first_event()
         room = SAME_INSTANT * (1.0 + abs(target))
         if first > target + room:
             return target
@@ -442,15 +445,7 @@ class Importer:
     def _count_standstill(self, time: float) -> None:
         self._standstill += 1
         if self._standstill > STANDSTILLS:
-            instance = self._stopper.instance
-            raise ComponentError(
-                f"{instance.name}: {instance.prefix}DoStep: expected steps that advance, got {STANDSTILLS} without "
-                f"progress at time {time:.17g}.",
-                instance=instance.name,
-                function=f"{instance.prefix}DoStep",
-                time=time,
-                log=instance.log.take(),
-            )
+            raise standstill_error(self._stopper.instance, STANDSTILLS, time)
 
     # ---- events ----
 
@@ -478,6 +473,8 @@ class Importer:
             self._restore_start()
             for transfer in self.transfers:
                 transfer.write_over_step(target - time)
+            if self.contacts.active:
+                self.contacts.apply()
             self.repeated_steps += 1
             self._at_event = []
             self.wants_to_end = False
@@ -498,5 +495,6 @@ class Importer:
 
     def free(self) -> None:
         """Free all components."""
+        self.contacts.free()
         for component in self.components.values():
             component.free()

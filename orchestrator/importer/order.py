@@ -13,7 +13,8 @@ def stepping_order(
 ) -> list[Component]:
     """Components with event mode first, then others with states, those without states last.
 
-    Among equals a component comes after those whose outputs its own outputs depend on directly.
+    Among equals a component comes after those whose outputs its own outputs depend on directly. In a circle only the
+    outputs that are connected count: those that are merely looked at may be late.
     """
 
     def rank(component: Component) -> int:
@@ -21,17 +22,33 @@ def stepping_order(
             return 2
         return 0 if component.event_mode else 1
 
-    after: dict[str, set[str]] = {name: set() for name in components}
-    for connection in connections:
-        (source, _), (name, variable) = connection.source, connection.target
-        if any(variable in inputs for inputs in components[name].depends.values()):
-            after[name].add(source)
+    after = _feeding(components, connections, connected=False)
+    after_connected = _feeding(components, connections, connected=True)
     waiting = sorted(components.values(), key=rank)
     order: list[Component] = []
     while waiting:
         equals = {c.name for c in waiting if rank(c) == rank(waiting[0])}
-        ready = (c for c in waiting if c.name in equals and not (after[c.name] - {c.name}) & equals)
-        chosen = next(ready, waiting[0])  # in a circle the order of declaration decides
+        ready = (
+            c
+            for feeding in (after, after_connected)
+            for c in waiting
+            if c.name in equals and not (feeding[c.name] - {c.name}) & equals
+        )
+        chosen = next(ready, waiting[0])  # in a circle of these too the order of declaration decides
         waiting.remove(chosen)
         order.append(chosen)
     return order
+
+
+def _feeding(
+    components: Mapping[str, Component], connections: Sequence[ConnectionSpec], *, connected: bool
+) -> dict[str, set[str]]:
+    """Of each component those that feed an output of it, or a connected one, directly."""
+    used = {connection.source for connection in connections}
+    feeding: dict[str, set[str]] = {name: set() for name in components}
+    for connection in connections:
+        (source, _), (name, variable) = connection.source, connection.target
+        outputs = components[name].depends.items()
+        if any(variable in inputs for output, inputs in outputs if not connected or (name, output) in used):
+            feeding[name].add(source)
+    return feeding

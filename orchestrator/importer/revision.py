@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import DISCARD
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import EventSpec
@@ -52,6 +53,12 @@ class Watch:
     """
 
     def __init__(self, component: Component, event: EventSpec) -> None:
+        if not component.has_states:
+            raise ComponentError(
+                f"{event.component}.{event.variable}: expected a watched component that can save its state, "
+                f"got one that cannot. Its events can be located only to a communication step.",
+                instance=event.component,
+            )
         self.component = component
         self.event = event
         self._group = component.group("Float64", [event.variable])

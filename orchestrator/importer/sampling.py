@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.orchestrator.fmi.instance import DISCARD
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import Component, kind_of
 from vibroimpact.orchestrator.importer.events import StepWatcher
@@ -128,23 +127,19 @@ class Sampler:
     def _revisit(
         self, probe: _Probe, time: float, instants: Sequence[float], rows: Sequence[NDArray[np.float64]]
     ) -> None:
-        """Read a component inside the step just made, and put it back at the step's end."""
-        component, instance = probe.component, probe.component.instance
-        instance.save(component.at_end)
-        kept = (instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end)
-        component.note_inputs()
-        component.revisit_start()
-        now = time
-        for row, instant in zip(rows, instants, strict=True):
-            if instant > now:
-                status = instance.step(now, instant - now)
-                if status == DISCARD:
-                    instance.check(status, "DoStep")
-            probe.read(row)
-            now = instant
-        instance.restore(component.at_end)
-        instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end = kept
-        instance.is_flagged = any(kept[1:])
+        """Read a component inside the step just made, and put it back at the step's end.
+
+        Each sample is reached from the start of the step: what an input means there (a slope from the start, the
+        force of a stop that yields) it does not mean later in the step.
+        """
+        component = probe.component
+        with component.taken_back():
+            for row, instant in zip(rows, instants, strict=True):
+                if instant > time:
+                    component.step_from_start(time, instant - time)
+                else:
+                    component.revisit_start()
+                probe.read(row)
 
     def _interpolate(
         self,

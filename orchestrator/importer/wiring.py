@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
@@ -143,27 +143,34 @@ class Transfer:
         ]
         names = [slopes[i] for i in self._sloping]
         self._rates = self.target.group("Float64", names) if names else None
-        self._begin_values = np.zeros(len(self._sloping))
+        self._kept: list[int] = []
+        self._begin_values = self.write.values.copy()
+
+    def keep_at_start(self, inputs: Container[str], *, kept: bool) -> None:
+        """Say whether these inputs mean the start of a step, also in one repeated with the values at its end."""
+        named = {i for i, c in enumerate(self.connections) if c.target[1] in inputs}
+        self._kept = sorted({*self._kept, *named} if kept else {*self._kept} - named)
 
     def note_begin(self) -> None:
         """Remember the inputs at the start of a step."""
-        if self._rates is not None:
-            self._begin_values[:] = self.write.values[self._sloping]
+        if self._rates is not None or self._kept:
+            self._begin_values[:] = self.write.values
 
     def write_over_step(self, size: float) -> None:
         """Write inputs for a repeated step of `size` s from the outputs at its end, which `take` has read.
 
-        An input with a slope follows the straight line from the start of the step; any other is held at its end.
+        An input with a slope follows the straight line from the start of the step; any other is held at its end,
+        but those that mean the start.
         """
+        values, begin = self.write.values, self._begin_values
         if self._rates is not None:
-            self._rates.values[:] = (self.write.values[self._sloping] - self._begin_values) / size
+            self._rates.values[:] = (values[self._sloping] - begin[self._sloping]) / size
             self._rates.set()
-            kept = self.write.values.copy()
-            self.write.values[self._sloping] = self._begin_values
-            self.write.set()
-            self.write.values[:] = kept
-        else:
-            self.write.set()
+        at_start = [*self._sloping, *self._kept]
+        at_end = values.copy()
+        values[at_start] = begin[at_start]
+        self.write.set()
+        values[:] = at_end
 
     def take(self) -> NDArray[Any]:
         """Read the outputs into the inputs' buffer, without writing; returns a copy of it."""

@@ -649,3 +649,46 @@ def test_an_opened_file_can_be_replaced_and_closed(tmp_path: Path) -> None:
 
 def test_a_dataset_without_runs_can_be_built_and_checked() -> None:
     check(build_dataset([], coordinates={}, direction=[], run_index=[]))
+
+
+def test_files_from_before_durations_of_contacts_were_stored_are_still_read(tmp_path: Path) -> None:
+    older = up_down().drop_vars(["impact_duration", "impact_restitution"])
+    with open_dataset(written(older, tmp_path)) as opened:
+        assert opened.vibroimpact.impacts(direction="up", angular_frequency=1.0).sizes["impact"] == 2
+
+
+def test_an_impact_table_without_durations_leaves_them_missing() -> None:
+    run = record(1.0, impacts=2)
+    assert run.impacts is not None
+    run.impacts = run.impacts[:, :5]
+    dataset = dataset_of([run, record(2.0, impacts=1)])
+    assert np.isnan(dataset["impact_duration"].values[:2]).all()
+    assert dataset["impact_duration"].values[2] == 0.0
+    check(dataset)
+
+
+def test_whole_states_are_stored_beside_the_runs_and_come_back_on_the_grid(tmp_path: Path) -> None:
+    runs = [record(float(k)) for k in range(3)] + [failed("no convergence")]
+    for k, run in enumerate(runs[:3]):
+        run.final_state = np.array([k, -k, 0.5 * k, 1e-300])
+    with open_dataset(written(dataset_of(runs), tmp_path)) as opened:
+        assert dict(opened.final_state.sizes) == {"angular_frequency": 4, "state": 4}
+        assert opened.final_state.sel(angular_frequency=2.0).values.tolist() == [2.0, -2.0, 1.0, 1e-300]
+        assert np.isnan(opened.final_state.values[3]).all()
+    runs[0].final_state = np.zeros(2)
+    with pytest.raises(DatasetError, match="states of one size, got 2, 4"):
+        dataset_of(runs)
+
+
+def test_text_of_a_single_run_is_read_as_text(tmp_path: Path) -> None:
+    path = written(dataset_of([record(1.0)], coordinates={}), tmp_path)
+    with open_dataset(path) as opened:
+        assert opened.message.values == ""
+
+
+def test_sampled_elements_of_a_body_are_described_by_the_schema() -> None:
+    names = ["modal_energy[12]", "energy.damping_loss"]
+    dataset = dataset_of([record(1.0, samples=2)], sample_variables=names)
+    assert dataset["modal_energy_12"].attrs == {"long_name": "energy of mode 12", "units": "J"}
+    assert dataset["energy_damping_loss"].attrs["units"] == "J"
+    check(dataset)

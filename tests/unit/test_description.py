@@ -160,8 +160,10 @@ def test_value_references_count_through_the_file_block_by_block(small: Component
 def test_fmpy_finds_nothing_wrong_with_either_version(
     small: Component, tmp_path: Path, contacts: int, emit: object
 ) -> None:
+    # two masses or modes stand for all: FMPy takes seconds over a thousand names, which test_fmu_check spends
     for component in (small, *read_components()):
-        text = (fmi2_xml if emit is fmi2_xml else fmi3_xml)(component.with_repeats({"contact": contacts}))
+        repeats = {block: 2 for block in component.repeats} | {"contact": contacts}
+        text = (fmi2_xml if emit is fmi2_xml else fmi3_xml)(component.with_repeats(repeats))
         (tmp_path / "modelDescription.xml").write_text(text, encoding="utf-8")
         assert validate_fmu(str(tmp_path)) == []
 
@@ -243,6 +245,92 @@ def test_the_readmes_of_the_repository_are_up_to_date() -> None:
     assert update_readmes(write=False) == ()
 
 
+COMMON = """
+[[unit]]
+name = "N"
+base = { kg = 1, m = 1, s = -2 }
+[[variable]]
+name = "size"
+description = "Modes in use"
+causality = "parameter"
+variability = "fixed"
+type = "Int64"
+start = 4
+min = 1
+max = 6
+counts = "mode"
+field = "size"
+code = "SIZE"
+[[variable]]
+name = "load[{k}]"
+description = "Load {k}"
+causality = "input"
+variability = "continuous"
+type = "Float64"
+unit = "N"
+start = 0.0
+field = "load[{i}]"
+code = "LOAD"
+repeat = "mode"
+[[variable]]
+name = "answer[{k}]"
+description = "Answer {k}"
+causality = "output"
+variability = "continuous"
+type = "Float64"
+unit = "N"
+field = "answer[{i}]"
+code = "ANSWER"
+repeat = "mode"
+dependencies = ["load[{*}]", "push", "pull"]
+"""
+
+
+@pytest.fixture
+def joined(tmp_path: Path) -> Component:
+    """Return the small component with what it has in common with others."""
+    (tmp_path / "core").mkdir()
+    (tmp_path / "core" / "common.toml").write_text(COMMON, encoding="utf-8")
+    (tmp_path / "small").mkdir()
+    path = tmp_path / "small" / "variables.toml"
+    text = SMALL.replace("contacts = 2", 'contacts = 2\nmodes = 6\ninclude = ["../core/common.toml"]')
+    path.write_text(text, encoding="utf-8")
+    return read_component(path)
+
+
+def test_included_variables_follow_the_components_own(joined: Component, small: Component) -> None:
+    assert [v.name for v in joined.variables[: len(small.variables)]] == [v.name for v in small.variables]
+    assert [v.name for v in joined.variables[9:12]] == ["size", "load[1]", "answer[1]"]
+    assert joined.repeats == {"contact": 2, "mode": 6}
+
+
+def test_an_included_file_is_part_of_the_token(joined: Component) -> None:
+    common = joined.source.parents[1] / "core" / "common.toml"
+    common.write_text(COMMON + "# changed\n", encoding="utf-8")
+    assert read_component(joined.source).token != joined.token
+    common.unlink()
+    with pytest.raises(ComponentFileError, match=r"common\.toml: expected a file"):
+        read_component(joined.source)
+
+
+def test_a_dependency_may_stand_for_a_whole_block(joined: Component) -> None:
+    answer = next(v for v in joined.with_repeats({"mode": 2}).variables if v.name == "answer[2]")
+    # and one that this component does not have is left out
+    assert joined.with_repeats({"mode": 2}).direct_inputs(answer, 3) == ("load[1]", "load[2]", "push")
+
+
+def test_what_counts_a_block_starts_with_the_number_asked_for(joined: Component) -> None:
+    for component, expected in (
+        (joined, ("4", "1", "6")),
+        (joined.with_repeats({"mode": 2}), ("2", "1", "2")),
+    ):
+        for text, tag in ((fmi3_xml(component), "Int64"), (fmi2_xml(component), "Integer")):
+            values = attributes(text, tag)[0]
+            assert (values["start"], values["min"], values["max"]) == expected
+    (joined.source.parent / "modelDescription.xml").write_text(fmi3_xml(joined), encoding="utf-8")
+    assert validate_fmu(str(joined.source.parent)) == []
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -256,6 +344,8 @@ def test_the_readmes_of_the_repository_are_up_to_date() -> None:
         ('variability = "tunable"', 'variability = "continuous"', "variability: expected"),
         ('dependencies = ["push"]', 'dependencies = ["pull"]', "dependencies: expected"),
         ("contacts = 2", "", "repeat: expected a count"),
+        ("start = inf", 'start = inf\ncounts = "mode"', "counts: expected a repeated block of the file"),
+        ('dependencies = ["push"]', 'dependencies = ["push[{*}]"]', "dependencies: expected"),
         ("start = inf", "", "start: expected"),
         ('code = "GAIN"', "", "gain: expected the keys code"),
         ('code = "GAIN"', 'code = "GAIN"\ncolour = "red"', "got colour"),

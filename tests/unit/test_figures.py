@@ -330,7 +330,7 @@ def test_plot_help_has_an_example() -> None:
         (
             ["runs.nc", "-o", "a.png", "--kind", "pie"],
             UsageError,
-            "expected one of auto, bifurcation, run, convergence, got 'pie'",
+            "--kind: expected one of auto, bifurcation, run, convergence",
         ),
     ],
 )
@@ -361,3 +361,47 @@ def test_a_file_that_is_damaged_in_its_data_is_one_message_too(tmp_path: Path) -
     done = CliRunner().invoke(command_line(), ["plot", str(path), "-o", str(tmp_path / "a.png")])
     assert isinstance(done.exception, DatasetError)
     assert "expected a readable NetCDF dataset" in str(done.exception)
+
+
+def test_more_than_displacement_and_velocity_is_drawn_in_panels_by_unit_with_modal_energies_apart(
+    tmp_path: Path,
+) -> None:
+    names = [
+        "displacement",
+        "velocity",
+        "displacement[2]",
+        "energy.kinetic",
+        "modal_energy[1]",
+        "modal_energy[2]",
+    ]
+    time = np.linspace(0.0, 1.0, 20)
+    run = RunRecord(
+        Outcome.ok,
+        "",
+        None,
+        np.array([[0.25, 1.0, 0.5, 0.8, 1.0, 0.7, 0.0]]),
+        np.empty((0, 3)),
+        np.column_stack([time, *(np.sin(k * time) for k in range(1, 7))]),
+        0.0,
+        0.0,
+        0.0,
+        1e-3,
+    )
+    figure = figures.draw(opened(dataset_of([run], coordinates={}, sample_variables=names), tmp_path))
+    panels = [(axis.get_ylabel().split()[-1], len(axis.get_lines())) for axis in figure.axes]
+    assert sorted(panels) == [("(J)", 1), ("(J)", 2), ("(m)", 2), ("(m/s)", 1)]
+    assert figure.axes[-1].get_xlabel() == "time (s)"
+
+
+def test_a_stop_at_another_point_than_the_observed_one_is_not_drawn_as_its_limit() -> None:
+    from vibroimpact.analysis.figures.runs import _stops
+
+    beam = '[body]\nkind = "beam"\n[[stop]]\nposition = 1.0\nlocation = {}\n'
+    chain = '[body]\nkind = "chain"\nmasses = [1, 1]\nobserved_mass = {}\n[[stop]]\nposition = 1.0\n'
+    for text, shown in (
+        (beam.format(1.0), 1),
+        (beam.format(0.5), 0),
+        (chain.format(2), 1),
+        (chain.format(1), 0),
+    ):
+        assert len(_stops(dataset_of([record(1.0)], coordinates={}, attrs={"scene": text}))) == shown

@@ -388,7 +388,8 @@ def test_a_scene_is_the_same_in_another_folder(tmp_path: Path) -> None:
             '"restitution"',
             '"externl"',
             'component.a.parameters."contact[1].law": expected one of "none" (0), "restitution" (1), '
-            '"external" (5), got "externl". Did you mean external?',
+            '"kelvin_voigt" (2), "hertz" (3), "hunt_crossley" (4), "external" (5), "external_force" (6), '
+            'got "externl". Did you mean external?',
         ),
         (
             "mass = 2",
@@ -468,7 +469,7 @@ def test_one_mistake_is_one_clear_line(old: str, new: str, problem: str) -> None
         ("a.mass = { values = [1] }", "sweep.a", 'Put the whole key in quotes: "a.mass".'),
         ('"a.velocity" = { values = [1] }', 'sweep."a.velocity"', "got the output velocity"),
         ('"a.record.impacts" = { values = [1] }', 'sweep."a.record.impacts"', "Run a scene for each value."),
-        ('"a.contact[1].law" = { values = [1, 2] }', 'sweep."a.contact[1].law"', "got 2.0"),
+        ('"a.contact[1].law" = { values = [1, 9] }', 'sweep."a.contact[1].law"', "got 9.0"),
         ('"a.impact_limit" = { values = [1, 1.5] }', 'sweep."a.impact_limit"', "a whole number, got 1.5"),
         ('"connection[2].gain" = { values = [1] }', 'sweep."connection[2].gain"', "has 1 [[connection]]"),
         ('"connection[0].gain" = { values = [1] }', 'sweep."connection[0].gain"', "Indices start at 1"),

@@ -15,13 +15,15 @@ from vibroimpact.orchestrator.general_models import ComponentTable, ConnectionTa
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene_errors import known_keys
 from vibroimpact.orchestrator.scene_models import (
+    BODY_MODELS,
+    STOP_MODELS,
     AxisTable,
     Execution,
     Forcing,
-    OscillatorBody,
+    Rayleigh,
     Record,
-    RestitutionStop,
     SceneHeader,
+    Sensor,
     TimeSeries,
 )
 from vibroimpact.orchestrator.sweep import SweepAxis
@@ -228,9 +230,10 @@ def test_the_reference_describes_every_key_of_every_table() -> None:
     reference = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
     models: list[type[BaseModel]] = [
         SceneHeader,
-        OscillatorBody,
+        *BODY_MODELS.values(),
         Forcing,
-        RestitutionStop,
+        Sensor,
+        *STOP_MODELS.values(),
         Record,
         Execution,
         AxisTable,
@@ -241,4 +244,5 @@ def test_the_reference_describes_every_key_of_every_table() -> None:
     ]
     keys = [key for model in models for key in known_keys(model)]
     keys += [f"time_series.{key}" for key in known_keys(TimeSeries)]
+    keys += [f"rayleigh.{key}" for key in known_keys(Rayleigh)]
     assert [key for key in keys if f"| `{key}` |" not in reference] == []

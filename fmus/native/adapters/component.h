@@ -11,6 +11,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "complaint.h"
 #include "step.h"
 
 enum { VI_FLOAT64 = 0, VI_INT64 = 1, VI_BOOLEAN = 2 };
@@ -25,8 +26,6 @@ typedef struct {
     uint32_t offset; /* in the component's struct, bytes */
 } vi_variable;
 
-enum { VI_MESSAGE_LENGTH = 1024 };
-
 /* A component. Each of its functions works on the flat struct `self` and never allocates. */
 typedef struct {
     const char *name;
@@ -37,7 +36,8 @@ typedef struct {
 
     /* Fill `self` (zeroed) with the default values. */
     void (*defaults)(void *self);
-    /* Check all parameters and start; on failure write every problem into `message`, return false. */
+    /* Check all parameters and start. On failure write every problem into `message` and return false; on success it is
+     * empty or holds a warning. */
     bool (*initialize)(void *self, double start_time, char message[VI_MESSAGE_LENGTH]);
     /* The variable with this value reference was set. */
     void (*was_set)(void *self, uint32_t value_reference);
@@ -55,6 +55,9 @@ typedef struct {
     double (*time)(const void *self);
     /* Bytes of `self` in use, so that a saved state holds no unused rows of the record. */
     size_t (*used_size)(const void *self);
+    /* The model description has `count` of the repeated variables `block` ("modes", "contacts"); called after
+     * `defaults`. NULL for a component to which this makes no difference. */
+    void (*sized)(void *self, const char *block, int count);
 } vi_component;
 
 /* The one component that this shared library holds. */

@@ -71,7 +71,6 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
                               fmi2String fmuResourceLocation, const fmi2CallbackFunctions *functions,
                               fmi2Boolean visible, fmi2Boolean loggingOn)
 {
-    UNUSED(fmuResourceLocation);
     UNUSED(visible);
     if (instanceName == NULL || instanceName[0] == '\0') {
         return refuse(functions, instanceName, "fmi2Instantiate: expected an instance name, got none");
@@ -90,6 +89,9 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         instance->callback = functions != NULL ? (void (*)(void))functions->logger : NULL;
         instance->environment = functions != NULL ? functions->componentEnvironment : NULL;
         instance->logging = loggingOn != fmi2False;
+        vi_sizes sizes;
+        vi_sizes_read_uri(fmuResourceLocation, &sizes);
+        vi_instance_size(instance, &sizes);
     }
     return instance;
 }

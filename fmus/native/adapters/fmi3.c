@@ -68,7 +68,6 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    UNUSED(resourcePath);
     UNUSED(visible);
     UNUSED(requiredIntermediateVariables);
     UNUSED(intermediateUpdate);
@@ -95,6 +94,9 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
         instance->logging = loggingOn;
         instance->event_mode_used = eventModeUsed;
         instance->early_return_allowed = earlyReturnAllowed;
+        vi_sizes sizes;
+        vi_sizes_read(resourcePath, &sizes);
+        vi_instance_size(instance, &sizes);
     }
     return instance;
 }
@@ -163,8 +165,8 @@ static bool events_are_handled(vi_instance *it, const char *function)
     }
     return vi_instance_fail(it, function,
                             "contact law external: expected an importer with event mode and early return, got "
-                            "eventModeUsed = %s, earlyReturnAllowed = %s. Use law restitution (1), or an importer that "
-                            "handles events",
+                            "eventModeUsed = %s, earlyReturnAllowed = %s. Use a law that the body evaluates itself, such as "
+                            "restitution (1), or an importer that handles events",
                             it->event_mode_used ? "true" : "false", it->early_return_allowed ? "true" : "false");
 }
 

@@ -41,24 +41,49 @@ void vi_instance_reset(vi_instance *instance)
 {
     memset(instance->self, 0, component->struct_size);
     component->defaults(instance->self);
+    for (int i = 0; component->sized != NULL && i < instance->sizes.count; ++i) {
+        component->sized(instance->self, instance->sizes.of[i].block, instance->sizes.of[i].size);
+    }
     instance->mode = VI_MODE_INSTANTIATED;
     instance->outputs_stale = false;
     instance->start_time = 0.0;
 }
 
-bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...)
+void vi_instance_size(vi_instance *instance, const vi_sizes *sizes)
+{
+    instance->sizes = *sizes;
+    vi_instance_reset(instance);
+}
+
+enum { LEVEL_WARNING = 1, LEVEL_ERROR = 3 }; /* in both versions of FMI */
+
+static void report(const vi_instance *instance, int level, const char *category, const char *function,
+                   const char *format, va_list arguments)
 {
     char text[VI_MESSAGE_LENGTH + 128];
     const int used = snprintf(text, sizeof text, "%s: %s: ", instance->name, function);
     const size_t start = used > 0 && (size_t)used < sizeof text ? (size_t)used : 0;
+    (void)vsnprintf(text + start, sizeof text - start, format, arguments);
+    if (instance->log != NULL) {
+        instance->log(instance, level, category, text);
+    }
+}
+
+bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...)
+{
     va_list arguments;
     va_start(arguments, format);
-    (void)vsnprintf(text + start, sizeof text - start, format, arguments);
+    report(instance, LEVEL_ERROR, "logStatusError", function, format, arguments);
     va_end(arguments);
-    if (instance->log != NULL) {
-        instance->log(instance, 3, "logStatusError", text);
-    }
     return false;
+}
+
+static void warn(const vi_instance *instance, const char *function, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    report(instance, LEVEL_WARNING, "logStatusWarning", function, format, arguments);
+    va_end(arguments);
 }
 
 static const char *mode_name(vi_mode_of_use mode)
@@ -84,8 +109,12 @@ bool vi_instance_expect(vi_instance *instance, const char *function, int modes)
 
 bool vi_instance_initialize(vi_instance *instance, const char *function)
 {
+    instance->message[0] = '\0';
     if (!component->initialize(instance->self, instance->start_time, instance->message)) {
         return vi_instance_fail(instance, function, "%s", instance->message);
+    }
+    if (instance->message[0] != '\0') {
+        warn(instance, function, "%s", instance->message);
     }
     instance->outputs_stale = false;
     return true;

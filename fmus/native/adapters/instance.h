@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "component.h"
+#include "resources.h"
 
 typedef enum {
     VI_MODE_INSTANTIATED = 1,
@@ -38,6 +39,7 @@ struct vi_instance {
     void *environment;
     void (*callback)(void);
     int32_t last_step_event; /* FMI 2.0 status enquiries */
+    vi_sizes sizes;          /* of the description */
 };
 
 /* NULL when memory is out. */
@@ -45,13 +47,16 @@ vi_instance *vi_instance_new(const char *name);
 void vi_instance_free(vi_instance *instance);
 void vi_instance_reset(vi_instance *instance);
 
+/* The description has these sizes: the start values are theirs, now and after each reset. */
+void vi_instance_size(vi_instance *instance, const vi_sizes *sizes);
+
 /* Log an error `function: text` and return false. */
 bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...);
 
 /* Is the instance in one of these modes? If not, log it. */
 bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
 
-/* Initialization's end: false (with the component's message logged) when a parameter is bad. */
+/* Initialization's end: false (with the component's message logged) when a parameter is bad. Logs its warning. */
 bool vi_instance_initialize(vi_instance *instance, const char *function);
 
 /* Get and set `n` variables of one type. `convert` moves one variable's `count` elements between the struct and the

@@ -2,9 +2,10 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
 /* Pivots smaller than this times the largest diagonal mean that contacts are redundant. */
-static const double REDUNDANT = 1e-11;
+static const double REDUNDANT = 1e-13;
 /* Redundant contacts share their load as if each had this times the largest mobility of its own; what that leaves over is
  * solved for again, so many times. */
 static const double SOFTENING = 1e-6;
@@ -105,10 +106,10 @@ void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORT
 }
 
 /* Murty's principal pivoting: the first contact that pulls, or is passed through, changes sides. Finite for positive
- * definite g; the bound on the turns is that of its proof. */
-void vi_complementary(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], double p[VI_PORTS])
+ * definite g; the bound on the turns is that of its proof. 0 when it was not: redundant contacts may send it in circles. */
+static int pivot_to_answer(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], int active[VI_PORTS],
+                           double p[VI_PORTS])
 {
-    int active[VI_PORTS] = {0};
     double scale = 0.0;
     for (int k = 0; k < n; ++k) {
         active[k] = b[k] > 0.0;
@@ -127,9 +128,34 @@ void vi_complementary(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_POR
             }
         }
         if (wrong < 0) {
-            return;
+            return 1;
         }
         active[wrong] = !active[wrong];
+    }
+    return 0;
+}
+
+void vi_complementary(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], double p[VI_PORTS])
+{
+    int active[VI_PORTS];
+    if (!pivot_to_answer(n, g, b, active, p)) {
+        /* all softened, so that every set of contacts has one answer; what that leaves over is solved for again */
+        double soft[VI_PORTS][VI_PORTS], found[VI_PORTS], largest = 0.0, least = 0.0;
+        for (int k = 0; k < n; ++k) {
+            largest = fmax(largest, fabs(g[k][k]));
+        }
+        memcpy(soft, g, sizeof soft);
+        for (int k = 0; k < n; ++k) {
+            soft[k][k] += SOFTENING * largest;
+        }
+        pivot_to_answer(n, soft, b, active, p);
+        vi_solve_active(n, g, b, active, found);
+        for (int k = 0; k < n; ++k) {
+            least = fmin(least, found[k]);
+        }
+        if (least >= 0.0) {
+            memcpy(p, found, sizeof found);
+        }
     }
     for (int k = 0; k < n; ++k) {
         p[k] = fmax(0.0, p[k]);

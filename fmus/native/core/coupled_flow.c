@@ -12,6 +12,9 @@
 static const double REACH = 2.5, REACH_YIELDING = 1.0;
 /* Of a power law the terms must fall by this over a segment: it has a singularity where the contact ends. */
 static const double SMALLEST_TERM = 0.01;
+/* In the first instants of a power law coefficient n is of size (rate / penetration)^n: the series ends before a product
+ * of two of them overflows. */
+static const double LARGEST_COEFFICIENT = 1e140;
 
 /* Rate that no motion of the system exceeds, rad/s. */
 static double fastest_rate(const vi_structure_model *model, const vi_drift_start *start)
@@ -142,12 +145,41 @@ static void shorten(vi_drift *drift, const vi_drift_start *start)
         if (start->press[k].kind != VI_PRESS_POWER) {
             continue;
         }
-        for (int n = VI_ORDER - 1; n <= VI_ORDER; ++n) {
+        for (int n = drift->order - 1; n <= drift->order; ++n) {
             if (d[n] != 0.0) {
                 drift->length = vi_min(drift->length, pow(tolerance * d[0] / fabs(d[n]), 1.0 / (double)n));
             }
         }
     }
+}
+
+/* Let the series end with this order. */
+static void end_series(vi_drift *drift, int order)
+{
+    drift->order = order;
+    for (int n = order + 1; n <= VI_ORDER; ++n) {
+        memset(drift->modal[n], 0, sizeof drift->modal[n]);
+        for (int k = 0; k < drift->model->contacts; ++k) {
+            drift->penetration[k][n] = 0.0;
+        }
+    }
+    for (int k = 0; k < drift->model->contacts; ++k) {
+        for (int n = order - 1; n <= VI_ORDER; ++n) {
+            drift->force[k][n] = 0.0;
+        }
+    }
+}
+
+/* Has a power law's series grown too steep to be continued? */
+static bool too_steep(const vi_drift *drift, const vi_drift_start *start, int n, double power[VI_PORTS][VI_ORDER + 1])
+{
+    for (int k = 0; k < drift->model->contacts; ++k) {
+        if (start->press[k].kind == VI_PRESS_POWER
+            && !(fabs(drift->penetration[k][n + 2]) < LARGEST_COEFFICIENT && fabs(power[k][n]) < LARGEST_COEFFICIENT)) {
+            return true;
+        }
+    }
+    return false;
 }
 
 void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_drift_start *start, double length)
@@ -161,6 +193,7 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
         any_yielding |= start->press[k].kind >= VI_PRESS_LINEAR;
     }
     drift->model = model;
+    drift->order = VI_ORDER;
     memset(drift->force, 0, sizeof drift->force);
     for (int j = 0; j < model->modes; ++j) {
         drift->modal[0][j] = 0.0;
@@ -188,6 +221,10 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
         extend_penetrations(drift, start, n + 2);
         drive[0] = drive[1];
         drive[1] = next;
+        if (too_steep(drift, start, n, power)) {
+            end_series(drift, n + 1);
+            break;
+        }
     }
     scale_of_holding(drift, start);
     const double fastest = fastest_rate(model, start);

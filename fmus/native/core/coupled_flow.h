@@ -28,6 +28,7 @@ typedef struct {
 typedef struct {
     const vi_structure_model *model;
     double length;                              /* valid for 0 <= u <= length, s */
+    int order;                                  /* of the polynomials; VI_ORDER but for the first touch of a power law */
     double modal[VI_ORDER + 1][VI_MODES];       /* modal displacements from the start; modal[0] = 0 */
     double penetration[VI_PORTS][VI_ORDER + 1]; /* d of each contact; [0] is its value at the start */
     double force[VI_PORTS][VI_ORDER + 1];       /* F of each contact, N; the last two coefficients are 0 */

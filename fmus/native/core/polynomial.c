@@ -4,6 +4,10 @@
 
 #include "majorant.h"
 
+/* After so many steps below the noise a value counts as zero also where it rises: of a value that is nothing but
+ * rounding, each step would certify only the next few roundings. */
+static const int LONGEST_CRAWL = 64;
+
 void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4])
 {
     double x = c[VI_ORDER], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
@@ -55,14 +59,21 @@ vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double len
 {
     const double bound = vi_polynomial_snap(c, length);
     double u = from;
+    int crawl = 0;
     for (;;) {
         double value[4];
         vi_polynomial_at(c, u, value);
-        const vi_approach p = {vi_max(0.0, value[0]), -value[1], -value[2], -value[3], bound};
+        vi_approach p = {vi_max(0.0, value[0]), -value[1], -value[2], -value[3], bound};
         if (p.velocity > 0.0 && p.clearance <= noise) {
             return land(c, u, &p, length);
         }
-        const double step = vi_certified_step(&p, length - u);
+        double horizon = length - u;
+        crawl = p.clearance <= noise ? crawl + 1 : 0;
+        if (crawl > LONGEST_CRAWL && bound > 0.0) {
+            p.clearance += noise;
+            horizon = vi_min(horizon, sqrt(sqrt(24.0 * noise / bound)));
+        }
+        const double step = vi_certified_step(&p, horizon);
         if (!(step < length - u)) {
             return (vi_fall){false, length, 0.0};
         }

@@ -50,11 +50,25 @@ static double coupling_rate(const vi_structure_model *model)
     return most;
 }
 
+/* shape . impulse to 32 digits: its rounded value is returned, what that leaves over is *low. */
+static double twofold_dot(const vi_structure_model *model, const double shape[], const double impulse[], double *low)
+{
+    double sum = 0.0, left = 0.0;
+    for (int j = 0; j < model->modes; ++j) {
+        const double product = shape[j] * impulse[j], total = sum + product, part = total - sum;
+        left += fma(shape[j], impulse[j], -product) + ((sum - (total - part)) + (product - part));
+        sum = total;
+    }
+    const double high = sum + left;
+    *low = left - (high - sum);
+    return high;
+}
+
 void vi_structure_prepare(vi_structure_model *model)
 {
     for (int k = 0; k < model->contacts; ++k) {
         for (int l = 0; l < model->contacts; ++l) {
-            model->mobility[k][l] = vi_structure_at(model, model->shape[k], model->impulse[l]);
+            model->mobility[k][l] = twofold_dot(model, model->shape[k], model->impulse[l], &model->mobility_low[k][l]);
             model->compliance[k][l] = vi_structure_at(model, model->shape[k], model->shape[l]);
         }
     }
@@ -129,9 +143,10 @@ bool vi_structure_watched(const vi_structure *s, int k)
 int vi_structure_beyond(const vi_structure *s)
 {
     for (int k = 0; k < s->model->contacts; ++k) {
-        const bool rigid = !vi_contact_law_is_compliant(s->contacts[k].law.law);
+        const int64_t law = s->contacts[k].law.law;
+        const bool rigid = !vi_contact_law_is_compliant(law) && law != VI_LAW_EXTERNAL_FORCE;
         const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
-        if (s->contacts[k].law.law != VI_LAW_NONE && rigid && vi_structure_clearance(s, k) < -noise) {
+        if (law != VI_LAW_NONE && rigid && vi_structure_clearance(s, k) < -noise) {
             return k + 1;
         }
     }
@@ -453,11 +468,11 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     case VI_DRIFT_ARRIVAL:
         vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
         break;
-    case VI_DRIFT_RELEASE: vi_structure_release(s, k, 2); break;
+    /* a load that has changed at once lifts the contact off with an acceleration; else its force has fallen to 0 */
+    case VI_DRIFT_RELEASE: vi_structure_release(s, k, u > 0.0 ? 2 : 1); break;
     case VI_DRIFT_SEPARATION: vi_structure_separate(s, k, true); break;
     case VI_DRIFT_RETURN:
-        s->state->status[k] = VI_CONTACT_YIELDING;
-        vi_structure_touch_down(s, k);
+        vi_structure_return(s, k);
         break;
     case VI_DRIFT_FREE: s->state->status[k] = VI_CONTACT_FREE; break;
     }

@@ -37,6 +37,7 @@ typedef struct {
     double coupling[VI_MODES][VI_MODES]; /* modal damping matrix, 1/s; only read when coupled */
     /* derived by vi_structure_prepare */
     double mobility[VI_PORTS][VI_PORTS];   /* velocity of contact i for a unit impulse at contact j, 1/kg */
+    double mobility_low[VI_PORTS][VI_PORTS]; /* its rounding: else it adds up over elastic impacts, always one way */
     double compliance[VI_PORTS][VI_PORTS]; /* acceleration of contact i for a unit force at contact j, 1/kg */
     double fastest;                      /* largest rate of any mode, rad/s */
 } vi_structure_model;

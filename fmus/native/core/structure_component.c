@@ -279,8 +279,8 @@ static void check_passed(const vi_structure_component *c, char *message)
 {
     const int passed = c->state.passed;
     if (passed) {
-        vi_complain(message, "contact[%d]: the last step passed through a stop whose law is external (event_time %.17g);"
-                             " restore the state before it and step to event_time", passed,
+        vi_complain(message, "contact[%d]: the last step passed through a stop whose law is external (event_time"
+                             " %.17g); restore the state before it and step to event_time", passed,
                     c->contacts[passed - 1].event_time);
     }
 }
@@ -308,18 +308,29 @@ bool vi_structure_component_step_is_good(const vi_structure_component *c, const 
     return message[0] == '\0';
 }
 
+/* A stop that answers with a force has answered once its importer goes on: the force follows by the inputs. */
+static void check_answer(const vi_structure_component *c, int k, char *message)
+{
+    const vi_contact *contact = &c->contacts[k];
+    const double r = contact->applied_restitution;
+    if (contact->law.law == VI_LAW_EXTERNAL && !(contact->answered && r >= 0.0 && r <= 1.0)) {
+        vi_complain(message, "contact[%d].applied_restitution: expected an answer 0 <= r <= 1 to the contact at"
+                             " %.17g s, got %s%.17g", k + 1, contact->event_time,
+                    contact->answered ? "" : "none; last value ", r);
+    }
+}
+
 bool vi_structure_component_resolve(vi_structure_component *c, char message[VI_MESSAGE_LENGTH])
 {
-    const int pending = c->state.pending;
-    if (!pending) {
+    if (!c->state.pending) {
         return true;
     }
-    const vi_contact *contact = &c->contacts[pending - 1];
-    const double r = contact->applied_restitution;
-    if (!contact->answered || !(r >= 0.0 && r <= 1.0)) {
-        vi_complain(message, "contact[%d].applied_restitution: expected an answer 0 <= r <= 1 to the contact at %.17g s,"
-                             " got %s%.17g", pending, contact->event_time,
-                    contact->answered ? "" : "none; last value ", r);
+    for (int k = 0; k < c->model.contacts; ++k) {
+        if (c->state.asking[k]) { /* several at one instant wait for their answers together */
+            check_answer(c, k, message);
+        }
+    }
+    if (message[0] != '\0') {
         return false;
     }
     const vi_structure parts = vi_structure_component_parts(c);
@@ -338,7 +349,7 @@ vi_step_result vi_structure_component_advance(vi_structure_component *c, vi_inst
 bool vi_structure_component_needs_events(const vi_structure_component *c)
 {
     for (int k = 0; k < VI_PORTS; ++k) {
-        if (c->contacts[k].law.law == VI_LAW_EXTERNAL) {
+        if (c->contacts[k].law.law == VI_LAW_EXTERNAL || c->contacts[k].law.law == VI_LAW_EXTERNAL_FORCE) {
             return true;
         }
     }

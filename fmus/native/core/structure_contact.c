@@ -21,7 +21,10 @@ static const int64_t MOST_LOW_IMPACTS = 4000000;
 static const double LOW_HEIGHT = 1e-10, SHORT_FLIGHT = 1e-7;
 /* A bounce shorter than this over the fastest rate is followed from the stop: of it only the position is rounded. */
 static const double LOW_BOUNCE = 0.1;
-/* A joint impact may set off others at the same instant; each round loses energy or ends. */
+/* Of its own mobility, what is left to a contact whose point others hold. */
+static const double KEPT = 1e-9;
+/* A joint impact may set off others at the same instant; each round loses energy or ends, but between stops that leave
+ * no room it would go on for ever. */
 static const int MOST_ROUNDS = 64;
 
 /* ---- forces now ---- */
@@ -194,10 +197,13 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
     const double restitution = touch->velocity > 0.0 ? vi_max(0.0, rebound) / touch->velocity : 0.0;
     const double penetration = -vi_structure_clearance(s, k);
     const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
+    /* the last push of a thin contact has thrown it out a little before this instant */
+    const double late = penetration < 0.0 && rebound > 0.0 ? -penetration / rebound : 0.0;
     s->contacts[k].impulse = touch->impulse;
     vi_record_contact(s->record, touch->time, touch->phase, touch->velocity, touch->impulse, k + 1, restitution,
-                      now - touch->time);
-    state->surface[k] = vi_max(0.0, penetration);
+                      vi_max(0.0, now - touch->time - late));
+    const double surface = vi_max(0.0, penetration), tau = s->contacts[k].relaxation_time;
+    state->surface[k] = rebound * tau > surface ? surface : 0.0; /* a surface that is faster follows without force */
     state->separated[k] = state->now;
     if (receding && penetration > noise) {
         state->status[k] = VI_CONTACT_RECEDING;
@@ -205,6 +211,24 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
         state->status[k] = VI_CONTACT_TOUCHING;
         state->leaving[k] = 0;
     }
+}
+
+bool vi_structure_surface_lags(const vi_structure *s, int k)
+{
+    return s->contacts[k].relaxation_time > 0.0 && s->state->surface[k] > 0.0;
+}
+
+void vi_structure_return(const vi_structure *s, int k)
+{
+    const vi_contact_law *law = &s->contacts[k].law;
+    const double depth = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
+    const bool pulls = law->law == VI_LAW_KELVIN_VOIGT ? law->stiffness * depth + law->damping * rate <= 0.0
+                                                       : 1.0 + law->damping * rate <= 0.0;
+    if (vi_structure_surface_lags(s, k) && pulls) {
+        s->state->surface[k] = 0.0;
+        return;
+    }
+    vi_structure_touch_down(s, k);
 }
 
 /* ---- impacts ---- */
@@ -385,24 +409,50 @@ static void after_impact(const vi_structure *s, int k, double approach, double i
     }
 }
 
-static void give_impulses(const vi_structure *s, const double impulse[])
+/* To the modes, rounded once: what is less than a rounding of the impulse still decides how a velocity is rounded. */
+static void give_impulses(const vi_structure *s, const double impulse[], const double low[])
 {
     for (int k = 0; k < s->model->contacts; ++k) {
-        const double push = vi_structure_direction(s, k) * impulse[k];
+        const double sign = vi_structure_direction(s, k), push = -sign * impulse[k], push_low = -sign * low[k];
         for (int j = 0; j < s->model->modes && push != 0.0; ++j) {
-            s->state->p[j] -= s->model->impulse[k][j] * push;
+            const double gain = s->model->impulse[k][j], step = gain * push, before = s->state->p[j];
+            const double sum = before + step, part = sum - before;
+            const double rounding = (before - (sum - part)) + (step - part);
+            s->state->p[j] = sum + (rounding + (fma(gain, push, -step) + gain * push_low));
         }
     }
 }
 
-/* Solve for the impulses of the contacts in play; the others are out of the problem. */
-static void joint_impulses(const vi_structure *s, const int in_play[], const double wanted[], double impulse[])
+/* What rounding has taken from the impulses p > 0 of g p = b, g given to twice its digits. */
+static void refine(int n, double g[VI_PORTS][VI_PORTS], double low[VI_PORTS][VI_PORTS], const double b[],
+                   const double p[], double more[])
 {
-    double whole[VI_PORTS][VI_PORTS], g[VI_PORTS][VI_PORTS], b[VI_PORTS], p[VI_PORTS];
+    double left[VI_PORTS];
+    int active[VI_PORTS] = {0};
+    for (int i = 0; i < n; ++i) {
+        double sum = b[i], rounding = 0.0;
+        active[i] = p[i] > 0.0;
+        for (int j = 0; j < n; ++j) {
+            const double product = -g[i][j] * p[j], total = sum + product, part = total - sum;
+            rounding += fma(-g[i][j], p[j], -product) + ((sum - (total - part)) + (product - part)) - low[i][j] * p[j];
+            sum = total;
+        }
+        left[i] = sum + rounding;
+    }
+    vi_solve_active(n, g, left, active, more);
+}
+
+/* Solve for the impulses of the contacts in play; the others are out of the problem. */
+static void joint_impulses(const vi_structure *s, const int in_play[], const double wanted[], double impulse[],
+                           double impulse_low[])
+{
+    double whole[VI_PORTS][VI_PORTS], whole_low[VI_PORTS][VI_PORTS], g[VI_PORTS][VI_PORTS], low[VI_PORTS][VI_PORTS];
+    double b[VI_PORTS], p[VI_PORTS], more[VI_PORTS];
     int index[VI_PORTS], count = 0;
     signed_matrix(s, s->model->mobility, whole);
+    signed_matrix(s, s->model->mobility_low, whole_low);
     for (int k = 0; k < s->model->contacts; ++k) {
-        impulse[k] = 0.0;
+        impulse[k] = impulse_low[k] = 0.0;
         if (in_play[k]) {
             index[count++] = k;
         }
@@ -411,11 +461,14 @@ static void joint_impulses(const vi_structure *s, const int in_play[], const dou
         b[i] = wanted[index[i]];
         for (int j = 0; j < count; ++j) {
             g[i][j] = whole[index[i]][index[j]];
+            low[i][j] = whole_low[index[i]][index[j]];
         }
     }
     vi_complementary(count, g, b, p);
+    refine(count, g, low, b, p, more);
     for (int i = 0; i < count; ++i) {
         impulse[index[i]] = p[i];
+        impulse_low[index[i]] = more[i];
     }
 }
 
@@ -424,7 +477,8 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
 {
     vi_structure_state *state = s->state;
     const int n = s->model->contacts;
-    double approach[VI_PORTS] = {0.0}, restitution[VI_PORTS] = {0.0}, wanted[VI_PORTS] = {0.0}, impulse[VI_PORTS];
+    double approach[VI_PORTS] = {0.0}, restitution[VI_PORTS] = {0.0}, wanted[VI_PORTS] = {0.0};
+    double impulse[VI_PORTS], impulse_low[VI_PORTS];
     int in_play[VI_PORTS] = {0};
     const double before = vi_structure_kinetic(s);
     for (int k = 0; k < n; ++k) {
@@ -436,8 +490,8 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
             wanted[k] = (1.0 + restitution[k]) * approach[k];
         }
     }
-    joint_impulses(s, in_play, wanted, impulse);
-    give_impulses(s, impulse);
+    joint_impulses(s, in_play, wanted, impulse, impulse_low);
+    give_impulses(s, impulse, impulse_low);
     state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
     for (int k = 0; k < n; ++k) {
         if (in_play[k] && !hit[k] && !(impulse[k] > 0.0)
@@ -453,6 +507,25 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
             after_impact(s, k, approach[k], impulse[k], restitution[k]);
         }
     }
+}
+
+/* A body between stops that leave it no room: whatever touches comes to rest. */
+static void wedge(const vi_structure *s)
+{
+    double g[VI_PORTS][VI_PORTS], approach[VI_PORTS], impulse[VI_PORTS];
+    int touches[VI_PORTS] = {0};
+    const double before = vi_structure_kinetic(s);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const int32_t status = s->state->status[k];
+        touches[k] = status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD;
+        approach[k] = vi_structure_approach(s, k);
+    }
+    signed_matrix(s, s->model->compliance, g);
+    vi_solve_active(s->model->contacts, g, approach, touches, impulse);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        add_push(s, k, impulse[k], s->state->p);
+    }
+    s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
 }
 
 void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
@@ -472,6 +545,7 @@ void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
             return;
         }
     }
+    wedge(s);
 }
 
 /* ---- arrival ---- */
@@ -574,6 +648,22 @@ void vi_structure_resolve(const vi_structure *s)
 
 /* ---- contacts that touch, at the start of a step or after something happened ---- */
 
+/* Is the point of contact k kept in place by the contacts that are held beside it? */
+static bool kept_by_others(const vi_structure *s, int k, double g[VI_PORTS][VI_PORTS])
+{
+    double column[VI_PORTS], share[VI_PORTS], left = g[k][k];
+    int held[VI_PORTS] = {0};
+    for (int l = 0; l < s->model->contacts; ++l) {
+        held[l] = l != k && s->state->status[l] == VI_CONTACT_HELD;
+        column[l] = g[l][k];
+    }
+    vi_solve_active(s->model->contacts, g, column, held, share);
+    for (int l = 0; l < s->model->contacts; ++l) {
+        left -= g[k][l] * share[l];
+    }
+    return left <= KEPT * g[k][k];
+}
+
 /* A compliant or rigid stop that is touched without speed: pressed, or left? */
 static void settle_resting(const vi_structure *s, const int candidate[])
 {
@@ -597,8 +687,13 @@ static void settle_resting(const vi_structure *s, const int candidate[])
         }
     }
     vi_complementary(count, small, b, p);
-    for (int i = 0; i < count; ++i) {
-        const int k = index[i];
+    for (int turn = 0; turn < 2 * count; ++turn) { /* rigid stops first: what they hold does not press a compliant one */
+        const int i = turn % count, k = index[i];
+        const int64_t law = s->contacts[k].law.law;
+        const bool compliant = law != VI_LAW_RESTITUTION && law != VI_LAW_EXTERNAL;
+        if (compliant != (turn >= count)) {
+            continue;
+        }
         const bool was_held = state->status[k] == VI_CONTACT_HELD;
         double gap = -b[i];
         for (int j = 0; j < count; ++j) {
@@ -608,23 +703,43 @@ static void settle_resting(const vi_structure *s, const int candidate[])
         look_at_held(s, k, &view);
         const double noise = view.noise;
         const bool tie = fabs(gap) <= noise && p[i] * view.mobility <= noise;
-        const bool presses = tie ? view.slope > 0.0 || (view.slope == 0.0 && state->leaving[k] != 2) || was_held
+        const bool idle = (tie || compliant) && kept_by_others(s, k, g);
+        const bool presses = idle ? false
+                             : tie ? view.slope > 0.0 || (view.slope == 0.0 && state->leaving[k] != 2) || was_held
                                  : p[i] * view.mobility > noise;
-        if (presses && s->contacts[k].law.law != VI_LAW_RESTITUTION && s->contacts[k].law.law != VI_LAW_EXTERNAL) {
+        if (presses && compliant) {
             vi_structure_touch_down(s, k);
         } else if (presses && !was_held) {
             vi_structure_rest(s, k, 0.0, 0.0);
         } else if (!presses && was_held) {
             vi_structure_release(s, k, 1);
         } else if (!presses) {
-            state->leaving[k] = tie ? 2 : 1;
+            state->leaving[k] = tie || idle ? 2 : 1;
         }
     }
+}
+
+/* Is yielding contact k neither pressed in nor going to be, since rigid stops hold its point where it touches? */
+static bool only_touches(const vi_structure *s, int k)
+{
+    double g[VI_PORTS][VI_PORTS];
+    if (fabs(vi_structure_clearance(s, k)) > VI_ROUNDING * vi_structure_displacement_size(s, k)
+        || fabs(vi_structure_approach(s, k)) > VI_ROUNDING * vi_structure_velocity_size(s, k)) {
+        return false;
+    }
+    signed_matrix(s, s->model->compliance, g);
+    return kept_by_others(s, k, g);
 }
 
 void vi_structure_settle(const vi_structure *s, const vi_step_request *request)
 {
     vi_structure_state *state = s->state;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (state->status[k] == VI_CONTACT_YIELDING && only_touches(s, k)) {
+            vi_structure_separate(s, k, false);
+            state->leaving[k] = 2;
+        }
+    }
     int candidate[VI_PORTS] = {0}, hit[VI_PORTS] = {0}, any_candidate = 0, first = -1;
     for (int k = 0; k < s->model->contacts && !state->pending; ++k) {
         if (!vi_structure_watched(s, k)) {

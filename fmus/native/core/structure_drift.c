@@ -14,7 +14,7 @@ typedef struct {
     double held[VI_MODES];
     vi_press press[VI_PORTS];
     int thin[VI_PORTS]; /* of a power law: so little penetration that its force acts as an impulse */
-    double length;      /* that thin contacts allow, s */
+    double length;      /* that thin contacts and relaxing surfaces allow, s */
 } situation;
 
 /* ---- thin contacts: the first and last instants of a power law, where its series does not converge ---- */
@@ -76,6 +76,10 @@ static void look(const vi_structure *s, situation *now)
         now->sign[k] = vi_structure_direction(s, k);
         now->press[k] = vi_structure_press(s, k);
         now->thin[k] = 0;
+        if (now->press[k].kind == VI_PRESS_NONE && s->state->status[k] == VI_CONTACT_RECEDING
+            && vi_structure_surface_lags(s, k)) {
+            now->length = vi_min(now->length, s->contacts[k].relaxation_time);
+        }
         any_power = any_power || now->press[k].kind == VI_PRESS_POWER;
     }
     if (!any_power) {
@@ -126,6 +130,24 @@ static vi_fall fall_through(const double c[VI_ORDER + 1], double length, double 
     return fall;
 }
 
+/* Does contact k stay where it is over the segment, as far as rounding of the terms it is the sum of can tell? It does
+ * where others hold its point too: on the opposite side, say. */
+static bool stays(const vi_structure *s, const vi_drift *drift, int k, const double clearance[], double length)
+{
+    const double moved = vi_polynomial_size(clearance, length);
+    double terms = s->state->status[k] == VI_CONTACT_FREE ? vi_structure_displacement_size(s, k) : 0.0;
+    for (int j = 0; j < s->model->modes; ++j) {
+        double size = 0.0;
+        for (int n = VI_ORDER; n >= 0; --n) {
+            size = size * length + fabs(drift->modal[n][j]);
+        }
+        terms += fabs(s->model->shape[k][j]) * size;
+    }
+    /* the loads that holding forces take off again */
+    terms += drift->force_scale[k] * fabs(s->model->mobility[k][k]) * length * length;
+    return moved <= VI_ROUNDING * terms;
+}
+
 static void arrivals(const vi_structure *s, const vi_drift *drift, int k, double length, event_found *first)
 {
     double clearance[VI_ORDER + 1];
@@ -137,6 +159,10 @@ static void arrivals(const vi_structure *s, const vi_drift *drift, int k, double
         clearance[0] = 0.0;
         clearance[1] = exact ? 0.0 : clearance[1];
         clearance[2] = exact == 2 ? 0.0 : clearance[2];
+    }
+    if (fabs(clearance[0]) <= VI_ROUNDING * vi_structure_displacement_size(s, k)
+        && stays(s, drift, k, clearance, length)) {
+        return;
     }
     const double noise = VI_ROUNDING * (fabs(s->contacts[k].position) + vi_polynomial_size(clearance, length));
     const vi_fall fall = vi_polynomial_fall(clearance, 0.0, length, noise);
@@ -153,12 +179,42 @@ static void releases(const vi_drift *drift, int k, double length, event_found *f
     consider(first, &fall, VI_DRIFT_RELEASE, k);
 }
 
+/* Rounding of `pressing`, and of what it is compared with when the contact recedes. */
+static double pressing_noise(const vi_structure *s, int k)
+{
+    const vi_contact_law *law = &s->contacts[k].law;
+    const bool linear = law->law == VI_LAW_KELVIN_VOIGT || law->law == VI_LAW_EXTERNAL_FORCE;
+    const double damping = law->law == VI_LAW_EXTERNAL_FORCE ? s->contacts[k].applied_damping : law->damping;
+    const double stiffness = law->law == VI_LAW_EXTERNAL_FORCE ? s->contacts[k].applied_stiffness : law->stiffness;
+    const double level = linear ? stiffness * vi_structure_displacement_size(s, k) : 1.0;
+    return VI_ROUNDING * (level + (law->law == VI_LAW_HERTZ ? 0.0 : damping * vi_structure_velocity_size(s, k)));
+}
+
+/* What has the sign of a yielding contact's force, and falls through zero with it: the force itself or, of a power law,
+ * 1 + damping d'. The series of its force does not reach as far as that of the motion: near touch-down it moves nothing
+ * yet, but has its singularity there. */
+static void pressing(const vi_drift *drift, const situation *now, int k, double sense[VI_ORDER + 1])
+{
+    const double *depth = drift->penetration[k];
+    for (int n = 0; n <= VI_ORDER; ++n) {
+        const double rate = n < VI_ORDER ? (double)(n + 1) * depth[n + 1] : 0.0;
+        sense[n] = now->press[k].kind == VI_PRESS_POWER ? (n == 0 ? 1.0 : 0.0) + now->press[k].damping * rate
+                                                        : drift->force[k][n];
+    }
+}
+
 static void separations(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double length,
                         event_found *first)
 {
-    const double *depth = drift->penetration[k], *force = drift->force[k];
+    const double *depth = drift->penetration[k];
     if (!now->thin[k]) {
-        vi_fall fall = fall_through(force, length, VI_ROUNDING * vi_polynomial_size(force, length));
+        double force[VI_ORDER + 1];
+        pressing(drift, now, k, force);
+        const double rounding = VI_ROUNDING * vi_polynomial_size(force, length);
+        vi_fall fall = {true, 0.0, 1.0};
+        if (force[0] >= -vi_max(rounding, pressing_noise(s, k))) { /* else an impact elsewhere, or the start, has thrown the point off its stop */
+            fall = fall_through(force, length, rounding);
+        }
         consider(first, &fall, VI_DRIFT_SEPARATION, k);
     }
     if (depth[0] > 0.0 || depth[1] < 0.0) {
@@ -175,10 +231,11 @@ static void gap_to_return(const vi_structure *s, const vi_drift *drift, int k, d
     const vi_contact *contact = &s->contacts[k];
     const double *depth = drift->penetration[k], tau = contact->relaxation_time;
     const double elapsed = vi_clock_elapsed(&s->model->clock, s->state->separated[k], s->state->now);
-    double surface = tau > 0.0 ? s->state->surface[k] * exp(-elapsed / tau) : 0.0;
+    const bool lags = vi_structure_surface_lags(s, k);
+    double surface = lags ? s->state->surface[k] * exp(-elapsed / tau) : 0.0;
     for (int n = 0; n <= VI_ORDER; ++n) {
         const double rate = n < VI_ORDER ? (double)(n + 1) * depth[n + 1] : 0.0;
-        if (tau > 0.0) {
+        if (lags) {
             gap[n] = surface - depth[n];
             surface *= -1.0 / (tau * (double)(n + 1));
         } else if (contact->law.law == VI_LAW_KELVIN_VOIGT) {
@@ -187,7 +244,7 @@ static void gap_to_return(const vi_structure *s, const vi_drift *drift, int k, d
             gap[n] = -((n == 0 ? 1.0 : 0.0) + contact->law.damping * rate);
         }
     }
-    gap[VI_ORDER] = tau > 0.0 ? gap[VI_ORDER] : 0.0; /* the rate's last coefficient is not known */
+    gap[VI_ORDER] = lags ? gap[VI_ORDER] : 0.0; /* the rate's last coefficient is not known */
 }
 
 static void returns(const vi_structure *s, const vi_drift *drift, int k, double length, event_found *first)
@@ -198,9 +255,13 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
         double gap[VI_ORDER + 1];
         gap_to_return(s, drift, k, gap);
         const double small = VI_ROUNDING * vi_polynomial_size(gap, length);
-        vi_fall fall = vi_polynomial_fall(gap, 0.0, length, small);
+        vi_fall fall = {true, 0.0, 1.0};
+        const bool lags = vi_structure_surface_lags(s, k);
+        if (gap[0] >= -vi_max(small, lags ? noise : pressing_noise(s, k))) { /* else an impact elsewhere has thrown the point back */
+            fall = vi_polynomial_fall(gap, 0.0, length, small);
+        }
         consider(first, &fall, VI_DRIFT_RETURN, k);
-        if (tau > 0.0) {
+        if (lags) {
             const double elapsed = vi_clock_elapsed(&s->model->clock, s->state->separated[k], s->state->now);
             const bool relaxed = s->state->surface[k] * exp(-elapsed / tau) <= RELAXED * noise / VI_ROUNDING;
             fall = (vi_fall){relaxed, 0.0, 1.0};

@@ -50,6 +50,13 @@ void vi_structure_release(const vi_structure *s, int k, int leaving);
 void vi_structure_touch_down(const vi_structure *s, int k);
 void vi_structure_separate(const vi_structure *s, int k, bool receding);
 
+/* A receding contact meets its surface: it presses again, or, moving out too fast for that, has a surface from now on
+ * that follows it without force. */
+void vi_structure_return(const vi_structure *s, int k);
+
+/* Does the surface of a receding compliant stop still lag behind, on its way back to rest? */
+bool vi_structure_surface_lags(const vi_structure *s, int k);
+
 /* Put the held contacts back on their stops, at rest: takes off what rounding has added. */
 void vi_structure_project(const vi_structure *s);
 

@@ -1,16 +1,22 @@
 #include "impact_stop.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 
 #include "component.h"
 #include "impact_stop_variables.h"
 
+/* A body comes to the surface within the rounding of its displacement: this times that and the position, m. */
+static const double SURFACE_ROUNDING = 4.0 * DBL_EPSILON;
+
 static void defaults(void *self)
 {
     impact_stop *stop = self;
     stop->law.law = VI_LAW_RESTITUTION;
     stop->law.restitution = 1.0;
+    stop->law.exponent = 1.5;
+    stop->side = VI_SIDE_UPPER;
     stop->applied_restitution = 1.0;
 }
 
@@ -20,25 +26,67 @@ static void was_set(void *self, uint32_t value_reference)
     (void)value_reference;
 }
 
+/* A body on the surface that does not leave it is in the stop by the least that there is. */
+static double penetration_of(const impact_stop *stop, double rate)
+{
+    const double penetration = vi_contact_direction(stop->side) * (stop->displacement - stop->position);
+    const double rounding = SURFACE_ROUNDING * (fabs(stop->displacement) + fabs(stop->position));
+    return rate >= 0.0 && fabs(penetration) <= rounding ? fmax(penetration, DBL_MIN) : penetration;
+}
+
 static void update_outputs(void *self)
 {
     impact_stop *stop = self;
-    stop->applied_restitution = vi_contact_law_restitution(&stop->law, fabs(stop->velocity));
-    stop->applied_force = 0.0;
+    stop->applied = (vi_contact_force){0.0, 0.0, 0.0};
+    stop->applied_restitution = 1.0;
+    if (vi_contact_law_is_compliant(stop->law.law)) {
+        const double rate = vi_contact_direction(stop->side) * stop->velocity;
+        stop->applied = vi_contact_law_force(&stop->law, penetration_of(stop, rate), rate);
+    } else {
+        stop->applied_restitution = vi_contact_law_restitution(&stop->law, fabs(stop->velocity));
+    }
+}
+
+static void check_restitution(char *message, const vi_contact_law *law)
+{
+    if (!(law->restitution >= 0.0 && law->restitution <= 1.0)) {
+        vi_complain(message, "restitution: expected 0 <= r <= 1, got %.17g", law->restitution);
+    }
+    vi_check_not_negative(message, "yield_velocity", law->yield_velocity);
+}
+
+static void check_compliance(char *message, const vi_contact_law *law)
+{
+    vi_check_positive(message, "stiffness", law->stiffness);
+    vi_check_not_negative(message, "damping", law->damping);
+    if (law->law == VI_LAW_HUNT_CROSSLEY && !(law->exponent >= 1.0 && isfinite(law->exponent))) {
+        vi_complain(message, "exponent: expected a finite number >= 1, got %.17g", law->exponent);
+    }
+}
+
+static bool parameters_are_good(const impact_stop *stop, char *message)
+{
+    if (!vi_contact_law_known(stop->law.law)) {
+        vi_complain(message,
+                    "law: expected 1 (restitution), 2 (kelvin_voigt), 3 (hertz) or 4 (hunt_crossley), got %lld",
+                    (long long)stop->law.law);
+    } else if (vi_contact_law_is_compliant(stop->law.law)) {
+        check_compliance(message, &stop->law);
+    } else {
+        check_restitution(message, &stop->law);
+    }
+    if (stop->side != VI_SIDE_UPPER && stop->side != VI_SIDE_LOWER) {
+        vi_complain(message, "side: expected 1 (upper) or 2 (lower), got %lld", (long long)stop->side);
+    }
+    vi_check_finite(message, "position", stop->position);
+    return message[0] == '\0';
 }
 
 static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
 {
     impact_stop *stop = self;
     message[0] = '\0';
-    if (!vi_contact_law_known(stop->law.law)) {
-        (void)snprintf(message, VI_MESSAGE_LENGTH, "law: expected 1 (restitution), got %lld",
-                       (long long)stop->law.law);
-        return false;
-    }
-    if (!(stop->law.restitution >= 0.0 && stop->law.restitution <= 1.0)) {
-        (void)snprintf(message, VI_MESSAGE_LENGTH, "restitution: expected 0 <= r <= 1, got %.17g",
-                       stop->law.restitution);
+    if (!parameters_are_good(stop, message)) {
         return false;
     }
     stop->time = start_time;

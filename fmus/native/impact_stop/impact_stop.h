@@ -8,8 +8,11 @@
 typedef struct {
     double time;
     vi_contact_law law;
-    double displacement, velocity;               /* inputs */
-    double applied_restitution, applied_force; /* outputs */
+    double position;
+    int64_t side;
+    double displacement, velocity; /* inputs */
+    double applied_restitution;    /* outputs */
+    vi_contact_force applied;
 } impact_stop;
 
 #endif

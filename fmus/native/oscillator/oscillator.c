@@ -1,25 +1,26 @@
 #include "oscillator.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <string.h>
 
 #include "component.h"
-#include "impact.h"
+#include "engine.h"
 #include "oscillator_variables.h"
 
 /* An importer's communication point may differ from the oscillator's own time by this times (1 + |time|), s. */
 static const double TIME_MISMATCH = 1e-9;
+/* Default relative error of a contact with law hertz or hunt_crossley. */
+static const double CONTACT_TOLERANCE = 1e-10;
 
 static void defaults(void *self)
 {
     oscillator *o = self;
     o->mass = o->stiffness = 1.0;
+    o->contact_tolerance = CONTACT_TOLERANCE;
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
         vi_contact *contact = &o->body.contacts[k];
         contact->side = VI_SIDE_UPPER;
         contact->law.restitution = 1.0;
+        contact->law.exponent = 1.5;
         contact->last_time = contact->last_phase = contact->stick_start = contact->stick_end = NAN;
         contact->event_time = NAN;
     }
@@ -27,39 +28,40 @@ static void defaults(void *self)
 
 /* ---- validation: every problem is named, in one message ---- */
 
-static void complain(char message[VI_MESSAGE_LENGTH], const char *format, ...)
+static void check_law(char *message, const vi_contact *contact, int n)
 {
-    const size_t used = strlen(message);
-    va_list arguments;
-    va_start(arguments, format);
-    if (used == 0) {
-        (void)vsnprintf(message, VI_MESSAGE_LENGTH, format, arguments);
-    } else if (used + 3 < VI_MESSAGE_LENGTH) {
-        memcpy(message + used, "; ", 3);
-        (void)vsnprintf(message + used + 2, VI_MESSAGE_LENGTH - used - 2, format, arguments);
+    const vi_contact_law *law = &contact->law;
+    if (law->law == VI_LAW_EXTERNAL_FORCE) {
+        return;
     }
-    va_end(arguments);
+    if (!vi_contact_law_is_compliant(law->law)) {
+        if (!(law->restitution >= 0.0 && law->restitution <= 1.0)) {
+            vi_complain(message, "contact[%d].restitution: expected 0 <= r <= 1, got %.17g", n, law->restitution);
+        }
+        if (!(law->yield_velocity >= 0.0) || !isfinite(law->yield_velocity)) {
+            vi_complain(message, "contact[%d].yield_velocity: expected a finite number >= 0, got %.17g", n,
+                        law->yield_velocity);
+        }
+        return;
+    }
+    if (!(law->stiffness > 0.0) || !isfinite(law->stiffness)) {
+        vi_complain(message, "contact[%d].stiffness: expected a finite number > 0, got %.17g", n, law->stiffness);
+    }
+    if (!(law->damping >= 0.0) || !isfinite(law->damping)) {
+        vi_complain(message, "contact[%d].damping: expected a finite number >= 0, got %.17g", n, law->damping);
+    }
+    if (law->law == VI_LAW_HUNT_CROSSLEY && (!(law->exponent >= 1.0) || !isfinite(law->exponent))) {
+        vi_complain(message, "contact[%d].exponent: expected a finite number >= 1, got %.17g", n, law->exponent);
+    }
+    if (!(contact->relaxation_time >= 0.0) || !isfinite(contact->relaxation_time)) {
+        vi_complain(message, "contact[%d].relaxation_time: expected a finite number >= 0, got %.17g", n,
+                    contact->relaxation_time);
+    }
 }
 
-static void check_positive(char *message, const char *name, double value)
+static bool is_law(int64_t law)
 {
-    if (!(value > 0.0) || !isfinite(value)) {
-        complain(message, "%s: expected a finite number > 0, got %.17g", name, value);
-    }
-}
-
-static void check_not_negative(char *message, const char *name, double value)
-{
-    if (!(value >= 0.0) || !isfinite(value)) {
-        complain(message, "%s: expected a finite number >= 0, got %.17g", name, value);
-    }
-}
-
-static void check_finite(char *message, const char *name, double value)
-{
-    if (!isfinite(value)) {
-        complain(message, "%s: expected a finite number, got %.17g", name, value);
-    }
+    return vi_contact_law_known(law) || law == VI_LAW_EXTERNAL || law == VI_LAW_EXTERNAL_FORCE;
 }
 
 static void check_contact(char *message, const oscillator *o, int k)
@@ -69,24 +71,26 @@ static void check_contact(char *message, const oscillator *o, int k)
     if (contact->law.law == VI_LAW_NONE) {
         return;
     }
-    if (!vi_contact_law_known(contact->law.law) && contact->law.law != VI_LAW_EXTERNAL) {
-        complain(message, "contact[%d].law: expected 0 (none), 1 (restitution) or 5 (external), got %lld", n,
-                 (long long)contact->law.law);
+    if (!is_law(contact->law.law)) {
+        vi_complain(message,
+                    "contact[%d].law: expected 0 (none), 1 (restitution), 2 (kelvin_voigt), 3 (hertz),"
+                    " 4 (hunt_crossley), 5 (external) or 6 (external_force), got %lld",
+                    n, (long long)contact->law.law);
     }
     if (contact->side != VI_SIDE_UPPER && contact->side != VI_SIDE_LOWER) {
-        complain(message, "contact[%d].side: expected 1 (upper) or 2 (lower), got %lld", n, (long long)contact->side);
+        vi_complain(message, "contact[%d].side: expected 1 (upper) or 2 (lower), got %lld", n,
+                    (long long)contact->side);
     }
-    if (!(contact->law.restitution >= 0.0 && contact->law.restitution <= 1.0)) {
-        complain(message, "contact[%d].restitution: expected 0 <= r <= 1, got %.17g", n, contact->law.restitution);
-    }
+    check_law(message, contact, n);
     if (!isfinite(contact->position)) {
-        complain(message, "contact[%d].position: expected a finite number, got %.17g", n, contact->position);
+        vi_complain(message, "contact[%d].position: expected a finite number, got %.17g", n, contact->position);
         return;
     }
     const double sign = vi_contact_direction(contact->side);
     if (sign * (o->displacement_start - contact->position) > 0.0) {
-        complain(message, "displacement_start: expected a start on the free side of contact[%d] (%s %.17g), got %.17g",
-                 n, sign > 0.0 ? "<=" : ">=", contact->position, o->displacement_start);
+        vi_complain(message,
+                    "displacement_start: expected a start on the free side of contact[%d] (%s %.17g), got %.17g", n,
+                    sign > 0.0 ? "<=" : ">=", contact->position, o->displacement_start);
     }
 }
 
@@ -99,50 +103,53 @@ static void check_gap(char *message, const oscillator *o)
     }
     const double sign = vi_contact_direction(a->side);
     if (!(sign * (a->position - b->position) > 0.0)) {
-        complain(message, "contact[2].position: expected room between the stops, got %.17g and %.17g", a->position,
-                 b->position);
+        vi_complain(message, "contact[2].position: expected room between the stops, got %.17g and %.17g", a->position,
+                    b->position);
     }
 }
 
 static void check_inputs(char *message, const oscillator *o)
 {
-    check_finite(message, "force", o->force);
-    check_finite(message, "force_rate", o->force_rate);
-    check_finite(message, "base_acceleration", o->base_acceleration);
-    check_finite(message, "base_acceleration_rate", o->base_acceleration_rate);
-    check_finite(message, "contact[1].applied_force", o->body.contacts[0].applied_force);
-    check_finite(message, "contact[2].applied_force", o->body.contacts[1].applied_force);
+    vi_check_finite(message, "force", o->force);
+    vi_check_finite(message, "force_rate", o->force_rate);
+    vi_check_finite(message, "base_acceleration", o->base_acceleration);
+    vi_check_finite(message, "base_acceleration_rate", o->base_acceleration_rate);
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        const vi_contact *contact = &o->body.contacts[k];
+        vi_check_finite(message, k == 0 ? "contact[1].applied_force" : "contact[2].applied_force",
+                        contact->applied_force);
+        vi_check_finite(message, k == 0 ? "contact[1].applied_stiffness" : "contact[2].applied_stiffness",
+                        contact->applied_stiffness);
+        vi_check_finite(message, k == 0 ? "contact[1].applied_damping" : "contact[2].applied_damping",
+                        contact->applied_damping);
+    }
 }
 
 static bool parameters_are_good(const oscillator *o, char *message)
 {
-    check_positive(message, "mass", o->mass);
-    check_not_negative(message, "damping", o->damping);
-    check_not_negative(message, "stiffness", o->stiffness);
-    check_finite(message, "forcing.amplitude", o->forcing_amplitude);
-    check_not_negative(message, "forcing.angular_frequency", o->forcing_angular_frequency);
-    check_finite(message, "forcing.phase", o->forcing_phase);
-    check_finite(message, "displacement_start", o->displacement_start);
-    check_finite(message, "velocity_start", o->velocity_start);
+    vi_check_positive(message, "mass", o->mass);
+    vi_check_not_negative(message, "damping", o->damping);
+    vi_check_not_negative(message, "stiffness", o->stiffness);
+    vi_check_finite(message, "forcing.amplitude", o->forcing_amplitude);
+    vi_check_not_negative(message, "forcing.angular_frequency", o->forcing_angular_frequency);
+    vi_check_finite(message, "forcing.phase", o->forcing_phase);
+    vi_check_finite(message, "displacement_start", o->displacement_start);
+    vi_check_finite(message, "velocity_start", o->velocity_start);
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
         check_contact(message, o, k);
+    }
+    if (oscillator_yields(o)) {
+        vi_check_positive(message, "contact_tolerance", o->contact_tolerance);
     }
     check_gap(message, o);
     check_inputs(message, o);
     if (o->body.impact_limit < 0) {
-        complain(message, "impact_limit: expected >= 0, got %lld", (long long)o->body.impact_limit);
+        vi_complain(message, "impact_limit: expected >= 0, got %lld", (long long)o->body.impact_limit);
     }
     return message[0] == '\0';
 }
 
 /* ---- life ---- */
-
-static void hold_inputs(oscillator *o)
-{
-    vi_body_hold(&o->body, o->force / o->mass - o->base_acceleration,
-                 o->force_rate / o->mass - o->base_acceleration_rate);
-    o->inputs_changed = 0;
-}
 
 static void was_set(void *self, uint32_t value_reference)
 {
@@ -157,24 +164,15 @@ static void was_set(void *self, uint32_t value_reference)
     }
 }
 
-static void start_mode(oscillator *o)
-{
-    const bool constant = o->forcing_angular_frequency == 0.0;
-    const double amplitude = constant ? o->forcing_amplitude * cos(o->forcing_phase) : o->forcing_amplitude;
-    vi_mode_start(&o->body.mode, o->mass, o->damping, o->stiffness, amplitude, o->forcing_angular_frequency);
-    o->body.mass = o->mass;
-}
-
 static void update_outputs(void *self)
 {
     oscillator *o = self;
-    o->time = vi_clock_time(&o->body.clock, o->body.now);
+    double relative;
+    o->time = vi_clock_time(&o->body.clock, oscillator_now(o));
     if (o->inputs_changed) {
-        hold_inputs(o);
+        oscillator_hold(o);
     }
-    const double relative = vi_body_outputs(&o->body);
-    o->displacement = o->body.displacement;
-    o->velocity = o->body.velocity;
+    oscillator_outputs(o, &o->displacement, &o->velocity, &relative);
     o->acceleration = relative + o->base_acceleration;
     o->energy_kinetic = 0.5 * o->mass * o->velocity * o->velocity;
     o->energy_potential = 0.5 * o->stiffness * o->displacement * o->displacement;
@@ -187,17 +185,16 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
     if (!parameters_are_good(o, message)) {
         return false;
     }
-    start_mode(o);
     vi_instant now;
-    if (!vi_clock_start(&o->body.clock, o->forcing_angular_frequency, o->forcing_phase, o->body.mode.natural)
-        || !isfinite(start_time) || !vi_clock_instant(&o->body.clock, start_time, 0.0, &now)) {
-        complain(message, "forcing.angular_frequency: expected a period between 1e-300 and 1e300 s that a start time of"
-                          " %.17g s can be counted in, got %.17g rad/s",
-                 start_time, o->forcing_angular_frequency);
+    if (!oscillator_start_clock(o, start_time, &now)) {
+        vi_complain(message,
+                    "forcing.angular_frequency: expected a period between 1e-300 and 1e300 s that a start time of"
+                    " %.17g s can be counted in, got %.17g rad/s",
+                    start_time, o->forcing_angular_frequency);
         return false;
     }
-    vi_body_start(&o->body, now, o->displacement_start, o->velocity_start);
-    hold_inputs(o);
+    oscillator_start(o, now);
+    oscillator_hold(o);
     update_outputs(o);
     return true;
 }
@@ -206,44 +203,58 @@ static bool step_is_good(const oscillator *o, const vi_step_request *request, vi
 {
     message[0] = '\0';
     if (!(request->size > 0.0) || !isfinite(request->size)) {
-        complain(message, "communicationStepSize: expected a finite number > 0, got %.17g", request->size);
+        vi_complain(message, "communicationStepSize: expected a finite number > 0, got %.17g", request->size);
     }
-    const double now = vi_clock_time(&o->body.clock, o->body.now);
+    const double now = vi_clock_time(&o->body.clock, oscillator_now(o));
     if (!(fabs(request->time - now) <= TIME_MISMATCH * (1.0 + fabs(now)))) {
-        complain(message, "currentCommunicationPoint: expected %.17g (the end of the last step), got %.17g", now,
-                 request->time);
+        vi_complain(message, "currentCommunicationPoint: expected %.17g (the end of the last step), got %.17g", now,
+                    request->time);
     }
     const double high = request->time + request->size;
     const double part = high - request->time;
     const double low = (request->time - (high - part)) + (request->size - part);
     if (message[0] == '\0' && !vi_clock_instant(&o->body.clock, high, low, target)) {
-        complain(message, "currentCommunicationPoint: expected a time below 2^53 forcing periods, got %.17g", high);
+        vi_complain(message, "currentCommunicationPoint: expected a time below 2^53 forcing periods, got %.17g", high);
     }
     check_inputs(message, o);
-    if (o->body.passed) {
-        complain(message, "contact[%d]: the last step passed through a stop whose law is external (event_time %.17g);"
-                          " restore the state before it and step to event_time", (int)o->body.passed,
-                 o->body.contacts[o->body.passed - 1].event_time);
+    const int passed = oscillator_passed(o);
+    if (passed) {
+        vi_complain(message,
+                    "contact[%d]: the last step passed through a stop whose law is external (event_time %.17g);"
+                    " restore the state before it and step to event_time",
+                    passed, o->body.contacts[passed - 1].event_time);
     }
     return message[0] == '\0';
+}
+
+/* Has every contact of this instant the answer that its law asks for? A force is one without being set: 0. */
+static void check_answers(char *message, const oscillator *o)
+{
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        const vi_contact *contact = &o->body.contacts[k];
+        const double r = contact->applied_restitution;
+        const bool asks = oscillator_asks(o, k) && contact->law.law == VI_LAW_EXTERNAL;
+        if (asks && (!contact->answered || !(r >= 0.0 && r <= 1.0))) {
+            vi_complain(message,
+                        "contact[%d].applied_restitution: expected an answer 0 <= r <= 1 to the contact at %.17g s,"
+                        " got %s%.17g",
+                        k + 1, contact->event_time, contact->answered ? "" : "none; last value ", r);
+        }
+    }
 }
 
 static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
 {
     oscillator *o = self;
     message[0] = '\0';
-    if (!o->body.pending) {
+    if (!oscillator_pending(o)) {
         return true;
     }
-    const vi_contact *contact = &o->body.contacts[o->body.pending - 1];
-    const double r = contact->applied_restitution;
-    if (!contact->answered || !(r >= 0.0 && r <= 1.0)) {
-        complain(message, "contact[%d].applied_restitution: expected an answer 0 <= r <= 1 to the contact at %.17g s,"
-                          " got %s%.17g", (int)o->body.pending, contact->event_time,
-                 contact->answered ? "" : "none; last value ", r);
+    check_answers(message, o);
+    if (message[0] != '\0') {
         return false;
     }
-    vi_body_resolve(&o->body);
+    oscillator_resolve(o);
     update_outputs(o);
     return true;
 }
@@ -255,27 +266,33 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     if (!step_is_good(o, request, &target, message) || !resolve(o, message)) {
         return VI_STEP_ERROR;
     }
-    hold_inputs(o);
-    const vi_step_result result = vi_body_advance(&o->body, target, request);
+    oscillator_hold(o);
+    const vi_step_result result = oscillator_advance(o, target, request);
     update_outputs(o);
     return result;
 }
 
 static bool event_pending(const void *self)
 {
-    return ((const oscillator *)self)->body.pending != 0;
+    return oscillator_pending(self) != 0;
 }
 
 static bool needs_events(const void *self)
 {
     const oscillator *o = self;
-    return o->body.contacts[0].law.law == VI_LAW_EXTERNAL || o->body.contacts[1].law.law == VI_LAW_EXTERNAL;
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        const int64_t law = o->body.contacts[k].law.law;
+        if (law == VI_LAW_EXTERNAL || law == VI_LAW_EXTERNAL_FORCE) {
+            return true;
+        }
+    }
+    return false;
 }
 
 static double present_time(const void *self)
 {
     const oscillator *o = self;
-    return vi_clock_time(&o->body.clock, o->body.now);
+    return vi_clock_time(&o->body.clock, oscillator_now(o));
 }
 
 static size_t used_size(const void *self)

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "body.h"
+#include "structure.h"
 
 /* All of an Oscillator's variables and state (variables.toml says what each is); copying it copies the Oscillator. */
 typedef struct {
@@ -13,11 +14,17 @@ typedef struct {
     double mass, damping, stiffness;
     double forcing_amplitude, forcing_angular_frequency, forcing_phase;
     double displacement_start, velocity_start;
+    double contact_tolerance;
     /* inputs */
     double force, force_rate, base_acceleration, base_acceleration_rate;
     int32_t inputs_changed; /* since they were last given to the body */
     /* outputs */
     double displacement, velocity, acceleration, energy_kinetic, energy_potential;
+    /* A stop that yields (a law of force) is met on the engine of structure.h, with one mode; the impulsive laws alone
+     * on the faster one of body.h. Contacts and record are those of `body` either way. */
+    int32_t yields;
+    vi_structure_model model;
+    vi_structure_state state;
     vi_body body; /* last: its record is saved only as far as it is used */
 } oscillator;
 

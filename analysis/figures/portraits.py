@@ -1,0 +1,175 @@
+"""Figures of one motion in other planes than time: phase portraits and impact maps."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, Floats, canvas, label, title
+from vibroimpact.analysis.schema import swept_names
+from vibroimpact.fmus.errors import DatasetError
+
+_PANEL_MM = 62
+# Small enough that ten thousand impacts do not run into one blot.
+_DOT = 1.1
+_QUARTERS = ("0", "π/2", "π", "3π/2", "2π")
+
+
+class _Orbit(NamedTuple):
+    """What one line of a portrait shows."""
+
+    name: str
+    words: str
+    displacement: Floats
+    velocity: Floats
+
+
+def draw_portrait(dataset: xr.Dataset, run: int | None = None) -> Figure:
+    """Draw velocity against displacement for each sampled pair; of a whole chain its modes too.
+
+    Lines end at an impact and begin again after it, joined by dots.
+
+    Raises
+    ------
+    DatasetError
+        If no displacement was sampled together with its velocity.
+    """
+    selection = {} if run is None else {"run_index": run}
+    samples = dataset.vibroimpact.samples(**selection)
+    orbits = _sampled_orbits(samples)
+    if not orbits:
+        raise DatasetError(
+            "figure: expected a displacement and its velocity in the time series, got no such pair. "
+            'Set variables = ["displacement", "velocity"] in time_series.'
+        )
+    hits = dataset.vibroimpact.impacts(**selection) if "impact" in dataset.dims else None
+    jumps = np.searchsorted(samples["time"].values, [] if hits is None else hits["impact_time"].values)
+    nondimensional = dataset.attrs.get("units_system") == "nondimensional"
+    modal = _modal_orbits(_scene(dataset), orbits)
+    panels = [(orbits, ("-", "-") if nondimensional else ("m", "m/s"))]
+    if modal:
+        panels.append((modal, ("-", "-") if nondimensional else ("√kg m", "√kg m/s")))
+    figure = canvas(6 + _PANEL_MM * len(panels))
+    axes = np.atleast_1d(figure.subplots(len(panels), 1))
+    for axis, (lines, (length, speed)) in zip(axes, panels, strict=True):
+        for place, orbit in enumerate(lines):
+            _draw_orbit(axis, orbit, jumps, COLOURS[place % len(COLOURS)] if len(lines) > 1 else LINE)
+        words = "modal displacement" if lines is modal else "displacement"
+        axis.xaxis.set_major_locator(MaxNLocator(5))
+        axis.set_xlabel(f"{words} ({length})")
+        axis.set_ylabel(f"{words.replace('displacement', 'velocity')} ({speed})")
+        if len(lines) > 1:
+            axis.legend(
+                frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1
+            )
+    for position in _observed_stops(_scene(dataset)):
+        axes[0].axvline(position, color=STOP, linestyle="--", linewidth=0.6, zorder=0)
+    return figure
+
+
+def _draw_orbit(axis: Any, orbit: _Orbit, jumps: Any, colour: str) -> None:
+    """Draw one line, broken where the velocity jumps."""
+    inside = jumps[(jumps > 0) & (jumps < orbit.displacement.size)]
+    broken = [np.insert(values, inside, np.nan) for values in (orbit.displacement, orbit.velocity)]
+    axis.plot(*broken, color=colour, label=orbit.words, rasterized=True)
+    joined = [_joined(values, inside) for values in (orbit.displacement, orbit.velocity)]
+    axis.plot(*joined, color=colour, linestyle=":", linewidth=0.6, rasterized=True)
+
+
+def _joined(values: Floats, jumps: Any) -> Floats:
+    """Return the values before and after each jump, with a gap after each pair, as one line."""
+    ends: Floats = np.stack([values[jumps - 1], values[jumps], np.full(jumps.size, np.nan)], axis=1).ravel()
+    return ends
+
+
+def _sampled_orbits(samples: xr.Dataset) -> list[_Orbit]:
+    """Return each sampled displacement with the velocity of the same name."""
+    named = {str(name): variable for name, variable in samples.data_vars.items()}
+    return [
+        _Orbit(name, title(variable), variable.values, named[partner].values)
+        for name, variable in named.items()
+        if "displacement" in name and (partner := name.replace("displacement", "velocity")) in named
+    ]
+
+
+def _modal_orbits(scene: dict[str, Any], orbits: list[_Orbit]) -> list[_Orbit]:
+    """Return the modal coordinates q = Psi' M y of a chain all of whose masses were sampled (equations.md 5.2)."""
+    body = scene.get("body", {})
+    masses = np.atleast_1d(np.asarray(body.get("masses", []), dtype=float))
+    by_name = {orbit.name: orbit for orbit in orbits}
+    chosen = [by_name.get(f"displacement_{i}") for i in range(1, masses.size + 1)]
+    rows = [orbit for orbit in chosen if orbit is not None]
+    if body.get("kind") != "chain" or len(rows) < masses.size or masses.size < 2:
+        return []
+    springs = np.append(np.broadcast_to(body["stiffnesses"], masses.shape), body.get("far_stiffness", 0.0))
+    matrix = np.diag(springs[:-1] + springs[1:]) - np.diag(springs[1:-1], 1) - np.diag(springs[1:-1], -1)
+    roots = np.sqrt(masses)
+    _, vectors = np.linalg.eigh(matrix / np.outer(roots, roots))
+    vectors *= np.where(vectors[0] < 0, -1.0, 1.0)
+    weights = (vectors * roots[:, None]).T
+    q = weights @ np.stack([orbit.displacement for orbit in rows])
+    p = weights @ np.stack([orbit.velocity for orbit in rows])
+    return [_Orbit(f"mode_{j + 1}", f"mode {j + 1}", q[j], p[j]) for j in range(masses.size)]
+
+
+def _scene(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the scene of a dataset; nothing where a sweep changed it or it cannot be read."""
+    if swept_names(dataset):
+        return {}
+    try:
+        return tomllib.loads(str(dataset.attrs.get("scene", "")))
+    except tomllib.TOMLDecodeError:
+        # The text is only provenance here: a portrait without stops and modes is still right.
+        return {}
+
+
+def _observed_stops(scene: dict[str, Any]) -> list[float]:
+    """Return the positions of the stops of a scene."""
+    return [float(stop["position"]) for stop in scene.get("stop", []) if "position" in stop]
+
+
+def draw_impact_map(dataset: xr.Dataset, run: int | None = None) -> Figure:
+    """Draw the impacts of one run in the plane of the impact map: forcing phase and velocity before impact.
+
+    Raises
+    ------
+    DatasetError
+        If the run has no impacts, or no forcing that gives them a phase.
+    """
+    hits = dataset.vibroimpact.impacts(**({} if run is None else {"run_index": run}))
+    phase = hits["impact_phase"].values
+    if not np.isfinite(phase).any():
+        raise DatasetError(
+            "figure: expected impacts with a forcing phase, got none. "
+            "Record a forced scene that meets its stop, with impacts = true."
+        )
+    figure = canvas(75)
+    axis = figure.subplots()
+    contacts = np.unique(hits["impact_contact"].values)
+    for place, contact in enumerate(contacts):
+        own = hits["impact_contact"].values == contact
+        axis.plot(
+            phase[own],
+            hits["impact_velocity"].values[own],
+            linestyle="none",
+            marker="o",
+            markersize=_DOT if own.sum() > 200 else 3.0,
+            markeredgewidth=0.0,
+            color=COLOURS[place % len(COLOURS)] if len(contacts) > 1 else MARK,
+            label=f"stop {contact}",
+            rasterized=True,
+        )
+    axis.set_xlim(0.0, 2.0 * math.pi)
+    axis.set_xticks(np.linspace(0.0, 2.0 * math.pi, 5), _QUARTERS)
+    axis.set_ylim(bottom=0.0)
+    axis.set_xlabel(label(hits["impact_phase"]))
+    axis.set_ylabel(label(hits["impact_velocity"]))
+    if len(contacts) > 1:
+        figure.legend(loc="outside upper center", ncols=4, markerscale=2.0, frameon=False)
+    return figure

@@ -1,0 +1,426 @@
+#include "beam.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "beam_modes.h"
+#include "beam_variables.h"
+#include "component.h"
+
+enum { START_MODES = 4 };
+enum { STRIDE = BEAM_CONTACT_APPLIED_RESTITUTION_2 - BEAM_CONTACT_APPLIED_RESTITUTION_1 };
+
+/* Estimated relative error of a natural frequency above which the theory is left. equations.md 6.7 */
+static const double VALIDITY_LIMIT = 0.02;
+/* Shear coefficient of a rectangular section. */
+static const double SHEAR_COEFFICIENT = 5.0 / 6.0;
+/* A point whose contact mass is more than this many beam masses is a support: no stop can be met there. */
+static const double HEAVIEST_POINT = 1e20;
+
+static void defaults(void *self)
+{
+    beam *b = self;
+    b->modes = START_MODES;
+    b->modes_described = VI_MODES;
+    b->boundary = VI_CLAMPED_FREE;
+    b->length = 0.25; /* a strip of aluminium */
+    b->width = 0.02;
+    b->thickness = 0.002;
+    b->youngs_modulus = 70e9;
+    b->density = 2700.0;
+    b->poisson_ratio = 0.3;
+    b->forcing_kind = FORCED_AT_POINT;
+    b->forcing_mode = 1;
+    b->forcing_location = b->sensor_location = 1.0;
+    b->impact_projection = PROJECTION_VARIATIONAL;
+    for (int k = 0; k < VI_PORTS; ++k) {
+        b->contact_location[k] = 1.0;
+    }
+    for (int k = 0; k < BEAM_SENSORS; ++k) {
+        b->sensor[k].location = 1.0;
+    }
+    vi_structure_component_defaults(&b->body);
+}
+
+static void sized(void *self, const char *block, int count)
+{
+    beam *b = self;
+    if (strcmp(block, "modes") == 0 && count >= 1 && count <= VI_MODES) {
+        b->modes = b->modes_described = count;
+    }
+}
+
+/* ---- validation ---- */
+
+static void check_choice(char *message, const char *name, int64_t value, int most)
+{
+    if (value < 1 || value > most) {
+        vi_complain(message, "%s: expected 1 to %d, got %lld", name, most, (long long)value);
+    }
+}
+
+static void check_location(char *message, const char *name, double value)
+{
+    if (!(value >= 0.0 && value <= 1.0)) {
+        vi_complain(message, "%s: expected 0 <= location <= 1 (a fraction of the length), got %.17g", name, value);
+    }
+}
+
+/* Of the section only what is used has to be right. */
+static void check_section(const beam *b, char *message)
+{
+    vi_check_positive(message, "length", b->length);
+    vi_check_not_negative(message, "flexural_rigidity", b->flexural_rigidity);
+    vi_check_not_negative(message, "mass_per_length", b->mass_per_length);
+    const bool rigidity_follows = !(b->flexural_rigidity > 0.0), mass_follows = !(b->mass_per_length > 0.0);
+    if (rigidity_follows) {
+        vi_check_positive(message, "youngs_modulus", b->youngs_modulus);
+    }
+    if (mass_follows) {
+        vi_check_positive(message, "density", b->density);
+    }
+    if (rigidity_follows || mass_follows) {
+        vi_check_positive(message, "width", b->width);
+        vi_check_positive(message, "thickness", b->thickness);
+        if (!(b->poisson_ratio > -1.0 && b->poisson_ratio <= 0.5)) {
+            vi_complain(message, "poisson_ratio: expected -1 < ratio <= 0.5, got %.17g", b->poisson_ratio);
+        }
+    }
+}
+
+static void check_modes(const beam *b, char *message)
+{
+    const int n = (int)b->modes;
+    vi_check_each(message, vi_check_not_negative, "damping_ratio", b->damping_ratio, n);
+    vi_check_not_negative(message, "rayleigh.mass", b->rayleigh_mass);
+    vi_check_not_negative(message, "rayleigh.stiffness", b->rayleigh_stiffness);
+    vi_check_each(message, vi_check_finite, "modal_displacement_start", b->modal_displacement_start, n);
+    vi_check_each(message, vi_check_finite, "modal_velocity_start", b->modal_velocity_start, n);
+}
+
+static void check_forcing(const beam *b, char *message)
+{
+    check_choice(message, "forcing.kind", b->forcing_kind, FORCED_BY_BASE);
+    vi_check_finite(message, "forcing.amplitude", b->forcing_amplitude);
+    if (b->forcing_kind == FORCED_AS_MODE && (b->forcing_mode < 1 || b->forcing_mode > b->modes)) {
+        vi_complain(message, "forcing.mode: expected 1 to %lld (modes), got %lld", (long long)b->modes,
+                    (long long)b->forcing_mode);
+    }
+    check_location(message, "forcing_location", b->forcing_location);
+}
+
+static void check_places(const beam *b, char *message)
+{
+    check_location(message, "sensor_location", b->sensor_location);
+    char name[32];
+    for (int k = 0; k < BEAM_SENSORS; ++k) {
+        (void)snprintf(name, sizeof name, "sensor[%d].location", k + 1);
+        check_location(message, name, b->sensor[k].location);
+    }
+    for (int k = 0; k < VI_PORTS; ++k) {
+        if (b->body.contacts[k].law.law != VI_LAW_NONE) {
+            (void)snprintf(name, sizeof name, "contact[%d].location", k + 1);
+            check_location(message, name, b->contact_location[k]);
+        }
+    }
+}
+
+static void check_inputs(const beam *b, char *message)
+{
+    vi_check_finite(message, "force", b->force);
+    vi_check_finite(message, "force_rate", b->force_rate);
+}
+
+static bool parameters_are_good(const beam *b, char *message)
+{
+    if (b->modes < 1 || b->modes > b->modes_described) {
+        vi_complain(message, "modes: expected 1 to %lld, got %lld", (long long)b->modes_described, (long long)b->modes);
+        return false;
+    }
+    check_choice(message, "boundary", b->boundary, VI_PINNED_PINNED);
+    check_section(b, message);
+    check_modes(b, message);
+    check_forcing(b, message);
+    check_choice(message, "impact_projection", b->impact_projection, PROJECTION_COLLOCATION);
+    check_places(b, message);
+    vi_structure_component_check(&b->body, message);
+    check_inputs(b, message);
+    return message[0] == '\0';
+}
+
+/* ---- from parameters to modes ---- */
+
+static double rigidity(const beam *b)
+{
+    const double area_moment = b->width * b->thickness * b->thickness * b->thickness / 12.0;
+    return b->flexural_rigidity > 0.0 ? b->flexural_rigidity : b->youngs_modulus * area_moment;
+}
+
+static double linear_density(const beam *b)
+{
+    return b->mass_per_length > 0.0 ? b->mass_per_length : b->density * b->width * b->thickness;
+}
+
+/* Mass-normalised shape of a point: phi / sqrt(beam mass). equations.md 6.1 */
+static void find_shape(const beam *b, double location, double shape[VI_MODES])
+{
+    for (int j = 0; j < b->modes; ++j) {
+        shape[j] = vi_beam_shape((vi_beam_boundary)b->boundary, j + 1, location, 0) / b->root_mass;
+    }
+}
+
+/* Amplitude of the harmonic modal force on mode j, N kg^(-1/2). equations.md 6.5 */
+static double modal_amplitude(const beam *b, int j)
+{
+    switch (b->forcing_kind) {
+    case FORCED_AT_POINT: return b->forcing_amplitude * b->forced_shape[j];
+    case FORCED_EVENLY: return b->forcing_amplitude * b->length * b->participation[j] / (b->root_mass * b->root_mass);
+    case FORCED_AS_MODE: return j + 1 == b->forcing_mode ? b->forcing_amplitude / b->root_mass : 0.0;
+    default: return -b->forcing_amplitude * b->participation[j];
+    }
+}
+
+static double mode_damping(const beam *b, int j, double natural)
+{
+    return b->damping_ratio[j] + 0.5 * (b->rayleigh_mass / natural + b->rayleigh_stiffness * natural);
+}
+
+/* The grid s_k = k / N, or k / (N + 1) where the far end cannot move, with the point nearest to `location` put there;
+ * returns the index of that point. equations.md 6.8 */
+static int find_grid(const beam *b, double location, double s[VI_MODES])
+{
+    const int n = (int)b->modes;
+    const int parts = b->boundary == VI_CLAMPED_FREE ? n : n + 1;
+    int nearest = 0;
+    for (int k = 0; k < n; ++k) {
+        s[k] = (double)(k + 1) / parts;
+        nearest = fabs(s[k] - location) < fabs(s[nearest] - location) ? k : nearest;
+    }
+    s[nearest] = location;
+    return nearest;
+}
+
+/* What a unit impulse at contact k gives to the modal velocities, by collocation: as much velocity of the contact point
+ * as by the variational rule, and none of the grid's other points. */
+static bool collocate(beam *b, int k)
+{
+    vi_structure_model *model = &b->body.model;
+    double s[VI_MODES], direction[VI_MODES];
+    const int at = find_grid(b, b->contact_location[k], s);
+    if (!vi_beam_collocation((vi_beam_boundary)b->boundary, model->modes, s, at, direction)) {
+        return false;
+    }
+    const double mobility = vi_structure_at(model, model->shape[k], model->shape[k]);
+    for (int j = 0; j < model->modes; ++j) {
+        model->impulse[k][j] = b->root_mass * direction[j] * mobility;
+    }
+    return true;
+}
+
+static void place_contact(beam *b, int k, char *message)
+{
+    vi_structure_model *model = &b->body.model;
+    const double location = b->contact_location[k];
+    find_shape(b, location, model->shape[k]);
+    memcpy(model->impulse[k], model->shape[k], sizeof model->impulse[k]);
+    if (b->body.contacts[k].law.law == VI_LAW_NONE) {
+        return;
+    }
+    const double mobility = vi_structure_at(model, model->shape[k], model->shape[k]);
+    if (!(mobility * b->root_mass * b->root_mass * HEAVIEST_POINT > 1.0)) {
+        vi_complain(message, "contact[%d].location: expected a point that can move, got %.17g, a support", k + 1,
+                    location);
+    } else if (b->impact_projection == PROJECTION_COLLOCATION && !collocate(b, k)) {
+        vi_complain(message, "contact[%d].location: expected a point that makes a grid for impact_projection"
+                             " collocation, got %.17g, for which the grid is singular", k + 1, location);
+    }
+}
+
+static void fill_modes(beam *b)
+{
+    const double share = b->body.forcing_angular_frequency == 0.0 ? cos(b->body.forcing_phase) : 1.0;
+    const double length = b->length;
+    const double rate = sqrt(rigidity(b) / linear_density(b)) / (length * length);
+    memset(b->body.natural, 0, sizeof b->body.natural);
+    for (int j = 0; j < b->modes; ++j) {
+        const double eigenvalue = vi_beam_eigenvalue((vi_beam_boundary)b->boundary, j + 1);
+        const double natural = eigenvalue * eigenvalue * rate;
+        b->body.natural[j] = natural;
+        b->participation[j] = b->root_mass * vi_beam_participation((vi_beam_boundary)b->boundary, j + 1);
+        vi_structure_mode(&b->body.model, j, natural, mode_damping(b, j, natural), share * modal_amplitude(b, j),
+                          b->body.forcing_angular_frequency);
+        b->body.state.q[j] = b->root_mass * b->modal_displacement_start[j];
+        b->body.state.p[j] = b->root_mass * b->modal_velocity_start[j];
+    }
+}
+
+static bool fill_model(beam *b, char *message)
+{
+    vi_structure_model *model = &b->body.model;
+    b->root_mass = sqrt(linear_density(b) * b->length);
+    model->modes = (int32_t)b->modes;
+    model->contacts = vi_structure_component_ports(&b->body);
+    find_shape(b, b->forcing_location, b->forced_shape);
+    find_shape(b, b->sensor_location, model->observed);
+    for (int k = 0; k < BEAM_SENSORS; ++k) {
+        find_shape(b, b->sensor[k].location, b->sensor[k].shape);
+    }
+    fill_modes(b);
+    if (!(b->body.natural[0] > 0.0 && isfinite(b->body.natural[model->modes - 1]))) {
+        vi_complain(message, "length: expected a beam whose natural frequencies are finite numbers > 0, got %.17g and"
+                             " %.17g rad/s", b->body.natural[0], b->body.natural[model->modes - 1]);
+    }
+    for (int k = 0; k < model->contacts; ++k) {
+        place_contact(b, k, message);
+    }
+    return message[0] == '\0';
+}
+
+/* Say which is the first mode that Euler-Bernoulli's theory does not hold for. */
+static void warn_of_validity(const beam *b, char *message)
+{
+    if (b->flexural_rigidity > 0.0 && b->mass_per_length > 0.0) {
+        return; /* the section is not known */
+    }
+    const double slenderness = b->thickness / sqrt(12.0) / b->length;
+    const double e_over_g = 2.0 * (1.0 + b->poisson_ratio);
+    for (int j = 1; j <= b->modes; ++j) {
+        const double error =
+            vi_beam_validity((vi_beam_boundary)b->boundary, j, slenderness, e_over_g, SHEAR_COEFFICIENT);
+        if (error > VALIDITY_LIMIT) {
+            vi_complain(message, "modes: mode %d leaves the validity of Euler-Bernoulli's theory: its natural frequency"
+                                 " comes out %.2g %% too high (limit %.2g %%). Use %s", j, 100.0 * error,
+                        100.0 * VALIDITY_LIMIT, j > 1 ? "fewer modes or a thinner beam" : "a thinner beam");
+            return;
+        }
+    }
+}
+
+/* ---- life ---- */
+
+static void hold_inputs(beam *b)
+{
+    double held[VI_MODES], held_rate[VI_MODES];
+    for (int j = 0; j < b->modes; ++j) {
+        held[j] = b->force * b->forced_shape[j] - b->body.base_acceleration * b->participation[j];
+        held_rate[j] = b->force_rate * b->forced_shape[j] - b->body.base_acceleration_rate * b->participation[j];
+    }
+    vi_structure_component_hold(&b->body, held, held_rate);
+}
+
+/* Of the input and of the forcing, m/s^2. */
+static double base_acceleration(const beam *b)
+{
+    const double input = vi_structure_component_base_acceleration(&b->body);
+    const bool forced = b->forcing_kind == FORCED_BY_BASE;
+    return forced ? input + b->forcing_amplitude * vi_structure_component_forcing(&b->body) : input;
+}
+
+static void update_outputs(void *self)
+{
+    beam *b = self;
+    b->time = vi_structure_component_time(&b->body);
+    if (b->body.inputs_changed) {
+        hold_inputs(b);
+    }
+    const vi_structure_component *body = &b->body;
+    const double base = base_acceleration(b);
+    vi_structure_component_outputs(&b->body, base);
+    for (int j = 0; j < b->modes; ++j) {
+        b->modal_displacement[j] = body->state.q[j] / b->root_mass;
+        b->modal_velocity[j] = body->state.p[j] / b->root_mass;
+    }
+    for (int k = 0; k < BEAM_SENSORS; ++k) {
+        beam_sensor *sensor = &b->sensor[k];
+        sensor->displacement = vi_structure_at(&body->model, sensor->shape, body->state.q);
+        sensor->velocity = vi_structure_at(&body->model, sensor->shape, body->state.p);
+        sensor->acceleration = vi_structure_at(&body->model, sensor->shape, body->modal_acceleration) + base;
+    }
+}
+
+static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
+{
+    beam *b = self;
+    message[0] = '\0';
+    if (!parameters_are_good(b, message) || !fill_model(b, message)
+        || !vi_structure_component_start(&b->body, start_time, "modal_displacement_start", message)) {
+        return false;
+    }
+    hold_inputs(b);
+    update_outputs(b);
+    warn_of_validity(b, message);
+    return true;
+}
+
+static void was_set(void *self, uint32_t reference)
+{
+    vi_structure_component_was_set(&((beam *)self)->body, reference, BEAM_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
+                                   BEAM_RECORD_TAKEN);
+}
+
+static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
+{
+    beam *b = self;
+    message[0] = '\0';
+    if (!vi_structure_component_resolve(&b->body, message)) {
+        return false;
+    }
+    update_outputs(b);
+    return true;
+}
+
+static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
+{
+    beam *b = self;
+    vi_instant target;
+    message[0] = '\0';
+    check_inputs(b, message);
+    if (!vi_structure_component_step_is_good(&b->body, request, &target, message)
+        || !vi_structure_component_resolve(&b->body, message)) {
+        return VI_STEP_ERROR;
+    }
+    hold_inputs(b);
+    const vi_step_result result = vi_structure_component_advance(&b->body, target, request);
+    update_outputs(b);
+    return result;
+}
+
+static bool event_pending(const void *self)
+{
+    return ((const beam *)self)->body.state.pending != 0;
+}
+
+static bool needs_events(const void *self)
+{
+    return vi_structure_component_needs_events(&((const beam *)self)->body);
+}
+
+static double present_time(const void *self)
+{
+    return vi_structure_component_time(&((const beam *)self)->body);
+}
+
+static size_t used_size(const void *self)
+{
+    return sizeof(beam) - vi_structure_component_unused(&((const beam *)self)->body);
+}
+
+const vi_component vi_this_component = {
+    .name = BEAM_NAME,
+    .token = BEAM_TOKEN,
+    .variables = beam_variables,
+    .variable_count = BEAM_VARIABLE_COUNT,
+    .struct_size = sizeof(beam),
+    .defaults = defaults,
+    .initialize = initialize,
+    .was_set = was_set,
+    .update_outputs = update_outputs,
+    .step = step,
+    .resolve = resolve,
+    .event_pending = event_pending,
+    .needs_events = needs_events,
+    .time = present_time,
+    .used_size = used_size,
+    .sized = sized,
+};

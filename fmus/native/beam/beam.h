@@ -1,0 +1,47 @@
+/* The Beam component: modes of an Euler-Bernoulli beam, with stops. */
+#ifndef VIBROIMPACT_BEAM_H
+#define VIBROIMPACT_BEAM_H
+
+#include <stdint.h>
+
+#include "structure_component.h"
+
+enum { BEAM_SENSORS = 4 };
+
+/* The numbers are those of the enumerations BeamForcing and ImpactProjection. */
+enum { FORCED_AT_POINT = 1, FORCED_EVENLY = 2, FORCED_AS_MODE = 3, FORCED_BY_BASE = 4 };
+enum { PROJECTION_VARIATIONAL = 1, PROJECTION_COLLOCATION = 2 };
+
+typedef struct {
+    double location;
+    double displacement, velocity, acceleration;
+    double shape[VI_MODES]; /* kg^(-1/2) */
+} beam_sensor;
+
+/* All of a Beam's variables and state (variables.toml says what each is); copying it copies the Beam. */
+typedef struct {
+    double time;
+    /* parameters */
+    int64_t modes, modes_described;
+    int64_t boundary;
+    double length, width, thickness, youngs_modulus, density;
+    double flexural_rigidity, mass_per_length, poisson_ratio;
+    double damping_ratio[VI_MODES], rayleigh_mass, rayleigh_stiffness;
+    double modal_displacement_start[VI_MODES], modal_velocity_start[VI_MODES];
+    int64_t forcing_kind, forcing_mode;
+    double forcing_amplitude, forcing_location, sensor_location;
+    int64_t impact_projection;
+    double contact_location[VI_PORTS];
+    /* inputs */
+    double force, force_rate;
+    /* derived at initialization */
+    double root_mass;                    /* of the beam: sqrt(mass_per_length * length), kg^(1/2) */
+    double forced_shape[VI_MODES];       /* of forcing_location, kg^(-1/2) */
+    double participation[VI_MODES];      /* modal force of a unit acceleration of the base, kg^(1/2) */
+    /* outputs */
+    double modal_displacement[VI_MODES], modal_velocity[VI_MODES];
+    beam_sensor sensor[BEAM_SENSORS];
+    vi_structure_component body; /* last: its record is saved only as far as it is used */
+} beam;
+
+#endif

@@ -1,0 +1,270 @@
+#include "chain.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "chain_variables.h"
+#include "component.h"
+
+enum { START_MASSES = 2 };
+enum { STRIDE = CHAIN_CONTACT_APPLIED_RESTITUTION_2 - CHAIN_CONTACT_APPLIED_RESTITUTION_1 };
+
+static void defaults(void *self)
+{
+    chain *c = self;
+    c->masses = START_MASSES;
+    c->masses_described = VI_MODES;
+    for (int i = 0; i < VI_MODES; ++i) {
+        c->parameter.mass[i] = c->parameter.stiffness[i] = 1.0;
+    }
+    vi_structure_component_defaults(&c->body);
+}
+
+static void sized(void *self, const char *block, int count)
+{
+    chain *c = self;
+    if (strcmp(block, "masses") == 0 && count >= 1 && count <= VI_MODES) {
+        c->masses = c->masses_described = count;
+    }
+}
+
+/* ---- validation ---- */
+
+static void check_mass_number(char *message, const char *name, const chain *c, int64_t number)
+{
+    if (number < 0 || number > c->masses) {
+        vi_complain(message, "%s: expected 1 to %lld, or 0 for the last mass, got %lld", name, (long long)c->masses,
+                    (long long)number);
+    }
+}
+
+static void check_inputs(const chain *c, char *message)
+{
+    vi_check_each(message, vi_check_finite, "force", c->force, (int)c->masses);
+    vi_check_each(message, vi_check_finite, "force_rate", c->force_rate, (int)c->masses);
+}
+
+static void check_masses(const chain *c, char *message)
+{
+    const int n = (int)c->masses;
+    vi_check_each(message, vi_check_positive, "mass", c->parameter.mass, n);
+    vi_check_each(message, vi_check_not_negative, "stiffness", c->parameter.stiffness, n);
+    vi_check_each(message, vi_check_not_negative, "damping", c->parameter.damping, n);
+    vi_check_not_negative(message, "far_stiffness", c->far_stiffness);
+    vi_check_not_negative(message, "far_damping", c->far_damping);
+    vi_check_each(message, vi_check_finite, "forcing.amplitude", c->forcing_amplitude, n);
+    vi_check_each(message, vi_check_finite, "displacement_start", c->displacement_start, n);
+    vi_check_each(message, vi_check_finite, "velocity_start", c->velocity_start, n);
+}
+
+static bool parameters_are_good(const chain *c, char *message)
+{
+    if (c->masses < 1 || c->masses > c->masses_described) {
+        vi_complain(message, "masses: expected 1 to %lld, got %lld", (long long)c->masses_described,
+                    (long long)c->masses);
+        return false;
+    }
+    check_masses(c, message);
+    check_mass_number(message, "observed_mass", c, c->observed_mass);
+    for (int k = 0; k < VI_PORTS; ++k) {
+        if (c->body.contacts[k].law.law != VI_LAW_NONE) {
+            char name[32];
+            (void)snprintf(name, sizeof name, "contact[%d].mass_number", k + 1);
+            check_mass_number(message, name, c, c->contact_mass[k]);
+        }
+    }
+    vi_structure_component_check(&c->body, message);
+    check_inputs(c, message);
+    return message[0] == '\0';
+}
+
+/* ---- from parameters to modes ---- */
+
+/* A port without a law may have any number: the last mass then. */
+static int index_of(const chain *c, int64_t number)
+{
+    return (int)(number < 1 || number > c->masses ? c->masses : number) - 1;
+}
+
+/* Sum over the masses of shape * load: the modal forces of loads on the masses. equations.md 5.2 */
+static void project(const chain *c, const double load[VI_MODES], double modal[VI_MODES])
+{
+    for (int j = 0; j < c->masses; ++j) {
+        modal[j] = 0.0;
+        for (int i = 0; i < c->masses; ++i) {
+            modal[j] += c->shape[i][j] * load[i];
+        }
+    }
+}
+
+static bool find_modes(chain *c, vi_chain_modes *modes, char *message)
+{
+    const int n = (int)c->masses;
+    vi_chain parameter = c->parameter;
+    parameter.masses = n;
+    parameter.stiffness[n] = c->far_stiffness;
+    parameter.damping[n] = c->far_damping;
+    if (!vi_chain_find_modes(&parameter, modes)) {
+        vi_complain(message, "mass, stiffness: expected a chain whose modes are finite numbers, got others");
+        return false;
+    }
+    memcpy(c->shape, modes->shape, sizeof c->shape);
+    return true;
+}
+
+static void fill_model(chain *c, const vi_chain_modes *modes)
+{
+    vi_structure_model *model = &c->body.model;
+    const bool constant = c->body.forcing_angular_frequency == 0.0;
+    const double share = constant ? cos(c->body.forcing_phase) : 1.0;
+    double force[VI_MODES];
+    project(c, c->forcing_amplitude, force);
+    model->modes = (int32_t)c->masses;
+    model->contacts = vi_structure_component_ports(&c->body);
+    model->coupled = !modes->classical;
+    memset(c->body.natural, 0, sizeof c->body.natural);
+    for (int j = 0; j < c->masses; ++j) {
+        c->body.natural[j] = modes->natural[j];
+        vi_structure_mode(model, j, modes->natural[j], modes->damping_ratio[j], share * force[j],
+                          c->body.forcing_angular_frequency);
+        memcpy(model->coupling[j], modes->damping[j], sizeof model->coupling[j]);
+    }
+    for (int k = 0; k < VI_PORTS; ++k) {
+        memcpy(model->shape[k], c->shape[index_of(c, c->contact_mass[k])], sizeof model->shape[k]);
+        memcpy(model->impulse[k], model->shape[k], sizeof model->impulse[k]);
+    }
+    memcpy(model->observed, c->shape[index_of(c, c->observed_mass)], sizeof model->observed);
+}
+
+/* q = Psi' M x, the inverse of x = Psi q. */
+static void start_modes(chain *c)
+{
+    double displacement[VI_MODES], velocity[VI_MODES];
+    for (int i = 0; i < c->masses; ++i) {
+        displacement[i] = c->parameter.mass[i] * c->displacement_start[i];
+        velocity[i] = c->parameter.mass[i] * c->velocity_start[i];
+    }
+    project(c, displacement, c->body.state.q);
+    project(c, velocity, c->body.state.p);
+}
+
+/* ---- life ---- */
+
+static void hold_inputs(chain *c)
+{
+    double load[VI_MODES], rate[VI_MODES], held[VI_MODES], held_rate[VI_MODES];
+    for (int i = 0; i < c->masses; ++i) {
+        load[i] = c->force[i] - c->parameter.mass[i] * c->body.base_acceleration;
+        rate[i] = c->force_rate[i] - c->parameter.mass[i] * c->body.base_acceleration_rate;
+    }
+    project(c, load, held);
+    project(c, rate, held_rate);
+    vi_structure_component_hold(&c->body, held, held_rate);
+}
+
+static void update_outputs(void *self)
+{
+    chain *c = self;
+    c->time = vi_structure_component_time(&c->body);
+    if (c->body.inputs_changed) {
+        hold_inputs(c);
+    }
+    const double base = vi_structure_component_base_acceleration(&c->body);
+    vi_structure_component_outputs(&c->body, base);
+    for (int i = 0; i < c->masses; ++i) {
+        c->displacement[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.q);
+        c->velocity[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.p);
+        c->acceleration[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.modal_acceleration) + base;
+    }
+}
+
+static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
+{
+    chain *c = self;
+    vi_chain_modes modes;
+    message[0] = '\0';
+    if (!parameters_are_good(c, message) || !find_modes(c, &modes, message)) {
+        return false;
+    }
+    fill_model(c, &modes);
+    start_modes(c);
+    if (!vi_structure_component_start(&c->body, start_time, "displacement_start", message)) {
+        return false;
+    }
+    hold_inputs(c);
+    update_outputs(c);
+    return true;
+}
+
+static void was_set(void *self, uint32_t reference)
+{
+    vi_structure_component_was_set(&((chain *)self)->body, reference, CHAIN_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
+                                   CHAIN_RECORD_TAKEN);
+}
+
+static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
+{
+    chain *c = self;
+    message[0] = '\0';
+    if (!vi_structure_component_resolve(&c->body, message)) {
+        return false;
+    }
+    update_outputs(c);
+    return true;
+}
+
+static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
+{
+    chain *c = self;
+    vi_instant target;
+    message[0] = '\0';
+    check_inputs(c, message);
+    if (!vi_structure_component_step_is_good(&c->body, request, &target, message)
+        || !vi_structure_component_resolve(&c->body, message)) {
+        return VI_STEP_ERROR;
+    }
+    hold_inputs(c);
+    const vi_step_result result = vi_structure_component_advance(&c->body, target, request);
+    update_outputs(c);
+    return result;
+}
+
+static bool event_pending(const void *self)
+{
+    return ((const chain *)self)->body.state.pending != 0;
+}
+
+static bool needs_events(const void *self)
+{
+    return vi_structure_component_needs_events(&((const chain *)self)->body);
+}
+
+static double present_time(const void *self)
+{
+    return vi_structure_component_time(&((const chain *)self)->body);
+}
+
+static size_t used_size(const void *self)
+{
+    return sizeof(chain) - vi_structure_component_unused(&((const chain *)self)->body);
+}
+
+const vi_component vi_this_component = {
+    .name = CHAIN_NAME,
+    .token = CHAIN_TOKEN,
+    .variables = chain_variables,
+    .variable_count = CHAIN_VARIABLE_COUNT,
+    .struct_size = sizeof(chain),
+    .defaults = defaults,
+    .initialize = initialize,
+    .was_set = was_set,
+    .update_outputs = update_outputs,
+    .step = step,
+    .resolve = resolve,
+    .event_pending = event_pending,
+    .needs_events = needs_events,
+    .time = present_time,
+    .used_size = used_size,
+    .sized = sized,
+};

@@ -1,0 +1,29 @@
+/* The Chain component: masses in a row on springs and dashpots, with stops. */
+#ifndef VIBROIMPACT_CHAIN_H
+#define VIBROIMPACT_CHAIN_H
+
+#include <stdint.h>
+
+#include "chain_modes.h"
+#include "structure_component.h"
+
+/* All of a Chain's variables and state (variables.toml says what each is); copying it copies the Chain. */
+typedef struct {
+    double time;
+    /* parameters */
+    int64_t masses, masses_described;
+    vi_chain parameter; /* masses, springs, dashpots; the far spring is put in its place at initialization */
+    double far_stiffness, far_damping;
+    double forcing_amplitude[VI_MODES];
+    double displacement_start[VI_MODES], velocity_start[VI_MODES];
+    int64_t observed_mass;
+    int64_t contact_mass[VI_PORTS];
+    /* inputs */
+    double force[VI_MODES], force_rate[VI_MODES];
+    /* outputs */
+    double displacement[VI_MODES], velocity[VI_MODES], acceleration[VI_MODES];
+    double shape[VI_MODES][VI_MODES]; /* shape[i][j]: displacement of mass i for q_j = 1, kg^(-1/2) */
+    vi_structure_component body; /* last: its record is saved only as far as it is used */
+} chain;
+
+#endif

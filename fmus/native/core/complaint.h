@@ -1,0 +1,21 @@
+/* Every problem of a body's parameters in one message: `name: expected <rule>, got <value>`, joined by "; ". */
+#ifndef VIBROIMPACT_COMPLAINT_H
+#define VIBROIMPACT_COMPLAINT_H
+
+enum { VI_MESSAGE_LENGTH = 1024 };
+
+/* Add a problem to a message that was empty or holds others. What finds no room is cut, and "..." says so. */
+void vi_complain(char message[VI_MESSAGE_LENGTH], const char *format, ...);
+
+/* Complain unless the value is a finite number > 0; >= 0; at all. */
+void vi_check_positive(char message[VI_MESSAGE_LENGTH], const char *name, double value);
+void vi_check_not_negative(char message[VI_MESSAGE_LENGTH], const char *name, double value);
+void vi_check_finite(char message[VI_MESSAGE_LENGTH], const char *name, double value);
+
+typedef void (*vi_check)(char message[VI_MESSAGE_LENGTH], const char *name, double value);
+
+/* The same check of name[1] to name[count]. */
+void vi_check_each(char message[VI_MESSAGE_LENGTH], vi_check check, const char *name, const double values[],
+                   int count);
+
+#endif

@@ -1,0 +1,38 @@
+/* The two engines that an Oscillator runs on, behind one set of words. */
+#ifndef VIBROIMPACT_OSCILLATOR_ENGINE_H
+#define VIBROIMPACT_OSCILLATOR_ENGINE_H
+
+#include <stdbool.h>
+
+#include "oscillator.h"
+
+/* Has a contact a law of force, its own or another FMU's? */
+bool oscillator_yields(const oscillator *o);
+
+/* Start the forcing's clock; false when the start time cannot be counted in its periods. */
+bool oscillator_start_clock(oscillator *o, double start_time, vi_instant *now);
+
+/* Begin at an instant from the start values; the parameters are good. */
+void oscillator_start(oscillator *o, vi_instant now);
+
+/* Give the inputs to the body from now on. */
+void oscillator_hold(oscillator *o);
+
+vi_step_result oscillator_advance(oscillator *o, vi_instant target, const vi_step_request *request);
+
+/* Resolve the pending contacts with their answers. */
+void oscillator_resolve(oscillator *o);
+
+/* Displacement, velocity and acceleration relative to the base, and the contacts' outputs, at the present instant. */
+void oscillator_outputs(oscillator *o, double *displacement, double *velocity, double *acceleration);
+
+vi_instant oscillator_now(const oscillator *o);
+
+/* Does contact k (0-based) wait for the answer of its external law? Several may, at one instant. */
+bool oscillator_asks(const oscillator *o, int k);
+
+/* A contact (1-based) that waits for an answer; the one that the last step flew through. 0: none. */
+int oscillator_pending(const oscillator *o);
+int oscillator_passed(const oscillator *o);
+
+#endif

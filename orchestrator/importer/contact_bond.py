@@ -1,0 +1,489 @@
+"""Contacts with stops that yield: what the importer does so that body and stop agree over a step.
+
+A body whose contact law is `external_force` presses a stop in through many steps. Over each it follows the stop's force
+as `applied_force + applied_stiffness * (penetration - at the start) + applied_damping * (rate - at the start)`, on its
+exact flow: a linearly implicit exchange, exact for a linear stop. Here is decided
+
+- how long a step in a contact may be: a fraction of the time that the contact takes, which the law of the stop
+  says for the speed of arrival;
+- which slopes the body gets from a stop that answers with a force alone: those of a straight line (in penetration and
+  rate) through the stop's own answers at both ends of the step, which is repeated until they settle (Broyden's
+  method). A stop that cannot go back to a saved state gets those of the step before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from ctypes import c_void_p
+from dataclasses import dataclass
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.instance import DISCARD
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.specification import ConnectionSpec
+from vibroimpact.orchestrator.importer.wiring import Transfer
+
+#: The law by which a body follows the force of another FMU; the number of `contact[k].law`.
+EXTERNAL_FORCE = 6
+LOWER_SIDE = 2
+#: What a body's contact port must have, beside the inputs.
+PORT_OUTPUTS = ("displacement", "velocity")
+FORCE, STIFFNESS, DAMPING = "applied_force", "applied_stiffness", "applied_damping"
+#: A body on the surface is there within this times its displacement and the stop's position.
+SURFACE_ROUNDING = 1e-15
+#: Steps in a contact, where the importer is told nothing else.
+CONTACT_STEPS = 30
+#: A step longer than its limit by more than this factor, as its end shows, is repeated.
+SLACK = 1.5
+#: A straight line that misses the stop's answer by less than this, relative to the largest force, hits it.
+FORCE_TOLERANCE = 1e-11
+MOST_REPETITIONS = 20
+#: A first step from rest on the surface is not looked for below this times (1 + |time|), s.
+SHORTEST = 1e-9
+#: A way of which one end is this much nearer to the surface than the other is near it.
+NEAR_SURFACE = 0.5
+#: A force this close to a straight line through the surface, relative, is one.
+STRAIGHT = 1e-9
+#: Search for the depth that stops a body: evaluations, and the misfit of the energy (logarithm) that ends it.
+PROBES = 40
+PROBE_MISFIT = 0.2
+#: The energy of a spring grows with the depth to the power 2, of an elastic contact of two bodies 2.5.
+ENERGY_EXPONENT = 2.25
+#: How the search goes deeper where the stop does not answer yet.
+DEEPER = 16.0
+
+
+@dataclass(slots=True)
+class _Answer:
+    """A contact at one instant: penetration (m), its rate (m/s), the force (N) and its slopes (N/m, N s/m)."""
+
+    penetration: float
+    rate: float
+    force: float
+    stiffness: float = 0.0
+    damping: float = 0.0
+
+    def force_at(self, penetration: float, rate: float) -> float:
+        """Return what the body makes of it elsewhere, before it clips what pulls, N."""
+        return (
+            self.force + self.stiffness * (penetration - self.penetration) + self.damping * (rate - self.rate)
+        )
+
+
+class ContactBond:
+    """One contact port of a body, and the component that answers it with a force.
+
+    Attributes
+    ----------
+    name : str
+        `body.contact[k]`.
+    body, stop : Component
+        Its two sides.
+    active : bool
+        The contact is closed in the step under way, or may be.
+    start : _Answer
+        The contact at the start of that step.
+    gives_slopes : bool
+        The stop answers with slopes.
+    """
+
+    def __init__(
+        self, components: dict[str, Component], transfers: Sequence[Transfer], force: ConnectionSpec
+    ) -> None:
+        self.port = force.target[1].rpartition(".")[0]
+        self.name = f"{force.target[0]}.{self.port}"
+        self.body, self.stop = components[force.target[0]], components[force.source[0]]
+        self._transfers = [t for t in transfers if t.source is self.stop and t.target is self.body]
+        self._inward = [t for t in transfers if t.source is self.body and t.target is self.stop]
+        self._answers = {
+            last: self._connection(self._transfers, f"{self.port}.{last}")
+            for last in (FORCE, STIFFNESS, DAMPING)
+        }
+        self.gives_slopes = any(self._answers[last] is not None for last in (STIFFNESS, DAMPING))
+        found = [connection for connection in self._answers.values() if connection is not None]
+        self._asked = self.stop.group("Float64", [c.source[1] for c in found])
+        self._told = list(self._answers.values())
+        self._outputs = self.body.group("Float64", [f"{self.port}.{last}" for last in PORT_OUTPUTS])
+        self._line = self.body.group("Float64", [f"{self.port}.{x}" for x in (FORCE, STIFFNESS, DAMPING)])
+        self._law = self.body.group("Int64", [f"{self.port}.law", f"{self.port}.side"])
+        self._constants = self.body.group("Float64", [f"{self.port}.position", f"{self.port}.mass"])
+        self._feeding = [
+            (last, connection)
+            for transfer in self._inward
+            for connection in transfer.connections
+            for last in PORT_OUTPUTS
+            if connection.source[1] == f"{self.port}.{last}"
+        ]
+        self._inputs = self.stop.group("Float64", [c.target[1] for _, c in self._feeding])
+        self._probe_state = c_void_p()
+        self.follows = False
+        self.active = False
+
+    @staticmethod
+    def _connection(transfers: Sequence[Transfer], target: str) -> ConnectionSpec | None:
+        found = (c for t in transfers for c in t.connections if c.target[1] == target)
+        return next(found, None)
+
+    @property
+    def revisable(self) -> bool:
+        """Can a step of both sides be repeated?"""
+        return self.body.has_states and self.stop.has_states
+
+    # ---- a run ----
+
+    def begin(self) -> None:
+        """Start a run: the parameters are set."""
+        law, side = (int(v) for v in self._law.get())
+        self.follows = law == EXTERNAL_FORCE
+        self.active = False
+        for transfer in self._transfers:
+            transfer.keep_at_start(
+                [f"{self.port}.{x}" for x in (FORCE, STIFFNESS, DAMPING)], kept=self.follows
+            )
+        if not self.follows:
+            return
+        self.sign = -1.0 if side == LOWER_SIDE else 1.0
+        self._position, self._mass = (float(v) for v in self._constants.get())
+        self._gains = [self._gain(self._transfers, c) for c in self._told]
+        self._input_gains = [self._gain(self._inward, c) for _, c in self._feeding]
+        self._stiffness = self._damping = 0.0
+        self._depth: float | None = None
+        self._limit = self._longest = math.inf
+        self._largest_force = 0.0
+        self._pace = 1.0
+
+    @staticmethod
+    def _gain(transfers: Sequence[Transfer], connection: ConnectionSpec | None) -> float:
+        if connection is None:
+            return 0.0
+        return next(t for t in transfers if t.carries(connection)).gain_of(connection)
+
+    # ---- a step ----
+
+    def look(self) -> _Answer:
+        """Read both sides as they are now: the body's motion, and the stop's last answer."""
+        displacement, velocity = (float(v) for v in self._outputs.get())
+        values = iter(self._asked.get())
+        force, stiffness, damping = (
+            0.0 if connection is None else gain * float(next(values))
+            for gain, connection in zip(self._gains, self._told, strict=True)
+        )
+        return _Answer(self.penetration_at(displacement), self.sign * velocity, force, stiffness, damping)
+
+    def begin_step(self, time: float, target: float, steps: float) -> float:
+        """Look at the contact before a step; returns where the step should end, s.
+
+        Parameters
+        ----------
+        time, target : float
+            Start and end of the step, s.
+        steps : float
+            Steps that a contact is divided into.
+        """
+        if not self.follows:
+            return target
+        start = self.look()
+        was_active, self.active = self.active, self._is_closed(start)
+        if not self.active:
+            self._longest = math.inf
+            return target
+        if not self.gives_slopes:
+            start.stiffness, start.damping = self._stiffness, self._damping
+        self.start = start
+        self._corrected = False
+        self._steps = steps
+        if not was_active:
+            self._largest_force = 0.0
+            contact_time = self._contact_time(start, time, target)
+            self._limit = contact_time / steps
+            self._pace = math.pi / contact_time if math.isfinite(contact_time) else 1.0 / (target - time)
+        self._largest_force = max(self._largest_force, start.force)
+        longest = min(self._limit, self._time_scale(start.stiffness))
+        self._is_blind = not was_active and math.isinf(longest)
+        if math.isfinite(longest):
+            self._longest = longest
+        return min(target, time + self._longest)
+
+    def _is_closed(self, now: _Answer) -> bool:
+        """Pressed in, or on the surface and perhaps about to be."""
+        size = abs(now.penetration) + 2.0 * abs(self._position)
+        on_surface = abs(now.penetration) <= SURFACE_ROUNDING * size
+        return now.force > 0.0 or (now.rate >= 0.0 if on_surface else now.penetration > 0.0)
+
+    def _time_scale(self, stiffness: float) -> float:
+        """Half a period of the contact mass on this stiffness, divided into the steps, s."""
+        return math.pi * math.sqrt(self._mass / stiffness) / self._steps if stiffness > 0.0 else math.inf
+
+    def apply(self) -> None:
+        """Give the body the straight line that it follows, where it is not the stop's own answer."""
+        if self.active and (self._corrected or not self.gives_slopes):
+            self._line.values[:] = self.start.force, self.start.stiffness, self.start.damping
+            self._line.set()
+
+    def revised_end(self, time: float, end: float) -> float | None:
+        """Return where a step just made must be repeated to; None when it may stay as it is."""
+        if not (self.active and self.revisable):
+            return None
+        now = self.look()
+        self._largest_force = max(self._largest_force, now.force)
+        if self._is_blind and not now.penetration > 0.0 and end - time > SHORTEST * (1.0 + abs(time)):
+            return time + (end - time) / DEEPER  # it went who knows how far in, and came back
+        scale = self._time_scale(self._slope_at(now))
+        if end - time > SLACK * scale:
+            return time + scale
+        changed = self._correct(now) if self.gives_slopes else self._learn(now)
+        return end if changed else None
+
+    def end_step(self, size: float) -> None:
+        """The step of `size` s counts: what it shows of the slopes serves the next one."""
+        if self.active and not self.gives_slopes:
+            if not self.revisable:
+                self._pace = 1.0 / size if size > 0.0 else 1.0
+                self._learn(self.look())
+            self._stiffness, self._damping = self.start.stiffness, self.start.damping
+
+    def _slope_at(self, now: _Answer) -> float:
+        """Stiffness at the end of a step; a stop without slopes is taken for a spring."""
+        if not now.force > 0.0:
+            return 0.0
+        if self.gives_slopes:
+            return now.stiffness
+        return now.force / now.penetration if now.penetration > 0.0 else 0.0
+
+    def _correct(self, now: _Answer) -> bool:
+        """Make the line's mean that of the stop's force over the step, once; returns whether it has changed.
+
+        Of a force with slopes at both ends the mean over the way between them is known to the fourth order; near the
+        surface the force is taken for a power of the penetration. A linear stop's force is on its line already.
+        """
+        start = self.start
+        lets_go = start.force > 0.0 >= now.force
+        missed = now.force - max(0.0, start.force_at(now.penetration, now.rate))
+        if self._corrected or (abs(missed) <= FORCE_TOLERANCE * self._largest_force and not lets_go):
+            return False
+        if start.force > 0.0 and now.force > 0.0:
+            self._bend(now)
+        elif now.force > 0.0:
+            exponent = now.stiffness * now.penetration / now.force
+            start.stiffness, start.damping = 2.0 * now.force / ((exponent + 1.0) * now.penetration), 0.0
+        elif not self._lets_go_at_surface(now):
+            return False
+        self._corrected = True
+        return True
+
+    def _bend(self, now: _Answer) -> None:
+        """The line with the mean of the stop's force, parallel to the chord unless that would let go too early."""
+        start = self.start
+        first, last, mean = start.force, now.force, self._mean(now)
+        moved, sped = now.penetration - start.penetration, now.rate - start.rate
+        lift = mean - 0.5 * (first + last)
+        if lift < -0.5 * min(first, last):
+            first, last = (first, 2.0 * mean - first) if first < last else (2.0 * mean - last, last)
+        else:
+            first, last = first + lift, last + lift
+        start.stiffness = 0.5 * (start.stiffness + now.stiffness)
+        start.damping = 0.5 * (start.damping + now.damping)
+        self._turn(moved, sped, last - first - start.stiffness * moved - start.damping * sped)
+        start.force = first
+
+    def _mean(self, now: _Answer) -> float:
+        """Mean of the stop's force over the way: of a cubic, near the surface of a power."""
+        start = self.start
+        moved, sped = now.penetration - start.penetration, now.rate - start.rate
+        near, far = sorted((start.penetration, now.penetration))
+        if 0.0 < near < NEAR_SURFACE * far:
+            exponent = math.log(now.force / start.force) / math.log(now.penetration / start.penetration)
+            work = now.force * now.penetration - start.force * start.penetration
+            return work / ((exponent + 1.0) * moved)
+        bend = (start.stiffness - now.stiffness) * moved + (start.damping - now.damping) * sped
+        return 0.5 * (start.force + now.force) + bend / 12.0
+
+    def _lets_go_at_surface(self, now: _Answer) -> bool:
+        """On the way out: the line that ends at the surface and does the work of a power of the penetration.
+
+        A spring and a dashpot let go before the surface, where their straight line says.
+        """
+        start = self.start
+        elastic = start.force - start.damping * start.rate
+        straight = abs(start.stiffness * start.penetration - elastic) <= STRAIGHT * abs(elastic)
+        if straight or not start.penetration > 0.0 >= now.penetration:
+            return False
+        exponent = start.stiffness * start.penetration / start.force
+        start.force *= 2.0 / (exponent + 1.0)
+        start.stiffness, start.damping = start.force / start.penetration, 0.0
+        return True
+
+    def _learn(self, now: _Answer) -> bool:
+        """Make the slopes fit the stop's answer at the end of the step; returns whether they have changed."""
+        start = self.start
+        penetration = max(now.penetration, 0.0)  # beyond the surface the force is that at the surface: none
+        defect = now.force - start.force_at(penetration, now.rate)
+        if now.force <= 0.0 and defect >= 0.0:
+            return False  # both have let go
+        if abs(defect) <= FORCE_TOLERANCE * self._largest_force:
+            return False
+        return self._turn(penetration - start.penetration, now.rate - start.rate, defect)
+
+    def _turn(self, moved: float, sped: float, defect: float) -> bool:
+        """Turn the line so that it rises by `defect` more on this way.
+
+        Broyden's update is the smallest change of the slopes that does it, penetration and rate being measured by the
+        contact's own time.
+        """
+        size = (self._pace * moved) ** 2 + sped * sped
+        if size == 0.0:
+            return False
+        self.start.stiffness += defect * self._pace**2 * moved / size
+        self.start.damping += defect * sped / size
+        return True
+
+    # ---- how long a contact takes ----
+
+    def _contact_time(self, start: _Answer, time: float, target: float) -> float:
+        """Time that a contact takes which begins like this, s; infinite where the slope given says it.
+
+        The depth at which the stop's force has done about as much work as the body has energy, `mass * rate^2`, is
+        asked from the stop itself. A spring of that depth takes pi * depth / rate, exactly; other laws about that.
+        """
+        if start.stiffness > 0.0 and self.gives_slopes:
+            return math.inf
+        if not (start.rate > 0.0 and self.stop.has_states and self._feeding):
+            return math.inf if self._depth is None else math.pi * self._depth / max(start.rate, 1e-300)
+        self._depth = self._depth_that_stops(start, time, target - time)
+        return math.inf if self._depth is None else math.pi * self._depth / start.rate
+
+    def _depth_that_stops(self, start: _Answer, time: float, size: float) -> float | None:
+        energy = self._mass * start.rate**2
+        depth = start.rate * size if self._depth is None else self._depth
+        instance = self.stop.instance
+        instance.save(self._probe_state)
+        found = None
+        for _ in range(PROBES):
+            force = self._force_at(depth, start.rate, time, size)
+            if not force > 0.0:
+                depth *= DEEPER
+                continue
+            misfit = math.log(energy / (force * depth))
+            depth *= math.exp(misfit / ENERGY_EXPONENT)
+            if abs(misfit) <= PROBE_MISFIT:
+                found = depth
+                break
+        instance.restore(self._probe_state)
+        self._write_inputs(start.penetration, start.rate)
+        instance.time = time
+        instance.returned_early = instance.needs_event_mode = instance.wants_to_end = False
+        instance.is_flagged = False
+        return found
+
+    def _force_at(self, penetration: float, rate: float, time: float, size: float) -> float:
+        """Ask the stop what it would answer, N; its state is left changed."""
+        instance = self.stop.instance
+        instance.restore(self._probe_state)
+        self._write_inputs(penetration, rate)
+        if instance.step(time, size) == DISCARD:
+            instance.check(DISCARD, "DoStep")
+        return self._gains[0] * float(self._asked.get()[0])
+
+    def _write_inputs(self, penetration: float, rate: float) -> None:
+        """Give the stop this motion of the contact point."""
+        values = {
+            "displacement": self._position + self.sign * penetration,
+            "velocity": self.sign * rate,
+        }
+        for i, (last, _) in enumerate(self._feeding):
+            self._inputs.values[i] = self._input_gains[i] * values[last]
+        self._inputs.set()
+
+    # ---- seen from the energy's side ----
+
+    def force_of_stop(self) -> float:
+        """Force that the stop answers now, N."""
+        return self._gains[0] * float(self._asked.get()[0])
+
+    def penetration_at(self, displacement: float) -> float:
+        """Return how far the contact point is in the stop, m."""
+        return self.sign * (displacement - self._position)
+
+    def show_stop(self, displacement: float, velocity: float) -> None:
+        """Give the stop this motion of the contact point."""
+        self._write_inputs(self.penetration_at(displacement), self.sign * velocity)
+
+    def free(self) -> None:
+        """Give back its saved state, before the stop is freed."""
+        if self._probe_state and not self.stop.instance.is_fatal:
+            self.stop.instance.free_state(self._probe_state)
+
+
+class ContactBonds:
+    """All contacts of an importer whose stops may yield.
+
+    Attributes
+    ----------
+    active : bool
+        Any of them is closed in the step under way.
+    """
+
+    def __init__(
+        self,
+        components: dict[str, Component],
+        transfers: Sequence[Transfer],
+        connections: Sequence[ConnectionSpec],
+        steps: float,
+    ) -> None:
+        if not steps > 0.0:
+            raise ComponentError(f"contact_steps: expected a number > 0, got {steps!r}.")
+        self._steps = steps
+        self.all = [
+            ContactBond(components, transfers, c)
+            for c in connections
+            if _is_contact_force(components[c.target[0]], c.target[1])
+        ]
+        self._following: list[ContactBond] = []
+        self.active = False
+
+    @property
+    def revisable(self) -> bool:
+        """May a step have to be repeated for one of them?"""
+        return any(bond.revisable for bond in self._following)
+
+    def begin(self) -> None:
+        """Start a run."""
+        for bond in self.all:
+            bond.begin()
+        self._following = [bond for bond in self.all if bond.follows]
+        self.active = False
+
+    def begin_step(self, time: float, target: float) -> float:
+        """Look at all contacts before a step; returns where it should end, s."""
+        for bond in self._following:
+            target = bond.begin_step(time, target, self._steps)
+        self.active = any(bond.active for bond in self._following)
+        return target
+
+    def apply(self) -> None:
+        """Give the bodies the slopes that their stops do not."""
+        for bond in self._following:
+            bond.apply()
+
+    def revised_end(self, time: float, end: float) -> float | None:
+        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        found = [bond.revised_end(time, end) for bond in self._following]
+        return min((e for e in found if e is not None), default=None)
+
+    def end_step(self, size: float) -> None:
+        """The step, of `size` s, counts."""
+        for bond in self._following:
+            bond.end_step(size)
+
+    def free(self) -> None:
+        """Give back what they have saved."""
+        for bond in self.all:
+            bond.free()
+
+
+def _is_contact_force(body: Component, variable: str) -> bool:
+    """Is this input the force of a contact port that can follow a stop which yields?"""
+    port, _, last = variable.rpartition(".")
+    needed = (*PORT_OUTPUTS, "law", "side", "position", "mass", STIFFNESS, DAMPING)
+    return last == FORCE and all(f"{port}.{name}" in body.variables for name in needed)

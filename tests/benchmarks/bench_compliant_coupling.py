@@ -1,0 +1,140 @@
+"""The energy of one elastic contact between a mass and a stop that yields, as two FMUs, against steps per contact.
+
+A plain importer of fixed steps (Jacobi, Gauss-Seidel), this importer with a stop that answers a force alone (steps are
+repeated), and with one that answers slopes too (the default, linearly implicit). For each law a dataset and a figure
+are left; the table also has what the importer itself reports as the residual.
+
+Run with `python tests/benchmarks/bench_compliant_coupling.py [FOLDER]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from compliant_parts import coupled, plain_energy_error
+
+from vibroimpact.analysis.orders import observed_order
+from vibroimpact.orchestrator.provenance import git_commit, versions
+
+STEPS = np.array([8, 15, 30, 60, 120, 240])
+STIFFNESS = {"kelvin_voigt": 1e4, "hertz": 1e6}
+METHODS = ("jacobi", "gauss_seidel", "force", "slopes")
+"""Two plain importers; this one with a stop that answers a force alone, and with one that answers slopes too."""
+DEFAULT_STEPS = 30
+GOAL = 1e-6
+"""Energy error that the default may have at 30 steps per contact, kelvin_voigt."""
+ROUNDING = 1e-11
+"""An error below this is rounding and written as 0: it has no order."""
+
+
+def measured(law: str, method: str, steps: int) -> tuple[float, float, float, float]:
+    """Return energy error, residual as reported (both relative), seconds of the contact, steps with repetitions."""
+    began = time.perf_counter()
+    if method in ("jacobi", "gauss_seidel"):
+        error = plain_energy_error(method, steps, STIFFNESS[law], law)
+        return error, math.nan, math.nan, math.nan
+    run = coupled(law, {"stiffness": STIFFNESS[law]}, slopes=method == "slopes", contact_steps=float(steps))
+    began = time.perf_counter()
+    run.importer.advance(2.0)
+    seconds = time.perf_counter() - began
+    error = run.values("velocity")[0] ** 2 - 1.0
+    residual, made = run.residual() / 0.5, run.importer.steps + run.importer.repeated_steps
+    run.importer.free()
+    return error, residual, seconds, float(made)
+
+
+def ladder(law: str) -> xr.Dataset:
+    """Measure all methods on the ladder of steps."""
+    found = np.array([[measured(law, method, int(n)) for n in STEPS] for method in METHODS])
+    energies = np.where(np.abs(found[:, :, 0]) > ROUNDING, found[:, :, 0], 0.0)
+    speeds = np.where(np.abs(found[:, :, 0]) > ROUNDING, np.sqrt(1.0 + found[:, :, 0]) - 1.0, 0.0)
+    axes = ("exchange", "macro_step")
+    words = {
+        "error": (speeds, "m/s", "error of the speed after the contact"),
+        "energy_drift": (energies, "1", "energy gained, relative"),
+        "interface_residual": (found[:, :, 1], "1", "energy residual as reported, relative"),
+        "wall_time": (found[:, :, 2], "s", "wall time, residual included"),
+        "steps_made": (found[:, :, 3], "1", "steps, with repeated ones"),
+    }
+    dataset = xr.Dataset(
+        {name: (axes, values, {"units": u, "long_name": text}) for name, (values, u, text) in words.items()},
+        coords={
+            "exchange": ("exchange", list(METHODS), {"long_name": "exchange of values"}),
+            "macro_step": (
+                "macro_step",
+                1.0 / STEPS,
+                {"units": "1", "long_name": "macro step / contact time"},
+            ),
+        },
+        attrs={
+            "title": f"One elastic contact, {law}, mass and stop as two FMUs",
+            "Conventions": "CF-1.11",
+            "source": f"vibroimpact {versions()['vibroimpact']}, tests/benchmarks/bench_compliant_coupling.py",
+            "versions": json.dumps(versions()),
+            "git_commit": git_commit(),
+        },
+    )
+    orders = [observed_order(1.0 / STEPS, dataset["energy_drift"].values[i]) for i in range(len(METHODS))]
+    dataset["energy_drift_order"] = ("exchange", orders, {"units": "1", "long_name": "observed order"})
+    return dataset
+
+
+def table(law: str, dataset: xr.Dataset) -> None:
+    """Print the ladder of one law."""
+    print(f"\n{law}: relative energy error of one elastic contact (residual reported)")
+    print("  steps   " + "".join(f"{method:>24}" for method in METHODS))
+    for i, n in enumerate(STEPS):
+        cells = []
+        for k in range(len(METHODS)):
+            error, residual = (dataset[v].values[k, i] for v in ("energy_drift", "interface_residual"))
+            shown = "" if math.isnan(residual) else f" ({residual:8.1e})"
+            cells.append(f"{error:10.1e}{shown}")
+        print(f"  {n:<8d}" + "".join(f"{cell:>24}" for cell in cells))
+    print("  order   " + "".join(f"{order:24.2f}" for order in dataset["energy_drift_order"].values))
+
+
+def draw(dataset: xr.Dataset, figure: Path) -> None:
+    """Leave the figure, where figures can be drawn."""
+    try:
+        from vibroimpact.analysis.figures import convergence, save
+    except ImportError as error:
+        print(f"  no figure: {error}")
+        return
+    save(convergence(dataset), figure)
+    print(f"  figure:  {figure}")
+
+
+def main() -> None:
+    """Measure, print, leave datasets and figures."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
+    folder = parser.parse_args().folder
+    folder.mkdir(parents=True, exist_ok=True)
+    for law in STIFFNESS:
+        dataset = ladder(law)
+        table(law, dataset)
+        path = folder / f"compliant_coupling_{law}.nc"
+        dataset.to_netcdf(path)
+        print(f"  dataset: {path}")
+        draw(dataset, path.with_suffix(".png"))
+        if law == "kelvin_voigt":
+            default = abs(float(dataset["energy_drift"].values[-1, list(STEPS).index(DEFAULT_STEPS)]))
+            verdict = "met" if default <= GOAL else "MISSED"
+            print(
+                f"  default at {DEFAULT_STEPS} steps: {default:.1e} of the energy; goal <= {GOAL:g}: {verdict}"
+            )
+
+
+if __name__ == "__main__":
+    main()

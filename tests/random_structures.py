@@ -1,0 +1,164 @@
+"""Random bodies of many modes with random stops, and runs of them that can be compared."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
+
+Array = NDArray[np.float64]
+
+RIGID, COMPLIANT = ("restitution",), ("kelvin_voigt", "hertz", "hunt_crossley")
+ALL_LAWS = RIGID + COMPLIANT
+MOST_IMPACTS = 3000
+"""Of one run: an elastic body pressed to its stop may bounce for ever; what comes later is not compared."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A body, its stops and its start, in numbers that can be mirrored, rescaled and reordered."""
+
+    modes: Modes
+    stops: tuple[Stop, ...]
+    q: Array
+    p: Array
+    duration: float
+
+    def body(self, *, energies: bool = False, extrema: bool = False) -> Structure:
+        """Make it, at time 0."""
+        return Structure(self.modes, self.stops, self.q, self.p, energies=energies, extrema=extrema)
+
+    def nudged(self, size: float) -> Scene:
+        """Return it with other start velocities: each mode's by `size` times the velocities there are."""
+        signs = np.where(np.arange(len(self.p)) % 2 == 0, 1.0, -1.0)
+        return replace(self, p=self.p + size * self.speed * signs)
+
+    @property
+    def speed(self) -> float:
+        """Size of modal velocities that this body reaches, m/s kg^(1/2)."""
+        natural = np.asarray(self.modes.natural)
+        pushed = np.abs(np.asarray(self.modes.force)).max() / max(1.0, natural.min())
+        return float(max(np.abs(self.p).max(), (natural * np.abs(self.q)).max(), pushed, 1e-3))
+
+
+@st.composite
+def bodies(draw: st.DrawFn, *, forced: bool | None = None, most: int = 8) -> Modes:
+    """Modes of any frequencies and damping, forced or not (None: either)."""
+    n = draw(st.integers(1, most))
+    natural = sorted(draw(st.lists(st.floats(0.3, 15.0), min_size=n, max_size=n)))
+    ratios = st.one_of(st.floats(0.0, 0.3), st.sampled_from([0.0, 0.02, 1.0, 3.0]))
+    zeta = draw(st.lists(ratios, min_size=n, max_size=n))
+    coupling = None
+    if (
+        draw(st.integers(0, 3)) == 0
+    ):  # damping that couples the modes: any symmetric matrix that only takes energy
+        root = np.array(draw(st.lists(st.floats(-0.6, 0.6), min_size=n * n, max_size=n * n))).reshape(n, n)
+        coupling = root @ root.T
+    if not (draw(st.booleans()) if forced is None else forced):
+        return Modes(natural, zeta, coupling=coupling)
+    force = draw(st.lists(st.floats(-2.0, 2.0), min_size=n, max_size=n))
+    return Modes(natural, zeta, force, draw(st.floats(0.3, 5.0)), draw(st.floats(-3.0, 3.0)), coupling)
+
+
+@st.composite
+def laws(draw: st.DrawFn, allowed: Sequence[str] = ALL_LAWS) -> dict[str, float | str]:
+    """Parameters of a stop's law."""
+    law = draw(st.sampled_from(list(allowed)))
+    if law == "restitution":
+        r = draw(st.one_of(st.floats(0.0, 0.95), st.sampled_from([0.0, 1.0])))
+        return {"law": law, "restitution": r, "yield_velocity": draw(st.sampled_from([0.0, 0.0, 0.1]))}
+    chosen: dict[str, float | str] = {"law": law, "stiffness": 10.0 ** draw(st.floats(0.0, 4.0))}
+    if law == "kelvin_voigt":
+        chosen["damping"] = draw(st.sampled_from([0.0, 0.1, 1.0, 10.0, 300.0]))
+    if law == "hunt_crossley":
+        chosen |= {"damping": draw(st.sampled_from([0.0, 0.1, 1.0])), "exponent": draw(st.floats(1.0, 2.5))}
+    return chosen
+
+
+@st.composite
+def scenes(
+    draw: st.DrawFn,
+    allowed: Sequence[str] = ALL_LAWS,
+    *,
+    forced: bool | None = None,
+    most_modes: int = 8,
+    most_stops: int = 3,
+    elastic: bool = True,
+) -> Scene:
+    """Bodies with one to `most_stops` stops in random places, started on their free sides (or on a stop).
+
+    `elastic` False leaves out the restitution of exactly 1.
+    """
+    modes = draw(bodies(forced=forced, most=most_modes))
+    n = len(np.asarray(modes.natural))
+    vector = st.lists(st.floats(-1.0, 1.0), min_size=n, max_size=n).map(np.array)
+    q, p = draw(vector), 2.0 * draw(vector)
+    stops = []
+    for _ in range(draw(st.integers(1, most_stops))):
+        shape, side = draw(vector), draw(st.sampled_from(["upper", "lower"]))
+        shape[draw(st.integers(0, n - 1))] += draw(
+            st.sampled_from([-1.5, 1.5])
+        )  # no stop without motion at it
+        gap = draw(st.one_of(st.floats(0.0, 1.0), st.sampled_from([0.0, 0.1])))
+        # a hair on the free side: the sum in C may round to the other side of it
+        position = float(shape @ q) + (gap + 1e-14) * (1.0 if side == "upper" else -1.0)
+        law = draw(laws(allowed))
+        if not elastic and law.get("restitution") == 1.0:
+            law["restitution"] = 0.8
+        stops.append(Stop(shape, position, side=side, **law))  # type: ignore[arg-type]
+    return Scene(modes, tuple(stops), q, p, draw(st.floats(0.5, 6.0)))
+
+
+@dataclass
+class Run:
+    """What a body did: states at the times asked for, as far as the run went."""
+
+    times: list[float] = field(default_factory=list)
+    states: list[Array] = field(default_factory=list)
+    counts: list[tuple[int, ...]] = field(default_factory=list)
+    ended: int = DONE
+
+
+def follow(scene: Scene, times: Iterable[float], *, stepped: Sequence[float] = ()) -> Run:
+    """Run a scene and look at these times; `stepped`: further times at which a step ends."""
+    asked, run = sorted(set(times)), Run()
+    with scene.body() as body:
+        for time in sorted({*asked, *stepped}):
+            if time <= body.time:
+                continue
+            run.ended = body.advance(time - body.time, most_impacts=MOST_IMPACTS)
+            if run.ended == IMPACT_LIMIT:
+                return run
+            if time in asked:
+                rows = body.impacts
+                run.times.append(time)
+                run.states.append(np.concatenate([body.displacement, body.velocity]))
+                run.counts.append(tuple(int(np.sum(rows[:, 5] == k + 1)) for k in range(len(scene.stops))))
+    return run
+
+
+NUDGE = 1e-13
+"""A start velocity off by this, relative: some hundred times what rounding may do in a run."""
+
+
+def apart(scene: Scene, one: Run, other: Run, times: Sequence[float]) -> list[tuple[float, float, float]]:
+    """Compare two runs that should agree but for rounding; returns (time, difference, largest allowed).
+
+    Impacts amplify rounding, without bound where orbits diverge or graze. How much, the scene itself tells: it is run
+    again from starts nudged by `NUDGE`, and the two runs may differ by no more than ten times what that changes.
+    """
+    twins = [follow(scene.nudged(size), times) for size in (NUDGE, -NUDGE)]
+    natural = np.asarray(scene.modes.natural)
+    weights = np.concatenate([natural, np.ones_like(natural)])  # displacements as velocities
+    found = []
+    for i in range(min(len(run.states) for run in (one, other, *twins))):
+        size = max(scene.speed, *(float(np.abs(weights * run.states[i]).max()) for run in (one, other)))
+        moved = max(float(np.abs(weights * (twin.states[i] - one.states[i])).max()) for twin in twins)
+        difference = float(np.abs(weights * (other.states[i] - one.states[i])).max())
+        found.append((one.times[i], difference, 10.0 * (moved + NUDGE * size)))
+    return found

@@ -1,0 +1,566 @@
+"""Scenes of chains, beams and stops that yield: what is read, what is said of mistakes, what their FMUs are told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vibroimpact.analysis.dataset import Direction, Outcome, check
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.modes import beam_modes
+from vibroimpact.orchestrator.body_parameters import float_parameters, integer_parameters, state_variables
+from vibroimpact.orchestrator.chunks import carried_attributes, carried_state
+from vibroimpact.orchestrator.empty_record import empty_record
+from vibroimpact.orchestrator.run_dataset import dataset_of_runs
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene_models import BeamBody, ChainBody, KelvinVoigtStop
+
+CHAIN = """\
+[body]
+kind = "chain"
+masses = [1.0, 2.0, 0.5]
+stiffnesses = [3.0, 1.0, 2.0]
+dampings = 0.1
+[forcing]
+amplitude = [0.5, 0.0, 0.1]
+angular_frequency = 0.9
+[[stop]]
+position = 0.1
+mass = 2
+restitution = 0.7
+[record]
+recorded_periods = 5
+"""
+BEAM = """\
+[body]
+kind = "beam"
+length = 0.25
+width = 0.02
+thickness = 0.002
+youngs_modulus = 70e9
+density = 2700
+modes = 3
+damping_ratio = [0.01, 0.02, 0.03]
+[forcing]
+amplitude = 0.05
+frequency = 25.0
+[[stop]]
+position = 0.001
+location = 0.8
+restitution = 0.6
+[record]
+recorded_periods = 5
+"""
+YIELDING = 'law = "kelvin_voigt"\nstiffness = 1e4\ndamping = 2.0'
+
+
+def scene_of(text: str) -> Scene:
+    return parse_scene(text, "s.toml")
+
+
+def changed(text: str, old: str, new: str) -> str:
+    assert old in text
+    return text.replace(old, new)
+
+
+def problems_of(text: str) -> list[str]:
+    with pytest.raises(SceneError) as caught:
+        scene_of(text)
+    return [problem.removeprefix("s.toml: ") for problem in caught.value.problems]
+
+
+def swept(text: str, *entries: str) -> str:
+    return text + "[sweep]\n" + "\n".join(entries)
+
+
+# What is read.
+
+
+def test_a_number_in_place_of_an_array_of_a_chain_is_the_same_for_all_elements() -> None:
+    each = scene_of(changed(CHAIN, "dampings = 0.1", "dampings = [0.1, 0.1, 0.1]"))
+    assert float_parameters(scene_of(CHAIN), None) == float_parameters(each, None)
+
+
+def test_the_observed_mass_is_that_of_the_first_stop_unless_the_scene_says_another() -> None:
+    assert integer_parameters(scene_of(CHAIN))["observed_mass"] == 2
+    other = changed(CHAIN, "dampings = 0.1", "dampings = 0.1\nobserved_mass = 1")
+    assert integer_parameters(scene_of(other))["observed_mass"] == 1
+    free = changed(CHAIN, "[[stop]]\nposition = 0.1\nmass = 2\nrestitution = 0.7\n", "")
+    assert integer_parameters(scene_of(free))["observed_mass"] == 3
+
+
+def test_a_chain_on_a_moving_base_is_driven_by_the_inertia_of_each_mass() -> None:
+    text = changed(CHAIN, "amplitude = [0.5, 0.0, 0.1]", 'kind = "base_acceleration"\namplitude = 2.0')
+    floats = float_parameters(scene_of(text), None)
+    assert [floats[f"forcing.amplitude[{i}]"] for i in (1, 2, 3)] == [-2.0, -4.0, -1.0]
+
+
+@pytest.mark.parametrize(
+    ("boundary", "sensor", "observed", "forced"),
+    [
+        ("clamped-free", "", 1.0, 1.0),
+        ("clamped-free", "[sensor]\nlocation = 0.3\n", 0.3, 1.0),
+        ("clamped-clamped", "", 0.8, 0.5),
+        ("pinned-pinned", "[sensor]\nlocation = 0.3\n", 0.3, 0.5),
+    ],
+)
+def test_a_beam_is_observed_and_forced_where_it_moves(
+    boundary: str, sensor: str, observed: float, forced: float
+) -> None:
+    text = changed(BEAM, "modes = 3", f'modes = 3\nboundary = "{boundary}"') + sensor
+    floats = float_parameters(scene_of(text), None)
+    assert (floats["sensor_location"], floats["forcing_location"]) == (observed, forced)
+
+
+def test_a_beam_of_rigidity_and_mass_per_length_needs_no_section() -> None:
+    section = "width = 0.02\nthickness = 0.002\nyoungs_modulus = 70e9\ndensity = 2700\n"
+    text = changed(BEAM, section, "flexural_rigidity = 0.9\nmass_per_length = 0.1\n")
+    floats = float_parameters(scene_of(text), None)
+    assert (floats["flexural_rigidity"], floats["mass_per_length"]) == (0.9, 0.1)
+    assert "width" not in floats
+
+
+@pytest.mark.parametrize(
+    ("law", "number", "floats"),
+    [
+        ("restitution = 0.7\nyield_velocity = 0.1", 1, {"restitution": 0.7, "yield_velocity": 0.1}),
+        (YIELDING, 2, {"stiffness": 1e4, "damping": 2.0, "relaxation_time": 0.0}),
+        ('law = "hertz"\nstiffness = 1e6', 3, {"stiffness": 1e6}),
+        (
+            'law = "hunt_crossley"\nstiffness = 1e6\ndamping = 0.3',
+            4,
+            {"stiffness": 1e6, "damping": 0.3, "exponent": 1.5},
+        ),
+    ],
+)
+def test_each_law_tells_the_fmu_its_number_and_its_own_parameters(
+    law: str, number: int, floats: dict[str, float]
+) -> None:
+    scene = scene_of(changed(CHAIN, "restitution = 0.7", law))
+    assert integer_parameters(scene)["contact[1].law"] == number
+    told = {
+        name.removeprefix("contact[1]."): value
+        for name, value in float_parameters(scene, None).items()
+        if name.startswith("contact[1].")
+    }
+    assert told == {"position": 0.1, **floats}
+
+
+def test_two_stops_of_one_side_share_a_place_if_the_nearer_one_yields() -> None:
+    bumper = f"[[stop]]\nposition = 0.05\nmass = 2\n{YIELDING}\n"
+    assert len(scene_of(CHAIN + bumper).stops) == 2
+
+
+def test_the_tolerance_of_nonlinear_contacts_is_told_to_the_fmu_where_the_scene_gives_one() -> None:
+    text = CHAIN + "[execution]\ncontact_tolerance = 1e-8\n"
+    assert float_parameters(scene_of(text), None)["contact_tolerance"] == 1e-8
+    assert "contact_tolerance" not in float_parameters(scene_of(CHAIN), None)
+    (line,) = problems_of(text.replace("1e-8", "0"))
+    assert line.startswith("execution.contact_tolerance: expected 0 < tolerance <= 0.01, got 0.")
+    general = (
+        '[component.a]\nfmu = "Chain"\n[record]\nrecorded_time = 1.0\n[execution]\ncontact_tolerance = 1e-8\n'
+    )
+    (line,) = problems_of(general)
+    assert line.endswith("Give it to the component: parameters = { contact_tolerance = 1e-8 }.")
+
+
+def test_a_body_may_start_pressed_into_a_stop_that_yields() -> None:
+    text = changed(changed(CHAIN, "position = 0.1", "position = -0.1"), "restitution = 0.7", YIELDING)
+    assert isinstance(scene_of(text).stops[0], KelvinVoigtStop)
+
+
+# What is said of mistakes.
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        (
+            "masses = [1.0, 2.0, 0.5]",
+            "masses = [1.0, -2.0, 0.5]",
+            "body.masses[2]: expected a number > 0, got -2.0",
+        ),
+        (
+            "masses = [1.0, 2.0, 0.5]",
+            "masses = []",
+            "body.masses: expected an array of 1 to 64 numbers > 0, got an",
+        ),
+        (
+            "masses = [1.0, 2.0, 0.5]",
+            "masses = 3",
+            "body.masses: expected an array of 1 to 64 numbers > 0, got 3.",
+        ),
+        (
+            "dampings = 0.1",
+            "damping_ratio = 0.1",
+            "body.damping_ratio: expected a known key, got the unknown key",
+        ),
+        (
+            "dampings = 0.1",
+            'dampings = "0.1"',
+            "body.dampings: expected an array of numbers >= 0, or one number",
+        ),
+        (
+            "stiffnesses = [3.0, 1.0, 2.0]",
+            "stiffnesses = [3.0, 1.0]",
+            "body.stiffnesses: expected an array of 3, one number for each mass, got an array of 2. "
+            "This scene has 3 masses.",
+        ),
+        (
+            "dampings = 0.1",
+            "dampings = 0.1\ndisplacement_start = [0.1]",
+            "body.displacement_start: expected an array of 3, one number for each mass, got an array of 1.",
+        ),
+        (
+            "dampings = 0.1",
+            "dampings = 0.1\ndisplacement_start = [0, 0.2, 0]",
+            "body.displacement_start[2]: expected a start on the free side of stop[1] (displacement <= 0.1), got 0.2",
+        ),
+        (
+            "dampings = 0.1",
+            "dampings = 0.1\nobserved_mass = 4",
+            "body.observed_mass: expected a mass of the chain, 1 to 3, got 4.",
+        ),
+        ("mass = 2", "mass = 4", "stop[1].mass: expected a mass of the chain, 1 to 3, got 4."),
+        (
+            "mass = 2",
+            "location = 0.5",
+            "stop[1].location: expected location for a beam, got it beside a chain. Say which mass by mass.",
+        ),
+        (
+            "amplitude = [0.5, 0.0, 0.1]",
+            "amplitude = 0.5",
+            "forcing.amplitude: expected an array of 3, one amplitude for each mass, got 0.5. "
+            "A force on the last mass alone: amplitude = [0, 0, 1].",
+        ),
+        (
+            "amplitude = [0.5, 0.0, 0.1]",
+            "amplitude = [0.5]",
+            "forcing.amplitude: expected an array of 3, one number for each mass, got an array of 1.",
+        ),
+        (
+            "amplitude = [0.5, 0.0, 0.1]",
+            'kind = "base_acceleration"\namplitude = [0.5, 0.0, 0.1]',
+            "forcing.amplitude: expected one number for a chain under base_acceleration, got an array of 3.",
+        ),
+        (
+            "amplitude = [0.5, 0.0, 0.1]",
+            'kind = "uniform"\namplitude = 1.0',
+            'forcing.kind: expected "force" or "base_acceleration" for a chain, got "uniform".',
+        ),
+        (
+            "[record]",
+            "[sensor]\nlocation = 0.5\n[record]",
+            "sensor: expected [sensor] in a scene of a beam, got one beside a chain. "
+            "Remove [sensor]; observed_mass in [body] says which mass.",
+        ),
+        (
+            "[record]",
+            "[[stop]]\nposition = 0.2\nmass = 2\nrestitution = 1\n[record]",
+            "stop[2].side: expected another place or side than that of stop[1], got two upper stops at one place",
+        ),
+        (
+            "recorded_periods = 5",
+            'recorded_periods = 5\ntime_series = { rate = 1, variables = ["displacement[4]"] }',
+            'record.time_series.variables[1]: expected a variable name, got "displacement[4]". Did you mean',
+        ),
+        (
+            "recorded_periods = 5",
+            'recorded_periods = 5\ntime_series = { rate = 1, variables = ["velocity", "velocity"] }',
+            'record.time_series.variables: expected each variable once, got "velocity" 2 times.',
+        ),
+        ("restitution = 0.7", "restitution = 0.7\nstiffness = 1", "stop[1].stiffness: expected a known key"),
+        ("restitution = 0.7", 'law = "hertz"', "stop[1].stiffness: expected a number > 0, got nothing."),
+        (
+            "restitution = 0.7",
+            'law = "hunt_crossley"\nstiffness = 1\nexponent = 0.5',
+            "stop[1].exponent: expected a number from 1 to 10, got 0.5.",
+        ),
+    ],
+)
+def test_one_mistake_of_a_chain_is_one_clear_line(old: str, new: str, problem: str) -> None:
+    (line,) = problems_of(changed(CHAIN, old, new))
+    assert line.startswith(problem)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("modes = 3", "modes = 65", "body.modes: expected a whole number from 1 to 64, got 65."),
+        (
+            "damping_ratio = [0.01, 0.02, 0.03]",
+            "damping_ratio = [0.01, -0.02, 0.03]",
+            "body.damping_ratio[2]: expected a number >= 0, got -0.02.",
+        ),
+        (
+            "damping_ratio = [0.01, 0.02, 0.03]",
+            "damping_ratio = [0.01, 0.02]",
+            "body.damping_ratio: expected an array of 3, one number for each mode, got an array of 2. "
+            "This scene has 3 modes.",
+        ),
+        (
+            "modes = 3",
+            'modes = 3\nboundary = "clamped"',
+            'body.boundary: expected "clamped-free", "clamped-clamped", "clamped-pinned" or "pinned-pinned"',
+        ),
+        (
+            "modes = 3",
+            "modes = 3\nrayleigh = { mas = 1 }",
+            'body.rayleigh.mas: expected a known key, got the unknown key "mas". Did you mean mass?',
+        ),
+        (
+            "modes = 3",
+            "modes = 3\ndisplacement_start = [0, 0, 0, 1]",
+            "body.displacement_start: expected at most 3 numbers, one for each mode, got an array of 4.",
+        ),
+        (
+            "density = 2700\n",
+            "",
+            "body: expected width, thickness, youngs_modulus, density, or flexural_rigidity and",
+        ),
+        (
+            "density = 2700\n",
+            "density = 2700\nmass_per_length = 1.0\n",
+            "body: expected width, thickness, youngs_modulus, density, or flexural_rigidity and mass_per_length, "
+            "got width, thickness, youngs_modulus, density beside mass_per_length. Remove those of one way.",
+        ),
+        (
+            "location = 0.8",
+            "location = 0.0",
+            "stop[1].location: expected a point where a clamped-free beam moves, got 0.0. 0.0 is the clamped end.",
+        ),
+        (
+            "location = 0.8",
+            "mass = 1",
+            "stop[1].mass: expected mass for a chain, got it beside a beam. Say where",
+        ),
+        ("location = 0.8", "location = 1.5", "stop[1].location: expected a number from 0 to 1, got 1.5."),
+        (
+            "amplitude = 0.05",
+            'amplitude = 0.05\nkind = "mode"',
+            "forcing.mode: expected a mode of the beam, 1 to 3, got nothing. Add mode = ... to [forcing].",
+        ),
+        (
+            "amplitude = 0.05",
+            'amplitude = 0.05\nkind = "uniform"\nlocation = 0.5',
+            'forcing.location: expected location for a beam with kind = "force", got it beside a beam under uniform.',
+        ),
+        (
+            "amplitude = 0.05",
+            "amplitude = [0.05]",
+            "forcing.amplitude: expected one number for a beam under force",
+        ),
+        (
+            "[record]",
+            "[sensor]\nlocation = 0\n[record]",
+            "sensor.location: expected a point where a clamped-free beam moves, got 0.0.",
+        ),
+        (
+            "recorded_periods = 5",
+            'recorded_periods = 5\ntime_series = { rate = 1, variables = ["modal_energy[4]"] }',
+            'record.time_series.variables[1]: expected a variable name, got "modal_energy[4]". Did you mean',
+        ),
+        (
+            "position = 0.001",
+            "position = -0.001",
+            "body.displacement_start: expected a start on the free side",
+        ),
+    ],
+)
+def test_one_mistake_of_a_beam_is_one_clear_line(old: str, new: str, problem: str) -> None:
+    (line,) = problems_of(changed(BEAM, old, new))
+    assert line.startswith(problem)
+
+
+def test_a_stop_of_a_beam_held_at_both_ends_needs_a_location() -> None:
+    text = changed(BEAM, "modes = 3", 'modes = 3\nboundary = "clamped-clamped"')
+    (line,) = problems_of(changed(text, "location = 0.8\n", ""))
+    assert line.startswith("stop[1].location: expected a number between 0 and 1, got nothing. Add location")
+
+
+def test_stops_on_both_sides_of_one_mass_leave_room_and_those_of_different_masses_need_not() -> None:
+    lower = '[[stop]]\nposition = 0.2\nmass = {}\nside = "lower"\nrestitution = 1\n'
+    text = changed(CHAIN, "dampings = 0.1", "dampings = 0.1\ndisplacement_start = [0.3, 0.1, 0.0]")
+    problems = problems_of(text + lower.format(2))
+    assert any(line.startswith("stop[1].position: expected the upper stop[1] above") for line in problems)
+    assert len(scene_of(text + lower.format(1)).stops) == 2
+
+
+def test_chains_and_beams_have_at_most_eight_stops() -> None:
+    stops = "".join(f"[[stop]]\nposition = {k}\nlocation = 0.{k}\nrestitution = 1\n" for k in range(1, 9))
+    (line,) = problems_of(BEAM + stops)
+    assert line == "stop: expected at most 8 stops, got 9. Remove [[stop]] tables."
+
+
+# Sweeps.
+
+
+def test_elements_and_scalars_of_every_table_are_swept() -> None:
+    scene = scene_of(
+        swept(
+            changed(CHAIN, "restitution = 0.7", YIELDING),
+            '"body.masses[2]" = { values = [2.0, 3.0] }',
+            '"body.dampings" = { values = [0.1, 0.2] }',
+            '"forcing.amplitude[3]" = { values = [0.1, 0.4] }',
+            '"stop[1].stiffness" = { values = [1e4, 1e5] }',
+        )
+    )
+    point = {axis.key: axis.values[1] for axis in scene.sweep}
+    floats = float_parameters(scene.with_values(point), None)
+    names = ("mass[2]", "damping[3]", "forcing.amplitude[3]", "contact[1].stiffness", "mass[1]")
+    assert [floats[name] for name in names] == [3.0, 0.2, 0.4, 1e5, 1.0]
+    assert [scene.sweep_coordinate_name(key) for key in point] == [
+        "masses_2",
+        "dampings",
+        "amplitude_3",
+        "stiffness",
+    ]
+    assert [scene.value(key) for key in point] == [2.0, 0.1, 0.1, 1e4]
+
+
+def test_a_beam_is_swept_in_length_damping_ratios_and_locations() -> None:
+    keys = {
+        "body.length": "length",
+        "body.damping_ratio[3]": "damping_ratio[3]",
+        "forcing.location": "forcing_location",
+        "stop[1].location": "contact[1].location",
+    }
+    scene = scene_of(swept(BEAM, *(f'"{key}" = {{ values = [0.5, 0.7] }}' for key in keys)))
+    floats = float_parameters(scene.with_values(dict.fromkeys(keys, 0.7)), None)
+    assert [floats[name] for name in keys.values()] == [0.7] * 4
+    one = changed(BEAM, "damping_ratio = [0.01, 0.02, 0.03]\n", "")
+    ratio = scene_of(swept(one, '"body.damping_ratio" = { values = [0.1, 0.2] }'))
+    assert float_parameters(ratio, None)["damping_ratio[2]"] == 0.1
+
+
+@pytest.mark.parametrize(
+    ("text", "entry", "hint"),
+    [
+        (
+            CHAIN,
+            '"body.masses" = { values = [1] }',
+            'an array of 3: sweep an element of it, such as "body.masses[1]"',
+        ),
+        (CHAIN, '"body.masses[4]" = { values = [1] }', "It is an array of 3"),
+        (CHAIN, '"body.dampings[1]" = { values = [1] }', "Write dampings as an array first"),
+        (
+            CHAIN,
+            '"body.displacement_start[1]" = { values = [1] }',
+            "Write displacement_start as an array first",
+        ),
+        (CHAIN, '"body.masses[2]" = { values = [1, -1] }', "expected a number > 0, got -1.0"),
+        (CHAIN, '"body.observed_mass" = { values = [1] }', "cannot be swept"),
+        (CHAIN, '"stop[1].mass" = { values = [1] }', "cannot be swept"),
+        (CHAIN, '"stop[1].stiffness" = { values = [1] }', "expected a numeric key of this scene"),
+        (CHAIN, '"body.length" = { values = [1] }', "expected a numeric key of this scene"),
+        (BEAM, '"body.modes" = { values = [1] }', "cannot be swept"),
+        (BEAM, '"stop[1].location" = { values = [0, 0.5] }', "0.0 is the clamped end"),
+        (BEAM, '"body.damping_ratio[1]" = { values = [0.1], path = "up" }', ""),
+    ],
+)
+def test_a_wrong_sweep_of_an_element_is_one_clear_line(text: str, entry: str, hint: str) -> None:
+    if not hint:
+        assert scene_of(swept(text, entry)).sweep[0].continuation
+        return
+    (line,) = problems_of(swept(text, entry))
+    assert hint in line
+
+
+def test_a_start_state_of_one_mass_is_no_path() -> None:
+    text = changed(CHAIN, "dampings = 0.1", "dampings = 0.1\nvelocity_start = [0, 0, 0]")
+    (line,) = problems_of(swept(text, '"body.velocity_start[2]" = { values = [0, 1], path = "up" }'))
+    assert line.startswith('sweep."body.velocity_start[2]".path: expected "independent" for a start state')
+
+
+def test_an_element_that_is_not_there_is_misuse() -> None:
+    for key in ("body.masses[4]", "body.masses", "stop[1].stiffness", "sensor.location"):
+        with pytest.raises(UsageError, match="expected"):
+            scene_of(CHAIN).value(key)
+    with pytest.raises(UsageError, match="expected"):
+        scene_of(CHAIN).with_values({"body.masses[4]": 1.0})
+
+
+# The state that a continuation carries.
+
+
+def test_the_state_of_a_structure_is_all_its_displacements_then_all_its_velocities() -> None:
+    assert state_variables(scene_of(CHAIN)) == (
+        *("displacement[1]", "displacement[2]", "displacement[3]"),
+        *("velocity[1]", "velocity[2]", "velocity[3]"),
+    )
+    assert state_variables(scene_of(BEAM))[:2] == ("modal_displacement[1]", "modal_displacement[2]")
+
+
+def test_a_carried_state_is_the_start_state_at_forcing_phase_zero_bit_for_bit() -> None:
+    state = (0.1, 0.05, -0.3, 1.0, -2.0, 3.0)
+    floats = float_parameters(
+        scene_of(changed(CHAIN, "frequency = 0.9", "frequency = 0.9\nphase = 1.0")), state
+    )
+    names = [f"{name}_start[{i}]" for name in ("displacement", "velocity") for i in (1, 2, 3)]
+    assert tuple(floats[name] for name in names) == state
+    assert floats["forcing.phase"] == 0.0
+
+
+def test_a_stop_that_moved_into_a_chain_moves_its_mass_alone() -> None:
+    floats = float_parameters(scene_of(CHAIN), (0.3, 0.4, -0.3, 1.0, -2.0, 3.0))
+    names = [f"{name}_start[{i}]" for name in ("displacement", "velocity") for i in (1, 2, 3)]
+    carried = [floats[name] for name in names]
+    assert carried == pytest.approx([0.3, 0.1, -0.3, 1.0, 0.0, 3.0], abs=1e-13)
+    assert carried[1] <= 0.1
+
+
+def test_a_stop_that_moved_into_a_beam_pushes_it_along_the_mobility_of_the_contact() -> None:
+    # reference: the modes' own shapes; the change of every mode is in proportion to its shape at the stop
+    scene = scene_of(BEAM)
+    assert isinstance(scene.body, BeamBody)
+    state = (0.01, 0.002, -0.001, 0.3, -0.2, 0.1)
+    floats = float_parameters(scene, state)
+    q = np.array([floats[f"modal_displacement_start[{j}]"] for j in (1, 2, 3)])
+    p = np.array([floats[f"modal_velocity_start[{j}]"] for j in (1, 2, 3)])
+    shape = beam_modes("clamped_free", 3).shapes(0.8)[0]
+    assert shape @ q == pytest.approx(0.001, rel=1e-11)
+    assert shape @ q <= 0.001
+    assert shape @ p == pytest.approx(0.0, abs=1e-14)
+    for before, after in ((state[:3], q), (state[3:], p)):
+        change = (after - np.array(before)) / shape
+        assert change == pytest.approx([change[0]] * 3, rel=1e-9)
+
+
+def test_a_stop_that_yields_is_pressed_in_by_what_it_moved() -> None:
+    scene = scene_of(changed(CHAIN, "restitution = 0.7", YIELDING))
+    assert isinstance(scene.body, ChainBody)
+    floats = float_parameters(scene, (0.3, 0.4, -0.3, 1.0, -2.0, 3.0))
+    assert (floats["displacement_start[2]"], floats["velocity_start[2]"]) == (0.4, -2.0)
+
+
+@pytest.mark.parametrize("state", [(0.1, -0.2), tuple(0.1 * k for k in range(12))])
+def test_a_part_keeps_the_carried_state_bit_for_bit(state: tuple[float, ...]) -> None:
+    assert carried_state(carried_attributes(state)) == state
+    assert carried_state({}) is None
+
+
+# What a dataset says of it.
+
+
+def test_swept_parameters_of_stops_and_loads_have_the_units_of_their_law() -> None:
+    uniform = changed(BEAM, "amplitude = 0.05", 'kind = "uniform"\namplitude = 0.05')
+    nonlinear = changed(uniform, "restitution = 0.6", 'law = "hunt_crossley"\nstiffness = 1e6\ndamping = 0.1')
+    keys = ("forcing.amplitude", "stop[1].stiffness", "stop[1].damping", "body.density", "stop[1].exponent")
+    scene = scene_of(swept(nonlinear, *(f'"{key}" = {{ values = [1.0] }}' for key in keys)))
+    record = empty_record(scene, Outcome.error, "", 0.0)
+    dataset = dataset_of_runs(scene, [dict.fromkeys(keys, 1.0)], [Direction.independent], [0], [record], {})
+    check(dataset)
+    units = {
+        name: dataset[name].attrs["units"]
+        for name in ("amplitude", "stiffness", "damping", "density", "exponent")
+    }
+    assert units == {
+        "amplitude": "N m-1",
+        "stiffness": "1",
+        "damping": "s m-1",
+        "density": "kg m-3",
+        "exponent": "1",
+    }
+    assert dataset["stiffness"].attrs["long_name"] == "stiffness in N/m^exponent"
+    assert dataset["final_state"].shape == (1, 6)
+    assert np.isnan(dataset["final_state"].values).all()
