@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 RIGID, COMPLIANT = ("restitution",), ("kelvin_voigt", "hertz", "hunt_crossley")
 ALL_LAWS = RIGID + COMPLIANT
+POWER = ("hertz", "hunt_crossley")
 MOST_IMPACTS = 3000
 """Of one run: an elastic body pressed to its stop may bounce for ever; what comes later is not compared."""
 
@@ -144,15 +145,19 @@ def follow(scene: Scene, times: Iterable[float], *, stepped: Sequence[float] = (
 
 NUDGE = 1e-13
 """A start velocity off by this, relative: some hundred times what rounding may do in a run."""
+NUDGE_POWER = 1e-10
+"""The same where a contact with a power law is followed to the default tolerance: a step's end changes its segments."""
 
 
 def apart(scene: Scene, one: Run, other: Run, times: Sequence[float]) -> list[tuple[float, float, float]]:
     """Compare two runs that should agree but for rounding; returns (time, difference, largest allowed).
 
     Impacts amplify rounding, without bound where orbits diverge or graze. How much, the scene itself tells: it is run
-    again from starts nudged by `NUDGE`, and the two runs may differ by no more than ten times what that changes.
+    again from starts nudged by `NUDGE` (`NUDGE_POWER`), and the two runs may differ by no more than ten times what that
+    changes.
     """
-    twins = [follow(scene.nudged(size), times) for size in (NUDGE, -NUDGE)]
+    nudge = NUDGE_POWER if any(stop.law in POWER for stop in scene.stops) else NUDGE
+    twins = [follow(scene.nudged(size), times) for size in (nudge, -nudge)]
     natural = np.asarray(scene.modes.natural)
     weights = np.concatenate([natural, np.ones_like(natural)])  # displacements as velocities
     found = []
@@ -160,5 +165,5 @@ def apart(scene: Scene, one: Run, other: Run, times: Sequence[float]) -> list[tu
         size = max(scene.speed, *(float(np.abs(weights * run.states[i]).max()) for run in (one, other)))
         moved = max(float(np.abs(weights * (twin.states[i] - one.states[i])).max()) for twin in twins)
         difference = float(np.abs(weights * (other.states[i] - one.states[i])).max())
-        found.append((one.times[i], difference, 10.0 * (moved + NUDGE * size)))
+        found.append((one.times[i], difference, 10.0 * (moved + nudge * size)))
     return found

@@ -3,6 +3,8 @@
 #include <stdbool.h>
 
 static const double THIRD = 1.0 / 3.0, TWELFTH = 1.0 / 12.0;
+/* A limit this many times the certified step is too far away for bisection to tell much. */
+static const double FAR = 16.0;
 
 /* Up to s the quartic lies below the parabola with this acceleration: a + j s/3 + bound s^2/12 is convex in s, so it
  * is largest at an end. */
@@ -21,6 +23,18 @@ static double longest_retreat(const vi_approach *p)
     }
     const double root = sqrt(slope * slope - 4.0 * bend * a);
     return slope > 0.0 ? -2.0 * a / (slope + root) : bend > 0.0 ? (root - slope) / (2.0 * bend) : HUGE_VAL;
+}
+
+/* A step by which the quartic has a root: there its last term is larger than all that can hold it back. */
+static double surely_passed(const vi_approach *p)
+{
+    if (!(p->bound > 0.0)) {
+        return HUGE_VAL;
+    }
+    const double share = 96.0 / p->bound; /* each of four terms may be a quarter of bound s^4 / 24 */
+    double s = vi_max(sqrt(sqrt(share * p->clearance)), sqrt(0.5 * share * fabs(p->acceleration)));
+    s = vi_max(s, share * fabs(p->jerk) / 6.0);
+    return p->velocity < 0.0 ? vi_max(s, cbrt(-share * p->velocity)) : s;
 }
 
 /* Does the parabola with this acceleration clear the stop up to s? One that bends away from it may dip in between:
@@ -42,6 +56,11 @@ double vi_certified_step(const vi_approach *p, double horizon)
     }
     if (p->velocity <= 0.0) {
         certified = vi_max(certified, vi_min(horizon, longest_retreat(p)));
+    }
+    if (limit > FAR * certified) {
+        limit = vi_max(certified, vi_min(limit, surely_passed(p)));
+        const double closer = vi_parabola_root(p->clearance, p->velocity, acceleration_up_to(p, limit));
+        certified = vi_max(certified, vi_min(limit, closer));
     }
     for (int pass = 0; pass < 4 && limit > 1.1 * certified; ++pass) {
         const double middle = 0.5 * (certified + limit);

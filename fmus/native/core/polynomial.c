@@ -43,7 +43,7 @@ double vi_polynomial_size(const double c[VI_ORDER + 1], double length)
 }
 
 /* The last step to a zero that is nearer than rounding can tell. */
-static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p, double length)
+static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p, double length, double noise)
 {
     const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
     if (square < 0.0) {
@@ -52,6 +52,9 @@ static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p
     double value[4];
     const double root = vi_min(length, u + 2.0 * p->clearance / (p->velocity + sqrt(square)));
     vi_polynomial_at(c, root, value);
+    if (!(value[0] >= -2.0 * noise)) { /* the velocity is no more than rounding, as the value is */
+        return (vi_fall){true, u, p->velocity};
+    }
     return (vi_fall){true, root, vi_max(0.0, -value[1])};
 }
 
@@ -65,7 +68,7 @@ vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double len
         vi_polynomial_at(c, u, value);
         vi_approach p = {vi_max(0.0, value[0]), -value[1], -value[2], -value[3], bound};
         if (p.velocity > 0.0 && p.clearance <= noise) {
-            return land(c, u, &p, length);
+            return land(c, u, &p, length, noise);
         }
         double horizon = length - u;
         crawl = p.clearance <= noise ? crawl + 1 : 0;

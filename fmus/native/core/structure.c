@@ -9,13 +9,17 @@
 
 /* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
 static const double LANDING = 1e-13;
-/* A contact that within a radian of the fastest mode does not go further from its stop than this times its other
- * displacements is followed from where it is. */
+/* A contact that leaves its stop, and within a radian of the fastest mode goes no further than this times its other
+ * displacements, is followed from where it is. Not one on its way in: its clearance is rounded already. */
 static const double LINGERING = 1e-6;
 /* A bounce shorter than this over the fastest rate is followed from the stop, not from the origin. */
 static const double LOW_BOUNCE = 0.1;
+/* Such a flight is at least this long over the fastest rate: its length is only the reach of the search. */
+static const double LEAST_BOUNCE = 1e-6;
 /* Of a segment, in periods: more than one, so that a flight of one period does not end in two segments. */
 static const double LONGEST_SEGMENT = 1.5;
+/* The last step to a contact is shorter than this over the fastest rate. */
+static const double LAST_STEP = 1e-5;
 /* A contact nearer than this over the fastest rate may be near enough to be told without another evaluation. */
 static const double NEAR_CONTACT = 1e-4;
 
@@ -274,11 +278,13 @@ static segment_end landing(segment_end end, double u, double length, double room
 
 /* ---- flight ---- */
 
-/* Land on the contact found at this approach: one step of the parabola that touches the motion there. */
-static double land(const vi_approach *p, double u)
+/* Land on the contact found at this approach: one step of the parabola that touches the motion there; none where the
+ * velocity is no more than rounding, as the clearance is. */
+static double land(const vi_structure_model *model, const vi_approach *p, double u)
 {
     const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
-    return square >= 0.0 ? u + 2.0 * p->clearance / (p->velocity + sqrt(square)) : u - p->velocity / p->acceleration;
+    const double step = square >= 0.0 ? 2.0 * p->clearance / (p->velocity + sqrt(square)) : -p->velocity / p->acceleration;
+    return step * model->fastest < LAST_STEP ? u + step : u;
 }
 
 /* Seconds to the contact when the parabola that touches the motion here tells it to the last bit; else HUGE_VAL. */
@@ -321,7 +327,7 @@ static int locate(const vi_structure *s, const vi_flight *flight, const vi_point
             }
             p.clearance = vi_max(0.0, p.clearance);
             if (p.velocity > 0.0 && p.clearance <= VI_ROUNDING * points[k].scale) {
-                *u = land(&p, *u);
+                *u = land(s->model, &p, *u);
                 return k;
             }
             const double seconds = seconds_to_landing(s->model, &points[k], &p);
@@ -393,9 +399,10 @@ static double low_bounce(const vi_structure *s)
         const double a = vi_structure_direction(s, k) * vi_structure_at(model, model->shape[k], acceleration);
         const double flight = vi_parabola_root(clearance, v, a), time = 1.0 / model->fastest;
         if (flight > 0.0 && flight * model->fastest < LOW_BOUNCE) {
-            shortest = vi_min(shortest, 2.0 * flight);
-        } else if (clearance + (fabs(v) + fabs(a) * time) * time
-                   < LINGERING * vi_structure_displacement_size(s, k)) {
+            /* no shorter than moves the body at all: what rounding calls a bounce need not come down */
+            shortest = vi_min(shortest, vi_max(2.0 * flight, LEAST_BOUNCE * time));
+        } else if (s->state->status[k] == VI_CONTACT_TOUCHING
+                   && (fabs(v) + fabs(a) * time) * time < LINGERING * vi_structure_displacement_size(s, k)) {
             shortest = vi_min(shortest, time);
         }
     }

@@ -189,6 +189,15 @@ void vi_structure_touch_down(const vi_structure *s, int k)
     contact->impulse = 0.0;
 }
 
+/* What has the sign of a compliant contact's force, whether it is pressed or not. */
+static double pressing_now(const vi_structure *s, int k)
+{
+    const vi_contact_law *law = &s->contacts[k].law;
+    const double depth = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
+    const double damping = law->law == VI_LAW_HERTZ ? 0.0 : law->damping;
+    return damping * rate + (law->law == VI_LAW_KELVIN_VOIGT ? law->stiffness * depth : 1.0);
+}
+
 void vi_structure_separate(const vi_structure *s, int k, bool receding)
 {
     vi_structure_state *state = s->state;
@@ -205,7 +214,9 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
     const double surface = vi_max(0.0, penetration), tau = s->contacts[k].relaxation_time;
     state->surface[k] = rebound * tau > surface ? surface : 0.0; /* a surface that is faster follows without force */
     state->separated[k] = state->now;
-    if (receding && penetration > noise) {
+    const bool left = s->contacts[k].law.law == VI_LAW_EXTERNAL_FORCE
+                      || pressing_now(s, k) <= vi_structure_pressing_noise(s, k);
+    if (receding && left && penetration > noise) {
         state->status[k] = VI_CONTACT_RECEDING;
     } else {
         state->status[k] = VI_CONTACT_TOUCHING;
@@ -220,11 +231,7 @@ bool vi_structure_surface_lags(const vi_structure *s, int k)
 
 void vi_structure_return(const vi_structure *s, int k)
 {
-    const vi_contact_law *law = &s->contacts[k].law;
-    const double depth = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
-    const bool pulls = law->law == VI_LAW_KELVIN_VOIGT ? law->stiffness * depth + law->damping * rate <= 0.0
-                                                       : 1.0 + law->damping * rate <= 0.0;
-    if (vi_structure_surface_lags(s, k) && pulls) {
+    if (vi_structure_surface_lags(s, k) && pressing_now(s, k) <= 0.0) {
         s->state->surface[k] = 0.0;
         return;
     }
@@ -664,6 +671,12 @@ static bool kept_by_others(const vi_structure *s, int k, double g[VI_PORTS][VI_P
     return left <= KEPT * g[k][k];
 }
 
+static bool gives_way(const vi_structure *s, int k)
+{
+    const int64_t law = s->contacts[k].law.law;
+    return vi_contact_law_is_compliant(law) || law == VI_LAW_EXTERNAL_FORCE;
+}
+
 /* A compliant or rigid stop that is touched without speed: pressed, or left? */
 static void settle_resting(const vi_structure *s, const int candidate[])
 {
@@ -674,39 +687,39 @@ static void settle_resting(const vi_structure *s, const int candidate[])
     signed_matrix(s, s->model->compliance, g);
     int index[VI_PORTS], count = 0;
     double small[VI_PORTS][VI_PORTS];
-    for (int k = 0; k < n; ++k) {
-        if (candidate[k]) {
+    int rigid = 0;
+    for (int turn = 0; turn < 2 * n; ++turn) { /* rigid stops first: a compliant one presses only once it is pressed in */
+        const int k = turn % n;
+        if (candidate[k] && gives_way(s, k) == (turn >= n)) {
             index[count++] = k;
+            rigid += turn < n;
         }
     }
     for (int i = 0; i < count; ++i) {
         const int k = index[i];
+        p[i] = 0.0;
         b[i] = vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], acceleration);
         for (int j = 0; j < count; ++j) {
             small[i][j] = g[k][index[j]];
         }
     }
-    vi_complementary(count, small, b, p);
-    for (int turn = 0; turn < 2 * count; ++turn) { /* rigid stops first: what they hold does not press a compliant one */
-        const int i = turn % count, k = index[i];
-        const int64_t law = s->contacts[k].law.law;
-        const bool compliant = law != VI_LAW_RESTITUTION && law != VI_LAW_EXTERNAL;
-        if (compliant != (turn >= count)) {
-            continue;
-        }
-        const bool was_held = state->status[k] == VI_CONTACT_HELD;
+    vi_complementary(rigid, small, b, p);
+    for (int i = 0; i < count; ++i) {
+        const int k = index[i];
+        const bool compliant = i >= rigid, was_held = state->status[k] == VI_CONTACT_HELD;
         double gap = -b[i];
         for (int j = 0; j < count; ++j) {
             gap += small[i][j] * p[j];
         }
         held_view view;
         look_at_held(s, k, &view);
-        const double noise = view.noise;
-        const bool tie = fabs(gap) <= noise && p[i] * view.mobility <= noise;
+        const double noise = compliant ? view.noise / view.mobility * s->model->mobility[k][k] : view.noise;
+        const double push = compliant ? -gap : p[i] * view.mobility; /* acceleration that the stop has to take */
+        const bool tie = fabs(gap) <= noise && push <= noise;
         const bool idle = (tie || compliant) && kept_by_others(s, k, g);
         const bool presses = idle ? false
-                             : tie ? view.slope > 0.0 || (view.slope == 0.0 && state->leaving[k] != 2) || was_held
-                                 : p[i] * view.mobility > noise;
+                             : tie ? view.slope > 0.0 || (view.slope == 0.0 && state->leaving[k] != 2 && !compliant) || was_held
+                                 : push > noise;
         if (presses && compliant) {
             vi_structure_touch_down(s, k);
         } else if (presses && !was_held) {

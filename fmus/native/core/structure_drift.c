@@ -9,6 +9,12 @@
 /* A surface that has relaxed to less than this times the displacements is at rest. */
 static const double RELAXED = 1e-16;
 
+/* A power law is entered as a thin contact from this much of the depth of that thin contact. */
+static const double ENTRY = 1e-3;
+
+/* Roundings of a displacement up to which a contact is on its stop. */
+static const double SAME_INSTANT = 16.0;
+
 typedef struct {
     double at[VI_PORTS], sign[VI_PORTS]; /* penetrations, directions */
     double held[VI_MODES];
@@ -73,6 +79,12 @@ static void look(const vi_structure *s, situation *now)
     vi_structure_held_now(s, now->held);
     for (int k = 0; k < s->model->contacts; ++k) {
         now->at[k] = -vi_structure_clearance(s, k);
+        /* a contact that begins now begins at depth 0: a graze is over before its depth would outgrow rounding */
+        if (s->state->status[k] == VI_CONTACT_YIELDING
+            && s->state->touch_down[k].time == vi_clock_time(&s->model->clock, s->state->now)
+            && fabs(now->at[k]) <= SAME_INSTANT * DBL_EPSILON * vi_structure_displacement_size(s, k)) {
+            now->at[k] = 0.0;
+        }
         now->sign[k] = vi_structure_direction(s, k);
         now->press[k] = vi_structure_press(s, k);
         now->thin[k] = 0;
@@ -93,7 +105,9 @@ static void look(const vi_structure *s, situation *now)
         const double rate = vi_structure_approach(s, k), depth = vi_max(0.0, now->at[k]);
         const double a = vi_structure_at(s->model, s->model->shape[k], acceleration);
         const double time = thin_time(s, k, rate, a);
-        if (rate <= 0.0 ? depth <= -rate * time || depth == 0.0 : depth <= DBL_EPSILON * rate * time) {
+        /* the way in: as far as its series would need steps much shorter than this one */
+        const double entered = ENTRY * (rate + 0.5 * vi_max(0.0, vi_structure_direction(s, k) * a) * time) * time;
+        if (rate <= 0.0 ? depth <= -rate * time || depth == 0.0 : depth <= entered) {
             now->thin[k] = 1;
             now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
             now->length = rate >= 0.0 ? vi_min(now->length, time) : now->length;
@@ -179,8 +193,7 @@ static void releases(const vi_drift *drift, int k, double length, event_found *f
     consider(first, &fall, VI_DRIFT_RELEASE, k);
 }
 
-/* Rounding of `pressing`, and of what it is compared with when the contact recedes. */
-static double pressing_noise(const vi_structure *s, int k)
+double vi_structure_pressing_noise(const vi_structure *s, int k)
 {
     const vi_contact_law *law = &s->contacts[k].law;
     const bool linear = law->law == VI_LAW_KELVIN_VOIGT || law->law == VI_LAW_EXTERNAL_FORCE;
@@ -212,7 +225,7 @@ static void separations(const vi_structure *s, const vi_drift *drift, const situ
         pressing(drift, now, k, force);
         const double rounding = VI_ROUNDING * vi_polynomial_size(force, length);
         vi_fall fall = {true, 0.0, 1.0};
-        if (force[0] >= -vi_max(rounding, pressing_noise(s, k))) { /* else an impact elsewhere, or the start, has thrown the point off its stop */
+        if (force[0] >= -vi_max(rounding, vi_structure_pressing_noise(s, k))) { /* else an impact elsewhere, or the start, has thrown the point off its stop */
             fall = fall_through(force, length, rounding);
         }
         consider(first, &fall, VI_DRIFT_SEPARATION, k);
@@ -241,7 +254,7 @@ static void gap_to_return(const vi_structure *s, const vi_drift *drift, int k, d
         } else if (contact->law.law == VI_LAW_KELVIN_VOIGT) {
             gap[n] = -(contact->law.stiffness * depth[n] + contact->law.damping * rate);
         } else {
-            gap[n] = -((n == 0 ? 1.0 : 0.0) + contact->law.damping * rate);
+            gap[n] = -((n == 0 ? 1.0 : 0.0) + (contact->law.law == VI_LAW_HERTZ ? 0.0 : contact->law.damping) * rate);
         }
     }
     gap[VI_ORDER] = lags ? gap[VI_ORDER] : 0.0; /* the rate's last coefficient is not known */
@@ -257,7 +270,7 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
         const double small = VI_ROUNDING * vi_polynomial_size(gap, length);
         vi_fall fall = {true, 0.0, 1.0};
         const bool lags = vi_structure_surface_lags(s, k);
-        if (gap[0] >= -vi_max(small, lags ? noise : pressing_noise(s, k))) { /* else an impact elsewhere has thrown the point back */
+        if (gap[0] >= -vi_max(small, lags ? noise : vi_structure_pressing_noise(s, k))) { /* else an impact elsewhere has thrown the point back */
             fall = vi_polynomial_fall(gap, 0.0, length, small);
         }
         consider(first, &fall, VI_DRIFT_RETURN, k);

@@ -54,6 +54,9 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding);
  * that follows it without force. */
 void vi_structure_return(const vi_structure *s, int k);
 
+/* Rounding of what has the sign of a compliant contact's force: the force itself or, of a power law, 1 + damping d'. */
+double vi_structure_pressing_noise(const vi_structure *s, int k);
+
 /* Does the surface of a receding compliant stop still lag behind, on its way back to rest? */
 bool vi_structure_surface_lags(const vi_structure *s, int k);
 

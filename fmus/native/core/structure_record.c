@@ -90,6 +90,9 @@ void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u
     vi_record_extend(s->record, here);
     vi_polynomial_at(polynomial, u, value);
     vi_record_extend(s->record, here + value[0]);
+    if (vi_polynomial_size(polynomial, u) <= VI_ROUNDING * fabs(here)) {
+        return; /* it is held: what its polynomial says is rounding */
+    }
     for (int turn = 0; turn < 16 && from < u; ++turn) {
         vi_polynomial_at(polynomial, from, value);
         const double sign = value[1] != 0.0 ? copysign(1.0, value[1]) : copysign(1.0, value[2]);

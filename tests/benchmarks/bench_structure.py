@@ -1,0 +1,234 @@
+"""What an impact of a beam costs: on a periodic orbit, over the number of modes, by law; and a stop out of reach.
+
+Clamped-free beam in units of its first mode (natural frequencies (xi_j / xi_1)^2), driven at its tip with 0.9 of
+the first natural frequency, with a stop of r = .7 at the tip. Damping ratio .02 in every mode and a stop at .98 of the
+amplitude that the steady motion would have there: with 8 modes an orbit of one impact per period. The tip of a beam is
+lighter the more modes there are (m / 4N) and soon bounces many times per period; to compare the same kind of orbit, the
+cost over the number of modes is taken at damping ratio .3 with a stop so near to the amplitude (`GAPS`) that there is
+one impact per period for every number of modes.
+
+Processor time, and the smallest of several repetitions: other work on the machine does not count.
+Run with `python tests/benchmarks/bench_structure.py [--repetitions 5] [--output results/bench_structure]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import math
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.modes import beam_modes
+from vibroimpact.fmus.structure import Modes, Stop, Structure
+
+FREQUENCY, DAMPING, RESTITUTION, GAP = 0.9, 0.02, 0.7, 0.98
+HIGH_DAMPING, GAPS = 0.3, {4: 0.999, 8: 0.999, 16: 0.9999, 32: 0.99999}
+PERIOD = 2.0 * math.pi / FREQUENCY
+SIZES = tuple(GAPS)
+#: The goals of the issue: us per impact of 8 modes, and the largest exponent of the cost over the number of modes.
+MOST_MICROSECONDS, LARGEST_EXPONENT = 20.0, 2.0
+SETTLING, PERIODS = 400, 2000
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One line of the table: what it costs, and on which motion."""
+
+    name: str
+    modes: int
+    microseconds: float
+    per: str
+    impacts_per_period: float
+    repeats_after: int
+
+    def sentence(self) -> str:
+        """Return it in words."""
+        orbit = f"repeats after {self.repeats_after}" if self.repeats_after else "not periodic"
+        return (
+            f"{self.name:46}{self.modes:4d} modes {self.microseconds:10.3f} us per {self.per}"
+            f"   ({self.impacts_per_period:.2f} impacts per period, {orbit})"
+        )
+
+
+def beam(modes: int, damping: float = DAMPING) -> tuple[Modes, NDArray[np.float64], float]:
+    """Return a beam, the shape of its tip and the amplitude of its steady motion there."""
+    found = beam_modes("clamped_free", modes)
+    natural = (np.asarray(found.eigenvalues) / found.eigenvalues[0]) ** 2
+    tip = np.asarray(found.shapes([1.0]))[0]
+    response = tip**2 / (natural**2 - FREQUENCY**2 + 2j * damping * natural * FREQUENCY)
+    return Modes(natural, damping, tip, FREQUENCY), tip, float(abs(response.sum()))
+
+
+def repeats_after(velocities: NDArray[np.float64]) -> int:
+    """Return after how many impacts the velocities repeat to 1e-9; 0: not within 12."""
+    for count in range(1, 13):
+        if len(velocities) > 4 * count and np.allclose(velocities[count:], velocities[:-count], rtol=1e-9):
+            return count
+    return 0
+
+
+def timed(body: Structure, periods: int, repetitions: int) -> float:
+    """Return the smallest processor time of following the body for so many periods, s."""
+    best = math.inf
+    for _ in range(repetitions):
+        began = time.process_time()
+        body.advance(periods * PERIOD)
+        best = min(best, time.process_time() - began)
+    return best
+
+
+def impacts(
+    name: str,
+    modes: int,
+    repetitions: int,
+    make: Callable[[NDArray[np.float64], float], Stop],
+    damping: float = DAMPING,
+) -> Figure:
+    """Time a beam with one stop per impact."""
+    body_modes, tip, amplitude = beam(modes, damping)
+    with Structure(body_modes, [make(tip, amplitude)]) as body:
+        body.advance(SETTLING * PERIOD)
+        before = len(body.impacts)
+        seconds = timed(body, PERIODS, repetitions)
+        rows = body.impacts[before:]
+        per_period = len(rows) / (PERIODS * repetitions)
+        each = 1e6 * seconds / (PERIODS * per_period)
+        return Figure(name, modes, each, "impact", per_period, repeats_after(rows[-60:, 3]))
+
+
+def restitution(tip: NDArray[np.float64], amplitude: float) -> Stop:
+    """Return the stop of the P(1,1) orbit."""
+    return Stop(tip, GAP * amplitude, restitution=RESTITUTION)
+
+
+def laws(modes: int, repetitions: int) -> list[Figure]:
+    """Time the laws at the same place: stops whose contact lasts about a fortieth of the period of the first mode."""
+    stiffness = 400.0
+    return [
+        impacts(
+            f"kelvin_voigt, stiffness {stiffness:g}, damping 4",
+            modes,
+            repetitions,
+            lambda tip, a: Stop(tip, GAP * a, law="kelvin_voigt", stiffness=stiffness, damping=4.0),
+        ),
+        impacts(
+            f"hertz, stiffness {stiffness:g}",
+            modes,
+            repetitions,
+            lambda tip, a: Stop(tip, GAP * a, law="hertz", stiffness=stiffness),
+        ),
+        impacts(
+            f"hunt_crossley, stiffness {stiffness:g}, chi .5",
+            modes,
+            repetitions,
+            lambda tip, a: Stop(tip, GAP * a, law="hunt_crossley", stiffness=stiffness, damping=0.5),
+        ),
+    ]
+
+
+def out_of_reach(modes: int, repetitions: int) -> tuple[Figure, Figure]:
+    """Time samples with a stop far away and without a stop, in turns."""
+    body_modes, tip, amplitude = beam(modes)
+    found = []
+    samples = 20_000
+    for stops in ([Stop(tip, 50.0 * amplitude)], []):
+        best = math.inf
+        with Structure(body_modes, stops) as body:
+            for _ in range(repetitions):
+                began = time.process_time()
+                for _ in range(samples):
+                    body.advance(0.01 * PERIOD)
+                best = min(best, time.process_time() - began)
+        name = "stop out of reach, 100 samples per period" if stops else "no stop, 100 samples per period"
+        found.append(Figure(name, modes, 1e6 * best / samples, "sample", 0.0, 0))
+    return found[0], found[1]
+
+
+def empty_call(repetitions: int) -> float:
+    """Return what a call of the door costs by itself, us: a sample of one mode without a stop or a force."""
+    best = math.inf
+    with Structure(Modes([1.0])) as body:
+        for _ in range(repetitions):
+            began = time.process_time()
+            for _ in range(20_000):
+                body.advance(0.01)
+            best = min(best, time.process_time() - began)
+    return 1e6 * best / 20_000
+
+
+def draw(sizes: list[Figure], exponent: float, path: Path) -> None:
+    """Draw the cost over the number of modes."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    n, cost = np.array([f.modes for f in sizes]), np.array([f.microseconds for f in sizes])
+    figure, axes = plt.subplots(figsize=(6, 4))
+    axes.loglog(n, cost, "o-", label=f"measured, exponent {exponent:.2f}")
+    axes.loglog(n, cost[0] * (n / n[0]) ** 2, "--", label="exponent 2")
+    axes.set_xticks(n, [str(x) for x in n])
+    axes.set_xlabel("modes")
+    axes.set_ylabel("processor time per impact, us")
+    axes.set_title("Clamped-free beam with a stop at its tip")
+    axes.legend()
+    figure.tight_layout()
+    figure.savefig(path, dpi=150)
+    plt.close(figure)
+
+
+def main() -> int:
+    """Measure, print, write CSV and figure; return 1 if a goal is missed."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repetitions", type=int, default=5)
+    parser.add_argument("--output", type=Path, default=Path("results/bench_structure"))
+    options = parser.parse_args()
+    sizes = [
+        impacts(
+            f"restitution .7, damping .3, stop at {GAPS[n]}",
+            n,
+            options.repetitions,
+            lambda tip, a, gap=GAPS[n]: Stop(tip, gap * a, restitution=RESTITUTION),  # type: ignore[misc]
+            HIGH_DAMPING,
+        )
+        for n in SIZES
+    ]
+    eight = impacts("restitution .7, damping .02, stop at .98", 8, options.repetitions, restitution)
+    exponent = float(np.polyfit(np.log(SIZES), np.log([f.microseconds for f in sizes]), 1)[0])
+    compliant = laws(8, options.repetitions)
+    far, without = out_of_reach(8, options.repetitions)
+    rows = [*sizes, eight, *compliant, far, without]
+    for row in rows:
+        print(row.sentence())
+    call = empty_call(options.repetitions)
+    print(
+        f"A sample through the door of one free mode costs {call:.3f} us: most of it is the call from Python."
+    )
+    print(
+        f"8 modes cost {eight.microseconds:.2f} us per impact; the cost grows as modes^{exponent:.2f}; "
+        f"a stop out of reach makes a sample {far.microseconds / without.microseconds:.2f} times as long as no stop."
+    )
+    options.output.mkdir(parents=True, exist_ok=True)
+    with (options.output / "bench_structure.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["name", "modes", "microseconds", "per", "impacts_per_period", "repeats_after"])
+        writer.writerows(
+            [f.name, f.modes, f"{f.microseconds:.4f}", f.per, f"{f.impacts_per_period:.4f}", f.repeats_after]
+            for f in rows
+        )
+    draw(sizes, exponent, options.output / "bench_structure.png")
+    good = (
+        eight.microseconds <= MOST_MICROSECONDS and exponent <= LARGEST_EXPONENT and eight.repeats_after > 0
+    )
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

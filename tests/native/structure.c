@@ -1,0 +1,151 @@
+/* Random bodies of up to 64 modes with up to eight stops of every law, extreme ones too: finite, never beyond a rigid
+ * stop, never back in time, never for ever; stops only push. */
+#include "structure.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "check.h"
+
+enum { RUNS = 10000 };
+
+static const double RATIOS[] = {0.0, 0.01, 0.3, 1.0, 1.0, 3.0, 100.0};
+static const double MASSES[] = {1e-9, 1e-3, 1.0, 1.0, 1.0, 1e3, 1e9};
+static const double STIFFNESSES[] = {1.0, 1e2, 1e4, 1e6, 1e10, 1e15};
+static const double RESTITUTIONS[] = {0.0, 1e-12, 0.5, 0.7, 0.9, 0.999, 1.0};
+static const double GAPS[] = {0.0, 1e-9, 1e-3, 0.1, 1.0};
+static const int64_t LAWS[] = {VI_LAW_NONE, VI_LAW_RESTITUTION, VI_LAW_RESTITUTION, VI_LAW_KELVIN_VOIGT, VI_LAW_HERTZ,
+                               VI_LAW_HUNT_CROSSLEY};
+
+#define ANY(table) table[choice(seed, (unsigned)(sizeof table / sizeof table[0]))]
+
+static vi_structure_model model;
+static vi_structure_state state;
+static vi_contact contacts[VI_PORTS];
+static vi_record record;
+static const vi_structure body = {&model, &state, contacts, &record};
+
+static void make_modes(uint64_t *seed, double root)
+{
+    const double w = choice(seed, 3) == 0 ? 0.0 : uniform(seed, 0.1, 5.0), growth = uniform(seed, 1.0, 1.2);
+    const bool alike = choice(seed, 2) == 0;
+    const double ratio = ANY(RATIOS);
+    double natural = choice(seed, 20) == 0 ? 0.0 : uniform(seed, 0.2, 3.0);
+    for (int j = 0; j < model.modes; ++j) {
+        const double force = w > 0.0 ? root * uniform(seed, -1.0, 1.0) : 0.0;
+        vi_structure_mode(&model, j, natural, natural > 0.0 ? (alike ? ratio : ANY(RATIOS)) : 0.0, force, w);
+        natural = natural * growth + uniform(seed, 0.0, 1.0);
+        state.q[j] = root * uniform(seed, -1.0, 1.0) / (1.0 + (double)(j * j));
+        state.p[j] = choice(seed, 3) == 0 ? 0.0 : root * uniform(seed, -1.0, 1.0) / (1.0 + (double)j);
+        model.observed[j] = 1.0 / root;
+    }
+    CHECK(vi_clock_start(&model.clock, w, uniform(seed, -3.0, 3.0), 1.0), "%s", "clock");
+}
+
+static void make_stop(uint64_t *seed, int k, double mass, double root)
+{
+    vi_contact *contact = &contacts[k];
+    const bool twin = k > 0 && choice(seed, 8) == 0; /* the same point again: redundant, or the other end of a gap */
+    double displacement = 0.0;
+    for (int j = 0; j < model.modes; ++j) {
+        const double own = uniform(seed, -1.0, 1.0) / root;
+        model.shape[k][j] = model.impulse[k][j] = twin ? model.shape[k - 1][j] : own;
+        displacement += model.shape[k][j] * state.q[j];
+    }
+    const double r = ANY(RESTITUTIONS);
+    contact->law = (vi_contact_law){ANY(LAWS), r, choice(seed, 4) == 0 ? 0.1 : 0.0, mass * ANY(STIFFNESSES),
+                                    0.0, uniform(seed, 1.0, 2.5)};
+    contact->law.damping = contact->law.law == VI_LAW_KELVIN_VOIGT
+                               ? uniform(seed, 0.0, 2.0) * sqrt(contact->law.stiffness * mass)
+                               : uniform(seed, 0.0, 1.0);
+    contact->side = choice(seed, 2) == 0 ? VI_SIDE_UPPER : VI_SIDE_LOWER;
+    contact->position = displacement + vi_contact_direction(contact->side) * ANY(GAPS);
+    contact->relaxation_time = choice(seed, 4) == 0 ? 0.1 : 0.0;
+}
+
+static void make(uint64_t *seed)
+{
+    memset(&model, 0, sizeof model);
+    memset(&state, 0, sizeof state);
+    memset(contacts, 0, sizeof contacts);
+    memset(&record, 0, sizeof record);
+    model.modes = choice(seed, 12) == 0 ? VI_MODES : 1 + (int)choice(seed, 8);
+    model.contacts = choice(seed, 12) == 0 ? VI_PORTS : (int)choice(seed, 4);
+    model.impact_limit = 200;
+    model.tolerance = 1e-8;
+    const double mass = ANY(MASSES), root = sqrt(mass);
+    make_modes(seed, root);
+    for (int k = 0; k < model.contacts; ++k) {
+        make_stop(seed, k, mass, root);
+    }
+    state.follow_energies = (int32_t)choice(seed, 2);
+    record.extrema = choice(seed, 4) == 0;
+    vi_structure_prepare(&model);
+    vi_structure_start(&body, (vi_instant){0, 0.0, 0.0});
+}
+
+/* Largest rate of the body with all its stops pressed: a coupled motion is followed in pieces of about 1 / rate. */
+static double fastest_rate(void)
+{
+    double rate = model.fastest;
+    for (int k = 0; k < model.contacts; ++k) {
+        const vi_contact_law *law = &contacts[k].law;
+        const bool linear = law->law == VI_LAW_KELVIN_VOIGT;
+        rate += sqrt(law->stiffness * model.mobility[k][k]) + (linear ? law->damping * model.mobility[k][k] : 0.0);
+    }
+    return rate;
+}
+
+static void check_state(int run)
+{
+    double acceleration[VI_MODES];
+    vi_structure_outputs(&body, acceleration);
+    for (int j = 0; j < model.modes; ++j) {
+        CHECK(isfinite(state.q[j]) && isfinite(state.p[j]) && isfinite(acceleration[j]), "run %d: mode %d: %g, %g, %g", run,
+              j, state.q[j], state.p[j], acceleration[j]);
+    }
+    for (int k = 0; k < model.contacts; ++k) {
+        double displacement = 0.0, size = fabs(contacts[k].position);
+        for (int j = 0; j < model.modes; ++j) {
+            displacement += model.shape[k][j] * state.q[j];
+            size += fabs(model.shape[k][j] * state.q[j]);
+        }
+        const double beyond = vi_contact_direction(contacts[k].side) * (displacement - contacts[k].position);
+        CHECK(contacts[k].law.law != VI_LAW_RESTITUTION || beyond <= 1e-12 * size, "run %d: %g beyond stop %d", run, beyond,
+              k + 1);
+        CHECK(isfinite(contacts[k].force) && contacts[k].force >= 0.0, "run %d: stop %d: %g N", run, k + 1,
+              contacts[k].force);
+    }
+    CHECK(isfinite(state.energies.contact_loss) && isfinite(state.energies.damping_loss), "run %d", run);
+}
+
+int main(int count, char **names)
+{
+    uint64_t seed = 4;
+    int64_t impacts = 0;
+    const int only = count > 1 ? atoi(names[1]) : -1; /* a run to look at by itself */
+    for (int run = 0; run < RUNS; ++run) {
+        uint64_t own = next_random(&seed);
+        if (only >= 0 && run != only) {
+            continue;
+        }
+        make(&own);
+        if (vi_structure_beyond(&body) != 0) {
+            continue; /* two stops from either side of a point, started between them by rounding only */
+        }
+        for (int n = 0; n < 6; ++n) {
+            const double size = pow(10.0, uniform(&own, -3.0, 2.0)) / fastest_rate(), before = vi_clock_time(&model.clock, state.now);
+            const vi_step_request request = {before, size, false, false};
+            vi_structure_advance(&body, vi_clock_after(&model.clock, state.now, size), &request);
+            CHECK(vi_clock_time(&model.clock, state.now) >= before, "run %d: back from %.17g", run, before);
+            record.taken = record.count;
+            vi_record_take(&record);
+            check_state(run);
+        }
+        for (int k = 0; k < model.contacts; ++k) {
+            impacts += contacts[k].count;
+        }
+    }
+    CHECK(only >= 0 || impacts > RUNS, "only %lld impacts: the runs are too short to say anything", (long long)impacts);
+    return 0;
+}

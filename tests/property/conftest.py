@@ -1,0 +1,71 @@
+"""States seed and number of examples of every property test at the end of a run."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import hypothesis
+import pytest
+from hypothesis.errors import UnsatisfiedAssumption
+
+SEED = 4
+"""Of every property test, so that a run can be repeated anywhere; `--hypothesis-seed=N` takes another."""
+
+COUNTS = pytest.StashKey[dict[str, list[int]]]()
+
+
+def _seed(config: pytest.Config) -> int | str:
+    chosen = config.getoption("hypothesis_seed", None)
+    if chosen is None:
+        return SEED
+    return int(chosen) if str(chosen).isdigit() else str(chosen)
+
+
+def _counted(function: Callable[..., Any], count: list[int]) -> Callable[..., Any]:
+    @functools.wraps(function)
+    def run(*arguments: Any, **named: Any) -> Any:
+        count[0] += 1
+        try:
+            return function(*arguments, **named)
+        except UnsatisfiedAssumption:
+            count[1] += 1
+            raise
+
+    return run
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash.setdefault(COUNTS, {})
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Any:
+    """Count the examples of a hypothesis test, and seed it."""
+    function = getattr(item, "obj", None)
+    if not hypothesis.is_hypothesis_test(function):
+        return (yield)
+    counts = item.config.stash.setdefault(COUNTS, {})
+    count = counts.setdefault(item.nodeid, [0, 0])
+    handle = function.hypothesis  # type: ignore[union-attr]
+    original, seed = handle.inner_test, _seed(item.config)
+    if isinstance(seed, int):
+        hypothesis.seed(seed)(function)
+    handle.inner_test = _counted(original, count)
+    try:
+        return (yield)
+    finally:
+        handle.inner_test = original
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    """Write what was tried."""
+    counts = config.stash.get(COUNTS, {})
+    if not counts:
+        return
+    total = sum(tried for tried, _ in counts.values())
+    terminalreporter.section(f"property tests: seed {_seed(config)}, {total} examples")
+    for name, (tried, left_out) in counts.items():
+        note = f" ({left_out} of them outside the property's range)" if left_out else ""
+        terminalreporter.line(f"{tried:6d} examples{note}: {name.split('::', 1)[-1]}")
