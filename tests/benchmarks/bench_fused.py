@@ -71,7 +71,7 @@ class Fused:
         record = self.runner.run({})
         seconds = time.perf_counter() - began
         assert record.impacts is not None
-        _, phase, velocity, _, _ = record.impacts[-1]
+        _, phase, velocity, *_ = record.impacts[-1]
         return seconds / self.impacts, abs(phase - PHASE), abs(velocity - VELOCITY)
 
 

@@ -77,7 +77,7 @@ static propagator propagate_overdamped(const vi_mode *mode, double u)
     return p;
 }
 
-static propagator propagate(const vi_mode *mode, double u)
+static inline propagator propagate(const vi_mode *mode, double u)
 {
     if (mode->regime == VI_OVERDAMPED) {
         return propagate_overdamped(mode, u);
@@ -156,7 +156,7 @@ static double energy_bound(const vi_mode *mode, double x, double v)
 }
 
 /* Bound on the homogeneous |x''''| from here on: equations.md 2.2, one order up. */
-static double homogeneous_bound(const vi_segment *s, double slow_left, double fast_left, double x, double v)
+static inline double homogeneous_bound(const vi_segment *s, double slow_left, double fast_left, double x, double v)
 {
     const vi_mode *mode = s->mode;
     const double amplitude_bound = mode->stiffness * mode->stiffness * s->amplitude * slow_left;

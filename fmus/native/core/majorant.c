@@ -4,7 +4,7 @@
 
 static const double THIRD = 1.0 / 3.0, TWELFTH = 1.0 / 12.0;
 /* A limit this many times the certified step is too far away for bisection to tell much. */
-static const double FAR = 16.0;
+static const double FAR = 64.0;
 
 /* Up to s the quartic lies below the parabola with this acceleration: a + j s/3 + bound s^2/12 is convex in s, so it
  * is largest at an end. */
