@@ -21,6 +21,9 @@ static const int64_t MOST_LOW_IMPACTS = 4000000;
 static const double LOW_HEIGHT = 1e-10, SHORT_FLIGHT = 1e-7;
 /* A bounce shorter than this over the fastest rate is followed from the stop: of it only the position is rounded. */
 static const double LOW_BOUNCE = 0.1;
+/* A contact whose force ends at a penetration of so many roundings, or of a power law with 1 + damping d' above so
+ * little, ends with its penetration. */
+static const double WITH_IT = 64.0, GONE = 1e-9;
 /* Of its own mobility, what is left to a contact whose point others hold. */
 static const double KEPT = 1e-9;
 /* A joint impact may set off others at the same instant; each round loses energy or ends, but between stops that leave
@@ -214,9 +217,10 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
     const double surface = vi_max(0.0, penetration), tau = s->contacts[k].relaxation_time;
     state->surface[k] = rebound * tau > surface ? surface : 0.0; /* a surface that is faster follows without force */
     state->separated[k] = state->now;
-    const bool left = s->contacts[k].law.law == VI_LAW_EXTERNAL_FORCE
-                      || pressing_now(s, k) <= vi_structure_pressing_noise(s, k);
-    if (receding && left && penetration > noise) {
+    const int64_t law = s->contacts[k].law.law;
+    const bool linear = law == VI_LAW_KELVIN_VOIGT || law == VI_LAW_EXTERNAL_FORCE;
+    /* the force is gone before the penetration, or with it */
+    if (receding && (linear ? penetration > WITH_IT * noise : pressing_now(s, k) <= GONE && penetration > noise)) {
         state->status[k] = VI_CONTACT_RECEDING;
     } else {
         state->status[k] = VI_CONTACT_TOUCHING;

@@ -15,6 +15,9 @@ static const double ENTRY = 1e-3;
 /* Roundings of a displacement up to which a contact is on its stop. */
 static const double SAME_INSTANT = 16.0;
 
+/* A receding contact that is pressed by more than so many roundings was thrown back. */
+static const double THROWN = 1e4;
+
 typedef struct {
     double at[VI_PORTS], sign[VI_PORTS]; /* penetrations, directions */
     double held[VI_MODES];
@@ -157,8 +160,11 @@ static bool stays(const vi_structure *s, const vi_drift *drift, int k, const dou
         }
         terms += fabs(s->model->shape[k][j]) * size;
     }
-    /* the loads that holding forces take off again */
+    /* the loads and the other stops' forces that holding forces take off again */
     terms += drift->force_scale[k] * fabs(s->model->mobility[k][k]) * length * length;
+    for (int l = 0; l < s->model->contacts; ++l) {
+        terms += fabs(s->model->compliance[k][l]) * vi_polynomial_size(drift->force[l], length) * length * length;
+    }
     return moved <= VI_ROUNDING * terms;
 }
 
@@ -270,7 +276,7 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
         const double small = VI_ROUNDING * vi_polynomial_size(gap, length);
         vi_fall fall = {true, 0.0, 1.0};
         const bool lags = vi_structure_surface_lags(s, k);
-        if (gap[0] >= -vi_max(small, lags ? noise : vi_structure_pressing_noise(s, k))) { /* else an impact elsewhere has thrown the point back */
+        if (gap[0] >= -THROWN * vi_max(small, lags ? noise : vi_structure_pressing_noise(s, k))) { /* else an impact elsewhere has thrown the point back */
             fall = vi_polynomial_fall(gap, 0.0, length, small);
         }
         consider(first, &fall, VI_DRIFT_RETURN, k);
