@@ -97,15 +97,20 @@ def scenes(
     """
     modes = draw(bodies(forced=forced, most=most_modes))
     n = len(np.asarray(modes.natural))
-    vector = st.lists(st.floats(-1.0, 1.0), min_size=n, max_size=n).map(np.array)
+    # nothing between 0 and 1e-6: squares of less underflow, which is not what is tested here
+    numbers = st.floats(-1.0, 1.0).map(lambda x: x if abs(x) >= 1e-6 else 0.0)
+    vector = st.lists(numbers, min_size=n, max_size=n).map(np.array)
     q, p = draw(vector), 2.0 * draw(vector)
     stops = []
-    for _ in range(draw(st.integers(1, most_stops))):
+    for number in range(draw(st.integers(1, most_stops))):
         shape, side = draw(vector), draw(st.sampled_from(["upper", "lower"]))
         shape[draw(st.integers(0, n - 1))] += draw(
             st.sampled_from([-1.5, 1.5])
         )  # no stop without motion at it
+        # only the first may be touched at the start: whether two are hit together or one after the other is no
+        # continuous question, and rounding would answer it
         gap = draw(st.one_of(st.floats(0.0, 1.0), st.sampled_from([0.0, 0.1])))
+        gap = gap if number == 0 else max(gap, 0.05)
         # a hair on the free side: the sum in C may round to the other side of it
         position = float(shape @ q) + (gap + 1e-14) * (1.0 if side == "upper" else -1.0)
         law = draw(laws(allowed))

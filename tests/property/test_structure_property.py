@@ -245,7 +245,11 @@ def test_all_energy_is_accounted_for(scene: Scene) -> None:
             assert body.damping_loss >= loss - ROUNDING * turnover
             work, loss, contact = body.forcing_work, body.damping_loss, body.contact_loss
             balance = body.energy - first - (work - loss - contact)
-            assert abs(balance) <= (TURNOVER_POWER if power else TURNOVER) * (turnover + body.energy)
+            # a body that is put on its stop to the last bit moves by a rounding of its displacements
+            rounding = ROUNDING * scene.speed**2
+            assert (
+                abs(balance) <= (TURNOVER_POWER if power else TURNOVER) * (turnover + body.energy) + rounding
+            )
 
 
 vectors = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3).map(np.array)

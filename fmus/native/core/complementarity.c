@@ -6,8 +6,8 @@
 
 /* Pivots smaller than this times the largest diagonal mean that contacts are redundant. */
 static const double REDUNDANT = 1e-13;
-/* Redundant contacts share their load as if each had this times the largest mobility of its own; what that leaves over is
- * solved for again, so many times. */
+/* Redundant contacts share their load as if each had this times the largest mobility of its own; what that leaves over
+ * is solved for again, so many times. */
 static const double SOFTENING = 1e-6;
 enum { REFINEMENTS = 4 };
 
@@ -106,7 +106,8 @@ void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORT
 }
 
 /* Murty's principal pivoting: the first contact that pulls, or is passed through, changes sides. Finite for positive
- * definite g; the bound on the turns is that of its proof. 0 when it was not: redundant contacts may send it in circles. */
+ * definite g; the bound on the turns is that of its proof. 0 when it was not: redundant
+ * contacts may send it in circles. */
 static int pivot_to_answer(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], int active[VI_PORTS],
                            double p[VI_PORTS])
 {

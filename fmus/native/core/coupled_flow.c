@@ -12,8 +12,8 @@
 static const double REACH = 2.5, REACH_YIELDING = 1.0;
 /* Of a power law the terms must fall by this over a segment: it has a singularity where the contact ends. */
 static const double SMALLEST_TERM = 0.01;
-/* In the first instants of a power law coefficient n is of size (rate / penetration)^n: the series ends before a product
- * of two of them overflows. */
+/* In the first instants of a power law coefficient n is of size (rate / penetration)^n: the series ends before a
+ * product of two of them overflows. */
 static const double LARGEST_COEFFICIENT = 1e140;
 
 /* Rate that no motion of the system exceeds, rad/s. */
@@ -72,7 +72,8 @@ static void free_load(const vi_drift *drift, const vi_drift_start *start, double
     const double order = (double)(n + 1);
     for (int j = 0; j < model->modes; ++j) {
         const vi_mode *mode = &model->mode[j];
-        const double held = n == 0 ? start->held[j] - mode->stiffness * start->q[j] : n == 1 ? start->held_rate[j] : 0.0;
+        const double first = start->held[j] - mode->stiffness * start->q[j];
+        const double held = n == 0 ? first : n == 1 ? start->held_rate[j] : 0.0;
         load[j] = drive * mode->force + held - mode->stiffness * drift->modal[n][j];
         if (!model->coupled) {
             load[j] -= 2.0 * mode->decay * order * drift->modal[n + 1][j];

@@ -40,11 +40,13 @@ static double thin_time(const vi_structure *s, int k, double rate, double accele
 {
     const double n = vi_structure_press(s, k).exponent, stiffness = thin_stiffness(s, k, rate);
     const double speed = fabs(rate), pull = fabs(acceleration), tolerance = s->model->tolerance;
-    double t = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0;
+    const double fastest = s->model->fastest;
+    double t = fastest > 0.0 ? 1.0 / fastest : 1.0;
     for (int halving = 0; halving < 1000 && t > 0.0; ++halving, t *= 0.5) {
         const double depth = speed * t + 0.5 * pull * t * t;
         const double most = stiffness * pow(depth, n) * t, total = speed + pull * t; /* velocity change at most */
-        const double error = most * n * (pull * t + most);
+        const double turned = pull * t + speed * (fastest * t) * (fastest * t); /* by everything else */
+        const double error = most * n * (turned + most);
         if (most <= tolerance * total || error <= tolerance * speed * speed) {
             return t;
         }
@@ -113,7 +115,10 @@ static void look(const vi_structure *s, situation *now)
         if (rate <= 0.0 ? depth <= -rate * time || depth == 0.0 : depth <= entered) {
             now->thin[k] = 1;
             now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
-            now->length = rate >= 0.0 ? vi_min(now->length, time) : now->length;
+            now->length = vi_min(now->length, time); /* on its way out it may be turned round before it is out */
+        } else if (rate < 0.0) {
+            /* not past a turning point next to depth 0: the power law goes on as |d|^n there, its series as d^n */
+            now->length = vi_min(now->length, -depth / rate);
         }
     }
 }
@@ -231,7 +236,8 @@ static void separations(const vi_structure *s, const vi_drift *drift, const situ
         pressing(drift, now, k, force);
         const double rounding = VI_ROUNDING * vi_polynomial_size(force, length);
         vi_fall fall = {true, 0.0, 1.0};
-        if (force[0] >= -vi_max(rounding, vi_structure_pressing_noise(s, k))) { /* else an impact elsewhere, or the start, has thrown the point off its stop */
+        /* else an impact elsewhere, or the start, has thrown the point off its stop */
+        if (force[0] >= -vi_max(rounding, vi_structure_pressing_noise(s, k))) {
             fall = fall_through(force, length, rounding);
         }
         consider(first, &fall, VI_DRIFT_SEPARATION, k);
@@ -276,7 +282,8 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
         const double small = VI_ROUNDING * vi_polynomial_size(gap, length);
         vi_fall fall = {true, 0.0, 1.0};
         const bool lags = vi_structure_surface_lags(s, k);
-        if (gap[0] >= -THROWN * vi_max(small, lags ? noise : vi_structure_pressing_noise(s, k))) { /* else an impact elsewhere has thrown the point back */
+        /* else an impact elsewhere has thrown the point back */
+        if (gap[0] >= -THROWN * vi_max(small, lags ? noise : vi_structure_pressing_noise(s, k))) {
             fall = vi_polynomial_fall(gap, 0.0, length, small);
         }
         consider(first, &fall, VI_DRIFT_RETURN, k);

@@ -31,10 +31,36 @@ bool vi_structure_watched(const vi_structure *s, int k);
 /* How contact k presses now. */
 vi_press vi_structure_press(const vi_structure *s, int k);
 
-/* Modal accelerations now, and the forces of held and yielding contacts; held ones may come out negative (they pull). */
+/* Modal accelerations now, and the forces of held and yielding contacts; held ones may come out negative: they would
+ * have to pull. */
 void vi_structure_accelerate(const vi_structure *s, double acceleration[], double force[]);
 
+/* The same without the forces of held contacts. */
+void vi_structure_accelerate_freely(const vi_structure *s, double acceleration[], double force[]);
+
+/* Add to a modal vector what a force (or impulse, over mass-normalised modes) of contact k on the body adds. */
+void vi_structure_push(const vi_structure *s, int k, double force, double modal[]);
+
+/* A matrix between contacts, seen from their stops: towards them counts positive. */
+void vi_structure_signed(const vi_structure *s, double matrix[VI_PORTS][VI_PORTS], double g[VI_PORTS][VI_PORTS]);
+
+/* A contact held at rest from now on: the plastic state, and the force that would hold it. */
+typedef struct {
+    double p[VI_MODES];
+    double mobility;         /* of the contact with those held beside it, 1/kg */
+    double pressure, slope, bend; /* acceleration towards the stop if it were free, and its rates, m/s^2, .. m/s^4 */
+    double noise;            /* of the pressure */
+} vi_held_view;
+
+void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view);
+
 /* ---- moments ---- */
+
+/* External laws among the contacts that are hit: wait for their answers, or (FMI 2.0) note the time and fly through. */
+bool vi_structure_ask(const vi_structure *s, const int hit[], bool stop_here);
+
+/* Those that are hit: compliant stops begin to yield, rigid ones answer together. */
+void vi_structure_resolve_hits(const vi_structure *s, const int hit[]);
 
 /* Contact k has arrived at its stop (others may have, too): resolve it, or wait for an answer, or pass (FMI 2.0). */
 void vi_structure_meet(const vi_structure *s, int k, bool stop_here);
