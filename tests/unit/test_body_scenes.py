@@ -564,3 +564,23 @@ def test_swept_parameters_of_stops_and_loads_have_the_units_of_their_law() -> No
     assert dataset["stiffness"].attrs["long_name"] == "stiffness in N/m^exponent"
     assert dataset["final_state"].shape == (1, 6)
     assert np.isnan(dataset["final_state"].values).all()
+
+
+def test_a_surface_that_lags_is_refused_where_the_stop_is_an_fmu_of_its_own() -> None:
+    scene = f"""
+    [body]
+    mass = 1.0
+    stiffness = 1.0
+    [[stop]]
+    position = 1.0
+    {YIELDING}
+    relaxation_time = 0.1
+    [record]
+    recorded_time = 1.0
+    """
+    scene_of(scene)
+    (line,) = problems_of(scene + '[execution]\nhow = "coupled"\n')
+    assert line == (
+        'stop[1].relaxation_time: expected a surface that relaxes at once beside how = "coupled", got a time. '
+        'Run it fused: how = "fused", or relaxation_time = 0.'
+    )
