@@ -120,7 +120,7 @@ _RULES = (
     VariableRule("run_index", ("run",), np.int32, "1", "index of the run in its campaign"),
     VariableRule("direction", ("run",), np.int8, "1", "direction of the sweep", _flags(Direction)),
     VariableRule("outcome", ("run",), np.int8, "1", "outcome of the run", _flags(Outcome)),
-    VariableRule("message", ("run",), object, "1", "why the run ended as it did"),
+    VariableRule("message", ("run",), object, "1", "why the run ended as it did, or what its body warned of"),
     VariableRule("point_seconds", ("run",), np.float64, "s", "wall time of the run"),
     VariableRule("final_displacement", ("run",), np.float64, "m", "displacement at the end of the run"),
     VariableRule("final_velocity", ("run",), np.float64, "m s-1", "velocity at the end of the run"),

@@ -67,6 +67,7 @@ class BodyDriver(RecordedBody):
         self._integers.set()
         instance.enter_initialization(0.0)
         instance.exit_initialization()
+        self._warnings = instance.log.take()
 
     def advance(self, end: float, slice_length: float = np.inf) -> None:
         """Advance to time `end`, s, taking the record's rows whenever it is full."""

@@ -61,6 +61,7 @@ class RecordedBody(ABC):
         self._rows = group("Float64", ("record.rows",), ROW_CAPACITY * ROW_WIDTH)
         self._table = self._rows.values.reshape(ROW_CAPACITY, ROW_WIDTH)
         self.rows = Rows()
+        self._warnings: tuple[str, ...] = ()
         self.watch(contacts=0)
 
     def watch(
@@ -97,6 +98,11 @@ class RecordedBody(ABC):
 
     def _some(self, kind: str, names: Sequence[str]) -> VariableGroup | None:
         return self._group_of(kind, names, None) if names else None
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the body had to say when the run began; it goes with the results."""
+        return self._warnings
 
     @property
     @abstractmethod

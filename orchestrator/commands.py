@@ -12,6 +12,11 @@ import typer
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign import CampaignReport
 
+#: Different warnings that a command repeats.
+MOST_WARNINGS = 3
+#: Larger campaigns keep their warnings to the dataset.
+MOST_RUNS_READ = 100_000
+
 # Each command imports what it needs when it runs: `vibroimpact --help` loads neither xarray nor Dask.
 
 
@@ -41,6 +46,7 @@ def run(
     runs = sum(outcomes.values())
     typer.echo(f"{_counted(runs, 'run')} in {time.perf_counter() - began:.1f} s: {output}")
     _tell_failures(outcomes)
+    _tell_warnings(output)
 
 
 def campaign(
@@ -88,6 +94,8 @@ def tell(report: CampaignReport) -> None:
         f"{_counted(report.workers, 'worker')}{kept}: {report.dataset}"
     )
     _tell_failures(report.outcomes)
+    if report.runs <= MOST_RUNS_READ:
+        _tell_warnings(report.dataset)
 
 
 def _tell_failures(outcomes: Mapping[str, int]) -> None:
@@ -95,6 +103,19 @@ def _tell_failures(outcomes: Mapping[str, int]) -> None:
     for name, count in failed.items():
         told = f"{_counted(count, 'point')} ended with the outcome {name}; see their messages in the dataset."
         typer.echo(told, err=True)
+
+
+def _tell_warnings(dataset: Path) -> None:
+    """Repeat what bodies said of runs that went well: such runs have a message only then."""
+    from vibroimpact.analysis import open_dataset
+
+    with open_dataset(dataset) as opened:
+        fine = opened.outcome.isin([0, 1]).values  # ok, stuck
+        messages = sorted({str(text) for text in opened.message.values[fine] if text})
+    for message in messages[:MOST_WARNINGS]:
+        typer.echo(f"warning: {message}", err=True)
+    if len(messages) > MOST_WARNINGS:
+        typer.echo(f"{len(messages) - MOST_WARNINGS} more warnings are in the dataset.", err=True)
 
 
 def _counted(count: int, what: str) -> str:

@@ -137,6 +137,7 @@ class CoupledDriver(RecordedBody):
         values: dict[tuple[str, str], Value] = {(BODY, name): value for name, value in floats.items()}
         values |= {target: floats[source] for target, source in self._stop_floats.items()}
         self.importer.begin(0.0, values)
+        self._warnings = self.importer.components[BODY].instance.log.take()
 
     def advance(self, end: float, slice_length: float = math.inf) -> None:
         """Advance to time `end`, s."""

@@ -96,6 +96,7 @@ class PointRunner:
         scene = self._scene.with_values(values) if values else self._scene
         run = _Run(scene, self._driver, self._plan, start)
         outcome, message = run.run()
+        message = message or "; ".join(self._driver.warnings)
         return run.record(outcome, message, time.perf_counter() - began)
 
     def close(self) -> None:

@@ -321,3 +321,28 @@ rate = 50
     run_scene(parse_scene(text, str(tmp_path / "s.toml")), tmp_path / "run.nc")
     with open_dataset(tmp_path / "run.nc") as ds:
         assert np.abs(ds.body_displacement.values).max() > 0.0
+
+
+def test_a_beam_too_thick_for_its_theory_says_so_on_the_command_line_and_in_the_dataset(
+    tmp_path: Path,
+) -> None:
+    scene, output = tmp_path / "thick.toml", tmp_path / "thick.nc"
+    scene.write_text(
+        """
+        [body]
+        kind = "beam"
+        length = 0.25
+        width = 0.02
+        thickness = 0.06
+        youngs_modulus = 70e9
+        density = 2700
+        [record]
+        recorded_time = 0.01
+        """
+    )
+    arguments = ["run", str(scene), "-o", str(output)]
+    done = subprocess.run([sys.executable, "-c", ENTRY, *arguments], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert "warning: body: " in done.stderr
+    with open_dataset(output) as dataset:
+        assert "leaves the validity of Euler-Bernoulli's theory" in str(dataset.message.values)
