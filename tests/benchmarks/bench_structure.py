@@ -175,6 +175,7 @@ def draw(sizes: list[Figure], exponent: float, path: Path) -> None:
     axes.loglog(n, cost, "o-", label=f"measured, exponent {exponent:.2f}")
     axes.loglog(n, cost[0] * (n / n[0]) ** 2, "--", label="exponent 2")
     axes.set_xticks(n, [str(x) for x in n])
+    axes.set_xticks([], minor=True)
     axes.set_xlabel("modes")
     axes.set_ylabel("processor time per impact, us")
     axes.set_title("Clamped-free beam with a stop at its tip")
