@@ -38,7 +38,6 @@ struct vi_instance {
     void (*log)(const vi_instance *instance, int level, const char *category, const char *text);
     void *environment;
     void (*callback)(void);
-    int32_t last_step_event; /* FMI 2.0 status enquiries */
     vi_sizes sizes;          /* of the description */
 };
 
