@@ -1,0 +1,63 @@
+"""Write what an analysis found: small NetCDF-4 files (CF-1.11), whole or not there at all."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import netCDF4
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.atomic import write_atomically
+from vibroimpact.analysis.schema import CONVENTIONS
+from vibroimpact.fmus.errors import DatasetError
+
+RESULTS_SCHEMA = "1"
+
+
+def results_kind(path: str | os.PathLike[str]) -> str | None:
+    """Return what kind of analysis wrote a file; None for any other file, also one that cannot be read."""
+    try:
+        with netCDF4.Dataset(os.fspath(path), "r") as file:
+            return str(file.getncattr("results_kind")) if "results_kind" in file.ncattrs() else None
+    except (OSError, RuntimeError):
+        return None
+
+
+def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: str) -> None:
+    """Write the dataset of an analysis.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Every variable with `units` and `long_name`; any dimensions.
+    path : path
+        An older file of this name is replaced only when the new one is complete.
+    kind : str
+        What it is (`spikes`, `estimates`, `replay`, ...), by which `vibroimpact plot` knows how to draw it.
+
+    Raises
+    ------
+    DatasetError
+        A variable has no unit or no name in words.
+    OSError
+        The file cannot be written, with the reason of the operating system.
+    """
+    problems = [
+        f"{kind}: {name}: expected the attribute {key}, got none."
+        for name, variable in dataset.variables.items()
+        for key in ("units", "long_name")
+        if not variable.attrs.get(key)
+    ]
+    if problems:
+        raise DatasetError("\n".join(problems))
+    described = dataset.assign_attrs(
+        Conventions=CONVENTIONS, results_schema=RESULTS_SCHEMA, results_kind=kind, **dataset.attrs
+    )
+    encoding: dict[Any, dict[str, Any]] = {
+        name: {"_FillValue": np.nan if name not in dataset.coords else None}
+        for name, variable in dataset.variables.items()
+        if variable.dtype.kind == "f"
+    }
+    write_atomically(path, bytes(described.to_netcdf(engine="netcdf4", encoding=encoding)))
