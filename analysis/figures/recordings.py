@@ -1,0 +1,152 @@
+"""Figures of recordings: every channel over its time, with what is clipped or missing, and trains of events."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, STOP, Floats, canvas, page_style
+from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording
+from vibroimpact.fmus.errors import DatasetError
+
+_PANEL_MM = 22
+_TRAIN_MM = 20
+_MOST_PANELS = 12
+_MOST_POINTS = 4000
+_UNIT_WORDS = {"9.80665 m s-2": "g", "m s-2": "m/s²", "m s-1": "m/s", "1": "-", "0.001 V": "mV"}
+_LONGEST_NAME = 34
+_MOST_BANDS = 200
+_LOG_FROM = 30.0
+
+
+def draw_recording(recording: Recording) -> Figure:
+    """Draw the channels of a recording, a panel for each on its own time axis, then its event trains.
+
+    Clipped samples are marked; where samples are missing or overrange a band runs through the panel. Event trains
+    show the interval after each event against its time. Long channels are drawn by the smallest and largest value of
+    each of some thousand spans, so that no peak is lost.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of more than twelve channels the first twelve are drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One column wide.
+
+    Raises
+    ------
+    DatasetError
+        There is nothing to draw.
+    """
+    channels = list(recording.channels.values())[:_MOST_PANELS]
+    trains = list(recording.events.values())[:_MOST_PANELS]
+    if not channels and not trains:
+        raise DatasetError(f"{recording.title}: expected channels or events to draw, got none.")
+    with page_style():
+        heights = [_PANEL_MM] * len(channels) + [_TRAIN_MM] * len(trains)
+        figure = canvas(10 + sum(heights) + 4 * len(heights), COLUMN_WIDTH)
+        axes = list(figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
+        for axis, channel in zip(axes, channels, strict=False):
+            _draw_channel(axis, channel)
+        for axis, train in zip(axes[len(channels) :], trains, strict=True):
+            _draw_train(axis, train)
+        _share_time(axes[: len(channels)], channels)
+        figure.align_ylabels(axes)
+    return figure
+
+
+def _share_time(axes: Sequence[Axes], channels: Sequence[Channel]) -> None:
+    """Write the instants once below each group of panels that have one axis."""
+    for place, (axis, channel) in enumerate(zip(axes, channels, strict=True)):
+        axis.set_xlim(channel.time[0], channel.time[-1])
+        last = place + 1 == len(channels) or channels[place + 1].axis is not channel.axis
+        axis.tick_params(labelbottom=last)
+        if last:
+            axis.set_xlabel("time (s)")
+
+
+def _draw_channel(axis: Axes, channel: Channel) -> None:
+    """Draw one channel with its marks."""
+    axis.plot(*_outline(channel.time, channel.values), color=LINE, linewidth=0.6, rasterized=True)
+    entries = []
+    absent = channel.quality & np.uint8(Quality.missing | Quality.overrange) != 0
+    if np.any(absent):
+        _draw_spans(axis, channel.time, absent)
+        entries.append(f"{int(absent.sum())} missing or overrange")
+    clipped = channel.quality & np.uint8(Quality.clipped) != 0
+    if np.any(clipped):
+        axis.plot(
+            channel.time[clipped],
+            channel.values[clipped],
+            linestyle="none",
+            marker="o",
+            markersize=2.2,
+            color=MARK,
+            rasterized=True,
+        )
+        entries.append(f"{int(clipped.sum())} clipped")
+    axis.set_title(_titled(channel.name, entries), fontsize=7.5, loc="left", pad=2)
+    axis.set_ylabel(f"({_UNIT_WORDS.get(channel.unit, channel.unit)})")
+
+
+def _titled(name: str, entries: Sequence[str]) -> str:
+    shown = name if len(name) <= _LONGEST_NAME else name[: _LONGEST_NAME - 1] + "…"
+    return shown + (f": {', '.join(entries)}" if entries else "")
+
+
+def _outline(time: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return a line through the smallest and largest value of each of some thousand spans of time."""
+    if len(time) <= _MOST_POINTS:
+        return time, values
+    per_span = -(-2 * len(time) // _MOST_POINTS)
+    spans = -(-len(time) // per_span)
+    padded = np.full(spans * per_span, np.nan)
+    padded[: len(values)] = values
+    table = padded.reshape(spans, per_span)
+    known = np.isfinite(table)
+    low = np.where(known, table, np.inf).min(axis=1)
+    high = np.where(known, table, -np.inf).max(axis=1)
+    empty = ~known.any(axis=1)
+    low[empty] = high[empty] = np.nan
+    return np.repeat(time[::per_span], 2), np.stack([low, high], axis=1).ravel()
+
+
+def _draw_spans(axis: Axes, time: Floats, marked: NDArray[np.bool_]) -> None:
+    """Draw a band over each run of marked samples."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]])))
+    half = float(np.median(np.diff(time))) / 2
+    for begin, end in edges.reshape(-1, 2)[:_MOST_BANDS]:
+        axis.axvspan(time[begin] - half, time[end - 1] + half, color=MARK, alpha=0.25, linewidth=0.3)
+
+
+def _draw_train(axis: Axes, train: EventTrain) -> None:
+    """Draw the interval after each event against its time."""
+    intervals = np.diff(train.times)
+    if len(intervals):
+        size = 1.5 if len(intervals) > _MOST_POINTS else 2.0
+        axis.plot(
+            train.times[:-1],
+            intervals,
+            linestyle="none",
+            marker=".",
+            markersize=size,
+            markeredgewidth=0.0,
+            color=LINE,
+            rasterized=True,
+        )
+        if intervals.min() > 0.0 and intervals.max() > _LOG_FROM * intervals.min():
+            axis.set_yscale("log")
+    for begin, end in np.reshape(train.attrs.get("masked", ()), (-1, 2)):
+        axis.axvspan(begin, end, color=STOP, alpha=0.3, linewidth=0.3)
+    if train.window is not None:
+        axis.set_xlim(*train.window)
+    axis.set_title(_titled(train.name, [f"{len(train.times)} events"]), fontsize=7.5, loc="left", pad=2)
+    axis.set_ylabel("interval (s)")
+    axis.set_xlabel("time (s)")

@@ -1,0 +1,1 @@
+"""Readers of file formats: each makes the same table of raw columns."""

@@ -1,0 +1,173 @@
+"""TDMS files of National Instruments, read with npTDMS.
+
+The instants come from `wf_increment` and `wf_start_offset`; `wf_samples` is the size of a block, not the length,
+and a start in 1904 (the epoch of LabVIEW) means that time is relative.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.importers.cells import OVERRANGE_FROM
+from vibroimpact.hardware.importers.labels import is_time_name
+from vibroimpact.hardware.importers.table import MOST_COLUMNS, Column, Floats, RawFile, Table
+
+_MOST_HEARD = 20
+_LONGEST_HEARD = 120
+_SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
+_EPOCH_ENDS = np.datetime64("1904-01-02")
+
+
+def read_tdms(path: os.PathLike[str] | str) -> RawFile:
+    """Read a TDMS file: a table for each group.
+
+    Raises
+    ------
+    DatasetError
+        The file is damaged, or has no channels of numbers.
+    """
+    from nptdms import TdmsFile
+
+    size = os.stat(path).st_size
+    try:
+        # opened here, so that it is closed too where the reader gives up
+        with _heard() as heard, open(path, "rb") as stream, TdmsFile.open(stream) as file:
+            raw = _read(file, size)
+            return replace(raw, remarks=[*raw.remarks, *dict.fromkeys(heard)][:_MOST_HEARD])
+    except DatasetError:
+        raise
+    # the reader gives up on damaged bytes with whatever error they lead to
+    except Exception as problem:
+        raise DatasetError(
+            f"expected a whole TDMS file, got one that cannot be read ({type(problem).__name__}: {problem})."
+        ) from problem
+
+
+@contextmanager
+def _heard() -> Iterator[list[str]]:
+    """Collect what npTDMS would write to the terminal: that a file is cut off, that a text is not UTF-8."""
+    from nptdms.log import log_manager
+
+    heard: list[str] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        heard.append(f"npTDMS says: {record.getMessage()[:_LONGEST_HEARD]}")
+        return False
+
+    log_manager.console_handler.addFilter(keep)
+    try:
+        yield heard
+    finally:
+        log_manager.console_handler.removeFilter(keep)
+
+
+def _read(file: Any, size: int) -> RawFile:
+    groups = file.groups()
+    channels = [channel for group in groups for channel in group.channels()]
+    if len(channels) > MOST_COLUMNS:
+        raise DatasetError(f"expected at most {MOST_COLUMNS} channels, got {len(channels)}.")
+    declared = sum(len(channel) for channel in channels)
+    if declared > size:  # nothing in this format is compressed: a sample is a byte at least
+        raise DatasetError(
+            f"expected at most {size} samples in as many bytes, got {declared}. It is damaged."
+        )
+    remarks: list[str] = []
+    starts = [_start(channel) for channel in channels]
+    known = [stamp for stamp in starts if stamp is not None]
+    origin = min(known) if known else None
+    tables = [_table(group, origin, remarks, len(groups) > 1) for group in groups]
+    if any(
+        stamp is None and "wf_start_time" in channel.properties
+        for stamp, channel in zip(starts, channels, strict=True)
+    ):
+        remarks.append(
+            "the start is given as 1904, the epoch of LabVIEW: time is relative, its date is not known"
+        )
+    attrs = {"source_title": str(file.properties["name"])} if file.properties.get("name") else {}
+    if origin is not None:
+        attrs["source_date"] = str(np.datetime_as_string(origin, unit="us"))
+    return RawFile("TDMS", [table for table in tables if table.columns or table.time], remarks, attrs)
+
+
+def _start(channel: Any) -> np.datetime64 | None:
+    stamp = channel.properties.get("wf_start_time")
+    if isinstance(stamp, np.datetime64) and stamp > _EPOCH_ENDS:
+        return stamp
+    return None
+
+
+def _table(group: Any, origin: np.datetime64 | None, remarks: list[str], titled: bool) -> Table:
+    columns: list[Column] = []
+    time = None
+    for channel in group.channels():
+        raw = channel[:]
+        if raw is None or not len(raw):
+            remarks.append(f"{channel.name}: holds no samples and is left out")
+        elif raw.dtype.kind == "M":
+            seconds = np.asarray((raw - raw[0]) / np.timedelta64(1, "ns") * 1e-9, dtype=np.float64)
+            time = Column(channel.name, seconds, "s")
+        elif raw.dtype.kind not in "fiub":
+            remarks.append(f"{channel.name}: its values are no numbers ({raw.dtype}), it is left out")
+        else:
+            columns.append(_column(channel, np.asarray(raw, dtype=np.float64), origin, remarks))
+    if time is None and len(columns) > 1 and is_time_name(columns[0].label) and columns[0].interval is None:
+        time, *columns = columns
+    return Table(columns, time, group.name if titled else "")
+
+
+def _column(channel: Any, values: Floats, origin: np.datetime64 | None, remarks: list[str]) -> Column:
+    known = channel.properties
+    start = _start(channel)
+    late = (
+        0.0 if start is None or origin is None else float((start - origin) / np.timedelta64(1, "us")) * 1e-6
+    )
+    increment = _number(known.get("wf_increment"))
+    samples = _number(known.get("wf_samples"))
+    said = "wf_samples is the size of a block, not the length: the samples are counted"
+    if samples is not None and samples != len(values) and said not in remarks:
+        remarks.append(said)
+    overrange = ~np.isfinite(values) & ~np.isnan(values) | (np.abs(values) > OVERRANGE_FROM)
+    return Column(
+        channel.name,
+        np.where(overrange, np.nan, values),
+        str(known.get("unit_string", "")),
+        overrange if np.any(overrange) else None,
+        increment if increment is not None and 0.0 < increment < np.inf else None,
+        (_number(known.get("wf_start_offset")) or 0.0) + late,
+        f"start {start}" if late else "",
+        _rails(channel),
+    )
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float | np.integer | np.floating) else None
+
+
+def _rails(channel: Any) -> tuple[float, float] | None:
+    """Return what the smallest and largest raw integers become by a linear scale; None where it is another."""
+    known = channel.properties
+    raw = channel.read_data(0, 1, scaled=False)
+    if isinstance(raw, dict):  # DAQmx: raw data by scaler
+        raw = next(iter(raw.values()), None)
+    if raw is None or raw.dtype.kind not in "iu" or raw.dtype.itemsize > 2:
+        return None
+    scales = [key for key in known if _SCALE_TYPE.fullmatch(key)]
+    if len(scales) != 1 or known[scales[0]] != "Linear":
+        return None
+    scale = scales[0].removesuffix("_Scale_Type")
+    slope = _number(known.get(f"{scale}_Linear_Slope"))
+    intercept = _number(known.get(f"{scale}_Linear_Y_Intercept"))
+    if slope is None or intercept is None:
+        return None
+    limits = np.iinfo(raw.dtype)
+    low, high = sorted((limits.min * slope + intercept, limits.max * slope + intercept))
+    return low, high

@@ -1,0 +1,119 @@
+"""MATLAB and NetCDF files, written here with scipy and netCDF4."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from vibroimpact.analysis.recording import Quality
+from vibroimpact.analysis.recording_files import open_recording, write_recording
+from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.hardware.import_settings import ImportSettings
+from vibroimpact.hardware.importing import import_recording
+
+RANDOM = np.random.default_rng(8)
+
+
+def matlab(folder: Path, **variables: Any) -> Path:
+    path = folder / "record.mat"
+    savemat(path, variables)
+    return path
+
+
+def test_a_vector_of_instants_makes_the_others_channels(tmp_path: Path) -> None:
+    time = np.arange(50) * 0.02 + 3.0
+    path = matlab(tmp_path, t=time, base=np.sin(time), pair=np.stack([time, -time], axis=1), gain=4.0)
+    recording = import_recording([path])
+    assert list(recording.channels) == ["base", "pair_1", "pair_2"]
+    assert recording.scalars["gain"].value == 4.0
+    np.testing.assert_allclose(recording.channels["pair_2"].axis.time, time, rtol=1e-12)
+
+
+@pytest.mark.parametrize("variable", [{"fs": 500.0}, {"dt": 0.002}])
+def test_a_sampling_rate_in_the_file_is_used(tmp_path: Path, variable: dict[str, float]) -> None:
+    recording = import_recording([matlab(tmp_path, base=RANDOM.normal(size=40), **variable)])
+    assert recording.channels["base"].axis.rate == pytest.approx(500.0)
+    assert not recording.scalars
+
+
+def test_vectors_that_ascend_unevenly_are_events(tmp_path: Path) -> None:
+    low, high = np.cumsum(RANDOM.exponential(size=40)), np.cumsum(RANDOM.exponential(size=60))
+    recording = import_recording([matlab(tmp_path, low=low, high=high)])
+    np.testing.assert_array_equal(recording.events["high"].times, high)
+    assert len(recording.events["low"].times) == 40
+
+
+def test_what_is_no_vector_of_numbers_is_left_out_and_told(tmp_path: Path) -> None:
+    path = matlab(
+        tmp_path, base=RANDOM.normal(size=40), fs=10.0, note="hello", box={"a": 1}, cube=np.zeros((3, 3, 3))
+    )
+    told = "\n".join(import_recording([path]).remarks)
+    assert all(f"{name}: " in told for name in ("note", "box", "cube"))
+
+
+def test_version_7_3_is_refused_with_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "new.mat"
+    path.write_bytes(
+        b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124)
+        + b"\x00\x02IM"
+        + b"\x00" * 384
+        + b"\x89HDF\r\n\x1a\n"
+    )
+    with pytest.raises(DatasetError, match=r"version 7\.3.*-v7"):
+        import_recording([path])
+
+
+def foreign(path: Path, unit: str = "s", count: int = 40) -> Path:
+    with netCDF4.Dataset(path, "w") as file:
+        file.createDimension("time", count)
+        time = file.createVariable("time", "f8", ("time",))
+        time.units = unit
+        time[:] = np.arange(count) * 0.5 + (1.7e9 if "since" in unit else 0.0)
+        base = file.createVariable("base", "f4", ("time",), fill_value=-999.0)
+        base.units = "m s-2"
+        base[:] = np.sin(np.arange(count))
+        base[5] = np.ma.masked
+        file.createVariable("name", str, ())
+    return path
+
+
+@pytest.mark.parametrize("unit", ["s", "seconds since 1970-01-01"])
+def test_a_foreign_netcdf_file_gives_its_variables_of_one_dimension(tmp_path: Path, unit: str) -> None:
+    recording = import_recording([foreign(tmp_path / "foreign.nc", unit)])
+    base = recording.channels["base"]
+    assert (base.axis.interval, base.unit) == (pytest.approx(0.5, rel=1e-12), "m s-2")
+    assert base.quality[5] == int(Quality.missing)
+    assert base.quality.sum() == int(Quality.missing)
+    assert "name: is left out" in "\n".join(recording.remarks)
+
+
+def test_a_recording_is_passed_on_as_it_is_and_takes_no_options(tmp_path: Path) -> None:
+    first = import_recording([foreign(tmp_path / "foreign.nc")])
+    write_recording(first, tmp_path / "ours.nc")
+    again = import_recording([tmp_path / "ours.nc"])
+    np.testing.assert_array_equal(again.channels["base"].values, first.channels["base"].values)
+    assert again.attrs["source_sha256"] == first.attrs["source_sha256"]
+    with pytest.raises(UsageError, match="expected no options"):
+        import_recording([tmp_path / "ours.nc"], ImportSettings(rate=2.0))
+
+
+def test_what_an_importer_makes_is_the_same_after_writing_and_opening(tmp_path: Path) -> None:
+    made = import_recording([foreign(tmp_path / "foreign.nc")])
+    write_recording(made, tmp_path / "ours.nc")
+    opened = open_recording(tmp_path / "ours.nc")
+    assert opened.remarks == made.remarks
+    for name, channel in made.channels.items():
+        other = opened.channels[name]
+        np.testing.assert_array_equal(other.values, channel.values)
+        np.testing.assert_array_equal(other.quality, channel.quality)
+        np.testing.assert_array_equal(other.axis.time, channel.axis.time)
+        assert (other.unit, other.label, other.axis.trigger) == (
+            channel.unit,
+            channel.label,
+            channel.axis.trigger,
+        )

@@ -1,0 +1,208 @@
+"""Tables of text; the references are the numbers that each test writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from vibroimpact.analysis.recording import Quality
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.import_settings import ImportSettings
+from vibroimpact.hardware.importers.text import find_dialect, headings, read_text
+from vibroimpact.hardware.importing import import_recording
+
+
+def written(folder: Path, text: str, name: str = "record.csv") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def remarks(path: Path, settings: ImportSettings | None = None) -> str:
+    return "\n".join(import_recording([path], settings).remarks)
+
+
+@pytest.mark.parametrize(
+    ("line", "delimiter", "decimal"),
+    [
+        ("0.5\t1.5\t2.5", "\t", "."),
+        ("0.5;1.5;2.5", ";", "."),
+        ("0.5,1.5,2.5", ",", "."),
+        ("0,5;1,5;2,5", ";", ","),
+        ("0,5\t1,5\t2,5", "\t", ","),
+        ("0,5 1,5 2,5", None, ","),
+        ("  0.5   1.5 2.5", None, "."),
+        ("0.5, 1.5, 2.5", ",", "."),
+        ("1e-3|-2E+5|.5", "|", "."),
+    ],
+)
+def test_delimiter_and_decimal_sign_are_found_from_the_rows(
+    line: str, delimiter: str | None, decimal: str
+) -> None:
+    dialect, _ = find_dialect(["a b c", *[line] * 5])
+    assert (dialect.delimiter, dialect.decimal) == (delimiter, decimal)
+
+
+def test_a_comma_that_may_be_decimal_is_told() -> None:
+    _, doubt = find_dialect(["1,25", "1,50", "1,75"])
+    assert "--decimal" in doubt[0]
+    assert find_dialect(["1,25", "1,50"], "", ",")[0].decimal == ","
+
+
+@pytest.mark.parametrize(
+    ("header", "names", "units"),
+    [
+        (["# time(s), \t \t acceleration(g)"], ["time", "acceleration"], ["s", "g"]),
+        (["#Time\tPos", "#[s]\t[au]"], ["Time", "Pos"], ["s", "au"]),
+        (["Zeit / s;Kraft / N"], ["Zeit", "Kraft"], ["s", "N"]),
+        (["made by a logger", "time,base", "s,m/s^2"], ["time", "base"], ["s", "m/s^2"]),
+        (['"time [ms]","force [kN]"'], ["time", "force"], ["ms", "kN"]),
+        (["three words here"], ["", ""], ["", ""]),
+    ],
+)
+def test_headings_and_units_are_found_above_the_rows(
+    header: list[str], names: list[str], units: list[str]
+) -> None:
+    delimiter = ";" if ";" in header[0] else "," if "," in header[0] and "#" not in header[0] else "\t"
+    assert headings(header, 2, delimiter if "words" not in header[0] else ",") == (names, units)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    table=arrays(
+        np.float64,
+        st.tuples(st.integers(2, 12), st.integers(2, 5)),
+        elements=st.floats(-1e30, 1e30, allow_nan=False),
+    ),
+    dialect=st.sampled_from([("\t", "."), (";", ","), (",", "."), (" ", "."), ("\t", ","), (";", ".")]),
+    titled=st.booleans(),
+)
+def test_a_table_written_in_any_dialect_is_read_back_to_the_last_digit(
+    table: np.ndarray, dialect: tuple[str, str], titled: bool
+) -> None:
+    delimiter, decimal = dialect
+    rows = [delimiter.join(repr(float(cell)).replace(".", decimal) for cell in row) for row in table]
+    header = [delimiter.join(f"signal{place}" for place in range(table.shape[1]))] if titled else []
+    raw = read_text("\n".join([*header, *rows]) + "\n")
+    columns = [*([raw.tables[0].time] if raw.tables[0].time else []), *raw.tables[0].columns]
+    assert len(columns) == table.shape[1]
+    for column, expected in zip(columns, table.T, strict=True):
+        np.testing.assert_array_equal(column.values, expected)
+
+
+def test_a_column_that_ends_early_is_shorter_and_not_missing(tmp_path: Path) -> None:
+    rows = [f"{k / 100}\t{k * 2}\t{k if k < 30 else ''}" for k in range(50)]
+    recording = import_recording([written(tmp_path, "time\tlong\tshort\n" + "\n".join(rows))])
+    assert (len(recording.channels["long"].values), len(recording.channels["short"].values)) == (50, 30)
+    assert not recording.channels["short"].quality.any()
+
+
+def test_one_number_in_the_first_row_is_a_single_value(tmp_path: Path) -> None:
+    rows = ["0.0\t1.5\t0.295", *[f"{k / 100}\t{k % 7}\t" for k in range(1, 40)]]
+    recording = import_recording([written(tmp_path, "\n".join(rows))])
+    assert recording.scalars["column_3"].value == 0.295
+    assert list(recording.channels) == ["column_2"]
+
+
+def test_markers_of_overrange_and_of_nothing_are_told_apart(tmp_path: Path) -> None:
+    marks = ["OVRNG", "Inf", "1e308", "9.9e37", "NaN", "", "n/a", "9.91e37"]
+    rows = [f"{k / 10},{marks[k - 3] if 3 <= k < 11 else k * 0.5}" for k in range(20)]
+    channel = import_recording([written(tmp_path, "time,force\n" + "\n".join(rows))]).channels["force"]
+    overrange, missing = int(Quality.overrange), int(Quality.missing)
+    assert channel.quality[3:11].tolist() == [overrange] * 4 + [missing] * 4
+    assert np.isnan(channel.values[3:11]).all()
+    assert channel.good.sum() == 12
+
+
+def test_words_among_numbers_count_as_missing_and_are_told_while_they_are_few(tmp_path: Path) -> None:
+    rows = [f"{k / 10},{'sensor off' if k == 7 else k}" for k in range(30)]
+    path = written(tmp_path, "time,force\n" + "\n".join(rows))
+    assert "'sensor off' in row 8" in remarks(path)
+    many = [f"{k / 10},{'off' if 5 < k < 15 else k}" for k in range(30)]
+    with pytest.raises(DatasetError, match="force: expected numbers, got 9 other cells"):
+        import_recording([written(tmp_path, "time,force\n" + "\n".join(many))])
+
+
+def test_a_column_of_words_is_left_out_and_told(tmp_path: Path) -> None:
+    rows = [f"{k / 10},{k},operator asleep" for k in range(30)]
+    path = written(tmp_path, "time,force,notes\n" + "\n".join(rows))
+    recording = import_recording([path])
+    assert list(recording.channels) == ["force"]
+    assert "notes: a column of words is left out: operator asleep" in "\n".join(recording.remarks)
+
+
+def test_dates_become_seconds_after_the_first(tmp_path: Path) -> None:
+    rows = [f"2026-07-30 20:59:{58 + k // 4:02d}.{k % 4 * 25:02d},{k}" for k in range(8)]
+    recording = import_recording([written(tmp_path, "timestamp,force\n" + "\n".join(rows))])
+    assert recording.channels["force"].axis.interval == pytest.approx(0.25, rel=1e-12)
+
+
+@pytest.mark.parametrize("day", ["2026-07-30", "30.07.2026", "7/30/2026"])
+def test_a_day_and_a_time_of_day_in_columns_of_their_own_are_understood(tmp_path: Path, day: str) -> None:
+    rows = [f"{day};09:59:{58 + k // 4:02d},{k % 4 * 25:02d};{k},5" for k in range(8)]
+    recording = import_recording([written(tmp_path, "Date;Time;force\n" + "\n".join(rows))])
+    assert list(recording.channels) == ["force"]
+    assert recording.channels["force"].axis.interval == pytest.approx(0.25, rel=1e-9)
+
+
+def test_times_in_milliseconds_become_seconds(tmp_path: Path) -> None:
+    rows = [f"{k * 2.5};{k}" for k in range(9)]
+    recording = import_recording([written(tmp_path, "time [ms];force [mN]\n" + "\n".join(rows))])
+    assert recording.channels["force"].axis.rate == pytest.approx(400.0, rel=1e-12)
+    assert recording.channels["force"].unit == "0.001 N"
+
+
+def test_names_units_scale_and_offset_of_the_user_come_first(tmp_path: Path) -> None:
+    path = written(tmp_path, "time,a\n" + "\n".join(f"{k / 10},{k}" for k in range(9)))
+    chosen = ImportSettings(name=("force",), unit=("N",), scale=(2.0,), offset=(-1.0,))
+    channel = import_recording([path], chosen).channels["force"]
+    np.testing.assert_array_equal(channel.values, 2.0 * np.arange(9) - 1.0)
+    assert (channel.unit, channel.label, channel.attrs["scale"]) == ("N", "a", 2.0)
+
+
+def test_an_unknown_unit_is_told_and_a_known_one_stored_as_cf_reads_it(tmp_path: Path) -> None:
+    path = written(tmp_path, "time (s),a (inch),b (g)\n" + "\n".join(f"{k / 10},{k},{k}" for k in range(9)))
+    recording = import_recording([path])
+    assert (recording.channels["a"].unit, recording.channels["b"].unit) == ("0.0254 m", "9.80665 m s-2")
+    path = written(tmp_path, "time (s),a (blips)\n" + "\n".join(f"{k / 10},{k}" for k in range(9)))
+    assert "the unit 'blips' is not known" in remarks(path)
+
+
+def test_text_that_is_not_utf_8_is_read_and_told(tmp_path: Path) -> None:
+    path = tmp_path / "latin.csv"
+    path.write_bytes(
+        "time,Kraft_für\n".encode("latin-1") + b"\n".join(b"%g,%d" % (k / 10, k) for k in range(9))
+    )
+    assert "not UTF-8" in remarks(path)
+
+
+def test_utf_16_and_byte_order_marks_are_understood(tmp_path: Path) -> None:
+    text = "time;Kraft\n" + "\n".join(f"{k / 10};{k}" for k in range(9))
+    for encoding in ("utf-16", "utf-8-sig"):
+        path = tmp_path / f"{encoding}.csv"
+        path.write_bytes(text.encode(encoding))
+        assert list(import_recording([path]).channels) == ["kraft"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("time,force\n", "expected rows of numbers, got none"),
+        ("just a letter\nto a friend\n", "expected rows of numbers, got none"),
+        ("\n\n\n", "expected rows of numbers, got none"),
+        ("force\n1\n2\n4\n3\n", "Give --rate"),
+        ("0.0,1\n", "expected channels of two samples or more"),
+        ("time,a\n" + "0.1,2\nrubbish here\n" * 8, "expected a row of numbers as before, got 'rubbish here'"),
+    ],
+)
+def test_a_text_without_a_record_is_refused_in_one_sentence(tmp_path: Path, text: str, said: str) -> None:
+    path = written(tmp_path, text)
+    with pytest.raises(DatasetError) as caught:
+        import_recording([path])
+    assert said in str(caught.value)
+    assert str(caught.value).startswith(str(path))

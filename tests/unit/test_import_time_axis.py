@@ -1,0 +1,140 @@
+"""When samples were taken: references are the clocks that each test makes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.importers.table import Column, Floats, Table
+from vibroimpact.hardware.printed_grid import common_step, decimal_step
+from vibroimpact.hardware.segments import split_at_restarts
+from vibroimpact.hardware.time_axis import Placement, place
+
+RANDOM = np.random.default_rng(4)
+
+
+def placed(instants: Floats, interval: float | None = None, rate: float | None = None) -> Placement:
+    values = np.arange(len(instants), dtype=float)
+    column = Column("force", values, interval=interval)
+    return place(Table([column], Column("time", instants)), column, rate)
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    interval=st.floats(1e-6, 10.0),
+    begin=st.floats(-100.0, 100.0),
+    count=st.integers(70, 400),
+    lost=st.sets(st.integers(1, 68), max_size=6),
+)
+@example(interval=1.0, begin=0.0, count=70, lost={2})
+def test_samples_that_are_missing_on_an_even_grid_are_put_back_as_missing(
+    interval: float, begin: float, count: int, lost: set[int]
+) -> None:
+    whole = begin + interval * np.arange(count)
+    kept = np.setdiff1d(np.arange(count), list(lost))
+    placement = placed(whole[kept])
+    assert len(placement.time) == count
+    assert placement.missing == len(lost)
+    np.testing.assert_array_equal(np.flatnonzero(placement.row >= 0), kept)
+    assert placement.interval == pytest.approx(interval, rel=1e-6)
+    np.testing.assert_allclose(placement.time, whole, rtol=0.0, atol=1e-3 * interval)
+
+
+@pytest.mark.parametrize("digits", [3, 4, 5, 6])
+def test_even_instants_are_recognized_behind_their_rounding(digits: int) -> None:
+    """20 kHz: with three digits twenty rows share an instant."""
+    exact = np.arange(8000) * 5e-5
+    placement = placed(np.round(exact, digits))
+    assert placement.interval == pytest.approx(5e-5, rel=1e-3 * 10.0 ** (3 - digits))
+    np.testing.assert_allclose(placement.time, exact, rtol=0.0, atol=0.6 * 10.0**-digits)
+
+
+def test_a_clock_that_jitters_is_kept_as_it_is() -> None:
+    instants = np.cumsum(RANDOM.uniform(0.04, 0.06, 300))
+    placement = placed(instants)
+    assert placement.interval is None
+    np.testing.assert_array_equal(placement.time, instants)
+    assert "not evenly spaced" in placement.remarks[-1]
+
+
+def test_repeated_and_swapped_rows_are_put_right_and_marked() -> None:
+    instants = np.arange(100) * 0.1
+    instants[[40, 41]] = instants[[41, 40]]
+    instants = np.insert(instants, 70, instants[70])
+    placement = placed(instants)
+    np.testing.assert_allclose(placement.time, np.arange(100) * 0.1, atol=1e-12)
+    assert np.flatnonzero(placement.suspect).tolist() == [40, 41, 70]
+    assert placement.row[[40, 41, 70, 71]].tolist() == [41, 40, 70, 72]
+    assert "go back 1 times" in placement.remarks[0]
+    assert "1 rows repeat an instant" in placement.remarks[1]
+
+
+def test_instants_in_plain_disorder_are_refused() -> None:
+    with pytest.raises(DatasetError, match="steps back"):
+        placed(RANDOM.uniform(0.0, 9.0, 200))
+    with pytest.raises(DatasetError, match="expected numbers, got none"):
+        placed(np.full(9, np.nan))
+
+
+def test_rows_without_an_instant_are_counted_on() -> None:
+    instants = np.arange(50) * 0.25
+    instants[[10, 11, 30]] = np.nan
+    placement = placed(instants)
+    np.testing.assert_allclose(placement.time, np.arange(50) * 0.25, atol=1e-12)
+    assert np.flatnonzero(placement.suspect).tolist() == [10, 11, 30]
+
+
+def test_the_uncertainty_of_contradicting_intervals_is_their_whole_spread() -> None:
+    """The shaker's numbers: .000606 and .000586 s in the header, .000605 s in the column."""
+    values = np.zeros(2000)
+    time = Column("time", np.arange(2000) * 0.000605)
+    columns = [Column("command", values, interval=0.000606), Column("base", values[:1900], interval=0.000586)]
+    table = Table(columns, time)
+    for column in columns:
+        placement = place(table, column)
+        assert placement.interval == pytest.approx(0.000605, rel=1e-9)
+        assert placement.uncertainty == pytest.approx((0.000606 - 0.000586) / 0.000605, rel=1e-9)
+        assert len(placement.time) == len(column.values)
+
+
+def test_the_rate_of_the_user_is_used_and_what_contradicts_it_is_told() -> None:
+    placement = placed(np.arange(40) * 0.01, interval=0.02, rate=1000.0)
+    assert placement.interval == 0.001
+    assert len(placement.remarks) == 2
+
+
+def test_a_record_far_longer_than_its_rows_is_not_filled() -> None:
+    instants = np.concatenate([np.arange(50) * 1e-3, [1e6, 1e6 + 1e-3]])
+    placement = placed(instants)
+    assert placement.missing == 0
+    assert len(placement.time) == 52
+
+
+def test_a_clock_that_begins_again_makes_two_records() -> None:
+    one, two = np.arange(30) * 0.1, np.arange(20) * 0.1
+    column = Column("force", np.arange(50.0))
+    tables, told = split_at_restarts(Table([column], Column("time", np.append(one, two))))
+    assert [len(table.columns[0].values) for table in tables] == [30, 20]
+    assert "begin again 1 times" in told[0]
+    assert tables[1].columns[0].values[0] == 30.0
+
+
+@settings(max_examples=50, deadline=None)
+@given(digits=st.integers(0, 6), seed=st.integers(0, 10**6))
+def test_the_weight_of_the_last_printed_digit_is_found(digits: int, seed: int) -> None:
+    values = np.round(np.random.default_rng(seed).uniform(1.0, 1000.0, 400), digits)
+    assert decimal_step(values) == pytest.approx(10.0**-digits, rel=1e-12)
+
+
+@pytest.mark.parametrize("step", [1024 / 44100, 1 / 50, 1 / 29.97])
+def test_the_frames_behind_rounded_intervals_are_found(step: float) -> None:
+    intervals = np.round(RANDOM.integers(12, 22, 4000) * step, 3)
+    assert common_step(intervals, 1e-3) == pytest.approx(step, rel=2e-4)
+
+
+def test_intervals_on_no_coarser_grid_have_none() -> None:
+    intervals = np.round(RANDOM.exponential(0.04, 4000), 3)
+    assert common_step(intervals[intervals > 0.0], 1e-3) == 0.0
