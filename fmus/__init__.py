@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -74,8 +75,14 @@ def component_name(name: str) -> str:
 
 def _folders() -> dict[str, str]:
     described = sorted((_package() / "native").glob("*/variables.toml"))
-    heads = (tomllib.loads(path.read_text(encoding="utf-8"))["component"] for path in described)
-    return {head["name"]: head["folder"] for head in heads}
+    return dict(_name_and_folder(path, path.stat().st_mtime_ns) for path in described)
+
+
+@cache
+def _name_and_folder(path: Path, changed: int) -> tuple[str, str]:
+    # every request for an FMU asks for all names, and reading the tables of variables takes longer than the rest
+    head = tomllib.loads(path.read_text(encoding="utf-8"))["component"]
+    return head["name"], head["folder"]
 
 
 def _package() -> Path:

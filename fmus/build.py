@@ -88,7 +88,8 @@ def fingerprint(native: Path = NATIVE) -> str:
     """Return the SHA-256 of everything that an FMU is made from, except the compiler."""
     digest = hashlib.sha256(repr((LANGUAGE, WARNINGS, sys.platform)).encode())
     sources = [p for p in native.rglob("*") if p.suffix in {".c", ".h", ".toml", ".md"}]
-    for path in sorted([*sources, *(HERE / "description").glob("*.py"), HERE / "build.py"]):
+    # sorted one folder at a time: the order must not depend on where the folders lie
+    for path in (*sorted(sources), *sorted((HERE / "description").glob("*.py")), HERE / "build.py"):
         digest.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 

@@ -12,9 +12,13 @@ from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from vibroimpact.fmus.errors import ComponentError, UsageError
 
 SIDES = {"upper": 1, "lower": 2}
+Array = NDArray[np.float64]
 
 
 class _Oscillator(ctypes.Structure):
@@ -79,6 +83,10 @@ def core_library() -> ctypes.CDLL:
     ]  # fmt: skip
     library.vi_door_next_contact.argtypes = [
         ctypes.POINTER(_Oscillator), number, pair, number, ctypes.c_int, number, pair,
+    ]  # fmt: skip
+    library.vi_door_motion.argtypes = [
+        ctypes.POINTER(_Oscillator), number, pair, number, ctypes.c_int, number, ctypes.c_int,
+        *3 * (ctypes.c_void_p,),
     ]  # fmt: skip
     return library
 
@@ -162,3 +170,68 @@ def next_contact(
             f"state {state}, position {position}, side {side!r}, duration {duration}."
         )
     return Contact(found[0], found[1]) if status else None
+
+
+def motion(
+    oscillator: Oscillator,
+    state: tuple[float, float],
+    instants: ArrayLike,
+    *,
+    position: float | None = None,
+    side: str = "upper",
+    restitution: float = 1.0,
+    phase: float = 0.0,
+) -> tuple[Array, Array]:
+    """Return displacements and velocities at many instants, through all impacts with a stop in between.
+
+    Parameters
+    ----------
+    oscillator, state, phase
+        As in `flow`.
+    instants : array_like, shape (sample,)
+        Seconds from now, >= 0, ascending.
+    position : float or None
+        Of the stop, m; None: there is none.
+    side : str
+        `upper` or `lower`.
+    restitution : float
+        0 to 1.
+
+    Returns
+    -------
+    displacement, velocity : ndarray, shape (sample,)
+        m and m/s; at an impact the velocity after it.
+
+    Raises
+    ------
+    UsageError
+        An argument is not finite, or out of its range.
+
+    Examples
+    --------
+    >>> x, v = motion(Oscillator(), (0.5, 1.0), [0.0, 3.141592653589793], position=2.0)
+    >>> x.round(12).tolist(), v.round(12).tolist()
+    ([0.5, -0.5], [1.0, -1.0])
+    """
+    times = np.ascontiguousarray(np.atleast_1d(np.asarray(instants, dtype=np.float64)))
+    displacement, velocity = np.empty_like(times), np.empty_like(times)
+    body = oscillator._as_structure()
+    hits = core_library().vi_door_motion(
+        body,
+        phase,
+        _pair(*state),
+        0.0 if position is None else position,
+        0 if position is None else SIDES.get(side, 0),
+        restitution,
+        len(times),
+        times.ctypes.data,
+        displacement.ctypes.data,
+        velocity.ctypes.data,
+    )
+    if hits < 0 or side not in SIDES:
+        raise UsageError(
+            "motion: expected finite arguments, ascending instants >= 0, side upper or lower and "
+            f"0 <= restitution <= 1, got {oscillator}, state {state}, position {position}, side {side!r}, "
+            f"restitution {restitution}."
+        )
+    return displacement, velocity

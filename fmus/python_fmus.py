@@ -1,6 +1,6 @@
 """Makes FMUs of Python functions; the one place that calls pythonfmu.
 
-pythonfmu builds in a process of its own, since it runs the user's file and leaves that file's folder on the
+pythonfmu builds in a process of its own, since it runs the slave's file and leaves that file's folder on the
 module path. Its model description is then completed (units, initial unknowns, dependencies, a token that
 depends on the contents alone), which FMI's rules and this package's connections need.
 """
@@ -16,11 +16,13 @@ import tempfile
 import uuid
 import zipfile
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
 from vibroimpact.fmus.fmu_zip import write_fmu
+from vibroimpact.fmus.si_units import SiUnit
 
 SOURCES = Path(__file__).with_name("python")
 USER_CONTACT_LAW = SOURCES / "user_contact_law"
@@ -29,8 +31,36 @@ LAW_FILE = "contact_law.py"
 DESCRIPTION = "modelDescription.xml"
 #: Longest time that pythonfmu, which runs the user's file, may take, s.
 BUILD_LIMIT = 120.0
-UNITS = {"displacement": "m", "velocity": "m/s", "applied_force": "N"}
-BASE_UNITS = {"m": {"m": 1}, "m/s": {"m": 1, "s": -1}, "N": {"kg": 1, "m": 1, "s": -2}}
+UNITS = {
+    "displacement": SiUnit({"m": 1}),
+    "velocity": SiUnit({"m": 1, "s": -1}),
+    "applied_force": SiUnit({"N": 1}),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class PythonFmu:
+    """What an FMU is made of.
+
+    Attributes
+    ----------
+    script : Path
+        The file with the slave's class, in a folder of its own that may be filled further.
+    extras : tuple of Path
+        Files and folders that go into the resources with it.
+    readme : Path
+        What the FMU's documentation says.
+    units : mapping of str to SiUnit
+        Units of the variables that have one.
+    blamed : str
+        What messages of a build that fails begin with: the user's file.
+    """
+
+    script: Path
+    extras: tuple[Path, ...]
+    readme: Path
+    units: Mapping[str, SiUnit]
+    blamed: str
 
 
 def build_user_contact_law(law: Path | str, output: Path | str) -> Path:
@@ -59,15 +89,29 @@ def build_user_contact_law(law: Path | str, output: Path | str) -> Path:
         A file cannot be read or written.
     """
     law, output = Path(law), Path(output)
-    _require_pythonfmu()
+    require_pythonfmu()
     with tempfile.TemporaryDirectory() as folder:
-        sources = Path(folder, "sources")
-        sources.mkdir()
-        _copy(USER_CONTACT_LAW / "user_contact_law.py", sources / "user_contact_law.py")
-        _copy(law, sources / LAW_FILE)
-        members = _built(sources, law)
-    members["documentation/README.md"] = (USER_CONTACT_LAW / "README.md").read_bytes()
-    members[DESCRIPTION] = _completed(members)
+        script, law_file = Path(folder, "user_contact_law.py"), Path(folder, LAW_FILE)
+        _copy(USER_CONTACT_LAW / "user_contact_law.py", script)
+        _copy(law, law_file)
+        return make_fmu(
+            PythonFmu(script, (law_file,), USER_CONTACT_LAW / "README.md", UNITS, str(law)), output
+        )
+
+
+def make_fmu(parts: PythonFmu, output: Path) -> Path:
+    """Let pythonfmu make an FMU, complete its description and write it; equal parts give equal bytes.
+
+    Raises
+    ------
+    ComponentFileError
+        The slave cannot be instantiated.
+    UsageError
+        The file cannot be written.
+    """
+    members = _built(parts)
+    members["documentation/README.md"] = parts.readme.read_bytes()
+    members[DESCRIPTION] = _completed(members, parts.units)
     try:
         write_fmu(output, members)
     except OSError as error:
@@ -75,7 +119,8 @@ def build_user_contact_law(law: Path | str, output: Path | str) -> Path:
     return output
 
 
-def _require_pythonfmu() -> None:
+def require_pythonfmu() -> None:
+    """Raise ComponentError where pythonfmu is not installed."""
     if importlib.util.find_spec("pythonfmu") is None:
         raise ComponentError(
             "pythonfmu: expected this package, which makes FMUs of Python code, got none. "
@@ -90,33 +135,26 @@ def _copy(source: Path, target: Path) -> None:
         raise UsageError(f"{source}: expected a Python file, got: {error.strerror}.") from error
 
 
-def _built(sources: Path, law: Path) -> dict[str, bytes]:
-    output = sources.parent / "output"
-    script, law_file = sources / "user_contact_law.py", sources / LAW_FILE
-    command = [
-        sys.executable,
-        "-m",
-        "pythonfmu",
-        "build",
-        "-f",
-        str(script),
-        "-d",
-        str(output),
-        str(law_file),
-    ]
+def _built(parts: PythonFmu) -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as output:
+        command = [sys.executable, "-m", "pythonfmu", "build", "-f", str(parts.script), "-d", output]
+        _run([*command, *(str(extra) for extra in parts.extras)], parts)
+        (path,) = Path(output).glob("*.fmu")
+        with zipfile.ZipFile(path) as archive:
+            return {name: archive.read(name) for name in archive.namelist()}
+
+
+def _run(command: list[str], parts: PythonFmu) -> None:
     try:
         result = subprocess.run(
-            command, capture_output=True, text=True, timeout=BUILD_LIMIT, cwd=sources.parent
+            command, capture_output=True, text=True, timeout=BUILD_LIMIT, cwd=parts.script.parent
         )
     except subprocess.TimeoutExpired as error:
         raise ComponentFileError(
-            f"{law}: expected to run within {BUILD_LIMIT:g} s, got no answer."
+            f"{parts.blamed}: expected to run within {BUILD_LIMIT:g} s, got no answer."
         ) from error
     if result.returncode != 0:
-        raise ComponentFileError(f"{law}: {_last_message(result.stderr)}")
-    (path,) = output.glob("*.fmu")
-    with zipfile.ZipFile(path) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
+        raise ComponentFileError(f"{parts.blamed}: {_last_message(result.stderr)}")
 
 
 def _last_message(errors: str) -> str:
@@ -126,10 +164,10 @@ def _last_message(errors: str) -> str:
     return last.removeprefix("ValueError: ").replace("%%", "%")
 
 
-def _completed(members: Mapping[str, bytes]) -> bytes:
+def _completed(members: Mapping[str, bytes], units: Mapping[str, SiUnit]) -> bytes:
     root = ElementTree.fromstring(members[DESCRIPTION])
     root.attrib.pop("generationDateAndTime", None)
-    _add_units(root)
+    _add_units(root, units)
     _add_dependencies(root)
     root.set("guid", _token(members, root))
     ElementTree.indent(root)
@@ -137,23 +175,36 @@ def _completed(members: Mapping[str, bytes]) -> bytes:
     return text
 
 
-def _add_units(root: ElementTree.Element) -> None:
+def _add_units(root: ElementTree.Element, units: Mapping[str, SiUnit]) -> None:
     definitions = ElementTree.Element("UnitDefinitions")
-    for name, exponents in BASE_UNITS.items():
-        unit = ElementTree.SubElement(definitions, "Unit", name=name)
-        ElementTree.SubElement(unit, "BaseUnit", {key: str(value) for key, value in exponents.items()})
-    # the schema wants them just after the interface
-    interface = root.find("CoSimulation")
-    root.insert(0 if interface is None else list(root).index(interface) + 1, definitions)
+    for name, unit in {unit.name: unit for unit in units.values() if unit.name}.items():
+        definition = ElementTree.SubElement(definitions, "Unit", name=name)
+        ElementTree.SubElement(definition, "BaseUnit", _base_unit(unit))
+    if len(definitions):
+        # the schema wants them just after the interface
+        interface = root.find("CoSimulation")
+        root.insert(0 if interface is None else list(root).index(interface) + 1, definitions)
     for variable in root.iter("ScalarVariable"):
-        real = variable.find("Real")
-        if real is not None and variable.get("name") in UNITS:
-            real.set("unit", UNITS[variable.get("name", "")])
+        real, found = variable.find("Real"), units.get(variable.get("name", ""))
+        if real is not None and found is not None and found.name:
+            real.set("unit", found.name)
+
+
+def _base_unit(unit: SiUnit) -> dict[str, str]:
+    attributes = {base: str(exponent) for base, exponent in unit.exponents.items()}
+    if unit.factor != 1.0:
+        attributes["factor"] = repr(unit.factor)
+    if unit.offset:
+        attributes["offset"] = repr(unit.offset)
+    return attributes
 
 
 def _add_dependencies(root: ElementTree.Element) -> None:
     variables = list(root.iter("ScalarVariable"))
     inputs = [str(index) for index, v in enumerate(variables, 1) if v.get("causality") == "input"]
+    given = [
+        str(index) for index, v in enumerate(variables, 1) if v.get("causality") in ("input", "parameter")
+    ]
     structure = root.find("ModelStructure")
     outputs = root.find("ModelStructure/Outputs")
     if structure is None or outputs is None:
@@ -161,7 +212,8 @@ def _add_dependencies(root: ElementTree.Element) -> None:
     initial = ElementTree.SubElement(structure, "InitialUnknowns")
     for unknown in outputs:
         unknown.set("dependencies", " ".join(inputs))
-        ElementTree.SubElement(initial, "Unknown", dict(unknown.attrib))
+        # at the start of a run they follow from the parameters too
+        ElementTree.SubElement(initial, "Unknown", {**unknown.attrib, "dependencies": " ".join(given)})
 
 
 def _token(members: Mapping[str, bytes], root: ElementTree.Element) -> str:

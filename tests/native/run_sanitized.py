@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from vibroimpact.fmus.build import NATIVE, fmi_headers
@@ -32,15 +33,33 @@ def supported(compiler: Sequence[str], sanitizer: str, folder: Path) -> bool:
     return compiled.returncode == 0 and subprocess.run([str(program)], capture_output=True).returncode == 0
 
 
-def run(test: Path, compiler: Sequence[str], sanitizers: Sequence[str], folder: Path) -> bool:
-    """Compile and run one test; return whether it passed."""
-    program = folder / test.stem
+def options_for(sanitizers: Sequence[str]) -> list[str]:
+    """Return the options that the core and the tests are compiled with."""
     options = [*LANGUAGE, *WARNINGS, "-Werror", "-g", "-O1", f"-I{NATIVE / 'core'}", f"-I{fmi_headers()}"]
     if sanitizers:
         options += [f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover=all"]
-    sources = [str(test), *map(str, sorted((NATIVE / "core").glob("*.c")))]
-    compiled = subprocess.run([*compiler, *options, *sources, "-o", str(program), "-lm"])
-    if compiled.returncode != 0:
+    return options
+
+
+def compile_core(compiler: Sequence[str], options: Sequence[str], folder: Path) -> list[Path] | None:
+    """Compile the core, which all tests share, side by side on all processors; None if that fails."""
+    sources = sorted((NATIVE / "core").glob("*.c"))
+    objects = [folder / f"{source.stem}.core.o" for source in sources]
+
+    def compiles(source: Path, target: Path) -> bool:
+        return subprocess.run([*compiler, *options, "-c", str(source), "-o", str(target)]).returncode == 0
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return objects if all(pool.map(compiles, sources, objects)) else None
+
+
+def run(
+    test: Path, compiler: Sequence[str], options: Sequence[str], core: Sequence[Path], folder: Path
+) -> bool:
+    """Compile and run one test; return whether it passed."""
+    program = folder / test.stem
+    command = [*compiler, *options, str(test), *map(str, core), "-o", str(program), "-lm"]
+    if subprocess.run(command).returncode != 0:
         return False
     return subprocess.run([str(program)], timeout=LIMIT, env=ENVIRONMENT).returncode == 0
 
@@ -54,8 +73,10 @@ def main() -> int:
         sanitizers = [s for s in SANITIZERS if supported(compiler, s, folder)]
         for missing in sorted(set(SANITIZERS) - set(sanitizers)):
             print(f"SKIPPED: the {missing} sanitizer, which {' '.join(compiler)} does not have here")
+        options = options_for(sanitizers)
+        core = compile_core(compiler, options, folder)
         for test in sorted(HERE.glob("*.c")):
-            passed = run(test, compiler, sanitizers, folder)
+            passed = core is not None and run(test, compiler, options, core, folder)
             print(
                 f"{test.name} ({', '.join(sanitizers) or 'no sanitizer'}): {'passed' if passed else 'FAILED'}"
             )

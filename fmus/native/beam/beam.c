@@ -95,6 +95,11 @@ static void check_modes(const beam *b, char *message)
     vi_check_each(message, vi_check_not_negative, "damping_ratio", b->damping_ratio, n);
     vi_check_not_negative(message, "rayleigh.mass", b->rayleigh_mass);
     vi_check_not_negative(message, "rayleigh.stiffness", b->rayleigh_stiffness);
+    for (int j = 0; j < n; ++j) {
+        vi_check_finite(message, "amplitude.frequency_slope", b->amplitude[j].frequency_slope);
+        vi_check_finite(message, "amplitude.damping_slope", b->amplitude[j].damping_slope);
+        vi_check_not_negative(message, "amplitude.damping_reciprocal", b->amplitude[j].damping_reciprocal);
+    }
     vi_check_each(message, vi_check_finite, "modal_displacement_start", b->modal_displacement_start, n);
     vi_check_each(message, vi_check_finite, "modal_velocity_start", b->modal_velocity_start, n);
 }
@@ -237,19 +242,40 @@ static void place_contact(beam *b, int k, char *message)
     }
 }
 
-static void fill_modes(beam *b)
+static void set_mode(beam *b, int j, double natural, double ratio)
 {
     const double share = b->body.forcing_angular_frequency == 0.0 ? cos(b->body.forcing_phase) : 1.0;
+    vi_structure_mode(&b->body.model, j, natural, ratio, share * modal_amplitude(b, j),
+                      b->body.forcing_angular_frequency);
+}
+
+/* Modes as they are at the present amplitudes, until the next step. */
+static void follow_amplitudes(beam *b)
+{
+    for (int j = 0; j < b->modes; ++j) {
+        const double natural = b->body.natural[j];
+        const double a = vi_amplitude_of(b->body.state.q[j], b->body.state.p[j], natural) / b->root_mass;
+        const double now = vi_amplitude_natural(&b->amplitude[j], natural, a);
+        const double ratio = vi_amplitude_ratio(&b->amplitude[j], mode_damping(b, j, natural), a);
+        /* the ratio is to the frequency of small motion: the stiffness does not change the damping */
+        set_mode(b, j, now, ratio * natural / now);
+    }
+    vi_structure_prepare(&b->body.model);
+}
+
+static void fill_modes(beam *b)
+{
     const double length = b->length;
     const double rate = sqrt(rigidity(b) / linear_density(b)) / (length * length);
     memset(b->body.natural, 0, sizeof b->body.natural);
+    b->depends_on_amplitude = 0;
     for (int j = 0; j < b->modes; ++j) {
         const double eigenvalue = vi_beam_eigenvalue((vi_beam_boundary)b->boundary, j + 1);
         const double natural = eigenvalue * eigenvalue * rate;
         b->body.natural[j] = natural;
         b->participation[j] = b->root_mass * vi_beam_participation((vi_beam_boundary)b->boundary, j + 1);
-        vi_structure_mode(&b->body.model, j, natural, mode_damping(b, j, natural), share * modal_amplitude(b, j),
-                          b->body.forcing_angular_frequency);
+        set_mode(b, j, natural, mode_damping(b, j, natural));
+        b->depends_on_amplitude |= vi_amplitude_acts(&b->amplitude[j]);
         b->body.state.q[j] = b->root_mass * b->modal_displacement_start[j];
         b->body.state.p[j] = b->root_mass * b->modal_velocity_start[j];
     }
@@ -379,6 +405,9 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     if (!vi_structure_component_step_is_good(&b->body, request, &target, message)
         || !vi_structure_component_resolve(&b->body, message)) {
         return VI_STEP_ERROR;
+    }
+    if (b->depends_on_amplitude) {
+        follow_amplitudes(b);
     }
     hold_inputs(b);
     const vi_step_result result = vi_structure_component_advance(&b->body, target, request);

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "amplitude.h"
 #include "structure_component.h"
 
 enum { BEAM_SENSORS = 4 };
@@ -27,6 +28,7 @@ typedef struct {
     double length, width, thickness, youngs_modulus, density;
     double flexural_rigidity, mass_per_length, poisson_ratio;
     double damping_ratio[VI_MODES], rayleigh_mass, rayleigh_stiffness;
+    vi_amplitude_law amplitude[VI_MODES];
     double modal_displacement_start[VI_MODES], modal_velocity_start[VI_MODES];
     int64_t forcing_kind, forcing_mode;
     double forcing_amplitude, forcing_location, sensor_location;
@@ -38,6 +40,7 @@ typedef struct {
     double root_mass;                    /* of the beam: sqrt(mass_per_length * length), kg^(1/2) */
     double forced_shape[VI_MODES];       /* of forcing_location, kg^(-1/2) */
     double participation[VI_MODES];      /* modal force of a unit acceleration of the base, kg^(1/2) */
+    int32_t depends_on_amplitude;        /* some mode does */
     /* outputs */
     double modal_displacement[VI_MODES], modal_velocity[VI_MODES];
     beam_sensor sensor[BEAM_SENSORS];

@@ -68,3 +68,30 @@ VI_DOOR int vi_door_next_contact(const vi_door_oscillator *oscillator, double ph
     contact[1] = fabs(body.velocity);
     return 1;
 }
+
+VI_DOOR int vi_door_motion(const vi_door_oscillator *oscillator, double phase, const double state[2], double position,
+                           int side, double restitution, int count, const double instants[], double displacement[],
+                           double velocity[])
+{
+    vi_body body;
+    if (!start(&body, oscillator, phase, state) || !isfinite(position) || !(restitution >= 0.0 && restitution <= 1.0)) {
+        return -1;
+    }
+    body.contacts[0].law.law = side == 0 ? VI_LAW_NONE : VI_LAW_RESTITUTION;
+    body.contacts[0].law.restitution = restitution;
+    body.contacts[0].side = side == 0 ? 1 : side;
+    body.contacts[0].position = position;
+    double reached = 0.0;
+    for (int i = 0; i < count; ++i) {
+        const vi_step_request request = {reached, instants[i] - reached, false, false};
+        vi_instant target;
+        if (!(instants[i] >= reached) || !vi_clock_instant(&body.clock, instants[i], 0.0, &target)
+            || vi_body_advance(&body, target, &request) == VI_STEP_ERROR) {
+            return -1;
+        }
+        reached = instants[i];
+        displacement[i] = body.displacement;
+        velocity[i] = body.velocity;
+    }
+    return (int)body.contacts[0].count;
+}

@@ -26,4 +26,11 @@ int vi_door_flow(const vi_door_oscillator *oscillator, double phase, const doubl
 int vi_door_next_contact(const vi_door_oscillator *oscillator, double phase, const double state[2], double position,
                          int side, double duration, double contact[2]);
 
+/* The motion at `count` ascending instants (s from now) through impacts with a stop at `position` (side 1 upper, 2
+ * lower, 0 for no stop): displacement[count] and velocity[count]. Chatter is summed and rests end as in the FMUs. Returns
+ * how often the stop was hit, -1 for a bad argument. */
+int vi_door_motion(const vi_door_oscillator *oscillator, double phase, const double state[2], double position,
+                   int side, double restitution, int count, const double instants[], double displacement[],
+                   double velocity[]);
+
 #endif

@@ -77,6 +77,27 @@ void oscillator_start(oscillator *o, vi_instant now)
     }
 }
 
+void oscillator_follow_amplitude(oscillator *o)
+{
+    if (!vi_amplitude_acts(&o->amplitude)) {
+        return;
+    }
+    const double root = sqrt(o->mass), natural = sqrt(o->stiffness / o->mass);
+    const double x = o->yields ? o->state.q[0] / root : o->body.displacement;
+    const double v = o->yields ? o->state.p[0] / root : o->body.velocity;
+    const double a = vi_amplitude_of(x, v, natural);
+    const double now = vi_amplitude_natural(&o->amplitude, natural, a);
+    const double ratio = vi_amplitude_ratio(&o->amplitude, 0.5 * o->damping / (root * sqrt(o->stiffness)), a);
+    /* the ratio is to the frequency of small motion: the spring does not stiffen the dashpot */
+    if (o->yields) {
+        vi_structure_mode(&o->model, 0, now, ratio * natural / now, amplitude(o) / root, o->forcing_angular_frequency);
+        vi_structure_prepare(&o->model);
+    } else {
+        vi_mode_start(&o->body.mode, o->mass, 2.0 * ratio * natural * o->mass, now * now * o->mass, amplitude(o),
+                      o->forcing_angular_frequency);
+    }
+}
+
 void oscillator_hold(oscillator *o)
 {
     if (o->yields) {

@@ -15,6 +15,9 @@ bool oscillator_start_clock(oscillator *o, double start_time, vi_instant *now);
 /* Begin at an instant from the start values; the parameters are good. */
 void oscillator_start(oscillator *o, vi_instant now);
 
+/* Spring and dashpot as they are at the present amplitude, until the next step; nothing where they do not depend on it. */
+void oscillator_follow_amplitude(oscillator *o);
+
 /* Give the inputs to the body from now on. */
 void oscillator_hold(oscillator *o);
 

@@ -130,6 +130,13 @@ static bool parameters_are_good(const oscillator *o, char *message)
     vi_check_positive(message, "mass", o->mass);
     vi_check_not_negative(message, "damping", o->damping);
     vi_check_not_negative(message, "stiffness", o->stiffness);
+    vi_check_finite(message, "amplitude.frequency_slope", o->amplitude.frequency_slope);
+    vi_check_finite(message, "amplitude.damping_slope", o->amplitude.damping_slope);
+    vi_check_not_negative(message, "amplitude.damping_reciprocal", o->amplitude.damping_reciprocal);
+    if (vi_amplitude_acts(&o->amplitude) && o->stiffness == 0.0) {
+        vi_complain(message, "amplitude: expected a stiffness > 0 beside it, got 0; without a spring there is no"
+                             " natural frequency to change");
+    }
     vi_check_finite(message, "forcing.amplitude", o->forcing_amplitude);
     vi_check_not_negative(message, "forcing.angular_frequency", o->forcing_angular_frequency);
     vi_check_finite(message, "forcing.phase", o->forcing_phase);
@@ -266,6 +273,7 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     if (!step_is_good(o, request, &target, message) || !resolve(o, message)) {
         return VI_STEP_ERROR;
     }
+    oscillator_follow_amplitude(o);
     oscillator_hold(o);
     const vi_step_result result = oscillator_advance(o, target, request);
     update_outputs(o);

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "amplitude.h"
 #include "body.h"
 #include "structure.h"
 
@@ -14,6 +15,7 @@ typedef struct {
     double mass, damping, stiffness;
     double forcing_amplitude, forcing_angular_frequency, forcing_phase;
     double displacement_start, velocity_start;
+    vi_amplitude_law amplitude;
     double contact_tolerance;
     /* inputs */
     double force, force_rate, base_acceleration, base_acceleration_rate;

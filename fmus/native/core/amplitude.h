@@ -1,0 +1,33 @@
+/* Natural frequency and damping that depend on the amplitude of the motion: the equivalent linear mode of a weakly
+ * nonlinear one (averaging, Krylov and Bogoliubov). They are found at the start of a step and held over it, so a step
+ * should be short against the time in which the amplitude changes.
+ *
+ * With amplitude a:  frequency = natural (1 + frequency_slope a),
+ *                    damping ratio = ratio + damping_slope a + damping_reciprocal / a.
+ * damping_slope is quadratic damping (of m x'' + b |x'| x': 4 b w / (3 pi m) per unit of 2 w ratio),
+ * damping_reciprocal is dry friction.
+ */
+#ifndef VIBROIMPACT_AMPLITUDE_H
+#define VIBROIMPACT_AMPLITUDE_H
+
+#include <stdbool.h>
+
+typedef struct {
+    double frequency_slope;    /* 1/m */
+    double damping_slope;      /* 1/m */
+    double damping_reciprocal; /* m */
+} vi_amplitude_law;
+
+/* Does the amplitude matter at all? */
+bool vi_amplitude_acts(const vi_amplitude_law *law);
+
+/* sqrt(x^2 + (v / natural)^2) */
+double vi_amplitude_of(double displacement, double velocity, double natural);
+
+/* Natural angular frequency at an amplitude: at least a tenth of `natural`, where the law has left its range. */
+double vi_amplitude_natural(const vi_amplitude_law *law, double natural, double amplitude);
+
+/* Damping ratio at an amplitude: at least 0; the amplitude's share is at most 1, which stops dry motion within a period. */
+double vi_amplitude_ratio(const vi_amplitude_law *law, double ratio, double amplitude);
+
+#endif
