@@ -1,0 +1,269 @@
+"""The correlation dimension of intervals: slopes for every embedding, beside those of shuffled surrogates.
+
+A shuffled surrogate has the same intervals in no order. What it shows comes from their distribution; only what the
+intervals show and it does not is dynamics. A slope that keeps growing with the embedding is no dimension.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from vibroimpact.analysis.intervals.correlation import (
+    FEWEST_PAIRS,
+    WINDOW,
+    CorrelationSums,
+    correlation_sums,
+    count_pairs,
+    fitted_slopes,
+)
+from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain, Span
+from vibroimpact.fmus.correlation import RADII_PER_OCTAVE
+
+Scale = Literal["raw", "log"]
+SCALES: tuple[Scale, ...] = ("raw", "log")
+
+EMBEDDING, SURROGATES, THEILER = 6, 8, 1
+MOST_INTERVALS, FEWEST_INTERVALS, FEWEST_DISTINCT = 10_000, 200, 50
+# Ties are warned of where fewer than this part of the intervals are distinct.
+MOSTLY_DISTINCT = 0.9
+# Instants that differ by this part of the latest one or less differ by rounding alone.
+ROUNDING = 2.0**-44
+# A motion repeats where so many of the pairs that are the same in one interval are the same in all.
+REPEATS = 0.5
+# Growth of the slope per embedding, against that of the surrogate: stands still, keeps up, runs ahead; a surrogate that
+# flattens.
+STILL, KEEPS_UP, AHEAD, FLATTENS = 0.15, 0.85, 1.3, 0.75
+# So near to its end a slope has saturated.
+REACHED = 0.2
+# Slope of a plateau, and how much of all pairs it leaves out at least.
+FLAT, LEFT_OUT = 0.1, 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """Slopes of the correlation sums of one sequence and of its shuffled surrogates.
+
+    Attributes
+    ----------
+    scale : {"raw", "log"}
+        Intervals (s), or their natural logarithms.
+    sums : CorrelationSums or None
+        None where they were refused.
+    slopes : ndarray of float, shape (embedding,)
+        Fitted over `window`.
+    surrogate_sums, surrogate_local_slopes : ndarray of float, shape (embedding, radius)
+        Means over the surrogates.
+    surrogate_slopes, surrogate_spread : ndarray of float, shape (embedding,)
+        Mean and standard deviation over the surrogates.
+    window : tuple of float
+        Lowest and highest C of the fits.
+    words : str
+        What the slopes say, or why there are none.
+    warnings : tuple of str
+        What limits them.
+    """
+
+    scale: Scale
+    sums: CorrelationSums | None
+    slopes: Floats
+    surrogate_sums: Floats
+    surrogate_local_slopes: Floats
+    surrogate_slopes: Floats
+    surrogate_spread: Floats
+    window: Span
+    words: str
+    warnings: tuple[str, ...] = ()
+
+
+def interval_dimension(
+    train: IntervalTrain,
+    scale: Scale,
+    *,
+    embedding: int = EMBEDDING,
+    theiler: int = THEILER,
+    window: Span = WINDOW,
+    seed: int = 0,
+) -> Dimension:
+    """Return the slopes of the correlation sums of a train's intervals, beside those of their shuffled surrogates.
+
+    Parameters
+    ----------
+    train : IntervalTrain
+        At most its first 10,000 intervals are used.
+    scale : {"raw", "log"}
+        Heavy-tailed intervals flatten the raw slopes falsely; take their logarithms.
+    embedding, theiler, window
+        Largest m; pairs so near in order do not count; C of the fits.
+    seed : int
+        Of the shuffles.
+
+    Returns
+    -------
+    Dimension
+        With words for a reason, and no sums, where the intervals cannot tell.
+    """
+    values = _values(train, scale)
+    reason = _refusal(train, values, embedding)
+    if reason:
+        return _refused(scale, reason, embedding, window)
+    values = values[:MOST_INTERVALS]
+    sums = correlation_sums(values, embedding, theiler=theiler)
+    # between two points of a grid a radius tells nothing
+    above = 2.0 * train.resolution / (float(np.median(train.intervals)) if scale == "log" else 1.0)
+    slopes = fitted_slopes(sums, window, above=above)
+    rng = np.random.default_rng(seed)
+    shuffled = [
+        correlation_sums(_shuffled(values, rng), embedding, theiler=theiler, radii=sums.radii)
+        for _ in range(SURROGATES)
+    ]
+    others = np.array([fitted_slopes(s, window, above=above) for s in shuffled])
+    return Dimension(
+        scale,
+        sums,
+        slopes,
+        np.mean([s.sums for s in shuffled], axis=0),
+        np.mean([s.local_slopes for s in shuffled], axis=0),
+        others.mean(axis=0),
+        others.std(axis=0, ddof=1),
+        window,
+        verdict(slopes, others.mean(axis=0)) + _plateau(sums),
+        _warnings(train, values),
+    )
+
+
+def verdict(slopes: Floats, surrogate: Floats) -> str:
+    """Return in words what slopes in m = 1, 2, ... say, beside those of a shuffled surrogate.
+
+    Examples
+    --------
+    >>> verdict(np.array([0.9, 1.2, 1.2, 1.2]), np.array([0.9, 1.8, 2.7, 3.6]))
+    'saturation at 1.20 from m = 2 on, where the surrogate goes on to 3.60: low-dimensional'
+    """
+    if np.all(slopes == 0.0):
+        return "slope 0 at every embedding: a finite number of points, a periodic motion"
+    if np.any(~np.isfinite(slopes)) or np.any(~np.isfinite(surrogate)):
+        return "not decided: too few radii with C in the window"
+    top, against = slopes[-1], surrogate[-1]
+    numbers = f"{top:.2f} at m = {len(slopes)}, shuffled {against:.2f}"
+    growth, expected = np.diff(slopes)[-2:].mean(), np.diff(surrogate)[-2:].mean()
+    if top > AHEAD * against:
+        return f"no saturation: noise at these radii, about an ordered motion ({numbers})"
+    if surrogate[-1] < FLATTENS * len(slopes) * min(surrogate[0], 1.0) and top > KEEPS_UP * against:
+        return f"flattens as its shuffled surrogate does ({numbers}): the distribution, not dynamics; no dimension"
+    if top > KEEPS_UP * against and growth > STILL:
+        return f"no saturation: noise-like, as its shuffled surrogate ({numbers})"
+    if growth < STILL * max(expected, 1.0):
+        first = int(np.argmax(slopes > top - max(REACHED, 0.1 * top))) + 1
+        return (
+            f"saturation at {top:.2f} from m = {first} on, where the surrogate goes on to {against:.2f}: "
+            "low-dimensional"
+        )
+    return f"not decided: grows slower than its shuffled surrogate, but does not stand still ({numbers})"
+
+
+def _plateau(sums: CorrelationSums) -> str:
+    """Return in words over which radii C stands still for an octave or more, at the largest m."""
+    near, share = sums.near[-1], sums.sums[-1]
+    start = near[:-RADII_PER_OCTAVE]
+    flat = (start >= FEWEST_PAIRS) & (near[RADII_PER_OCTAVE:] <= start * 2.0**FLAT)
+    flat &= share[RADII_PER_OCTAVE:] < 1.0 - LEFT_OUT
+    places = np.flatnonzero(flat)
+    if not len(places):
+        return ""
+    low, high = sums.radii[places[0]], sums.radii[places[-1] + RADII_PER_OCTAVE]
+    return (
+        f"; slope 0 at radii from {low:.2g} to {high:.2g} (C = {share[places[0]]:.2g}): "
+        "there the intervals look like a finite number of points"
+    )
+
+
+def distinct_intervals(train: IntervalTrain) -> int:
+    """Return how many different intervals there are, those that differ by rounding alone being one."""
+    return len(np.unique(_rounded(train)))
+
+
+def _rounded(train: IntervalTrain) -> Floats:
+    quantum = max(float(np.max(np.abs(train.times))) * ROUNDING, float(np.finfo(np.float64).tiny))
+    steps: Floats = np.rint(train.separated / quantum)
+    # two roundings may part what is the same: join steps that are neighbours
+    known = steps[np.isfinite(steps)]
+    order = np.unique(known)
+    group = np.cumsum(np.concatenate([[0], np.diff(order) > 2.0]))
+    first = order[np.searchsorted(group, group)]
+    joined = np.full(len(steps), np.nan)
+    joined[np.isfinite(steps)] = first[np.searchsorted(order, known)] * quantum
+    return joined
+
+
+def _values(train: IntervalTrain, scale: Scale) -> Floats:
+    values = _rounded(train)
+    if scale == "raw":
+        return values
+    with np.errstate(divide="ignore"):
+        logarithms: Floats = np.log(values)
+    # events that coincide have no logarithm: vectors do not reach over them
+    return np.where(np.isfinite(logarithms), logarithms, np.nan)
+
+
+def _refusal(train: IntervalTrain, values: Floats, embedding: int) -> str:
+    known = values[np.isfinite(values)]
+    distinct = len(np.unique(known))
+    if len(known) < FEWEST_INTERVALS:
+        return f"refused: expected at least {FEWEST_INTERVALS} intervals, got {len(known)}"
+    if count_pairs(np.isfinite(values[:MOST_INTERVALS]), embedding, 0) < FEWEST_INTERVALS:
+        return f"refused: too few successive intervals without a mask between them for vectors of {embedding}"
+    if distinct == 1:
+        return "slope 0: all intervals are the same, a periodic motion"
+    if distinct >= FEWEST_DISTINCT:
+        return ""
+    if _repeats(values, embedding):
+        return f"slope 0: {distinct} distinct intervals in an order that repeats, a periodic motion"
+    grid = f" (they lie on a grid of {train.resolution:.3g} s)" if train.resolution > 0.0 else ""
+    return (
+        f"refused: only {distinct} distinct intervals among {len(known)}{grid}; expected at least "
+        f"{FEWEST_DISTINCT}: below their spacing every slope is that of the grid"
+    )
+
+
+def _repeats(values: Floats, embedding: int) -> bool:
+    """Return whether intervals that are the same go on being the same, as in a periodic motion."""
+    known = np.unique(values[np.isfinite(values)])
+    spacing = float(np.min(np.diff(known)))
+    sums = correlation_sums(
+        values[: FEWEST_INTERVALS * 5] / spacing, embedding, radii=np.array([0.5, 0.5625])
+    )
+    same = sums.sums[:, 0]
+    return bool(same[-1] > REPEATS * same[0])
+
+
+def _shuffled(values: Floats, rng: np.random.Generator) -> Floats:
+    """Return the values in another order; what is not known stays where it is."""
+    shuffled = values.copy()
+    known = np.isfinite(values)
+    shuffled[known] = rng.permutation(values[known])
+    return shuffled
+
+
+def _warnings(train: IntervalTrain, values: Floats) -> tuple[str, ...]:
+    known = values[np.isfinite(values)]
+    distinct = len(np.unique(known))
+    lines = [
+        f"with {len(known)} intervals no slope above about {2.0 * np.log10(len(known)):.1f} can be told "
+        "(2 log10 of their number)"
+    ]
+    if len(train.separated) > len(values):
+        lines.append(f"only the first {len(values)} of {len(train.separated)} intervals are used")
+    if distinct < MOSTLY_DISTINCT * len(known):
+        lines.append(
+            f"ties: only {distinct} of {len(known)} intervals are distinct; small radii are not trustworthy"
+        )
+    return tuple(lines)
+
+
+def _refused(scale: Scale, reason: str, embedding: int, window: Span) -> Dimension:
+    slopes = np.full(embedding, 0.0 if reason.startswith("slope 0") else np.nan)
+    unknown, nothing = np.full(embedding, np.nan), np.empty((embedding, 0))
+    return Dimension(scale, None, slopes, nothing, nothing, unknown, unknown, window, reason)

@@ -1,0 +1,97 @@
+"""Missed beats of a nearly periodic train: intervals that are too long for their neighbourhood.
+
+The yardstick is the median of the intervals around each one, so a rate that drifts is no gap, and neither is a
+neighbouring gap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
+
+# Intervals on either side of one that make its median.
+NEIGHBOURS = 10
+# A gap is longer than so many local medians: between one beat and two.
+LONGEST_BEAT = 1.5
+# Robust coefficient of variation about the local median up to which one beat and two can be told apart.
+NEARLY_PERIODIC = 0.2
+FEWEST_INTERVALS = 10
+# Median absolute deviation to standard deviation, of a normal distribution.
+MAD_TO_SIGMA = 1.4826
+
+
+@dataclass(frozen=True, slots=True)
+class Gaps:
+    """Intervals in which beats are missing.
+
+    Attributes
+    ----------
+    place : ndarray of int, shape (gap,)
+        Index of the interval among all intervals of the train.
+    missing : ndarray of int, shape (gap,)
+        Beats that each would have had: its length in local medians, rounded, less one.
+    ratio : ndarray of float, shape (interval,)
+        Each interval over its local median; NaN where masked.
+    spread : float
+        Robust coefficient of variation about the local median.
+    reason : str
+        Why none were looked for; empty when they were.
+    """
+
+    place: NDArray[np.intp]
+    missing: NDArray[np.int64]
+    ratio: Floats
+    spread: float
+    reason: str = ""
+
+
+def find_gaps(train: IntervalTrain) -> Gaps:
+    """Return the gaps of a nearly periodic train.
+
+    Valid where intervals scatter by less than about a fifth about their local median; otherwise one beat and two
+    overlap, and none are looked for.
+
+    Examples
+    --------
+    >>> from vibroimpact.analysis.intervals import interval_train
+    >>> beats = np.delete(np.arange(40.0), [7, 20, 21])
+    >>> found = find_gaps(interval_train(beats))
+    >>> found.place.tolist(), found.missing.tolist()
+    ([6, 18], [1, 2])
+    """
+    intervals = train.intervals
+    nothing = np.empty(0, dtype=np.intp)
+    ratio = np.full(len(train.kept), np.nan)
+    if len(intervals) < FEWEST_INTERVALS:
+        reason = f"expected at least {FEWEST_INTERVALS} intervals, got {len(intervals)}"
+        return Gaps(nothing, nothing, ratio, float("nan"), reason)
+    typical = local_median(intervals)
+    if not np.all(typical > 0.0):
+        return Gaps(nothing, nothing, ratio, float("nan"), "most events of some neighbourhood coincide")
+    ratio[train.kept] = intervals / typical
+    centred = ratio[train.kept]
+    spread = float(MAD_TO_SIGMA * np.median(np.abs(centred - np.median(centred))))
+    if spread > NEARLY_PERIODIC:
+        reason = (
+            f"the train is not nearly periodic: its intervals scatter by {100 * spread:.0f} % about their local "
+            f"median; expected at most {100 * NEARLY_PERIODIC:.0f} %"
+        )
+        return Gaps(nothing, nothing, ratio, spread, reason)
+    place = np.flatnonzero(np.nan_to_num(ratio) > LONGEST_BEAT)
+    missing = np.maximum(np.rint(ratio[place]).astype(np.int64) - 1, 1)
+    return Gaps(place, missing, ratio, spread)
+
+
+def local_median(values: Floats) -> Floats:
+    """Return the median of the neighbours of each value, itself left out; windows shrink at no end but shift."""
+    reach = min(NEIGHBOURS, (len(values) - 1) // 2)
+    windows = np.lib.stride_tricks.sliding_window_view(values, 2 * reach + 1)
+    others = np.delete(windows, reach, axis=1)
+    middle = np.median(others, axis=1)
+    return np.concatenate(
+        [np.full(reach, middle[0]), middle, np.full(len(values) - reach - len(middle), middle[-1])]
+    )

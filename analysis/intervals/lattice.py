@@ -1,0 +1,222 @@
+"""Missed and spurious spikes of a motion with one spike per period, from the lattice that its intervals make.
+
+True spikes of a period-1 motion lie one interval I apart. One missed makes an interval 2I, so the points of the delay
+plot lie on the lattice (iI, jI); one too many cuts an interval in two, whose points lie on the lines x = I, y = I and
+x + y = I (thesis 5.4.2 and figure 5.13). The estimate goes back to the events: those at the phase of the lattice are
+true, the others spurious, and places of the lattice without an event were missed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import beta
+
+from vibroimpact.analysis.intervals.density import interval_density
+from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
+
+FEWEST_EVENTS = 30
+# Events whose phases are averaged for the place of the lattice: it may drift, slowly.
+WINDOW = 41
+# An event is on the lattice within so many standard deviations of the true ones, but never nearer than NEAREST of an
+# interval, and where that would be more than FARTHEST of one the lattice is blurred.
+SIGMAS, NEAREST, FARTHEST = 5.0, 0.005, 0.2
+# Least part of all events on the lattice.
+MOSTLY = 0.7
+ROUNDS = 4
+# Spans of up to so many events sharpen the interval; their ends are on the lattice within this part of it.
+LONGEST_SPAN, HALF_WAY = 64, 0.25
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """A probability from a count: its estimate, standard error, and one-sided 95 % upper bound (Clopper-Pearson)."""
+
+    value: float
+    standard_error: float
+    upper: float
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """What the lattice of a period-1 train says.
+
+    Attributes
+    ----------
+    interval : float
+        I, s.
+    jitter : float
+        Standard deviation of true spikes about their places, s.
+    missed, spurious : Share
+        p: a true spike is missed; s: an interval of the true motion has a spurious spike.
+    places, counted_missed, counted_spurious : int
+        Places of the lattice, those without an event, and events between them.
+    on_lattice : ndarray of bool, shape (event,)
+    reason : str
+        Why there is no lattice; empty when there is.
+    """
+
+    interval: float
+    jitter: float
+    missed: Share
+    spurious: Share
+    places: int
+    counted_missed: int
+    counted_spurious: int
+    on_lattice: NDArray[np.bool_]
+    reason: str = ""
+
+
+def interval_lattice(train: IntervalTrain) -> Lattice:
+    """Return missed and spurious spikes of a motion with one spike per period.
+
+    Valid where misses are independent of each other, spurious spikes come at any phase and at most one in an interval,
+    and true spikes keep the phase of a clock (a forcing) that drifts slowly or not at all. Spurious spikes that fall
+    on the lattice cannot be seen; their number is made up for.
+
+    Parameters
+    ----------
+    train : IntervalTrain
+        Its most frequent interval is the first guess of I.
+
+    Returns
+    -------
+    Lattice
+        With a reason, and shares of NaN, where there is no such lattice.
+
+    Examples
+    --------
+    >>> from vibroimpact.analysis.intervals import interval_train
+    >>> times = np.delete(np.arange(200.0), [10, 50, 51, 120])
+    >>> lattice = interval_lattice(interval_train(np.sort(np.append(times, [30.4, 77.7]))))
+    >>> lattice.interval, lattice.counted_missed, lattice.counted_spurious
+    (1.0, 4, 2)
+    """
+    times = train.times
+    if len(times) < FEWEST_EVENTS:
+        return no_lattice(train, f"expected at least {FEWEST_EVENTS} events, got {len(times)}")
+    guess = _most_frequent(train)
+    if not guess > 0.0:
+        return no_lattice(train, "the most frequent interval is 0 s")
+    interval, offset = _clock(times, guess)
+    jitter, width = _widths(offset, train.resolution / interval)
+    on_lattice = np.abs(offset) < width
+    if width > FARTHEST:
+        return no_lattice(
+            train,
+            f"no single lattice: events scatter by {100 * jitter:.0f} % of the most frequent interval "
+            f"({interval:.4g} s) about its multiples; expected at most {100 * FARTHEST / SIGMAS:.0f} %",
+        )
+    if np.mean(on_lattice) < MOSTLY:
+        return no_lattice(
+            train,
+            f"no single lattice: {100 * np.mean(on_lattice):.0f} % of the events lie at multiples of the most "
+            f"frequent interval ({interval:.4g} s); expected at least {100 * MOSTLY:.0f} %",
+        )
+    return _shares(train, interval, jitter, width, offset, on_lattice)
+
+
+def _most_frequent(train: IntervalTrain) -> float:
+    density = interval_density(train.intervals, resolution=train.resolution)
+    return float(density.at[np.argmax(density.kernel)])
+
+
+def _clock(times: Floats, guess: float) -> tuple[float, Floats]:
+    """Return the interval of the lattice and each event's offset from its nearest place, in intervals (-.5 to .5).
+
+    The place of the lattice near an event is the mean phase of the events around it, first of all, then of those found
+    on the lattice.
+    """
+    interval, weight = _sharpened(times, guess), np.ones(len(times))
+    phase = np.exp(2j * np.pi * (times - times[0]) / interval)
+    offset = np.zeros(len(times))
+    for _ in range(ROUNDS):
+        mean = _running_sum(phase * weight)
+        # what is left of a drift is smaller each time
+        phase = phase * np.exp(-1j * np.angle(mean))
+        offset = np.angle(phase) / (2.0 * np.pi)
+        weight = (np.abs(offset) < max(_widths(offset, 0.0)[1], NEAREST)).astype(np.float64)
+    return interval, offset
+
+
+def _sharpened(times: Floats, guess: float) -> float:
+    """Return the interval of the lattice, from longer and longer spans; each serves to count the next."""
+    interval, reach = guess, 1
+    while reach <= min(LONGEST_SPAN, len(times) // 4):
+        spans = times[reach:] - times[:-reach]
+        number = np.rint(spans / interval)
+        beside = spans / interval - number
+        near = (np.abs(beside) < HALF_WAY) & (number > 0.0)
+        if not near.any():
+            break
+        interval *= 1.0 + float(np.median(beside[near] / number[near]))
+        reach *= 2
+    return interval
+
+
+def _running_sum(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return the sum over the neighbours of each value, fewer at the ends."""
+    half = min(WINDOW, len(values)) // 2
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    first = np.maximum(np.arange(len(values)) - half, 0)
+    last = np.minimum(np.arange(len(values)) + half + 1, len(values))
+    return np.asarray(total[last] - total[first])
+
+
+def _widths(offset: Floats, resolution: float) -> tuple[float, float]:
+    """Return the jitter, and how far from its place an event may be, in intervals."""
+    jitter = 1.4826 * float(np.median(np.abs(offset)))
+    return jitter, max(SIGMAS * jitter, NEAREST, 1.5 * resolution)
+
+
+def _shares(
+    train: IntervalTrain,
+    interval: float,
+    jitter: float,
+    width: float,
+    offset: Floats,
+    on_lattice: NDArray[np.bool_],
+) -> Lattice:
+    """Count places from one true event to the next, wherever nothing masked lies between them."""
+    true = np.flatnonzero(on_lattice)
+    steps = np.rint(np.diff(train.times[true]) / interval - np.diff(offset[true])).astype(np.int64)
+    masked = np.concatenate([[0], np.cumsum(~train.kept)])
+    clear = masked[true[1:]] == masked[true[:-1]]
+    # two events at one place are one true and one spurious
+    double = clear & (steps == 0)
+    between = np.where(clear, np.diff(true) - 1, 0)
+    places = int(steps[clear].sum())
+    empty = int(np.maximum(steps[clear] - 1, 0).sum())
+    extra = int(between.sum())
+    # a spurious event within `width` of a place is taken for a true one, or stands in for a missed one
+    spurious = _share(extra, places, 1.0 - 2.0 * width)
+    missed = _share(empty, places, 1.0 - 2.0 * width * spurious.value)
+    return Lattice(
+        interval, jitter * interval, missed, spurious, places, empty, extra + int(double.sum()), on_lattice
+    )
+
+
+def _share(count: int, trials: int, seen: float) -> Share:
+    """Return the probability of what is seen only in a part of all cases."""
+    value = count / trials
+    error = np.sqrt(value * (1.0 - value) / trials) if value < 1.0 else float("nan")
+    upper = float(beta.ppf(0.95, count + 1, trials - count)) if count < trials else 1.0
+    return Share(min(value / seen, 1.0), float(error / seen), min(upper / seen, 1.0))
+
+
+def no_lattice(train: IntervalTrain, reason: str) -> Lattice:
+    """Return a lattice that is none, for a reason."""
+    unknown = Share(*(float("nan"),) * 3)
+    return Lattice(
+        float("nan"),
+        float("nan"),
+        unknown,
+        unknown,
+        0,
+        0,
+        0,
+        np.zeros(len(train.times), dtype=np.bool_),
+        reason,
+    )

@@ -1,0 +1,132 @@
+"""Everything that a train of events tells, in one dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import xarray as xr
+
+from vibroimpact.analysis.intervals.cycles import Cycle, cycle_of_lattice, read_cycle
+from vibroimpact.analysis.intervals.density import Density, interval_density
+from vibroimpact.analysis.intervals.dimension import EMBEDDING, SCALES, THEILER, interval_dimension
+from vibroimpact.analysis.intervals.gaps import find_gaps
+from vibroimpact.analysis.intervals.lattice import Lattice, interval_lattice, no_lattice
+from vibroimpact.analysis.intervals.report_parts import (
+    density_part,
+    dimension_part,
+    gap_part,
+    interval_part,
+    lattice_part,
+    variability_part,
+)
+from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain, Span, interval_train
+from vibroimpact.fmus.correlation import MOST_EMBEDDING
+from vibroimpact.fmus.errors import UsageError
+
+
+def interval_report(
+    times: Floats,
+    *,
+    window: Span | None = None,
+    masked: Sequence[Span] = (),
+    forcing_period: float | None = None,
+    resolution: float = 0.0,
+    count_bin: float | None = None,
+    embedding: int = EMBEDDING,
+    theiler: int = THEILER,
+    seed: int = 0,
+) -> xr.Dataset:
+    """Return what the intervals of a train of events tell.
+
+    Parameters
+    ----------
+    times : ndarray of float, shape (event,)
+        s, ascending; two may coincide.
+    window : tuple of float, optional
+        Start and end of the observation, s; by default the first and the last event.
+    masked : sequence of (float, float)
+        Spans (start, end) of no observation, s; see `seams`.
+    forcing_period : float, optional
+        s; needed to read q of a P(p,q) motion.
+    resolution : float
+        Grid on which the instants were written, s; 0 where none shows.
+    count_bin : float, optional
+        Bin of the Fano factor, s; by default the mean interval, rounded to one digit.
+    embedding, theiler : int
+        Of the correlation sums: most intervals in a delay vector, 2 to 16; pairs of vectors at most so many places
+        apart do not count.
+    seed : int
+        Of the shuffled surrogates.
+
+    Returns
+    -------
+    xarray.Dataset
+        Intervals, rate, coefficient of variation, Fano factors; densities; gaps; lattice rates; correlation sums of raw
+        intervals and of their logarithms with surrogates. What was read from them in words, and why something was
+        refused, is in the attributes `cycle`, `lattice`, `gaps`, `dimension_raw`, `dimension_log`, and what limits the
+        last two in `dimension_raw_warnings`, `dimension_log_warnings`.
+
+    Raises
+    ------
+    EstimationError
+        There are fewer than three events, all are at one instant, or every interval is masked.
+    UsageError
+        An argument is out of its range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> report = interval_report(np.arange(0.0, 50.0, 0.5), forcing_period=0.5)
+    >>> float(report["rate"]), report.attrs["cycle"][:6]
+    (2.0, 'P(1,1)')
+    """
+    for name, value in (("forcing_period", forcing_period), ("count_bin", count_bin)):
+        if value is not None and not 0.0 < value < float("inf"):
+            raise UsageError(f"intervals: {name}: expected more than 0 s, got {value}.")
+    if not 2 <= embedding <= MOST_EMBEDDING or theiler < 0:
+        raise UsageError(
+            f"intervals: expected an embedding from 2 to {MOST_EMBEDDING} and a Theiler window of 0 or more, "
+            f"got {embedding} and {theiler}."
+        )
+    train = interval_train(times, window=window, masked=masked, resolution=resolution)
+    density = interval_density(train.intervals, resolution=resolution)
+    cycle, lattice = read_motion(train, density, forcing_period)
+    parts = (
+        interval_part(train),
+        variability_part(train, count_bin),
+        density_part(density, cycle),
+        gap_part(train, find_gaps(train)),
+        lattice_part(train, lattice),
+        *(
+            dimension_part(interval_dimension(train, scale, embedding=embedding, theiler=theiler, seed=seed))
+            for scale in SCALES
+        ),
+    )
+    report = xr.merge(parts, combine_attrs="no_conflicts")
+    return report.assign_attrs(
+        events=len(train.times),
+        window=[float(edge) for edge in train.window],
+        window_from="given" if train.stated else "first and last event",
+        masked_spans=len(train.masked),
+        resolution=resolution,
+        forcing_period=forcing_period or 0.0,
+        seed=seed,
+    )
+
+
+def read_motion(
+    train: IntervalTrain, density: Density, forcing_period: float | None
+) -> tuple[Cycle, Lattice]:
+    """Return the motion that the intervals show, and the lattice if it has one spike per cycle.
+
+    Intervals that repeat after two or more make no single lattice; with missed spikes a lattice often repeats after
+    nothing, and the motion is read from the lattice.
+    """
+    cycle = read_cycle(train, density, forcing_period)
+    if cycle.impacts > 1:
+        reason = f"no single lattice: the intervals repeat after {cycle.impacts}"
+        return cycle, no_lattice(train, reason)
+    lattice = interval_lattice(train)
+    if not cycle.impacts and not lattice.reason:
+        return cycle_of_lattice(lattice, cycle.peaks, forcing_period), lattice
+    return cycle, lattice

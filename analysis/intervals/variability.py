@@ -1,0 +1,127 @@
+"""How regular a train is: rate, coefficient of variation, Fano factor.
+
+What is estimated says how: the standard error of the rate comes from counts in long bins, which keeps the memory of
+the train; the Fano factor depends on its bins, so their width is stated and their offset varied.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
+
+# Bins of the standard error of a rate, and places of the first bin tried for a Fano factor.
+RATE_BINS, OFFSETS = 20, 20
+# Widths of the Fano curve, in mean intervals, and the fewest bins that give a variance.
+CURVE = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+FEWEST_BINS = 10
+# Of a bin: ends that differ by rounding alone are the same.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """Events per second, and its standard error."""
+
+    value: float
+    standard_error: float
+
+
+@dataclass(frozen=True, slots=True)
+class FanoFactor:
+    """Variance (ddof 1) over mean of the counts in bins.
+
+    Attributes
+    ----------
+    width : float
+        Of the bins, s.
+    bins : int
+        How many.
+    value : float
+        With the first bin at the start of the window.
+    standard_error : float
+        sqrt(2 / (bins - 1)) of the value: as if the counts were normal and independent.
+    lowest, highest : float
+        Over `OFFSETS` places of the first bin.
+    """
+
+    width: float
+    bins: int
+    value: float
+    standard_error: float
+    lowest: float
+    highest: float
+
+
+def rate(train: IntervalTrain) -> Rate:
+    """Return events per second of observation.
+
+    In a window that was given, events over its duration; otherwise intervals over the span from the first event to
+    the last. The standard error comes from the counts in 20 long bins (as it would from any 20 independent repeats);
+    NaN where there are too few events.
+    """
+    events = len(train.times) - (0 if train.stated else 1)
+    value = events / train.duration
+    counts = bin_counts(train, (train.window[1] - train.window[0]) / RATE_BINS)
+    if len(counts) < FEWEST_BINS or events < 2 * RATE_BINS:
+        return Rate(value, float("nan"))
+    relative = np.std(counts, ddof=1) / np.mean(counts) / np.sqrt(len(counts))
+    return Rate(value, float(value * relative))
+
+
+def coefficient_of_variation(train: IntervalTrain) -> float:
+    """Return standard deviation (ddof 0) over mean of the intervals that count: 1 for a Poisson process."""
+    intervals = train.intervals
+    return float(np.std(intervals) / np.mean(intervals))
+
+
+def fano_factor(train: IntervalTrain, width: float) -> FanoFactor:
+    """Return the Fano factor of the counts in bins of a width (s).
+
+    The bins start with the window; the part of the window that they do not fill, and bins that touch a masked span,
+    do not count. All values are NaN where there are fewer than 10 bins.
+    """
+    counts = bin_counts(train, width)
+    if len(counts) < FEWEST_BINS:
+        return FanoFactor(width, len(counts), *(float("nan"),) * 4)
+    value = _variance_to_mean(counts)
+    shifted = [_variance_to_mean(bin_counts(train, width, k * width / OFFSETS)) for k in range(OFFSETS)]
+    error = value * np.sqrt(2.0 / (len(counts) - 1))
+    return FanoFactor(width, len(counts), value, float(error), min(shifted), max(shifted))
+
+
+def fano_curve(train: IntervalTrain) -> list[FanoFactor]:
+    """Return the Fano factor at several widths, in steps of mean intervals, as far as the train is long enough."""
+    mean = float(np.mean(train.intervals))
+    factors = (fano_factor(train, mean * multiple) for multiple in CURVE)
+    return [factor for factor in factors if np.isfinite(factor.value)]
+
+
+def usual_bin(train: IntervalTrain) -> float:
+    """Return the mean interval (s), rounded to one digit."""
+    mean = float(np.mean(train.intervals))
+    return float(f"{mean:.0e}")
+
+
+def bin_counts(train: IntervalTrain, width: float, offset: float = 0.0) -> Floats:
+    """Return the counts in the bins that lie in the window and touch no masked span."""
+    start, end = train.window[0] + offset, train.window[1]
+    number = int((end - start) / width + ROUNDING)
+    if number < 1:
+        return np.empty(0)
+    edges = start + width * np.arange(number + 1)
+    # an event at an edge belongs to the bin that begins there, whatever the last digit says
+    place = np.searchsorted(edges - ROUNDING * width, train.times, "right") - 1
+    inside = place[(place >= 0) & (place < number)]
+    counts = np.bincount(inside, minlength=number).astype(np.float64)
+    clear = np.ones(number, dtype=np.bool_)
+    for first, last in train.masked:
+        clear &= (edges[1:] <= first) | (edges[:-1] >= last)
+    return counts[clear]
+
+
+def _variance_to_mean(counts: Floats) -> float:
+    mean = float(np.mean(counts))
+    return float(np.var(counts, ddof=1) / mean) if mean > 0.0 else float("nan")
