@@ -1,0 +1,105 @@
+"""The slowly moving offset of a signal: a running median, which spikes that take less than half the time cannot move.
+
+Thesis section 5.2.2: the zero of a strain gauge drifts during an experiment, and with it the meaning of a threshold.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+#: Median absolute deviation of normal noise times this is its standard deviation.
+MAD_TO_SIGMA = 1.482602218505602
+#: A median of fewer samples is no offset.
+_FEWEST_SAMPLES = 32
+#: Of a block, this part must be free of spikes for its median to be used.
+_LEAST_FREE = 0.25
+#: A window half as long is taken only if it lowers the noise by more than this.
+_WORTH = 0.05
+#: Windows are at least this many times the longest spike, which then moves their median by 3 % of the noise.
+_SPIKES_IN_WINDOW = 20
+
+
+def robust_sigma(values: Floats) -> float:
+    """Return the standard deviation of the noise in a signal at rest most of the time: 1.4826 MAD about 0.
+
+    Examples
+    --------
+    >>> quiet = np.tile([-1.0, 1.0], 50)
+    >>> round(robust_sigma(np.append(quiet, 1000.0)), 4)
+    1.4826
+    """
+    return float(MAD_TO_SIGMA * np.median(np.abs(values))) if values.size else 0.0
+
+
+def running_median(values: Floats, window: int, used: NDArray[np.bool_] | None = None) -> Floats:
+    """Return medians of windows that overlap by half, joined by straight lines.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+    window : int
+        Samples in a window; a window as long as the signal gives one constant.
+    used : ndarray of bool, shape (sample,), optional
+        Samples to take; a window with less than a quarter of them is bridged.
+
+    Returns
+    -------
+    ndarray of float, shape (sample,)
+
+    Examples
+    --------
+    >>> signal = np.full(100, 3.0)
+    >>> signal[40:44] = 50.0
+    >>> float(np.ptp(running_median(signal, 40)))
+    0.0
+    """
+    length = len(values)
+    kept = np.ones(length, dtype=bool) if used is None else used
+    if window >= length or length < 2 * _FEWEST_SAMPLES:
+        return np.full(length, float(np.median(values[kept])) if np.any(kept) else 0.0)
+    centres, medians = [], []
+    for start in range(0, length - window // 2, max(1, window // 2)):
+        stop = min(start + window, length)
+        part = values[start:stop][kept[start:stop]]
+        if part.size >= _LEAST_FREE * (stop - start):
+            centres.append(0.5 * (start + stop - 1))
+            medians.append(float(np.median(part)))
+    if not medians:
+        return running_median(values, length, used)
+    # straight on to both ends: a constant there would leave the slope of the drift as a spike
+    for end, beside, place in ((0, 1, -0.5), (-1, -2, length - 0.5)):
+        if len(medians) > 1 and len(centres) > 1:
+            slope = (medians[end] - medians[beside]) / (centres[end] - centres[beside])
+            value = medians[end] + slope * (place - centres[end])
+            where = 0 if end == 0 else len(centres)
+            centres.insert(where, place)
+            medians.insert(where, value)
+    return np.interp(np.arange(length), centres, medians)
+
+
+def drift_window(values: Floats, longest_spike: int, used: NDArray[np.bool_]) -> int:
+    """Return the longest window (samples) that follows the drift.
+
+    From the whole signal down, a window is halved while that lowers the noise of what is left by more than
+    5 %, and never below 20 times the longest spike.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+    longest_spike : int
+        Samples.
+    used : ndarray of bool, shape (sample,)
+        Samples outside spikes.
+    """
+    shortest = max(2 * _FEWEST_SAMPLES, _SPIKES_IN_WINDOW * longest_spike)
+    window = len(values)
+    best, lowest = window, robust_sigma((values - running_median(values, window, used))[used])
+    while window // 2 >= shortest:
+        window //= 2
+        noise = robust_sigma((values - running_median(values, window, used))[used])
+        if noise < (1.0 - _WORTH) * lowest:
+            best, lowest = window, noise
+    return best

@@ -1,0 +1,145 @@
+"""From pulses to mechanics: the part of the time in contact, impact velocities, calibration of a load cell.
+
+Thesis sections 5.2.4 and 5.3, equations (5.1) to (5.6).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.errors import EstimationError, UsageError
+
+Floats = NDArray[np.float64]
+
+#: The rigid-impact model is taken to be adequate below this contact-time measure (thesis section 5.2.4).
+SHORT_CONTACT = 0.025
+
+
+@dataclass(frozen=True, slots=True)
+class ContactTime:
+    """The contact-time measure: part of the time in contact, with its standard error and the time it is over (s)."""
+
+    measure: float
+    standard_error: float
+    span: float
+    count: int
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Sensitivity of a load cell, V/N, with its standard error and the relative scatter of single impulses."""
+
+    sensitivity: float
+    standard_error: float
+    scatter: float
+
+
+def contact_time_measure(start: Floats, duration: Floats) -> ContactTime:
+    """Return the part of the time in which the spikes are above the threshold (thesis eq. 5.3).
+
+    mu_H = (1/t_n) sum S_j over the spikes fired from the first firing to the last one, without the last, which is
+    not completed within t_n. It is a ratio of two means, of which the standard error is taken: that of
+    S_j - mu_H I_j over the mean interval.
+
+    Parameters
+    ----------
+    start : ndarray of float, shape (spike,)
+        Firing times, s.
+    duration : ndarray of float, shape (spike,)
+        Time above the threshold, s.
+
+    Raises
+    ------
+    EstimationError
+        Less than two spikes.
+
+    Examples
+    --------
+    >>> found = contact_time_measure(np.array([0.0, 0.05, 0.1, 0.15]), np.array([1.2, 1.0, 1.4, 1.1]) * 1e-3)
+    >>> round(found.measure, 6)
+    0.024
+    """
+    if len(start) < 2:
+        raise EstimationError(f"contact time: expected at least 2 spikes, got {len(start)}.")
+    intervals, contacts = np.diff(start), duration[:-1]
+    span = float(intervals.sum())
+    measure = float(contacts.sum()) / span
+    count = len(intervals)
+    error = np.nan
+    if count > 1:
+        left = contacts - measure * intervals
+        error = float(np.sqrt(np.sum(left**2) / (count - 1) / count) / np.mean(intervals))
+    return ContactTime(measure, error, span, count)
+
+
+def impact_velocity(impulse: Floats, restitution: float, mass: float | None) -> Floats:
+    """Return the velocity before impact from the impulse (thesis eq. 5.6): V = J / (m (1 + r)).
+
+    Parameters
+    ----------
+    impulse : ndarray of float, shape (spike,)
+        N s; of an acceleration (m/s) where `mass` is None.
+    restitution : float
+        0 to 1.
+    mass : float or None
+        Effective mass of the contact in the model in use, kg.
+
+    Raises
+    ------
+    UsageError
+        Restitution or mass out of its range.
+
+    Examples
+    --------
+    >>> impact_velocity(np.array([4e-4]), 0.6, 0.02).round(6)
+    array([0.0125])
+    """
+    if not 0.0 <= restitution <= 1.0:
+        raise UsageError(f"restitution: expected 0 <= r <= 1, got {restitution!r}.")
+    if mass is not None and not mass > 0.0:
+        raise UsageError(f"mass: expected more than 0 kg, got {mass!r}.")
+    velocity: Floats = np.abs(impulse) / ((mass or 1.0) * (1.0 + restitution))
+    return velocity
+
+
+def calibrate(measured: Floats, known: Floats) -> Calibration:
+    """Fit the sensitivity of a load cell to impulses that are known.
+
+    Least squares through the origin: measured (V s) = sensitivity (V/N) times known (N s).
+
+    Parameters
+    ----------
+    measured : ndarray of float, shape (spike,)
+        V s, as `measure_pulses` gives it for a channel in volts.
+    known : ndarray of float, shape (spike,)
+        N s, from a pendulum or a dropped mass.
+
+    Raises
+    ------
+    UsageError
+        Not as many impulses known as spikes were found.
+    EstimationError
+        None of the known impulses differs from 0.
+
+    Examples
+    --------
+    >>> round(calibrate(np.array([0.218, 0.436]), np.array([10.0, 20.0])).sensitivity, 6)
+    0.0218
+    """
+    if len(measured) != len(known):
+        raise UsageError(
+            f"known impulses: expected one for each of the {len(measured)} spikes found, got {len(known)}."
+        )
+    power = float(np.sum(known**2))
+    if power == 0.0:
+        raise EstimationError("calibration: expected known impulses other than 0, got none.")
+    sensitivity = float(np.sum(measured * known)) / power
+    left = measured - sensitivity * known
+    if len(known) < 2:
+        return Calibration(sensitivity, np.nan, np.nan)
+    variance = float(np.sum(left**2)) / (len(known) - 1)
+    scatter = float(np.sqrt(variance * len(known) / power) / abs(sensitivity)) if sensitivity else np.nan
+    return Calibration(sensitivity, float(np.sqrt(variance / power)), scatter)

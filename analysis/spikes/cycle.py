@@ -1,0 +1,250 @@
+"""Periodic excitation in a signal: whether there is any, its period, and the waveform of its cycle.
+
+A forced system's signal repeats with the forcing; its spikes and shocks do not. The median over all cycles, phase by
+phase, is the periodic part: a shock in a few of them cannot move it. A train of spikes may repeat just as well, and is
+what is looked for; it differs in that the signal rests most of the time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import get_window
+
+from vibroimpact.analysis.spikes.baseline import MAD_TO_SIGMA, robust_sigma, running_median
+
+Floats = NDArray[np.float64]
+
+#: A median over fewer cycles is not the periodic part.
+FEWEST_CYCLES = 10
+#: Fewer samples in a cycle do not show its waveform.
+_FEWEST_SAMPLES = 8
+#: The signal without its periodic part must be quieter than this part of the signal.
+_MOST_LEFT = 0.5
+#: Largest change of the amplitude from the first to the last third of the cycles; a ring decays by more.
+_STEADY = 0.1
+#: The strongest line may be a harmonic of the fundamental, up to this one.
+_HARMONICS = 8
+#: A longer period must lower what is left by this factor to be the true one.
+_LONGER_PAYS = 0.7
+_REFINEMENTS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """The periodic part of a signal, or why there is none.
+
+    Attributes
+    ----------
+    period : float
+        Samples; 0 where nothing repeats.
+    periodic : ndarray of float, shape (sample,)
+        The periodic part, about the signal's own mean level; zeros where there is none.
+    count : int
+        Cycles in the signal.
+    left : float
+        Noise without the periodic part, as a part of the noise with it.
+    reason : str
+        Why it is an excitation or why not, in words.
+    """
+
+    period: float
+    periodic: Floats
+    count: int
+    left: float
+    reason: str
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a periodic excitation."""
+        return self.period > 0.0
+
+
+def find_cycle(values: Floats, period: float | None = None) -> Cycle:
+    """Look for a periodic excitation.
+
+    It is one if (a) at least ten cycles are there; (b) the median over its cycles, taken off, leaves less than
+    half of the signal's median magnitude: a train of spikes rests most of the time, so that its median magnitude is
+    noise already, and noise has no cycle; (c) its amplitude in the first and the last third of the cycles agrees
+    within 10 %: a ring decays.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+        Evenly sampled, no gaps.
+    period : float, optional
+        Samples; given, it is refined no further and nothing is tested.
+    """
+    level = values - running_median(values, max(len(values) // 4, 1))
+    if period is not None:
+        return _folded(values, period, f"a period of {period:g} samples was asked for")
+    first = _strongest_line(level)
+    if first is None:
+        return _none(values, "too short for ten cycles")
+    best = _fundamental(level, first)
+    if best is None:
+        return _none(values, "no ten cycles of any line in its spectrum")
+    if best.left > _MOST_LEFT:
+        return _none(
+            values,
+            f"no cycle explains it: {min(best.left, 1.0):.0%} of its noise is left without the best one",
+        )
+    change = _change_of_amplitude(level, best)
+    if change > _STEADY:
+        return _none(values, f"what repeats is not steady: its amplitude changes by {change:.0%}")
+    # the drift again, now without the ripple that whole cycles leave in a running median
+    drift = running_median(values - best.periodic, max(len(values) // 4, 1))
+    return _folded(values - drift, refined_period(values - drift, best.period), "")
+
+
+def _none(values: Floats, reason: str) -> Cycle:
+    return Cycle(0.0, np.zeros(len(values)), 0, 1.0, reason)
+
+
+def _strongest_line(values: Floats) -> float | None:
+    """Return the period (samples) of the strongest line of the spectrum that has ten cycles in the signal."""
+    length = len(values)
+    if length < FEWEST_CYCLES * _FEWEST_SAMPLES:
+        return None
+    spectrum = np.abs(np.fft.rfft(values * get_window("hann", length)))
+    # lines below ten cycles, and their skirts, are drift
+    spectrum[: FEWEST_CYCLES - 1] = 0.0
+    spectrum[length // _FEWEST_SAMPLES :] = 0.0
+    place = int(np.argmax(spectrum))
+    return length / place if spectrum[place] > 0.0 else None
+
+
+def _fundamental(values: Floats, line: float) -> Cycle | None:
+    """Return the cycle whose period is the line's or a small multiple of it."""
+    best: Cycle | None = None
+    exact = refined_period(values, line)
+    for multiple in range(1, _HARMONICS + 1):
+        period = exact * multiple
+        if len(values) / period < FEWEST_CYCLES:
+            break
+        trial = _folded(values, period, "")
+        if best is None or trial.left < _LONGER_PAYS * best.left:
+            best = trial
+    return best
+
+
+def refined_period(values: Floats, period: float) -> float:
+    """Return the period of a line from its phase, cycle by cycle.
+
+    The phase of the line against a clock of the trial period grows by a constant from cycle to cycle where the
+    trial is off; the median of the slopes between all pairs of cycles (Theil 1950, Sen 1968) corrects it and takes
+    no notice of a shock.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+    period : float
+        Samples, right to a fraction of a cycle over the signal.
+
+    Examples
+    --------
+    >>> samples = np.arange(5000)
+    >>> round(refined_period(np.sin(2 * np.pi * samples / 123.4567), 124.0), 3)
+    123.457
+    """
+    for _ in range(_REFINEMENTS):
+        whole = max(2, round(period))
+        count = len(values) // whole
+        rotated = values[: count * whole] * np.exp(-2j * np.pi * np.arange(count * whole) / period)
+        cycles = rotated.reshape(count, whole)
+        # two cycles under a Hann window: harmonics and the image of the line are at its zeros
+        window = get_window("hann", 2 * whole)
+        lines = cycles[:-1] @ window[:whole] + cycles[1:] @ window[whole:]
+        phases = np.unwrap(np.angle(lines))
+        centres = (np.arange(count - 1) + 1.0) * whole
+        # every cycle against the one half the record later: the slopes with most weight
+        half = max(1, (count - 1) // 2)
+        slopes = (phases[half:] - phases[:-half]) / (centres[half:] - centres[:-half])
+        frequency = 1.0 / period + float(np.median(slopes)) / (2.0 * np.pi)
+        if not 0.5 / period < frequency < 2.0 / period:
+            return period
+        period = 1.0 / frequency
+    return period
+
+
+def fold(values: Floats, period: float) -> Floats:
+    """Return the cycles of a signal, shape (cycle, phase): linear between samples, the last part cycle left out."""
+    bins = max(2, round(period))
+    count = int((len(values) - 1) / period)
+    grid = (np.arange(count)[:, None] + np.arange(bins) / bins) * period
+    cycles: Floats = np.interp(grid.ravel(), np.arange(len(values)), values).reshape(count, bins)
+    return cycles
+
+
+def unfold(waveform: Floats, period: float, length: int) -> Floats:
+    """Return a waveform of one cycle, repeated over a signal of so many samples."""
+    bins = len(waveform)
+    phase = (np.arange(length) / period) % 1.0 * bins
+    repeated: Floats = np.interp(phase, np.arange(bins + 1), np.append(waveform, waveform[0]))
+    return repeated
+
+
+def _folded(values: Floats, period: float, reason: str) -> Cycle:
+    cycles = fold(values, period)
+    periodic = unfold(np.median(cycles, axis=0), period, len(values))
+    before, after = robust_sigma(values), robust_sigma(values - periodic)
+    left = after / before if before > 0.0 else 1.0
+    count = len(cycles)
+    words = reason or f"{count} cycles repeat; without them {left:.1%} of the noise is left"
+    return Cycle(period, periodic, count, left, words)
+
+
+def _change_of_amplitude(values: Floats, cycle: Cycle) -> float:
+    """Return how much the amplitude of the cycles changes from the first third to the last."""
+    cycles = fold(values, cycle.period)
+    waveform = np.median(cycles, axis=0)
+    waveform = waveform - waveform.mean()
+    amplitudes = cycles @ waveform / float(waveform @ waveform)
+    third = max(1, len(amplitudes) // 3)
+    early, late = float(np.median(amplitudes[:third])), float(np.median(amplitudes[-third:]))
+    return abs(late - early) / max(abs(early), abs(late))
+
+
+def cycle_scores(residual: Floats, period: float, window: int) -> Floats:
+    """Return how far the short-window RMS is above what it is at the same phase in the other cycles.
+
+    A smooth shock is small against the signal and no larger than the irregular moments of every cycle; it is large
+    against what the same phase of other cycles shows. The score is (rms - median) / (1.4826 MAD), median and MAD
+    over the cycles at that phase, both smoothed over the window.
+
+    Parameters
+    ----------
+    residual : ndarray of float, shape (sample,)
+        The signal without its periodic part.
+    period : float
+        Samples.
+    window : int
+        Samples of the RMS.
+
+    Returns
+    -------
+    ndarray of float, shape (sample,)
+    """
+    rms = np.sqrt(_moving_mean(residual**2, window))
+    cycles = fold(rms, period)
+    middle = np.median(cycles, axis=0)
+    spread = np.median(np.abs(cycles - middle), axis=0)
+    spread = np.convolve(np.tile(spread, 3), np.ones(window) / window, "same")[len(spread) : 2 * len(spread)]
+    length = len(residual)
+    scale = MAD_TO_SIGMA * unfold(spread, period, length)
+    floor = np.finfo(float).eps * float(np.max(np.abs(residual), initial=0.0))
+    smallest = max(floor, float(np.finfo(float).tiny))
+    scores: Floats = (rms - unfold(middle, period, length)) / np.maximum(scale, smallest)
+    return scores
+
+
+def _moving_mean(values: Floats, window: int) -> Floats:
+    """Return the mean over a window about each sample, cut at the ends."""
+    sums = np.concatenate(([0.0], np.cumsum(values)))
+    places = np.arange(len(values))
+    first = np.maximum(places - window // 2, 0)
+    last = np.minimum(places - window // 2 + window, len(values))
+    means: Floats = np.maximum((sums[last] - sums[first]) / (last - first), 0.0)
+    return means

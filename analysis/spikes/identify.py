@@ -1,0 +1,384 @@
+"""Identify the spikes of a channel: method, baseline, threshold, groups.
+
+`identify` does what thesis section 5.2 calls spike identification; all it decides is in what it returns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.recording import Channel, Quality
+from vibroimpact.analysis.spikes.baseline import drift_window, running_median
+from vibroimpact.analysis.spikes.cycle import Cycle, cycle_scores, find_cycle
+from vibroimpact.analysis.spikes.detection import Excursions, Group, find_excursions, group_excursions
+from vibroimpact.analysis.spikes.noise import Tail, samples_in_half_wave, tail_threshold
+from vibroimpact.analysis.units import measured_unit
+from vibroimpact.fmus.errors import EstimationError, UsageError
+
+Floats = NDArray[np.float64]
+
+METHODS = ("auto", "threshold", "cycle_median", "cycle_threshold")
+POLARITIES = {"both": 0, "positive": 1, "negative": -1}
+#: The RMS of a smooth shock is taken over this part of a cycle.
+_RMS_WINDOWS_IN_CYCLE = 10
+#: A forced motion is given so many cycles to settle: at its start, and after a shock.
+_CYCLES_TO_SETTLE = 2.0
+#: Nothing below this part of the largest value is a spike: simulated signals have no noise to set a threshold by.
+_SMALLEST_PART = 1e-3
+#: Windows of a first look at the drift are no shorter than this part (1 / 2000 * 20) of the record.
+_FIRST_LOOK = 2000
+_FEWEST_SAMPLES = 16
+#: Noise changes its sign after fewer samples than this, if it is not filtered far below the sampling rate.
+_HALF_WAVE_OF_MOTION = 12.0
+
+
+@dataclass(frozen=True, slots=True)
+class SpikeSettings:
+    """How spikes are to be found; None is: chosen from the data.
+
+    Attributes
+    ----------
+    method : {"auto", "threshold", "cycle_median", "cycle_threshold"}
+        `threshold`: the signal without its baseline against a threshold. `cycle_median`: the periodic part is removed
+        and the short-window RMS of the rest compared with the same phase of the other cycles.
+        `cycle_threshold`: the periodic part is removed, then as `threshold`.
+    threshold : float or None
+        SI unit of the channel; a robust score with `cycle_median`.
+    threshold_part : float or None
+        The threshold as a part of the largest value instead.
+    hysteresis : float
+        Lower threshold as a part of the threshold, 0 to 1.
+    minimum_samples : int
+        Fewer samples above the threshold are no spike (thesis section 5.3: four).
+    merge : float or None
+        Excursions closer than this are one spike, s; None: ten lengths of its main excursion; two cycles with
+        `cycle_median`, in which the motion settles again.
+    polarity : {"both", "positive", "negative"}
+    noise : float or None
+        Standard deviation of the noise, SI unit, taken for normal.
+    false_alarms : float
+        Expected number of noise peaks above the threshold in the record.
+    baseline_window : float or None
+        s.
+    rms_window : float or None
+        s; None: a tenth of a cycle.
+    period : float or None
+        Of the excitation, s.
+    """
+
+    method: str = "auto"
+    threshold: float | None = None
+    threshold_part: float | None = None
+    hysteresis: float = 0.5
+    minimum_samples: int = 4
+    merge: float | None = None
+    polarity: str = "both"
+    noise: float | None = None
+    false_alarms: float = 0.01
+    baseline_window: float | None = None
+    rms_window: float | None = None
+    period: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be meant, all of it at once."""
+        problems = [
+            f"{name}: expected {rule}, got {got!r}." for name, rule, ok, got in self._rules() if not ok
+        ]
+        if problems:
+            raise UsageError("\n".join(problems))
+
+    def _rules(self) -> list[tuple[str, str, bool, object]]:
+        positive = ("threshold", "noise", "baseline_window", "rms_window", "period")
+        values = {name: getattr(self, name) for name in positive}
+        return [
+            *((name, "more than 0", value is None or value > 0.0, value) for name, value in values.items()),
+            ("method", f"one of {', '.join(METHODS)}", self.method in METHODS, self.method),
+            ("polarity", f"one of {', '.join(POLARITIES)}", self.polarity in POLARITIES, self.polarity),
+            ("hysteresis", "0 < hysteresis <= 1", 0.0 < self.hysteresis <= 1.0, self.hysteresis),
+            ("minimum_samples", "1 or more", self.minimum_samples >= 1, self.minimum_samples),
+            ("merge", "0 or more", self.merge is None or self.merge >= 0.0, self.merge),
+            ("false_alarms", "0 < false_alarms < 1", 0.0 < self.false_alarms < 1.0, self.false_alarms),
+            (
+                "threshold",
+                "a part between 0 and 100 %",
+                self.threshold_part is None or 0.0 < self.threshold_part < 1.0,
+                self.threshold_part,
+            ),
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """What was found in a channel, and how.
+
+    Attributes
+    ----------
+    time, signal : ndarray of float, shape (sample,)
+        s; SI unit of the channel, bad samples bridged by straight lines.
+    bad : ndarray of bool, shape (sample,)
+        Samples with no value of their own.
+    clipped : ndarray of bool, shape (sample,)
+    baseline, residual : ndarray of float, shape (sample,)
+        Drift and periodic part; the signal without them.
+    statistic : ndarray of float, shape (sample,)
+        What was compared with the threshold: the residual, or the robust score.
+    unit : str
+        SI unit of the signal.
+    method, reason : str
+    threshold, lower_threshold : float
+        In units of the statistic.
+    noise : float
+        Standard deviation of the residual at rest, SI unit.
+    tail : Tail
+        Of the statistic.
+    cycle : Cycle
+    excursions : Excursions
+    groups : list of Group
+    short : int
+        Excursions that had too few samples.
+    settled : float
+        s; what came before is the start of a periodic motion, not spikes.
+    baseline_window : int
+        Samples.
+    settings : SpikeSettings
+    remarks : list of str
+    """
+
+    time: Floats
+    signal: Floats
+    bad: NDArray[np.bool_]
+    clipped: NDArray[np.bool_]
+    baseline: Floats
+    residual: Floats
+    statistic: Floats
+    unit: str
+    method: str
+    reason: str
+    threshold: float
+    lower_threshold: float
+    noise: float
+    tail: Tail
+    cycle: Cycle
+    excursions: Excursions
+    groups: list[Group]
+    short: int
+    settled: float
+    baseline_window: int
+    settings: SpikeSettings
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def interval(self) -> float:
+        """Mean sampling interval, s."""
+        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+
+
+def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identification:
+    """Find the spikes of a channel.
+
+    Parameters
+    ----------
+    channel : Channel
+    settings : SpikeSettings, optional
+
+    Raises
+    ------
+    EstimationError
+        Too few good samples, or a periodic part is asked for and the samples are not even.
+    """
+    chosen = settings or SpikeSettings()
+    signal, bad = _bridged(channel)
+    time = channel.time
+    cycle, method, reason = _method(channel, signal, chosen)
+    periodic = cycle.periodic if method != "threshold" else np.zeros(len(signal))
+    interval = float(time[-1] - time[0]) / (len(time) - 1)
+    baseline, window = _baseline(signal - periodic, bad, chosen, interval)
+    residual = signal - periodic - baseline
+    polarity = POLARITIES[chosen.polarity]
+    statistic = residual
+    if method == "cycle_median":
+        width = round(chosen.rms_window / interval) if chosen.rms_window else 0
+        width = max(2, width or round(cycle.period / _RMS_WINDOWS_IN_CYCLE))
+        statistic, polarity = cycle_scores(residual, cycle.period, width), 1
+    start = np.arange(len(time)) < (_CYCLES_TO_SETTLE * cycle.period if method != "threshold" else 0.0)
+    tail, noise = _noise(statistic, residual, bad | start, chosen, polarity, method)
+    threshold = _threshold(statistic, tail, chosen, polarity)
+    excursions, short = _excursions(time, statistic, threshold, chosen, polarity)
+    settling = _CYCLES_TO_SETTLE * cycle.period * interval
+    merge = settling if method == "cycle_median" and chosen.merge is None else chosen.merge
+    groups = group_excursions(excursions, time, merge)
+    settled = float(time[0])
+    if method != "threshold":
+        groups, settled = _after_start(groups, excursions, time, settling)
+    return Identification(
+        time,
+        signal,
+        bad,
+        np.asarray((channel.quality & np.uint8(Quality.clipped)) != 0),
+        baseline + periodic,
+        residual,
+        statistic,
+        measured_unit(channel.unit).si,
+        method,
+        reason,
+        threshold,
+        chosen.hysteresis * threshold,
+        noise,
+        tail,
+        cycle,
+        excursions,
+        groups,
+        short,
+        settled,
+        window,
+        chosen,
+        _remarks(channel, bad)
+        + (_unrest(residual[~bad], interval) if method == "threshold" and noise else []),
+    )
+
+
+def _bridged(channel: Channel) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the values in SI units with straight lines over what is missing, and what is missing."""
+    values = channel.si()
+    bad = ~np.isfinite(values)
+    if np.count_nonzero(~bad) < _FEWEST_SAMPLES:
+        raise EstimationError(
+            f"{channel.name}: expected at least {_FEWEST_SAMPLES} samples with a value, "
+            f"got {np.count_nonzero(~bad)}."
+        )
+    if np.any(bad):
+        values = values.copy()
+        values[bad] = np.interp(channel.time[bad], channel.time[~bad], values[~bad])
+    return values, bad
+
+
+def _method(channel: Channel, signal: Floats, settings: SpikeSettings) -> tuple[Cycle, str, str]:
+    """Return the periodic part, the method and why it was chosen."""
+    interval = channel.axis.interval
+    if settings.method == "threshold":
+        return Cycle(0.0, np.zeros(len(signal)), 0, 1.0, "not looked for"), "threshold", "asked for"
+    if interval is None:
+        if settings.method.startswith("cycle"):
+            raise EstimationError(
+                f"{channel.name}: {settings.method}: expected evenly spaced samples, got uneven ones. "
+                "Resample it at import, or use --method threshold."
+            )
+        cycle = Cycle(0.0, np.zeros(len(signal)), 0, 1.0, "the samples are not evenly spaced")
+    else:
+        cycle = find_cycle(signal, settings.period / interval if settings.period else None)
+    if settings.method == "auto":
+        if cycle.found:
+            return cycle, "cycle_median", f"periodic excitation: {cycle.reason}"
+        return cycle, "threshold", f"no periodic excitation: {cycle.reason}"
+    if settings.method.startswith("cycle") and not cycle.found:
+        raise EstimationError(
+            f"{channel.name}: {settings.method}: expected a periodic excitation, got none: {cycle.reason}. "
+            "Give its period with --period, or use --method threshold."
+        )
+    return cycle, settings.method, "asked for"
+
+
+def _baseline(
+    values: Floats, bad: NDArray[np.bool_], settings: SpikeSettings, interval: float
+) -> tuple[Floats, int]:
+    """Return the drift and the window (samples) it was taken over, spikes left out."""
+    length = len(values)
+    if settings.baseline_window is not None:
+        window = min(length, max(2, round(settings.baseline_window / interval)))
+        return running_median(values, window, ~bad), window
+    # a first look shows where the spikes are; they are taken to be shorter than a hundredth of the record by far
+    first = running_median(values, drift_window(values, length // _FIRST_LOOK, ~bad), ~bad)
+    level = tail_threshold((values - first)[~bad], settings.false_alarms).threshold
+    places = np.arange(length, dtype=np.float64)
+    found, _ = find_excursions(places, values - first, level, settings.hysteresis, settings.minimum_samples)
+    used = ~bad
+    for group in group_excursions(found, places, None):
+        used[found.first[group.first] : found.last[group.last] + 1] = False
+    longest = int(np.max(found.last - found.first + 1, initial=1))
+    if np.count_nonzero(used) < length // 4:
+        used = ~bad
+    window = drift_window(values, longest, used)
+    return running_median(values, window, used), window
+
+
+def _noise(
+    statistic: Floats,
+    residual: Floats,
+    bad: NDArray[np.bool_],
+    settings: SpikeSettings,
+    polarity: int,
+    method: str,
+) -> tuple[Tail, float]:
+    """Return the tail of the statistic and the noise of the residual."""
+    tail = tail_threshold(statistic[~bad], settings.false_alarms, polarity)
+    noise = settings.noise
+    if noise is not None and method != "cycle_median":
+        from scipy.special import ndtri
+
+        normal = -float(ndtri(settings.false_alarms / (2.0 * len(statistic))))
+        return Tail(noise, 0.0, noise * normal, 0), noise
+    if noise is not None:
+        return tail, noise
+    return tail, tail.sigma if method != "cycle_median" else tail_threshold(residual[~bad], 0.01).sigma
+
+
+def _threshold(statistic: Floats, tail: Tail, settings: SpikeSettings, polarity: int) -> float:
+    """Return the threshold asked for, or that of the noise."""
+    largest = float(np.max(np.abs(statistic) if polarity == 0 else polarity * statistic, initial=0.0))
+    if settings.threshold is not None:
+        return settings.threshold
+    if settings.threshold_part is not None:
+        return settings.threshold_part * largest
+    return max(tail.threshold, _SMALLEST_PART * largest, float(np.finfo(float).tiny))
+
+
+def _excursions(
+    time: Floats, statistic: Floats, threshold: float, settings: SpikeSettings, polarity: int
+) -> tuple[Excursions, int]:
+    looked_at = statistic if polarity == 0 else np.where(polarity * statistic > 0.0, statistic, 0.0)
+    return find_excursions(time, looked_at, threshold, settings.hysteresis, settings.minimum_samples)
+
+
+def _after_start(
+    groups: list[Group], found: Excursions, time: Floats, reach: float
+) -> tuple[list[Group], float]:
+    """Return the spikes after the motion has settled, and when it had.
+
+    A forced motion that does not begin in its own cycle approaches it; what stands out of the cycle's median within the
+    first two cycles, and all that follows it without a quiet cycle, is that approach.
+    """
+    begin = float(time[0])
+    if groups and float(found.up[groups[0].first]) - begin < reach:
+        return groups[1:], float(time[found.last[groups[0].last]])
+    return groups, begin
+
+
+def _unrest(residual: Floats, interval: float) -> list[str]:
+    """Say so where the signal between the spikes is a motion, of which the threshold then speaks."""
+    samples = samples_in_half_wave(residual)
+    if samples < _HALF_WAVE_OF_MOTION:
+        return []
+    return [
+        f"Between its spikes the signal is no noise but a motion at about {0.5 / (samples * interval):.3g} Hz: "
+        "the threshold is what this motion hardly passes. Consider --method, --threshold and --baseline."
+    ]
+
+
+def _remarks(channel: Channel, bad: NDArray[np.bool_]) -> list[str]:
+    remarks = []
+    count = int(np.count_nonzero(bad))
+    if count:
+        remarks.append(f"{count} samples have no value; straight lines bridge them.")
+    clipped = int(np.count_nonzero(channel.quality & np.uint8(Quality.clipped)))
+    if clipped:
+        remarks.append(f"{clipped} samples are clipped: peak and impulse of their spikes are lower bounds.")
+    uncertainty = channel.axis.interval_uncertainty
+    if uncertainty:
+        remarks.append(
+            f"The time axes of the source contradict each other: every frequency, period and duration "
+            f"is uncertain by {uncertainty:.1%}."
+        )
+    return remarks

@@ -1,0 +1,188 @@
+"""The threshold that noise alone passes a stated number of times in a record, whatever the tail of the noise.
+
+The peaks of noise above a high level follow a generalised Pareto law (Pickands 1975; Balkema and de Haan 1974):
+
+    P(peak > level + y | peak > level) = (1 + shape y / scale)^(-1 / shape)
+
+Its shape is 0 for normal or exponential tails and 1 / nu for Student's t with nu degrees of freedom. Both numbers are
+estimated from the peaks of the record itself. Spikes are not part of the noise, so the fit starts from the lower
+peaks and takes in what the law so far explains, until nothing changes: noise is taken in to its last peak, spikes
+stay out behind the gap before them. Ringing after a spike leaves no such gap; but it raises all of a stretch, where an
+outlier of heavy-tailed noise raises one sample. Stretches whose median magnitude is far above that of the record
+are therefore left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from vibroimpact.analysis.spikes.baseline import robust_sigma
+
+Floats = NDArray[np.float64]
+
+#: Peaks above this quantile are the tail; of few peaks more are taken, at most the upper half.
+_TAIL_QUANTILE = 0.8
+_PEAKS_WANTED = 50
+#: Fewer peaks than this make no tail; a normal one is assumed then.
+_FEWEST_PEAKS = 20
+#: What the fit starts with, as a part of the tail: at least so much of it is taken to be noise.
+_FIRST_PART = 0.5
+_MOST_ROUNDS = 200
+#: A peak is left out of the noise only if the law expects it a hundred times more rarely than a false alarm: to leave
+#: out the largest peaks of heavy-tailed noise would make its tail look light.
+_GROWN = 0.01
+#: The record is looked at in so many stretches, none shorter than this many samples.
+_STRETCHES = 200
+_SHORTEST_STRETCH = 32
+#: A stretch rings if its median magnitude is more than so many times that of the median stretch. Noise alone, even
+#: Cauchy's in 32 samples, stays below.
+_RINGS = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Tail:
+    """The noise of a record and the threshold that follows from it.
+
+    Attributes
+    ----------
+    sigma : float
+        Robust standard deviation of the noise, in units of the signal.
+    shape : float
+        Shape of the tail, with one standard error added where it is positive.
+    threshold : float
+        What noise passes `false_alarms` times in a record like this.
+    peaks : int
+        Half waves of noise that the tail was fitted to.
+    """
+
+    sigma: float
+    shape: float
+    threshold: float
+    peaks: int
+
+
+def half_wave_peaks(values: Floats) -> Floats:
+    """Return the largest magnitude in each stretch of one sign, the first and last stretch included.
+
+    Examples
+    --------
+    >>> half_wave_peaks(np.array([1.0, 3.0, -2.0, -1.0, 4.0]))
+    array([3., 2., 4.])
+    """
+    # an exact 0 has no sign, and ends no stretch
+    values = values[values != 0.0]
+    if not values.size:
+        return np.zeros(0)
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(np.signbit(values))) + 1))
+    peaks: Floats = np.maximum.reduceat(np.abs(values), starts)
+    return peaks
+
+
+def _peaks_of_one_sign(values: Floats) -> Floats:
+    """Return the largest value in each stretch of values above 0."""
+    positive = values > 0.0
+    starts = np.flatnonzero(positive & ~np.append(False, positive[:-1]))
+    if not starts.size:
+        return np.zeros(0)
+    peaks: Floats = np.maximum.reduceat(values, starts)
+    return peaks
+
+
+def samples_in_half_wave(values: Floats) -> float:
+    """Return the mean length, in samples, of the stretches of one sign where a signal is quiet."""
+    rest = values[quiet(values)]
+    return len(rest) / max(1, half_wave_peaks(rest).size)
+
+
+def quiet(values: Floats) -> NDArray[np.bool_]:
+    """Return which samples lie in stretches that do not ring.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+        The signal without its baseline.
+    """
+    length = len(values)
+    stretch = max(_SHORTEST_STRETCH, length // _STRETCHES)
+    count = length // stretch
+    if count < 4:
+        return np.ones(length, dtype=bool)
+    magnitudes = np.abs(values[: count * stretch]).reshape(count, stretch)
+    medians = np.median(magnitudes, axis=1)
+    rings = medians > _RINGS * np.median(medians)
+    # ringing begins and ends somewhere in the stretches beside
+    still = ~(rings | np.append(rings[1:], False) | np.append(False, rings[:-1]))
+    place = np.minimum(np.arange(length) // stretch, count - 1)
+    return np.asarray(still[place])
+
+
+def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Tail:
+    """Return the threshold that noise passes `false_alarms` times a record, from the record itself.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+        The signal without its baseline.
+    false_alarms : float
+        Expected number of noise peaks above the threshold in the whole record.
+    polarity : int
+        1 or -1 to look at peaks of one sign only, 0 for both.
+    """
+    values = values[quiet(values)]
+    sigma = robust_sigma(values)
+    if sigma == 0.0:
+        # a signal that rests exactly: nothing but what is not rest
+        return Tail(0.0, 0.0, 0.0, 0)
+    signed = values * polarity if polarity else values
+    peaks = half_wave_peaks(signed) if not polarity else _peaks_of_one_sign(signed)
+    part = float(np.clip(1.0 - _PEAKS_WANTED / max(peaks.size, 1), 0.5, _TAIL_QUANTILE))
+    level = float(np.quantile(peaks, part)) if peaks.size else 0.0
+    excesses = np.sort(peaks[peaks > level] - level)
+    if excesses.size < _FEWEST_PEAKS:
+        normal = -float(ndtri(min(0.5, false_alarms / (2.0 * max(1, len(values))))))
+        return Tail(sigma, 0.0, sigma * normal, int(excesses.size))
+    shape, height, count = _grown_fit(excesses, false_alarms)
+    return Tail(sigma, shape, level + height, count)
+
+
+def _grown_fit(excesses: Floats, false_alarms: float) -> tuple[float, float, int]:
+    """Return shape, threshold above the level, and the number of peaks that are noise."""
+    count = max(_FEWEST_PEAKS // 2, int(_FIRST_PART * excesses.size))
+    for _ in range(_MOST_ROUNDS):
+        height = _exceeded(*_pareto(excesses[:count], 0.0), count / (_GROWN * false_alarms))
+        grown = int(np.searchsorted(excesses, height, side="right"))
+        if grown <= count:
+            break
+        count = grown
+    shape, scale = _pareto(excesses[:count], 1.0)
+    return shape, _exceeded(shape, scale, count / false_alarms), count
+
+
+def _exceeded(shape: float, scale: float, ratio: float) -> float:
+    """Return the height that one of `ratio` peaks exceeds."""
+    if shape < 1e-9:
+        return scale * float(np.log(ratio))
+    return scale * float(np.expm1(shape * np.log(ratio))) / shape
+
+
+def _pareto(excesses: Floats, errors: float) -> tuple[float, float]:
+    """Return shape and scale from probability-weighted moments (Hosking and Wallis 1987).
+
+    A shape below 0 would claim that the noise has an end; 0 is kept then, with the mean as scale. To the shape
+    `errors` of its standard errors are added: too high a threshold misses a weak spike, too low a one invents spikes.
+    """
+    count = excesses.size
+    mean = float(excesses.mean())
+    weights = (count - 1.0 - np.arange(count)) / (count - 1.0)
+    weighted = float(np.mean(weights * excesses))
+    shape = 2.0 - mean / (mean - 2.0 * weighted) if mean > 2.0 * weighted else 1.0
+    # asymptotic variance of the shape near 0 is 1 / count; it grows slowly with the shape
+    shape = shape + errors * (1.0 + max(shape, 0.0)) / np.sqrt(count)
+    if shape <= 0.0:
+        return 0.0, mean
+    shape = min(shape, 2.0)
+    return float(shape), float(mean * max(1.0 - shape, 0.05)) if shape < 1.0 else float(np.median(excesses))

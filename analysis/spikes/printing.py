@@ -1,0 +1,150 @@
+"""What was found about spikes, as tables and sentences."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from rich.console import Console
+from rich.table import Table
+
+from vibroimpact.analysis.spikes.contact import SHORT_CONTACT
+from vibroimpact.analysis.spikes.report import SpikeReport
+
+#: A longer list of spikes is cut; all of them are in the dataset.
+_MOST_ROWS = 12
+
+
+def print_spikes(console: Console, report: SpikeReport) -> None:
+    """Print how spikes were found, each spike, and what they say of the contact.
+
+    Parameters
+    ----------
+    console : rich.console.Console
+    report : SpikeReport
+    """
+    data = report.dataset
+    count = int(data.sizes["spike"])
+    console.print(f"{data.attrs['channel']}: {count or 'no'} {'spike' if count == 1 else 'spikes'}.")
+    for line in _words(report):
+        console.print(line, style="yellow", markup=False, highlight=False)
+    console.print(_settings(report))
+    if count:
+        console.print(_spikes(data))
+        if count > _MOST_ROWS:
+            console.print(f"{count - _MOST_ROWS} more spikes are in the dataset.")
+        console.print(_waveforms(data))
+        _print_contact(console, data)
+
+
+def _words(report: SpikeReport) -> list[str]:
+    """Return what a reader must know before any number."""
+    data, found = report.dataset, report.found
+    lines = list(found.remarks)
+    if int(data["spikes_cut_off"]):
+        lines.append(f"Cut off by an end of the record and left out: {int(data['spikes_cut_off'])}.")
+    if found.settled > float(found.time[0]):
+        lines.append(
+            f"The motion had settled into its cycle at {found.settled:.4g} s; before that nothing is counted."
+        )
+    if found.short:
+        fewest = found.settings.minimum_samples
+        lines.append(
+            f"Excursions of fewer than {fewest} samples above the threshold, left out: {found.short}."
+        )
+    return lines
+
+
+def _settings(report: SpikeReport) -> Table:
+    """Return the method and its parameters."""
+    found, data = report.found, report.dataset
+    unit = str(data["threshold"].attrs["units"])
+    shown = "" if unit == "1" else f" {unit}"
+    own = "" if found.unit == "1" else f" {found.unit}"
+    chosen = found.settings
+    asked = chosen.threshold is not None or chosen.threshold_part is not None
+    why = "asked for" if asked else f"noise passes it {chosen.false_alarms:g} times in such a record"
+    table = Table("how", "value", "why", title="Identification", title_justify="left")
+    table.add_row("method", found.method, found.reason)
+    if found.cycle.found:
+        period = found.cycle.period * found.interval
+        doubt = float(data.attrs["interval_uncertainty"])
+        within = f" ± {doubt:.1%}" if doubt else ""
+        table.add_row("excitation", f"{1.0 / period:.6g} Hz{within}", f"{found.cycle.count} cycles")
+    table.add_row("threshold", f"{found.threshold:.4g}{shown}", why)
+    table.add_row("over at", f"{found.lower_threshold:.4g}{shown}", f"hysteresis {chosen.hysteresis:g}")
+    table.add_row("noise", f"{found.noise:.4g}{own}", f"tail shape {found.tail.shape:.2f} (0: normal)")
+    table.add_row(
+        "baseline", f"{found.baseline_window * found.interval:.4g} s", "window of the running median"
+    )
+    table.add_row("polarity", chosen.polarity, f"at least {chosen.minimum_samples} samples")
+    merge = f"{chosen.merge:g} s" if chosen.merge is not None else _automatic_merge(found.method)
+    table.add_row("ringing", merge, "excursions as close are one spike")
+    return table
+
+
+def _automatic_merge(method: str) -> str:
+    return "2 cycles" if method == "cycle_median" else "2 to 10 lengths of the spike"
+
+
+def _spikes(data: xr.Dataset) -> Table:
+    """Return one row for each spike."""
+    peak, impulse = str(data["spike_peak"].attrs["units"]), str(data["spike_impulse"].attrs["units"])
+    heads = ["time (s)", "above (ms)", f"peak ({peak})", f"impulse ({impulse})", "passes"]
+    columns = [("spike_peak", "spike_peak_error"), ("spike_impulse", "spike_impulse_error")]
+    if "spike_velocity" in data:
+        heads.insert(4, "velocity (m/s)")
+        columns.append(("spike_velocity", "spike_velocity_error"))
+    table = Table(*heads, title="Spikes", title_justify="left")
+    table.columns[0].no_wrap = True
+    for place in range(min(int(data.sizes["spike"]), _MOST_ROWS)):
+        one = data.isel(spike=place)
+        clipped = " clipped" if int(one["spike_clipped"]) else ""
+        table.add_row(
+            f"{float(one['spike_time']):.6f}{clipped}",
+            f"{1e3 * float(one['spike_duration']):.4g}",
+            *(_with_error(float(one[value]), float(one[error])) for value, error in columns),
+            f"{int(one['spike_excursions'])}",
+        )
+    return table
+
+
+def _with_error(value: float, error: float) -> str:
+    """Return a value to the second digit of its error.
+
+    >>> _with_error(0.87483, 0.0062), _with_error(43949.8, 23.8)
+    ('0.8748 ± 0.0062', '43950 ± 24')
+    """
+    if not 0.0 < error < np.inf or value == 0.0:
+        return f"{value:.5g} ± {error:.2g}"
+    digits = int(np.floor(np.log10(abs(value)))) - int(np.floor(np.log10(error))) + 2
+    return f"{value:.{min(max(digits, 1), 7)}g} ± {error:.2g}"
+
+
+def _waveforms(data: xr.Dataset) -> Table:
+    """Return how well each curve fits."""
+    table = Table("curve", "goodness", "length (ms)", "chosen", title="Waveform", title_justify="left")
+    for name in data["waveform"].values:
+        fit = data.sel(waveform=name)
+        goodness = fit["spike_fit_goodness"].values
+        if not np.any(np.isfinite(goodness)):
+            continue
+        length = 1e3 * float(np.nanmedian(fit["spike_fit_length"].values))
+        words = f"{length:.4g}" + (" (standard deviation)" if name == "bell" else "")
+        mark = "yes" if name == data.attrs["waveform"] else ""
+        table.add_row(str(name).replace("_", "-"), f"{float(np.nanmedian(goodness)):.4f}", words, mark)
+    return table
+
+
+def _print_contact(console: Console, data: xr.Dataset) -> None:
+    if "sensitivity" in data:
+        value, error = float(data["sensitivity"]), float(data["sensitivity_error"])
+        console.print(f"Sensitivity of the load cell {value:.5g} ± {error:.2g} V/N, from the impulses given.")
+    if "contact_time_measure" not in data:
+        return
+    measure, error = float(data["contact_time_measure"]), float(data["contact_time_measure_error"])
+    verdict = "below" if measure < SHORT_CONTACT else "not below"
+    console.print(
+        f"Contact-time measure {measure:.4g} ± {error:.2g} above the threshold, "
+        f"{float(data['contact_time_measure_feet']):.4g} from foot to foot: "
+        f"{verdict} {SHORT_CONTACT:g}, under which rigid impacts are an adequate model."
+    )

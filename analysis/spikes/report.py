@@ -1,0 +1,302 @@
+"""What was found about the spikes of a channel, as one dataset."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.recording import Channel
+from vibroimpact.analysis.spikes.contact import Calibration, calibrate, contact_time_measure, impact_velocity
+from vibroimpact.analysis.spikes.identify import Identification, SpikeSettings, identify
+from vibroimpact.analysis.spikes.pulses import FOOT, Pulses, measure_pulses
+from vibroimpact.analysis.spikes.waveforms import WAVEFORMS
+from vibroimpact.analysis.units import measured_unit
+from vibroimpact.fmus.errors import UsageError
+
+Floats = NDArray[np.float64]
+
+_IMPULSE_UNITS = {"m s-2": "m s-1", "1": "s", "m": "m s", "m s-1": "m"}
+
+
+@dataclass(frozen=True, slots=True)
+class Mechanics:
+    """What turns a signal into forces and velocities; None is: not known.
+
+    Attributes
+    ----------
+    mass : float or None
+        Effective mass of the contact, kg.
+    restitution : float or None
+    sensitivity : float or None
+        Of the load cell, V/N.
+    known_impulses : ndarray of float or None
+        N s, one for each spike: the sensitivity is fitted.
+    foot : float
+        Part of the peak down to which a pulse is integrated.
+    waveform : str
+        By which the impulse below that is estimated, or "auto".
+    """
+
+    mass: float | None = None
+    restitution: float | None = None
+    sensitivity: float | None = None
+    known_impulses: Floats | None = None
+    foot: float = FOOT
+    waveform: str = "auto"
+
+
+@dataclass(frozen=True, slots=True)
+class SpikeReport:
+    """Spikes of one channel: how they were found, what they carry, and the dataset that says both."""
+
+    found: Identification
+    pulses: Pulses
+    dataset: xr.Dataset
+    calibration: Calibration | None = None
+
+
+def spike_report(
+    channel: Channel, settings: SpikeSettings | None = None, mechanics: Mechanics | None = None
+) -> SpikeReport:
+    """Find the spikes of a channel and measure them.
+
+    Spikes that are cut off by an end of the record are counted and left out.
+
+    Parameters
+    ----------
+    channel : Channel
+        Force, voltage of a load cell, acceleration; any unit.
+    settings : SpikeSettings, optional
+    mechanics : Mechanics, optional
+
+    Raises
+    ------
+    EstimationError
+        See `identify`.
+    UsageError
+        A setting that does not fit the channel.
+    """
+    known = mechanics or Mechanics()
+    calibration = None
+    if known.known_impulses is not None:
+        _expect_volts(channel, "known impulses")
+        pulses = measure_pulses(identify(channel, settings), known.foot, known.waveform)
+        calibration = calibrate(np.abs(pulses.impulse[pulses.complete]), known.known_impulses)
+        channel = in_newtons(channel, calibration.sensitivity)
+    elif known.sensitivity is not None:
+        _expect_volts(channel, "sensitivity")
+        channel = in_newtons(channel, known.sensitivity)
+    found = identify(channel, settings)
+    pulses = measure_pulses(found, known.foot, known.waveform)
+    return SpikeReport(found, pulses, _dataset(channel, found, pulses, known, calibration), calibration)
+
+
+def unobserved(report: SpikeReport) -> tuple[tuple[float, float], ...]:
+    """Return the spans (s) without samples in which a spike would not have been seen: longer than half a pulse."""
+    found = report.found
+    edges = np.diff(np.concatenate(([False], found.bad, [False])).astype(np.int8))
+    first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    lengths = report.dataset["spike_length"].values
+    least = 0.5 * float(np.median(lengths)) if lengths.size else 0.0
+    spans = zip(found.time[first], found.time[last], strict=True)
+    return tuple((float(a), float(b)) for a, b in spans if b - a > least)
+
+
+def _expect_volts(channel: Channel, what: str) -> None:
+    unit = measured_unit(channel.unit).si
+    if unit not in ("V", "1"):
+        raise UsageError(f"{what}: expected a channel in volts, got {channel.name} in {unit}. Leave it out.")
+
+
+def in_newtons(channel: Channel, sensitivity: float) -> Channel:
+    """Return the channel of a load cell as force: volts over sensitivity (V/N).
+
+    Raises
+    ------
+    UsageError
+        The sensitivity is not more than 0.
+    """
+    if not sensitivity > 0.0:
+        raise UsageError(f"sensitivity: expected more than 0 V/N, got {sensitivity!r}.")
+    return replace(channel, values=channel.si() / sensitivity, unit="N")
+
+
+def impulse_unit(unit: str) -> str:
+    """Return the SI unit of the integral over time of a signal.
+
+    >>> impulse_unit("N"), impulse_unit("m s-2")
+    ('N s', 'm s-1')
+    """
+    return _IMPULSE_UNITS.get(unit, f"{unit} s")
+
+
+def _dataset(
+    channel: Channel,
+    found: Identification,
+    pulses: Pulses,
+    known: Mechanics,
+    calibration: Calibration | None,
+) -> xr.Dataset:
+    kept = pulses.complete
+    variables = {
+        name: ("spike", values[kept], {"units": units, "long_name": words})
+        for name, (values, units, words) in _columns(found, pulses, known).items()
+    }
+    variables |= _fits(found, pulses)
+    scalars = {
+        name: ((), float(value), {"units": units, "long_name": words})
+        for name, (value, units, words) in _scalars(found, pulses, calibration).items()
+    }
+    names = np.array(list(WAVEFORMS))
+    coordinate = ("waveform", names, {"units": "1", "long_name": "fitted curve"})
+    return xr.Dataset(
+        {**variables, **scalars}, {"waveform": coordinate}, _attributes(channel, found, pulses, known)
+    )
+
+
+def _columns(
+    found: Identification, pulses: Pulses, known: Mechanics
+) -> dict[str, tuple[NDArray[Any], str, str]]:
+    """Return name, values, unit and words of each variable of a spike."""
+    unit, whole = found.unit, impulse_unit(found.unit)
+    columns: dict[str, tuple[NDArray[Any], str, str]] = {
+        "spike_time": (pulses.start, "s", "first upward crossing of the threshold"),
+        "spike_end": (pulses.end, "s", "end of the spike and its ringing"),
+        "spike_peak_time": (pulses.peak_time, "s", "instant of the peak"),
+        "spike_duration": (pulses.duration, "s", "time above the threshold, without ringing"),
+        "spike_length": (pulses.length, "s", "length of the pulse from foot to foot"),
+        "spike_peak": (pulses.peak, unit, "peak, band-limited between the samples"),
+        "spike_peak_error": (pulses.peak_error, unit, "error of the peak by noise and resampling"),
+        "spike_peak_sampled": (pulses.sampled_peak, unit, "largest sample"),
+        "spike_peak_deficit": (
+            pulses.deficit,
+            unit,
+            "most that the largest sample can fall short of the peak",
+        ),
+        "spike_impulse": (pulses.impulse, whole, "impulse down to the baseline"),
+        "spike_impulse_error": (pulses.impulse_error, whole, "error of the impulse by noise and waveform"),
+        "spike_impulse_above": (pulses.impulse_above, whole, "impulse while above the threshold"),
+        "spike_excursions": (pulses.excursions, "1", "excursions past the threshold, ringing included"),
+        "spike_clipped": (pulses.clipped.astype(np.int8), "1", "whether samples are clipped or missing"),
+    }
+    velocity = _velocity(found.unit, pulses, known)
+    if velocity is not None:
+        columns["spike_velocity"] = (velocity[0], "m s-1", "velocity before impact")
+        columns["spike_velocity_error"] = (
+            velocity[1],
+            "m s-1",
+            "error of the velocity by that of the impulse",
+        )
+    return columns
+
+
+def _velocity(unit: str, pulses: Pulses, known: Mechanics) -> tuple[Floats, Floats] | None:
+    """Return velocities before impact and their errors, where mass and restitution say enough."""
+    if known.restitution is None:
+        if known.mass is not None:
+            raise UsageError("mass: expected a restitution with it, got none. Give --restitution too.")
+        return None
+    if unit == "m s-2":
+        mass = None
+    elif unit == "N":
+        mass = known.mass
+        if mass is None:
+            raise UsageError("restitution: expected a mass with it, got none. Give --mass too.")
+    else:
+        raise UsageError(
+            f"restitution: expected a force or an acceleration, got a channel in {unit}. "
+            "Give --sensitivity for a load cell in volts."
+        )
+    return (
+        impact_velocity(pulses.impulse, known.restitution, mass),
+        impact_velocity(pulses.impulse_error, known.restitution, mass),
+    )
+
+
+def _fits(found: Identification, pulses: Pulses) -> dict[str, Any]:
+    """Return what the fitted curves are, by curve and spike."""
+    kept = pulses.complete
+    wanted = {
+        "spike_fit_peak": ("peak", found.unit, "peak of the fitted curve"),
+        "spike_fit_length": ("length", "s", "length of the fitted curve; its standard deviation for a bell"),
+        "spike_fit_middle": ("middle", "s", "middle of the fitted curve"),
+        "spike_fit_goodness": (
+            "goodness",
+            "1",
+            "part of the variance within the pulse that the curve explains",
+        ),
+    }
+    signs = np.where(pulses.peak[kept] < 0.0, -1.0, 1.0)
+    result = {}
+    for name, (field, units, words) in wanted.items():
+        rows = np.array([getattr(pulses.fits[each], field)[kept] for each in WAVEFORMS])
+        if field == "peak":
+            rows = rows * signs
+        result[name] = (("waveform", "spike"), rows, {"units": units, "long_name": words})
+    return result
+
+
+def _scalars(
+    found: Identification, pulses: Pulses, calibration: Calibration | None
+) -> dict[str, tuple[float, str, str]]:
+    """Return name, value, unit and words of what is said of the whole record."""
+    unit = "1" if found.method == "cycle_median" else found.unit
+    scalars: dict[str, tuple[float, str, str]] = {
+        "threshold": (found.threshold, unit, "threshold"),
+        "lower_threshold": (found.lower_threshold, unit, "threshold at which a spike is over"),
+        "noise": (found.noise, found.unit, "standard deviation of the noise, robust"),
+        "noise_tail_shape": (found.tail.shape, "1", "shape of the tail of the noise, generalised Pareto"),
+        "false_alarms": (found.settings.false_alarms, "1", "noise peaks expected above the threshold"),
+        "baseline_window": (found.baseline_window * found.interval, "s", "window of the baseline"),
+        "spikes_cut_off": (
+            float(np.count_nonzero(~pulses.complete)),
+            "1",
+            "spikes cut off by an end of the record",
+        ),
+        "excursions_too_short": (found.short, "1", "excursions of too few samples"),
+        "settled": (found.settled, "s", "end of the start of a periodic motion"),
+    }
+    if found.cycle.found:
+        period = found.cycle.period * found.interval
+        scalars["excitation_period"] = (period, "s", "period of the excitation")
+    kept = pulses.complete
+    if np.count_nonzero(kept) >= 2:
+        above = contact_time_measure(pulses.start[kept], pulses.duration[kept])
+        feet = contact_time_measure(pulses.start[kept], pulses.length[kept])
+        scalars |= {
+            "contact_time_measure": (above.measure, "1", "part of the time above the threshold"),
+            "contact_time_measure_error": (above.standard_error, "1", "its standard error"),
+            "contact_time_measure_feet": (feet.measure, "1", "part of the time between the feet of pulses"),
+            "contact_time_measure_feet_error": (feet.standard_error, "1", "its standard error"),
+        }
+    if calibration is not None:
+        scalars["sensitivity"] = (calibration.sensitivity, "V N-1", "sensitivity of the load cell, fitted")
+        scalars["sensitivity_error"] = (calibration.standard_error, "V N-1", "its standard error")
+    return scalars
+
+
+def _attributes(
+    channel: Channel, found: Identification, pulses: Pulses, known: Mechanics
+) -> dict[str, str | float | int]:
+    """Return what is said in words, and every setting that numbers came from."""
+    settings = found.settings
+    attributes: dict[str, str | float | int | None] = {
+        "channel": channel.name,
+        "method": found.method,
+        "method_reason": found.reason,
+        "polarity": settings.polarity,
+        "minimum_samples": settings.minimum_samples,
+        "merge": settings.merge if settings.merge is not None else "automatic",
+        "waveform": pulses.waveform,
+        "foot": known.foot,
+        "mass": known.mass,
+        "restitution": known.restitution,
+        "sensitivity": known.sensitivity,
+        "interval_uncertainty": channel.axis.interval_uncertainty,
+        "remarks": "\n".join(found.remarks),
+    }
+    return {name: value for name, value in attributes.items() if value is not None}
