@@ -1,0 +1,206 @@
+"""Figures of replays: a measured and a simulated signal over each other, and what is left between them."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vibroimpact.analysis.figures.page import (
+    COLOURS,
+    LINE,
+    MARK,
+    STOP,
+    Floats,
+    canvas,
+    page_style,
+    unit_symbol,
+)
+from vibroimpact.analysis.recording import Quality
+from vibroimpact.fmus.errors import DatasetError
+
+_HEIGHT_MM = 110
+_HEIGHTS = (1.25, 1.25, 0.9)
+_ZOOM_PERIODS = 12.0
+"""The first part shows so many dominant periods from the onset, and a sixth of that before it."""
+_BEFORE = 1.0 / 6.0
+_LONGEST_NAME = 14
+_NEARLY_ALL = 0.6
+"""Without a second look where the first part is more than this share of the record."""
+# Values beyond these are read more easily with a power of ten beside the unit.
+_SMALL, _LARGE = 1e-2, 1e4
+
+
+def draw_replay(dataset: xr.Dataset, comparison: str | None = None) -> Figure:
+    """Draw a comparison: the whole record, its first part, and the residual with the scores of running windows.
+
+    Clipped samples, which were not scored, are marked on the measured signal.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of `comparison_dataset`.
+    comparison : str, optional
+        Which one, by the name of its channel; default: the first.
+
+    Raises
+    ------
+    DatasetError
+        There is no such comparison.
+    """
+    names = [str(name) for name in dataset["comparison"].values]
+    name = names[0] if comparison is None else comparison
+    if name not in names:
+        raise DatasetError(f'figure: comparison: expected one of {", ".join(names)}, got "{name}".')
+    scores = dataset.isel(comparison=names.index(name))
+    measured = dataset[f"{name}_measured"]
+    time = measured[str(measured.dims[0])].values
+    scale, unit = _time_unit(time)
+    parts = _parts(scores, time)
+    with page_style():
+        figure = canvas(_HEIGHT_MM if len(parts) == 2 else 0.72 * _HEIGHT_MM)
+        heights = _HEIGHTS[2 - len(parts) :]
+        axes = figure.subplots(len(parts) + 1, 1, height_ratios=heights)
+        size, prefix = _factor(measured.values)
+        for axis, part in zip(axes, parts, strict=False):
+            _draw_both(axis, dataset, name, (scale * time, scale * part), size)
+            _draw_events(axis, dataset, name, scale, scale * part)
+            axis.set_ylabel(f"{_short(name)} ({prefix}{unit_symbol(measured)})")
+        _say_scores(axes[0], scores)
+        axes[0].legend(
+            frameon=False,
+            ncols=3,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            borderaxespad=0.1,
+            handlelength=1.5,
+            columnspacing=1.0,
+            handletextpad=0.5,
+        )
+        _draw_residual(axes[-1], dataset, name, (scale * time, scale * parts[0]), size)
+        _draw_running(axes[-1], scores, scale)
+        axes[-1].set_ylabel(f"residual\n({prefix}{unit_symbol(measured)})")
+        axes[-1].set_xlabel(f"time ({unit})")
+    return figure
+
+
+def _short(name: str) -> str:
+    """Return a name that fits beside a panel."""
+    return name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME - 1]}…"
+
+
+def _time_unit(time: Floats) -> tuple[float, str]:
+    return (1e3, "ms") if float(time[-1] - time[0]) < 2.0 else (1.0, "s")
+
+
+def _factor(values: Floats) -> tuple[float, str]:
+    """Return what values are multiplied with, and how the label says so."""
+    largest = float(np.nanmax(np.abs(values)))
+    if _SMALL <= largest < _LARGE or largest <= 0.0:
+        return 1.0, ""
+    power = 3 * int(np.floor(np.log10(largest) / 3))
+    return 10.0**-power, f"$10^{{{power}}}$ " if power else ""
+
+
+def _parts(scores: xr.Dataset, time: Floats) -> list[Floats]:
+    """Return the stretches that are shown (s): the whole, and the first part of the event."""
+    whole = np.array([time[0], time[-1]])
+    frequency, onset = float(scores["measured_frequency"]), float(scores["onset"])
+    if not np.isfinite(frequency) or frequency <= 0.0:
+        return [whole]
+    length = _ZOOM_PERIODS / frequency
+    first = np.array([max(time[0], onset - _BEFORE * length), min(time[-1], onset + length)])
+    return [whole, first] if np.ptp(first) < _NEARLY_ALL * np.ptp(whole) else [whole]
+
+
+def _draw_both(axis: Axes, dataset: xr.Dataset, name: str, times: tuple[Floats, Floats], size: float) -> None:
+    time, part = times
+    rows = (time >= part[0]) & (time <= part[1])
+    measured = size * dataset[f"{name}_measured"].values
+    clipped = rows & ((dataset[f"{name}_quality"].values & int(Quality.clipped)) != 0)
+    axis.plot(time[rows], measured[rows], color=LINE, linewidth=0.9, label="measured", rasterized=True)
+    axis.plot(
+        time[rows],
+        size * dataset[f"{name}_simulated"].values[rows],
+        color=MARK,
+        linewidth=0.6,
+        linestyle=(0, (4, 1.5)),
+        label="simulated",
+        rasterized=True,
+    )
+    if np.any(clipped):
+        axis.plot(
+            time[clipped], measured[clipped], ".", color="k", markersize=2.5, label="clipped", rasterized=True
+        )
+    axis.set_xlim(part[0], part[1])
+
+
+def _draw_events(axis: Axes, dataset: xr.Dataset, name: str, scale: float, part: Floats) -> None:
+    """Mark events: measured ones at the bottom of the panel, simulated ones at its top."""
+    if f"{name}_event_matched" not in dataset:
+        return
+    matched, missed, extra, delay = (
+        dataset[f"{name}_event_{kind}"].values for kind in ("matched", "missed", "extra", "delay")
+    )
+    both = (
+        (np.concatenate([matched, missed]), 0.0, 0.08, LINE),
+        (np.concatenate([matched + delay, extra]), 0.92, 1.0, MARK),
+    )
+    for times, bottom, top, colour in both:
+        shown = scale * times[(scale * times >= part[0]) & (scale * times <= part[1])]
+        height = axis.get_xaxis_transform()
+        axis.vlines(shown, bottom, top, transform=height, color=colour, linewidth=0.8)
+
+
+def _say_scores(axis: Axes, scores: xr.Dataset) -> None:
+    """Write the score, and how the signals were aligned, into a panel."""
+    lag, error = 1e3 * float(scores["lag"]), 1e3 * float(scores["lag_error"])
+    inverted = ", inverted" if float(scores["polarity"]) < 0.0 else ""
+    # one digit more than the error begins with
+    digits = 3 if error <= 0.0 or not np.isfinite(error) else max(0, 1 - int(np.floor(np.log10(error))))
+    doubt, given = (f" ± {error:.{digits}f}", "") if error > 0.0 else ("", " (given)")
+    axis.text(
+        0.98,
+        0.95,
+        f"VAF {float(scores['variance_accounted_for']):.2f} %\nlag {lag:.{digits}f}{doubt} ms{given}{inverted}",
+        transform=axis.transAxes,
+        ha="right",
+        va="top",
+        fontsize=7,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+    )
+
+
+def _draw_residual(
+    axis: Axes, dataset: xr.Dataset, name: str, times: tuple[Floats, Floats], size: float
+) -> None:
+    time, part = times
+    residual = size * dataset[f"{name}_residual"].values
+    # what was not scored is not part of the residual that was
+    scored = dataset[f"{name}_quality"].values == 0
+    axis.plot(time, np.where(scored, residual, np.nan), color=STOP, linewidth=0.5, rasterized=True)
+    axis.set_xlim(part[0], part[1])
+
+
+def _draw_running(axis: Axes, scores: xr.Dataset, scale: float) -> None:
+    """Draw the score of each running window over the residual, on an axis of its own; below 0 an arrow."""
+    if "running_window_start" not in scores:
+        return
+    onset = float(scores["onset"])
+    variance = scores["running_window_variance"].values
+    known = np.isfinite(variance)
+    if not np.any(known):
+        return
+    variance = variance[known]
+    start = scale * (scores["running_window_start"].values[known] + onset)
+    stop = scale * (scores["running_window_stop"].values[known] + onset)
+    shown = variance >= 0.0
+    beside = axis.twinx()
+    beside.hlines(variance[shown], start[shown], stop[shown], color=COLOURS[2], linewidth=1.2)
+    # worse than the mean: the arrow points to where the score is
+    below = 0.5 * (start + stop)[~shown]
+    beside.plot(below, np.full(len(below), 4.0), "v", color=COLOURS[2], markersize=3)
+    beside.set_ylim(0.0, 105.0)
+    beside.set_ylabel("VAF (%)", color=COLOURS[2])
+    axis.tick_params(right=False)

@@ -1,0 +1,314 @@
+"""A simulated response beside the measured one: aligned, its residual, and every score of it.
+
+The measured samples stay as they are (only their offset is removed): the simulated signal, smooth and free of noise,
+is brought to their instants, their clock and their sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.recording import Channel, Quality
+from vibroimpact.analysis.replay.alignment import Alignment, Interpolated, align
+from vibroimpact.analysis.replay.event import Event, find_event
+from vibroimpact.analysis.replay.matching import EventMatch, match_events
+from vibroimpact.analysis.replay.peaks import PeakErrors, compare_peaks
+from vibroimpact.analysis.replay.scoring import (
+    Span,
+    best_gain,
+    running_windows,
+    variance_accounted_for,
+    windowed_variance,
+)
+from vibroimpact.analysis.replay.spectra import DominantFrequency, dominant_frequency
+from vibroimpact.fmus.errors import EstimationError
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+RUNNING_WINDOWS = 10
+"""The record after the onset is scored in so many windows where no length is given."""
+RUNNING_PERIODS = 2.0
+"""A running window holds at least so many dominant periods of the event."""
+EVENT_TOLERANCE = 0.25
+"""Events are paired within this share of the dominant period where no tolerance is given."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """One simulated signal compared with one measured channel; values in the SI unit of the channel.
+
+    Attributes
+    ----------
+    measured : Channel
+        As it was recorded.
+    simulated_name : str
+        What was compared with it.
+    values : ndarray of float, shape (sample,)
+        Measured, less its offset.
+    simulated : ndarray of float, shape (sample,)
+        At the instants, on the clock and with the sign of the measured channel; NaN where nothing was simulated.
+    scored : ndarray of bool, shape (sample,)
+        Good measured samples where something was simulated.
+    event : Event
+        Of the measured channel: onset, noise, dominant period.
+    offset : float
+        Removed from the measured values.
+    alignment : Alignment
+    variance : float
+        Variance accounted for over all scored samples, percent.
+    windows : list of tuple of float
+        Windows asked for, s from the onset.
+    running : list of tuple of float
+        Windows side by side from the onset to the end, s from the onset.
+    peaks : PeakErrors or None
+        Of the window asked for.
+    events : EventMatch or None
+        Of both, where they were given, on the clock of the channel.
+    remarks : tuple of str
+    """
+
+    measured: Channel
+    simulated_name: str
+    values: Floats
+    simulated: Floats
+    scored: Flags
+    event: Event
+    offset: float
+    alignment: Alignment
+    variance: float
+    windows: list[Span]
+    running: list[Span]
+    peaks: PeakErrors | None
+    events: EventMatch | None
+    remarks: tuple[str, ...]
+
+    @property
+    def residual(self) -> Floats:
+        """Measured less simulated, shape (sample,); NaN where nothing was simulated."""
+        return self.values - self.simulated
+
+    @property
+    def noise_ceiling(self) -> float:
+        """What a perfect model would score, given the noise before the event, percent; NaN where it is not known."""
+        variance = float(np.var(self.values[self.scored]))
+        return 100.0 * (1.0 - self.event.noise**2 / variance) if variance > 0.0 else float("nan")
+
+    @property
+    def gain(self) -> float:
+        """Factor on the simulated signal that would bring it nearest; 1 where its size is right."""
+        return best_gain(self.values, self.simulated, self.scored)
+
+    @property
+    def window_variance(self) -> Floats:
+        """Scores of the windows asked for, percent, shape (window,)."""
+        return self._variance_in(self.windows)
+
+    @property
+    def running_variance(self) -> Floats:
+        """Scores of the running windows, percent, shape (running window,)."""
+        return self._variance_in(self.running)
+
+    def _variance_in(self, windows: list[Span]) -> Floats:
+        clock = self.measured.time - self.event.onset
+        return windowed_variance(clock, self.values, self.simulated, self.scored, windows)
+
+    @property
+    def measured_frequency(self) -> DominantFrequency:
+        """Dominant frequency of the measured signal over the event, Hz."""
+        return self._line(self.values)
+
+    @property
+    def simulated_frequency(self) -> DominantFrequency:
+        """Dominant frequency of the simulated signal over the same stretch, Hz."""
+        # it is driven by a record on the same doubtful clock, so the same uncertainty holds
+        return self._line(self.simulated)
+
+    def _line(self, values: Floats) -> DominantFrequency:
+        time = self.measured.time
+        rows = (time >= self.event.onset) & (time <= self.event.end) & np.isfinite(self.simulated)
+        uncertainty = self.measured.axis.interval_uncertainty
+        return dominant_frequency(time[rows], values[rows], interval_uncertainty=uncertainty)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many samples were scored, and why others were not."""
+        quality = self.measured.quality
+        clipped = (quality & np.uint8(Quality.clipped)) != 0
+        bad = ~self.measured.good & ~clipped
+        return {
+            "scored": int(np.count_nonzero(self.scored)),
+            "clipped": int(np.count_nonzero(clipped)),
+            "missing": int(np.count_nonzero(bad)),
+            "not_simulated": int(np.count_nonzero(self.measured.good & ~np.isfinite(self.simulated))),
+        }
+
+
+def compare(
+    simulated_time: Floats,
+    simulated: Floats,
+    measured: Channel,
+    *,
+    most_lag: float | None = None,
+    lag: Literal["auto"] | float = "auto",
+    polarity: Literal["auto"] | int = "auto",
+    event_window: Span | None = None,
+    offset: Literal["before", "level", "none"] | float = "before",
+    windows: Sequence[Span] = (),
+    running: float | None = None,
+    peak_window: Span | None = None,
+    measured_events: Floats | None = None,
+    simulated_events: Floats | None = None,
+    event_tolerance: float | None = None,
+    simulated_name: str = "simulated",
+) -> Comparison:
+    """Compare a simulated signal with a measured channel.
+
+    Parameters
+    ----------
+    simulated_time, simulated : ndarray of float, shape (simulated sample,)
+        s on the clock of the drive, ascending; values in the SI unit of the channel.
+    measured : Channel
+    most_lag : float, optional
+        s, largest lag tried where `lag` is "auto"; default: half of the record.
+    lag, polarity, event_window
+        As in `align`. Give lag=0.0 and polarity=1 for channels of one trigger and known sign.
+    offset : {"before", "level", "none"} or float
+        Removed from the measured values: their mean before the event; what brings the means of both signals together
+        (for a sensor without a zero whose record does not begin quietly: it hides a constant error of the model);
+        nothing; or a value in the SI unit.
+    windows : sequence of tuple of float
+        To be scored one by one, s from the onset of the event.
+    running : float, optional
+        Length of the running windows, s; default: a tenth of the record after the onset, two periods at least.
+    peak_window : tuple of float, optional
+        Where extremes are compared, s from the onset.
+    measured_events, simulated_events : ndarray of float, shape (event,), optional
+        s, each on its own clock: impacts, or spikes.
+    event_tolerance : float, optional
+        s; default: a quarter of the dominant period.
+    simulated_name : str
+        What the simulated signal is called in tables: `beam.sensor.acceleration`.
+
+    Raises
+    ------
+    EstimationError
+        Too little that is good in the channel, or the simulation does not overlap it.
+    """
+    event = find_event(measured)
+    time, values = measured.time, measured.si()
+    alignment = align(
+        simulated_time,
+        simulated,
+        measured,
+        most_lag=0.5 * float(time[-1] - time[0]) if most_lag is None else most_lag,
+        event_window=event_window,
+        polarity=polarity,
+        lag=lag,
+        event=event,
+    )
+    brought = _brought(simulated_time, simulated, measured, alignment)
+    scored = measured.good & np.isfinite(brought)
+    removed = _offset(offset, event, values[scored], brought[scored])
+    values = values - removed
+    signals = (time - event.onset, values, brought, scored)
+    return Comparison(
+        measured=measured,
+        simulated_name=simulated_name,
+        values=values,
+        simulated=brought,
+        scored=scored,
+        event=event,
+        offset=removed,
+        alignment=alignment,
+        variance=variance_accounted_for(values, brought, scored),
+        windows=list(windows),
+        running=_side_by_side(float(time[-1]), event, running),
+        peaks=_peaks(signals, peak_window, event, offset),
+        events=_matched(
+            measured_events,
+            simulated_events,
+            alignment.lag,
+            event_tolerance or EVENT_TOLERANCE * event.period,
+        ),
+        remarks=(*alignment.remarks, *_remarks(measured, event, offset, scored)),
+    )
+
+
+def _brought(simulated_time: Floats, simulated: Floats, measured: Channel, alignment: Alignment) -> Floats:
+    """Return the simulated signal at the measured instants, NaN where nothing was simulated."""
+    model = Interpolated(simulated_time, simulated)
+    at = measured.time - alignment.lag
+    # a lag of nothing must not lose the first or the last sample to rounding
+    slack = 1e-9 * (model.end - model.start)
+    inside = (at >= model.start - slack) & (at <= model.end + slack)
+    if np.count_nonzero(inside & measured.good) < 2:
+        raise EstimationError(
+            f"{measured.name}: expected a simulation that overlaps the recording, on the clock of the drive "
+            f"{at[0]:.6g} s to {at[-1]:.6g} s, got one of {model.start:.6g} s to {model.end:.6g} s. "
+            "Simulate this stretch, or give the lag."
+        )
+    return np.where(inside, alignment.polarity * model(at), np.nan)
+
+
+def _side_by_side(end: float, event: Event, running: float | None) -> list[Span]:
+    """Return the running windows, s from the onset; the last sample is within the last."""
+    stretch = end - event.onset
+    length = running or max(stretch / RUNNING_WINDOWS, RUNNING_PERIODS * event.period)
+    return running_windows(0.0, stretch * (1.0 + 1e-9), length)
+
+
+def _offset(offset: str | float, event: Event, values: Floats, brought: Floats) -> float:
+    if offset == "level":
+        return float(np.mean(values) - np.mean(brought))
+    return {"before": event.offset, "none": 0.0}[offset] if isinstance(offset, str) else float(offset)
+
+
+def _peaks(
+    signals: tuple[Floats, Floats, Floats, Flags], window: Span | None, event: Event, offset: str | float
+) -> PeakErrors | None:
+    """Compare extremes, their heights from the rest value: 0 where that was removed, else the mean."""
+    if window is None:
+        return None
+    _, values, _, scored = signals
+    level = 0.0 if offset == "before" and event.quiet is not None else float(np.mean(values[scored]))
+    return compare_peaks(*signals, window, event.period, level)
+
+
+def _matched(
+    measured: Floats | None, simulated: Floats | None, lag: float, tolerance: float
+) -> EventMatch | None:
+    if measured is None and simulated is None:
+        return None
+    none = np.empty(0)
+    return match_events(
+        none if measured is None else np.asarray(measured, dtype=np.float64),
+        none if simulated is None else np.asarray(simulated, dtype=np.float64) + lag,
+        tolerance,
+    )
+
+
+def _remarks(measured: Channel, event: Event, offset: str | float, scored: Flags) -> list[str]:
+    """Say what of the record was not scored, and what could not be found out."""
+    said = []
+    if event.quiet is None and offset == "before":
+        said.append(
+            "the recording does not begin quietly (a continuous signal, or noise only): its offset could not be "
+            "estimated and was left, and the start of the record stands for the onset of the event"
+        )
+    good, done = int(np.count_nonzero(measured.good)), int(np.count_nonzero(scored))
+    if done < good:
+        said.append(f"{good - done} good samples lie outside the simulated time and are not scored")
+    if good < len(scored):
+        said.append(f"{len(scored) - good} samples are clipped, missing or out of range and are not scored")
+    if measured.axis.interval_uncertainty > 0.0:
+        said.append(
+            f"the sampling interval is uncertain by {100 * measured.axis.interval_uncertainty:.2g} %: so is "
+            "every frequency"
+        )
+    return said

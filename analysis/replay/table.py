@@ -1,0 +1,126 @@
+"""Comparisons as a table for people."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from vibroimpact.analysis.replay.comparison import Comparison
+from vibroimpact.analysis.replay.replay_dataset import comparison_names
+from vibroimpact.analysis.replay.spectra import DominantFrequency
+from vibroimpact.analysis.units import measured_unit
+
+_MOST_WINDOWS = 12
+
+
+def print_comparison(console: Console, comparisons: Sequence[Comparison]) -> None:
+    """Print the scores of comparisons, a column for each, and what a reader must know.
+
+    Parameters
+    ----------
+    console : rich.console.Console
+    comparisons : sequence of Comparison
+    """
+    names = comparison_names(comparisons)
+    table = Table(title="Simulated against measured", title_justify="left", box=SIMPLE_HEAD)
+    table.add_column("score")
+    for name in names:
+        table.add_column(name, justify="right")
+    for heading, said in _ROWS:
+        cells = [said(comparison) for comparison in comparisons]
+        if any(cells):
+            table.add_row(heading, *cells)
+    _add_windows(table, comparisons)
+    console.print(table)
+    for name, comparison in zip(names, comparisons, strict=True):
+        for remark in comparison.remarks:
+            console.print(f"{name}: {remark}", highlight=False, markup=False)
+
+
+def _percent(value: float) -> str:
+    return f"{value:.2f} %" if np.isfinite(value) else "-"
+
+
+def _lag(comparison: Comparison) -> str:
+    found = comparison.alignment
+    if found.lag_error <= 0.0:
+        return f"{1e3 * found.lag:.4f} ms (given)"
+    return f"{1e3 * found.lag:.4f} +- {1e3 * found.lag_error:.2g} ms"
+
+
+def _instant(time: float) -> str:
+    return f"{1e3 * time:.4g} ms" if abs(time) < 1.0 else f"{time:.4g} s"
+
+
+def _margin(value: float) -> str:
+    return f"{value:.3f}" if np.isfinite(value) else "-"
+
+
+def _frequency(line: DominantFrequency) -> str:
+    doubt = f" +- {line.uncertainty:.2g}" if line.uncertainty > 0.0 else ""
+    return f"{line.frequency:.5g}{doubt} Hz"
+
+
+def _counts(comparison: Comparison) -> str:
+    return ", ".join(f"{count} {why.replace('_', ' ')}" for why, count in comparison.counts.items() if count)
+
+
+def _peaks(comparison: Comparison) -> str:
+    peaks = comparison.peaks
+    if peaks is None:
+        return ""
+    return f"{100 * peaks.worst:.1f} % of {len(peaks.time)}" if len(peaks.time) else "no peaks"
+
+
+def _events(comparison: Comparison) -> str:
+    match = comparison.events
+    if match is None:
+        return ""
+    return f"{len(match.measured)} matched, {len(match.missed)} missed, {len(match.extra)} extra"
+
+
+_ROWS: tuple[tuple[str, Callable[[Comparison], str]], ...] = (
+    ("simulated", lambda c: c.simulated_name),
+    ("variance accounted for", lambda c: _percent(c.variance)),
+    ("  of a perfect model (noise)", lambda c: _percent(c.noise_ceiling)),
+    ("best gain", lambda c: f"{c.gain:.4f}"),
+    ("lag", _lag),
+    ("polarity", lambda c: f"{c.alignment.polarity:+d}"),
+    ("correlation at the start", lambda c: f"{c.alignment.correlation:.4f}"),
+    ("  less the other polarity's", lambda c: _margin(c.alignment.polarity_margin)),
+    ("  less the next best lag's", lambda c: _margin(c.alignment.lag_margin)),
+    ("onset of the event", lambda c: _instant(c.event.onset)),
+    (
+        "offset removed",
+        lambda c: f"{c.offset:.4g} {measured_unit(c.measured.unit).si.removeprefix('1')}".rstrip(),
+    ),
+    ("measured frequency", lambda c: _frequency(c.measured_frequency)),
+    ("simulated frequency", lambda c: _frequency(c.simulated_frequency)),
+    ("  resolved within", lambda c: f"{c.measured_frequency.resolution:.3g} Hz"),
+    ("worst error of a peak", _peaks),
+    ("events", _events),
+    ("samples", _counts),
+)
+
+
+def _add_windows(table: Table, comparisons: Sequence[Comparison]) -> None:
+    """Add a row for each window: those asked for, then the running ones, from the onset in ms."""
+    for what in ("windows", "running"):
+        spans = sorted({span for comparison in comparisons for span in getattr(comparison, what)})
+        if len(spans) > _MOST_WINDOWS:
+            # those of each channel differ; the dataset and the figure have them
+            continue
+        for start, stop in spans:
+            cells = []
+            for comparison in comparisons:
+                mine: list[tuple[float, float]] = getattr(comparison, what)
+                scores = comparison.window_variance if what == "windows" else comparison.running_variance
+                cells.append(
+                    _percent(float(scores[mine.index((start, stop))])) if (start, stop) in mine else ""
+                )
+            heading = "  window" if what == "windows" else "  running"
+            table.add_row(f"{heading} {_instant(start)} to {_instant(stop)}", *cells)
