@@ -132,6 +132,10 @@ class RecordedBody(ABC):
     def close(self) -> None:
         """Free what is driven."""
 
+    def inputs(self, names: Sequence[str]) -> VariableGroup:
+        """Return the body's real inputs of these names as a group: fill its buffer, then `set`."""
+        return self._group_of("Float64", names, None)
+
     def record(self, *, impacts: bool, extrema: bool, periods: bool) -> None:
         """Say what the body records from now on; its energies count from here."""
         self._switches.values[:] = (impacts, extrema, periods)

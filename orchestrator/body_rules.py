@@ -12,8 +12,10 @@ from vibroimpact.orchestrator.scene_draft import Draft
 from vibroimpact.orchestrator.scene_errors import Problem, nearest, quoted
 from vibroimpact.orchestrator.scene_models import BeamBody, Body, ChainBody, Forcing
 
+AMPLITUDE_KEYS = ("frequency_slope", "damping_slope", "damping_reciprocal")
 SECTION_KEYS = ("width", "thickness", "youngs_modulus", "density")
 RIGIDITY_KEYS = ("flexural_rigidity", "mass_per_length")
+FREQUENCY_KEYS = ("frequency", "mass_per_length")
 
 
 def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
@@ -23,7 +25,8 @@ def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
         for key in ("stiffnesses", "dampings", "displacement_start", "velocity_start"):
             yield from _size_problem(f"body.{key}", getattr(body, key), body.size, "mass")
     if isinstance(body, BeamBody):
-        yield from _size_problem("body.damping_ratio", body.damping_ratio, body.size, "mode")
+        for key in ("damping_ratio", *AMPLITUDE_KEYS):
+            yield from _size_problem(f"body.{key}", getattr(body, key), body.size, "mode")
         for key in ("displacement_start", "velocity_start"):
             given = len(getattr(body, key))
             if given > body.size:
@@ -44,13 +47,18 @@ def beam_is_given_once(draft: Draft) -> Iterator[Problem]:
         return
     written = draft.written("body")
     section = [key for key in SECTION_KEYS if key in written]
-    rigidity = [key for key in RIGIDITY_KEYS if key in written]
-    ways = f"{', '.join(SECTION_KEYS)}, or {' and '.join(RIGIDITY_KEYS)}"
+    by_frequency = "frequency" in written
+    way_without_section = FREQUENCY_KEYS if by_frequency else RIGIDITY_KEYS
+    rigidity = [key for key in ("frequency", *RIGIDITY_KEYS) if key in written]
+    ways = f"{', '.join(SECTION_KEYS)}, or {' and '.join(RIGIDITY_KEYS)}, or {' and '.join(FREQUENCY_KEYS)}"
+    if by_frequency and "flexural_rigidity" in written:
+        yield Problem("body", ways, "frequency beside flexural_rigidity", "Remove one of them.")
+        return
     if section and rigidity:
         got = f"{', '.join(section)} beside {', '.join(rigidity)}"
         yield Problem("body", ways, got, "Remove those of one way.")
         return
-    way, given = (RIGIDITY_KEYS, rigidity) if rigidity else (SECTION_KEYS, section)
+    way, given = (way_without_section, rigidity) if rigidity else (SECTION_KEYS, section)
     missing = [key for key in way if key not in given]
     if missing:
         yield Problem("body", ways, ", ".join(given) or "neither", f"Add {', '.join(missing)}.")
@@ -64,10 +72,13 @@ def observed_point_is_there(draft: Draft) -> Iterator[Problem]:
     if "sensor" not in draft.document or body is None:
         return
     if not isinstance(body, BeamBody):
-        hint = "Remove [sensor]" + (
-            "; observed_mass in [body] says which mass." if isinstance(body, ChainBody) else "."
-        )
-        yield Problem("sensor", "[sensor] in a scene of a beam", f"one beside {body.NAME}", hint)
+        if "location" in draft.written("sensor"):
+            hint = "Remove it" + (
+                "; observed_mass in [body] says which mass." if isinstance(body, ChainBody) else "."
+            )
+            yield Problem(
+                "sensor.location", "a location in a scene of a beam", f"one beside {body.NAME}", hint
+            )
         return
     span = draft.span("sensor.location")
     yield from fixed_point_problems("sensor.location", body, span)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vibroimpact.orchestrator.replay_commands import register as register_replay
+
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign import CampaignReport
 
@@ -25,6 +27,7 @@ def register(app: typer.Typer) -> None:
     app.command("run")(run)
     app.command("campaign")(campaign)
     app.command("demo")(demo)
+    register_replay(app)
 
 
 def run(

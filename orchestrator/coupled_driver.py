@@ -72,6 +72,8 @@ class CoupledDriver(RecordedBody):
         How values are exchanged; the contacts do not depend on it.
     body : str
         Name of the body's FMU: `Oscillator`, `Chain` or `Beam`.
+    others, connections : sequences
+        Further components, such as a Replay, and how they are connected to the body.
     """
 
     def __init__(
@@ -83,12 +85,15 @@ class CoupledDriver(RecordedBody):
         macro_step: float = math.inf,
         exchange: Exchange = "gauss_seidel",
         body: str = "Oscillator",
+        others: Sequence[ComponentSpec] = (),
+        connections: Sequence[ConnectionSpec] = (),
     ) -> None:
         self._limit = integers["impact_limit"]
         own = {name: value for name, value in integers.items() if name != "impact_limit"}
         self._stops = [self._stop(k, own) for k in range(1, stops + 1)]
-        specs = [ComponentSpec(BODY, fmu_path(body), body_integers(own)), *self._stops]
-        self.importer = Importer(specs, connections_of(stops), macro_step=macro_step, exchange=exchange)
+        specs = [ComponentSpec(BODY, fmu_path(body), body_integers(own)), *self._stops, *others]
+        joined = [*connections_of(stops), *connections]
+        self.importer = Importer(specs, joined, macro_step=macro_step, exchange=exchange)
         self.importer.on_event = self._count_event
         self.importer.on_pause = self._make_room
         self._stop_floats = self._stop_parameters(floats)

@@ -15,6 +15,9 @@ def oscillator_floats(body: OscillatorBody, scene: Scene) -> dict[str, float]:
         "displacement_start": body.displacement_start,
         "velocity_start": body.velocity_start,
     }
+    for key in ("frequency_slope", "damping_slope", "damping_reciprocal"):
+        if key in body.model_fields_set:
+            parameters[f"amplitude.{key}"] = getattr(body, key)
     if scene.forcing is not None:
         # a base that accelerates is an inertial force on the relative coordinate
         scale = 1.0 if scene.forcing.kind == "force" else -body.mass

@@ -40,7 +40,7 @@ def observed_location(body: BeamBody, stops: Sequence[Stop], sensor: Sensor | No
 
     That of `[sensor]`; else the tip of a clamped-free beam; else the point of stop[1], or the middle.
     """
-    if sensor is not None:
+    if sensor is not None and sensor.location is not None:
         return sensor.location
     if far_end_moves(body):
         return TIP

@@ -10,6 +10,7 @@ import xarray as xr
 
 from vibroimpact.analysis.dataset import Direction, RunRecord, build_dataset, file_names
 from vibroimpact.orchestrator.empty_record import sample_variables
+from vibroimpact.orchestrator.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene_keys import parse_key
 
@@ -57,6 +58,7 @@ def dataset_of_runs(
         omit=_omitted(scene),
         event_components=[c.name for c in scene.general.components] if scene.general is not None else (),
         connections=_energy_connections(scene),
+        compared=compared_names(scene),
     )
     for file, long_name in _long_names(scene, names).items():
         dataset[file].attrs["long_name"] = long_name
@@ -77,6 +79,8 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
 
 def _unit_of_key(scene: Scene, key: str) -> str | None:
     """Return the unit of a swept key where it depends on its table; None where the name says it."""
+    if key == RECORDING_KEY:
+        return "1"
     if key == "forcing.amplitude" and scene.forcing is not None:
         return FORCING_UNITS[scene.forcing.kind]
     parts = parse_key(key)
@@ -106,6 +110,13 @@ def _long_names(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
 def _omitted(scene: Scene) -> tuple[str, ...]:
     record = scene.record
     return (() if record.extrema else EXTREMA) + (() if record.strobe else STROBE)
+
+
+def compared_names(scene: Scene) -> tuple[str, ...]:
+    """Return the names of what a replay compares."""
+    if scene.replay is None:
+        return ()
+    return tuple(f"{pair.simulated} ~ {pair.measured}" for pair in scene.replay.compare)
 
 
 def _energy_connections(scene: Scene) -> tuple[str, ...]:

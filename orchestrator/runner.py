@@ -66,7 +66,7 @@ class PointRunner:
         self.instruction_set = platform.machine()
         self._scene = scene
         self._plan = TimeSeriesPlan(scene)
-        self._driver = _driver_of(scene, self.execution)
+        self._driver = driver_of(scene, self.execution)
         self._driver.watch(
             contacts=len(scene.stops),
             sampled=self._plan.variables,
@@ -104,7 +104,8 @@ class PointRunner:
         self._driver.close()
 
 
-def _driver_of(scene: Scene, execution: str) -> RecordedBody:
+def driver_of(scene: Scene, execution: str) -> RecordedBody:
+    """Return what drives a scene's body: fused, or coupled to its stops."""
     floats, integers = float_parameters(scene, None), integer_parameters(scene)
     fmu = FMU_NAMES[scene.body.kind]
     if execution == "fused":

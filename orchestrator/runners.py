@@ -48,4 +48,8 @@ def open_runner(
     """Return the runner of a scene in this process."""
     if scene.general is not None:
         return GeneralRunner(scene, execution=execution, log=log, wrap=wrap)
+    if scene.replay is not None:
+        from vibroimpact.orchestrator.replay_runner import ReplayRunner  # scipy, for those who replay
+
+        return ReplayRunner(scene, execution=execution)
     return PointRunner(scene, execution=execution)

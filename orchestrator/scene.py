@@ -17,6 +17,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.general_scene import GeneralScene
+from vibroimpact.orchestrator.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene_file import parse_toml, read_text
 from vibroimpact.orchestrator.scene_keys import Key, coordinate_name, number_of, numeric_key, replacement
 from vibroimpact.orchestrator.scene_models import Body, Execution, Forcing, Record, Sensor, Stop
@@ -49,6 +50,8 @@ class Scene(BaseModel):
         The stops in the order of the file.
     sensor : Sensor or None
         Where a beam is observed; None without a `[sensor]` table.
+    replay : Replay or None
+        Recorded channels that drive the body and that its motion is compared with; None without `[replay]`.
     record : Record
         What is recorded; periods in a forced scene, times in any other. In a general scene `impacts` says
         whether located events are recorded.
@@ -72,6 +75,7 @@ class Scene(BaseModel):
     sweep: tuple[SweepAxis, ...]
     execution: Execution
     general: GeneralScene | None = None
+    replay: Replay | None = None
 
     @field_serializer("general")
     def _without_folders(self, general: GeneralScene | None) -> dict[str, Any] | None:
@@ -142,6 +146,8 @@ class Scene(BaseModel):
             return self.model_copy(update={"general": self.general.with_values(values)})
         tables = self._numbered_tables()
         for key, value in values.items():
+            if key == RECORDING_KEY:  # which recording is replayed: no number of any table
+                continue
             parts = numeric_key(key)
             owner = tables.get(_slot(parts))
             if owner is None:
@@ -215,4 +221,5 @@ def parse_scene(text: str, source: str) -> Scene:
         sweep=tables.sweep,
         execution=tables.execution,
         general=tables.general,
+        replay=tables.replay,
     )

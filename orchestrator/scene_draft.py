@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from vibroimpact.orchestrator.replay_models import Replay
 from vibroimpact.orchestrator.scene_keys import number_of, parse_key
 from vibroimpact.orchestrator.scene_models import Body, Forcing, Record, SceneHeader, Sensor, Stop
 from vibroimpact.orchestrator.sweep import SweepAxis
@@ -26,6 +27,7 @@ class Draft:
     record: Record | None
     axes: tuple[SweepAxis, ...]
     sensor: Sensor | None = None
+    replay: Replay | None = None
 
     def written(self, table: str) -> Mapping[str, Any]:
         """Return a table as written, or an empty one."""

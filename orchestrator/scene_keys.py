@@ -16,10 +16,11 @@ SWEEPABLE: dict[str, tuple[str, ...]] = {
         *("mass", "stiffness", "damping", "damping_ratio", "displacement_start", "velocity_start"),
         *("masses", "stiffnesses", "dampings", "far_stiffness", "far_damping"),
         *("length", "width", "thickness", "youngs_modulus", "density"),
-        *("flexural_rigidity", "mass_per_length"),
+        *("flexural_rigidity", "mass_per_length", "frequency"),
+        *("frequency_slope", "damping_slope", "damping_reciprocal"),
     ),
     "forcing": ("amplitude", "angular_frequency", "frequency", "phase", "location"),
-    "sensor": ("location",),
+    "sensor": ("location", "gain", "offset"),
     "stop": (
         *("position", "restitution", "yield_velocity"),
         *("stiffness", "damping", "exponent", "relaxation_time", "location"),

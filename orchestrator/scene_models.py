@@ -69,6 +69,9 @@ class SceneHeader(SceneTable):
 _BODY_KINDS = Rule('"oscillator", "chain" or "beam"')
 
 
+_SLOPE_HINT = "It is of the amplitude of the motion; 0 is a mode that does not depend on it."
+
+
 class OscillatorBody(SceneTable):
     """`[body]`: one mass on a spring and a dashpot, mass x'' + damping x' + stiffness x = force."""
 
@@ -86,6 +89,9 @@ class OscillatorBody(SceneTable):
     ] = None
     displacement_start: Annotated[Finite, Rule("a finite number", "m")] = 0.0
     velocity_start: Annotated[Finite, Rule("a finite number", "m/s")] = 0.0
+    frequency_slope: Annotated[Finite, Rule("a finite number", "1/m", _SLOPE_HINT)] = 0.0
+    damping_slope: Annotated[Finite, Rule("a finite number", "1/m", _SLOPE_HINT)] = 0.0
+    damping_reciprocal: Annotated[NotNegative, Rule("a number >= 0", "m", _SLOPE_HINT)] = 0.0
 
     @property
     def damping(self) -> float:
@@ -161,6 +167,10 @@ class BeamBody(SceneTable):
     density: Annotated[Positive | None, Rule("a number > 0", "kg/m^3")] = None
     flexural_rigidity: Annotated[Positive | None, Rule("a number > 0", "N m^2")] = None
     mass_per_length: Annotated[Positive | None, Rule("a number > 0", "kg/m")] = None
+    frequency: Annotated[
+        Positive | None,
+        Rule("a number > 0", "Hz", "It is the first natural frequency, beside mass_per_length."),
+    ] = None
     boundary: Annotated[
         Literal["clamped-free", "clamped-clamped", "clamped-pinned", "pinned-pinned"],
         Rule('"clamped-free", "clamped-clamped", "clamped-pinned" or "pinned-pinned"'),
@@ -173,6 +183,17 @@ class BeamBody(SceneTable):
             hint="One number for all modes, or one for each.",
             item="a number >= 0",
         ),
+    ] = 0.0
+    frequency_slope: Annotated[
+        FiniteNumbers,
+        Rule("a finite number, or an array of them", "1/m", _SLOPE_HINT, item="a finite number"),
+    ] = 0.0
+    damping_slope: Annotated[
+        FiniteNumbers,
+        Rule("a finite number, or an array of them", "1/m", _SLOPE_HINT, item="a finite number"),
+    ] = 0.0
+    damping_reciprocal: Annotated[
+        NotNegativeNumbers, Rule("a number >= 0, or an array of them", "m", _SLOPE_HINT, item="a number >= 0")
     ] = 0.0
     rayleigh: Annotated[
         Rayleigh | None, Rule("a table such as { mass = 0.1, stiffness = 1e-5 }", hint="Both are optional.")
@@ -207,9 +228,14 @@ _LOCATION = Rule(
 
 
 class Sensor(SceneTable):
-    """`[sensor]`: the point of a beam whose displacement is recorded."""
+    """`[sensor]`: the observed point of a beam, and what a reading there is: gain * value + offset."""
 
-    location: Annotated[Fraction, _LOCATION]
+    location: Annotated[Fraction | None, _LOCATION] = None
+    gain: Annotated[
+        Finite,
+        Rule("a finite number", hint="A reading is gain * value + offset, in the unit of its channel."),
+    ] = 1.0
+    offset: Annotated[Finite, Rule("a finite number", hint="It has the unit of the reading.")] = 0.0
 
 
 class Forcing(SceneTable):

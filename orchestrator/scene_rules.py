@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from vibroimpact.orchestrator.body_rules import BODY_RULES
+from vibroimpact.orchestrator.replay_rules import REPLAY_RULES
 from vibroimpact.orchestrator.scene_draft import FREQUENCY_KEYS, Draft
 from vibroimpact.orchestrator.scene_errors import Problem, key_path, quoted
 from vibroimpact.orchestrator.scene_keys import START_STATE
@@ -33,6 +34,7 @@ def rule_problems(draft: Draft) -> list[Problem]:
         _units_agree,
         *BODY_RULES,
         *STOP_RULES,
+        *REPLAY_RULES,
         _record_counts_what_there_is,
         _samples_fit,
         _coupling_is_asked_for,
@@ -107,7 +109,7 @@ def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:
 
 def _missing_duration(draft: Draft, right: str, wrong: str) -> Iterator[Problem]:
     raw = draft.document.get("record")
-    if raw is None and "body" not in draft.document:
+    if raw is None and ("body" not in draft.document or "replay" in draft.document):
         return  # a file without the main table is told only that
     if raw is None or (isinstance(raw, dict) and right not in raw and wrong not in raw):
         unit = "a whole number of forcing periods" if right in PERIOD_KEYS else "a number > 0 (time)"

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.general_scene import GeneralScene
+from vibroimpact.orchestrator.replay_models import Replay
+from vibroimpact.orchestrator.replay_rules import recording_axis
 from vibroimpact.orchestrator.scene_draft import Draft
 from vibroimpact.orchestrator.scene_errors import Problem, choice_problem, quoted, unknown_key
 from vibroimpact.orchestrator.scene_keys import parse_key
@@ -27,10 +29,10 @@ from vibroimpact.orchestrator.sweep import SweepAxis
 from vibroimpact.orchestrator.sweep_table import read_sweep
 from vibroimpact.orchestrator.table_reader import Table, read_table
 
-_SHORT_TABLES = ("body", "forcing", "stop", "sensor")
+_SHORT_TABLES = ("body", "forcing", "stop", "sensor", "replay")
 _GENERAL_TABLES = ("component", "connection", "event")
 _COMMON_TABLES = ("record", "sweep", "execution")
-_OPTIONAL_TABLES = ("load_cell", "exciter", "noise", "daq", "replay")
+_OPTIONAL_TABLES = ("load_cell", "exciter", "noise", "daq")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +48,7 @@ class Tables:
     execution: Execution
     general: GeneralScene | None = None
     sensor: Sensor | None = None
+    replay: Replay | None = None
 
 
 def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[Tables | None, list[Problem]]:
@@ -97,13 +100,16 @@ def _read_short(document: Mapping[str, Any]) -> tuple[Tables | None, list[Proble
     reader.problems += _table_problems(document, ("scene", *_SHORT_TABLES, *_COMMON_TABLES))
     header, body, forcing = reader.header(), reader.body(), reader.forcing()
     stops, record, execution = reader.stops(), reader.record(), reader.execution()
-    sensor = reader.sensor()
-    draft = Draft(reader.document, header, body, forcing, stops, record, axes, sensor)
+    sensor, replay = reader.sensor(), reader.replay()
+    draft = Draft(reader.document, header, body, forcing, stops, record, axes, sensor, replay)
     problems = reader.problems + sweep_problems + rule_problems(draft)
     if problems or header is None or body is None or record is None or execution is None:
         return None, problems
     whole = tuple(stop for stop in stops if stop is not None)
-    return Tables(header, body, forcing, whole, _applicable(record), axes, execution, None, sensor), []
+    axes += recording_axis(replay)
+    return Tables(
+        header, body, forcing, whole, _applicable(record), axes, execution, None, sensor, replay
+    ), []
 
 
 def _table_problems(document: Mapping[str, Any], known: tuple[str, ...]) -> Iterator[Problem]:
@@ -166,6 +172,11 @@ class _Reader:
         if "sensor" not in self.document:
             return None
         return self._table(Sensor, self.document["sensor"], ("sensor",))
+
+    def replay(self) -> Replay | None:
+        if "replay" not in self.document:
+            return None
+        return self._table(Replay, self.document["replay"], ("replay",))
 
     def stops(self) -> tuple[Stop | None, ...]:
         stops = self.document.get("stop", [])

@@ -20,6 +20,8 @@ class TimeSeriesPlan:
     ----------
     scene : Scene
         A scene of the short form.
+    names : sequence of str, optional
+        What is sampled, in place of what the scene's `record.time_series` names.
 
     Attributes
     ----------
@@ -31,15 +33,20 @@ class TimeSeriesPlan:
         Whether the body must follow its energies for them.
     """
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: Scene, names: Sequence[str] | None = None) -> None:
         series = scene.record.time_series
-        self.names: tuple[str, ...] = series.variables if series is not None else ()
+        asked = series.variables if series is not None else ()
+        self.names: tuple[str, ...] = asked if names is None else tuple(names)
         parts = [fmu_variables(name, len(scene.stops)) for name in self.names]
         self.variables = tuple(dict.fromkeys(variable for part in parts for variable in part))
         self.energies = scene.body.kind != "oscillator" and follow_energies(self.names)
         # a beam knows that its base moves; the others see it as forces on their masses only
         self._relative = scene.body.kind != "beam"
         self._columns = [[self.variables.index(variable) for variable in part] for part in parts]
+
+    def is_plain(self, forcing: Forcing | None) -> bool:
+        """Whether the sampled variables are those of the FMU, one by one: nothing is left for `row` to do."""
+        return forcing is None and self._columns == [[place] for place in range(len(self.names))]
 
     def row(self, values: NDArray[np.float64], forcing: Forcing | None, angle: float) -> Sequence[float]:
         """Return the sampled variables at one instant.

@@ -1,0 +1,270 @@
+"""The command `vibroimpact replay`."""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from vibroimpact.analysis.replay.trust import Verdict
+    from vibroimpact.orchestrator.replay import Replayer
+    from vibroimpact.orchestrator.replay_fit import ReplayFit
+    from vibroimpact.orchestrator.replay_output import Replayed
+    from vibroimpact.orchestrator.scene import Scene
+
+_TABLE = re.compile(r"^\s*\[\s*replay\s*\]\s*(#.*)?$", re.MULTILINE)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command("replay")(replay)
+
+
+def replay(
+    scene: Annotated[Path, typer.Argument(help="Scene file (TOML) with a [replay] table.")],
+    recordings: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Recordings to replay, and to fit to; left out, those that the scene names."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc); of a campaign its folder.")
+    ] = None,
+    fit: Annotated[
+        str, typer.Option(help="Numbers of the scene to fit: body.damping_ratio,sensor.gain")
+    ] = "",
+    score: Annotated[
+        list[Path] | None, typer.Option(help="Recording to score that was not fitted on; may be repeated.")
+    ] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    execution: Annotated[
+        str | None,
+        typer.Option(help="auto, fused, or coupled (a Replay FMU drives); else as the scene says."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes of a campaign.", min=1)] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Dask scheduler of a campaign.")] = None,
+) -> None:
+    """Drive a scene by recorded channels and compare its motion with what was measured.
+
+    One recording, or several with --fit and --score, make a dataset. A folder as output makes a campaign over all
+    recordings and the grid that the scene sweeps, on many workers; the same command resumes it.
+
+    Example: vibroimpact replay examples/board.toml a0.nc -o a0_replay.nc --fit body.damping_ratio --score a1.nc
+    """
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.scene import load_scene
+
+    loaded = load_scene(scene)
+    if output is None:
+        raise UsageError(
+            "--output: expected a dataset (.nc) or the folder of a campaign, got nothing. Add -o."
+        )
+    if output.suffix != ".nc":
+        _refuse_with_campaign(fit, score, figure, execution)
+        _campaign(with_recordings(loaded, recordings or []), output, workers, scheduler)
+        return
+    if workers is not None or scheduler is not None:
+        raise UsageError("--workers, --scheduler: expected the folder of a campaign as output, got a file.")
+    if any(axis.key != "replay.recording" for axis in loaded.sweep):
+        raise UsageError(
+            f"{scene}: sweep: expected no sweep for one dataset. Give a folder with -o for a campaign."
+        )
+    _to_dataset(loaded, recordings or [], score or [], output, fit, figure, execution or loaded.execution.how)
+
+
+def _refuse_with_campaign(fit: str, *others: object) -> None:
+    from vibroimpact.fmus.errors import UsageError
+
+    if fit or any(others):
+        raise UsageError(
+            "--output: expected a dataset (.nc) beside --fit, --score, --figure or --execution, got a "
+            "folder. Campaigns replay; they do not fit."
+        )
+
+
+def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:
+    """Return a scene that names recordings, as if its file did: workers read them by themselves.
+
+    Raises
+    ------
+    UsageError
+        The scene names recordings too, or there are none.
+    """
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.replay import replay_table
+    from vibroimpact.orchestrator.scene import parse_scene
+
+    named = replay_table(scene).recordings
+    if named and recordings:
+        raise UsageError(
+            f"{scene.source}: replay.recordings: expected recordings in the scene or on the command line, got both."
+        )
+    if not recordings:
+        if not named:
+            raise UsageError(
+                f"{scene.source}: expected a recording to replay, got none. Name one after the scene."
+            )
+        return scene
+    # JSON's strings are TOML's
+    line = f"recordings = {json.dumps([str(path.absolute()) for path in recordings])}"
+    text, count = _TABLE.subn(lambda match: f"{match[0]}\n{line}", scene.text, count=1)
+    if not count:
+        raise UsageError(
+            f"{scene.source}: replay: expected the table as a line [replay], got it written otherwise. Write [replay], "
+            "or name the recordings in it."
+        )
+    return parse_scene(text, scene.source)
+
+
+def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
+    from vibroimpact.orchestrator.commands import tell
+    from vibroimpact.orchestrator.progress import shown_progress
+
+    if workers is not None and scheduler is not None:
+        raise UsageError(
+            "--workers and --scheduler: expected one of them, got both. A scheduler has its own workers."
+        )
+    try:
+        with shown_progress() as progress:
+            report = run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)
+    except CampaignInterrupted as interrupted:
+        typer.echo(str(interrupted), err=True)
+        raise typer.Exit(130) from None
+    tell(report)
+
+
+def _to_dataset(
+    scene: Scene,
+    recordings: Sequence[Path],
+    scored: Sequence[Path],
+    output: Path,
+    fit: str,
+    figure: Path | None,
+    execution: str,
+) -> None:
+    from rich.console import Console
+
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.replay_output import replay_dataset
+
+    began = time.perf_counter()
+    paths = _paths(with_recordings(scene, recordings))
+    if scored and not fit:
+        raise UsageError(
+            "--score: expected --fit beside it: a recording is scored with numbers fitted on others."
+        )
+    console = Console()
+    with ExitStack() as stack:
+        fitted, verdict, replays = _replays(stack, scene, paths, scored, fit, execution)
+        _print(console, replays, fitted, verdict)
+        dataset = replay_dataset(replays, fitted, verdict)
+        _write(dataset, output, figure)
+    console.print(f"{output} in {time.perf_counter() - began:.1f} s", highlight=False, soft_wrap=True)
+
+
+def _paths(scene: Scene) -> list[Path]:
+    from vibroimpact.orchestrator.replay import recording_of, replay_table
+
+    return [recording_of(scene, number) for number in range(1, len(replay_table(scene).recordings) + 1)]
+
+
+def _replays(
+    stack: ExitStack, scene: Scene, paths: Sequence[Path], scored: Sequence[Path], fit: str, execution: str
+) -> tuple[ReplayFit | None, Verdict | None, list[Replayed]]:
+    from vibroimpact.analysis.replay.trust import trust
+    from vibroimpact.orchestrator.replay import opened_replays
+    from vibroimpact.orchestrator.replay_fit import fit_keys, scores_of
+    from vibroimpact.orchestrator.replay_output import Replayed
+    from vibroimpact.orchestrator.replay_scoring import compare_motion
+
+    keys = fit_keys(scene, fit) if fit else ()
+    # a number that the scene leaves at its default counts as written from now on
+    scene = scene.with_values({key: scene.value(key) for key in keys})
+    replayers = stack.enter_context(opened_replays(scene, [*paths, *scored], execution))
+    found = _fitted(replayers[: len(paths)], keys) if keys else None
+    numbers = found.numbers if found is not None else None
+    replays = []
+    for place, replayer in enumerate(replayers):
+        motion = replayer.simulate(numbers)
+        use = "replayed" if found is None else ("fitted" if place < len(paths) else "scored")
+        replays.append(Replayed(replayer, motion, compare_motion(replayer, motion), use))
+    if found is None:
+        return None, None, replays
+    scores = scores_of(replayers, [replay.comparisons for replay in replays], len(paths))
+    verdict = trust(scores.fitted, scores.others, scores.without_dynamics)
+    return found, replace(verdict, reasons=(*verdict.reasons, *scores.remarks)), replays
+
+
+def _fitted(replayers: Sequence[Replayer], keys: Sequence[str]) -> ReplayFit:
+    """Fit with a line that says how far it is."""
+    from rich.console import Console
+
+    from vibroimpact.orchestrator.replay_fit import fit_replay
+
+    console = Console(stderr=True)
+    with console.status("fitting") as status:
+        return fit_replay(
+            replayers,
+            keys,
+            told=lambda count, error: status.update(
+                f"fitting: {count} simulations, error {100 * error:.3g} %"
+            ),
+        )
+
+
+def _print(
+    console: Console, replays: Sequence[Replayed], fit: ReplayFit | None, verdict: Verdict | None
+) -> None:
+    from rich.table import Table
+
+    from vibroimpact.analysis.replay.table import print_comparison
+
+    for replay in replays:
+        console.print(f"[bold]{replay.name}[/bold] ({replay.use})", highlight=False)
+        for line in (*replay.replayer.remarks, *replay.motion.warnings):
+            console.print(f"  {line}", highlight=False, soft_wrap=True)
+        if replay.comparisons:
+            print_comparison(console, replay.comparisons)
+    if fit is not None:
+        table = Table("number", "found", "standard error", "began with", title="Fit", title_justify="left")
+        for key, value, error, start in zip(fit.keys, fit.values, fit.standard_error, fit.start, strict=True):
+            table.add_row(key, f"{value:.6g}", f"{error:.2g}", f"{start:.6g}")
+        console.print(table)
+        for line in fit.remarks:
+            console.print(f"  {line}", highlight=False, soft_wrap=True)
+    if verdict is not None:
+        console.print(verdict.words, highlight=False, soft_wrap=True)
+        for reason in verdict.reasons[1:]:
+            console.print(f"  also: {reason}", highlight=False, soft_wrap=True)
+
+
+def _write(dataset: object, output: Path, figure: Path | None) -> None:
+    import xarray as xr
+
+    from vibroimpact.analysis.results import write_results
+    from vibroimpact.fmus.errors import UsageError
+
+    assert isinstance(dataset, xr.Dataset)
+    try:
+        write_results(dataset, output, kind="replay")
+        if figure is not None:
+            from vibroimpact.analysis import figures
+            from vibroimpact.analysis.figures.replay import draw_replay
+
+            figures.save(draw_replay(dataset), figure)
+    except OSError as error:
+        raise UsageError(
+            f"{error.filename or output}: expected a place where a file can be written, got "
+            f"{error.strerror or error}. Choose another."
+        ) from error

@@ -1,0 +1,392 @@
+"""Fits of a replay: the numbers of a scene that bring what it simulates nearest to what was measured.
+
+Least squares over all compared channels of all recordings. Lag and polarity are found from the start of the event
+alone and then held while the numbers are fitted, so that an error of the model cannot hide in them; with better
+numbers they are found again, until they stay.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from vibroimpact.analysis.replay.alignment import Interpolated
+from vibroimpact.analysis.replay.comparison import Comparison
+from vibroimpact.fmus.errors import ComponentError, EstimationError, UsageError
+from vibroimpact.orchestrator.replay import Replayer
+from vibroimpact.orchestrator.replay_scoring import compare_motion, score_without_dynamics
+from vibroimpact.orchestrator.scene import Scene
+
+Floats = NDArray[np.float64]
+
+#: Numbers that mean nothing at or below 0, by the end of their key.
+POSITIVE = frozenset(
+    {"mass", "stiffness", "frequency", "angular_frequency", "length", "width", "thickness", "density"}
+    | {"youngs_modulus", "flexural_rigidity", "mass_per_length"}
+)
+NOT_NEGATIVE = frozenset(
+    {"damping", "damping_ratio", "damping_reciprocal", "yield_velocity", "relaxation_time"}
+)
+FRACTIONS = frozenset({"restitution", "location"})
+#: How the natural frequency enters a number: frequencies as such, stiffnesses by their square.
+_FREQUENCY_POWER = {"frequency": 1.0, "stiffness": 2.0, "flexural_rigidity": 2.0, "youngs_modulus": 2.0}
+#: A record with less than this share of the motion of those fitted has nothing to be scored: its drive did not act.
+LEAST_MOTION = 1e-4
+MOST_ALIGNMENTS = 6
+#: Condition of the scaled normal matrix above which two numbers are one: their difference is derivative noise.
+MOST_CONDITION = 1e8
+#: The lag stays where it moves by less than this share of its own error.
+LAG_STAYS = 0.1
+#: Step of the numeric derivatives, relative to the larger of a number and its scale.
+DERIVATIVE_STEP = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayFit:
+    """What a fit found.
+
+    Attributes
+    ----------
+    keys : tuple of str
+    start, values, standard_error : ndarray, shape (key,)
+        Each in the unit of its key. The errors are those of least squares with residuals that are correlated in
+        time (Newey and West): they hold where the model is right, and do not see what a wrong one misses.
+    correlation : ndarray, shape (key, key)
+        Of the errors.
+    comparisons : tuple of list of Comparison
+        Of each recording that was fitted, with the numbers found.
+    alignments : int
+        How often lag and polarity were found.
+    simulations : int
+        How often all recordings were simulated.
+    remarks : tuple of str
+        Numbers at a bound, pairs that the data do not separate, a lag that did not settle.
+    """
+
+    keys: tuple[str, ...]
+    start: Floats
+    values: Floats
+    standard_error: Floats
+    correlation: Floats
+    comparisons: tuple[list[Comparison], ...]
+    alignments: int
+    simulations: int
+    remarks: tuple[str, ...]
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The values found, by key."""
+        return dict(zip(self.keys, self.values.tolist(), strict=True))
+
+
+def fit_keys(scene: Scene, text: str) -> tuple[str, ...]:
+    """Return the keys of `--fit body.damping_ratio,sensor.gain`.
+
+    Raises
+    ------
+    UsageError
+        A key is no number of the scene, or is there twice.
+    """
+    keys = tuple(key.strip() for key in text.split(",") if key.strip())
+    if not keys or len(set(keys)) < len(keys):
+        raise UsageError(
+            f"--fit: expected keys such as body.damping_ratio,sensor.gain, each once, got {text!r}."
+        )
+    for key in keys:
+        scene.value(key)
+    return keys
+
+
+def fit_replay(
+    replayers: Sequence[Replayer],
+    keys: Sequence[str],
+    *,
+    told: Callable[[int, float], None] = lambda simulations, error: None,
+) -> ReplayFit:
+    """Fit numbers of a scene to recordings.
+
+    Parameters
+    ----------
+    replayers : sequence of Replayer
+        Of one scene, one for each recording; the scene compares something.
+    keys : sequence of str
+        Numbers of the scene to be found; it gives where to start.
+    told : callable
+        Called after each simulation with their number and the root-mean-square error (1: that of the mean).
+
+    Raises
+    ------
+    EstimationError
+        Nothing is compared, the data say nothing of a number, or the search does not end.
+    """
+    return _Fit(replayers, tuple(keys), told).run()
+
+
+class _Fit:
+    def __init__(
+        self, replayers: Sequence[Replayer], keys: tuple[str, ...], told: Callable[[int, float], None]
+    ) -> None:
+        self.replayers, self.keys, self.told = replayers, keys, told
+        scene = replayers[0].scene
+        if not replayers[0].readings:
+            raise EstimationError(
+                f"{scene.source}: replay.compare: expected something to fit to, got nothing. Add compare = [...]."
+            )
+        self.start = np.array([scene.value(key) for key in keys])
+        self.lower, self.upper = (np.array(ends) for ends in zip(*map(_bounds, keys), strict=True))
+        self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
+        self.simulations = 0
+
+    def run(self) -> ReplayFit:
+        values, remarks = self.start.copy(), []
+        comparisons = self.compared(values)
+        values, comparisons = self.better_start(values, comparisons)
+        self.refuse_alike(self._slopes(values, comparisons))  # before a search that would wander about
+        for alignments in range(1, MOST_ALIGNMENTS + 1):  # noqa: B007 counted for the report
+            solution = self.solve(values, comparisons)
+            values = solution.x * self.scale
+            renewed = self.compared(values)
+            settled = _have_settled(comparisons, renewed)
+            comparisons = renewed
+            if settled:
+                break
+        else:
+            remarks.append("lag and polarity did not settle: do not rely on the numbers")
+        covariance = self.covariance(values, comparisons)
+        errors = np.sqrt(np.diag(covariance))
+        correlation = covariance / np.outer(errors, errors)
+        remarks += self._remarks(values, errors, correlation)
+        return ReplayFit(
+            self.keys, self.start, values, errors, correlation, comparisons, alignments, self.simulations,
+            tuple(remarks),
+        )  # fmt: skip
+
+    def better_start(
+        self, values: Floats, comparisons: tuple[list[Comparison], ...]
+    ) -> tuple[Floats, tuple[list[Comparison], ...]]:
+        """Begin at the dominant frequency that was measured where that explains more: far off, the search gets lost.
+
+        Numbers of the frequency are scaled by the ratio of the two frequencies, stiffnesses by its square.
+        """
+        first = comparisons[0][0]
+        ratio = first.measured_frequency.frequency / first.simulated_frequency.frequency
+        powers = np.array([_FREQUENCY_POWER.get(_name(key), 0.0) for key in self.keys])
+        if not np.any(powers) or not np.isfinite(ratio) or ratio <= 0.0:
+            return values, comparisons
+        other = np.clip(values * ratio**powers, self.lower, self.upper)
+        others = self.compared(other)
+        return (other, others) if _explained(others) > _explained(comparisons) else (values, comparisons)
+
+    def compared(self, values: Floats) -> tuple[list[Comparison], ...]:
+        """Simulate every recording and find lag and polarity anew."""
+        numbers = self._numbers(values)
+        return tuple(compare_motion(replayer, replayer.simulate(numbers)) for replayer in self.replayers)
+
+    def _numbers(self, values: Floats) -> dict[str, float]:
+        self.simulations += 1
+        return dict(zip(self.keys, values.tolist(), strict=True))
+
+    def residuals(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> list[Floats]:
+        """Return the residual of each channel over its own standard deviation, lag and polarity held."""
+        numbers = self._numbers(values)
+        found = []
+        for replayer, compared in zip(self.replayers, comparisons, strict=True):
+            motion = replayer.simulate(numbers)
+            for reading, comparison in zip(motion.readings, compared, strict=True):
+                at = comparison.measured.time[comparison.scored] - comparison.alignment.lag
+                simulated = comparison.alignment.polarity * Interpolated(motion.time, reading)(at)
+                measured = comparison.values[comparison.scored]
+                found.append((measured - simulated) / np.std(measured))
+        self.told(self.simulations, float(np.sqrt(np.mean(np.concatenate(found) ** 2))))
+        return found
+
+    def solve(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> Any:
+        def of(scaled: Floats) -> Floats:
+            return np.concatenate(self.residuals(scaled * self.scale, comparisons))
+
+        inside = np.clip(values, self.lower + 1e-12 * self.scale, self.upper - 1e-12 * self.scale)
+        try:
+            return least_squares(
+                of,
+                inside / self.scale,
+                bounds=(self.lower / self.scale, self.upper / self.scale),
+                x_scale="jac",
+                diff_step=DERIVATIVE_STEP,
+                xtol=1e-9,
+                ftol=1e-10,
+                gtol=1e-10,
+                max_nfev=100,
+            )
+        except ComponentError as error:
+            raise EstimationError(
+                f"fit: the search reached numbers that the body refuses: {error} Start nearer, or fit fewer numbers."
+            ) from error
+
+    def covariance(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> Floats:
+        """Return the covariance of the numbers, with residuals that are correlated in time (Newey and West)."""
+        residuals = self.residuals(values, comparisons)
+        slopes = self._slopes(values, comparisons)
+        bread = self.refuse_alike(slopes)
+        inverse = np.linalg.inv(bread)
+        meat = sum(
+            (_meat(slope, residual) for slope, residual in zip(slopes, residuals, strict=True)),
+            np.zeros_like(bread),
+        )
+        covariance: Floats = inverse @ meat @ inverse
+        return covariance
+
+    def refuse_alike(self, slopes: Sequence[Floats]) -> Floats:
+        """Return the normal matrix of the slopes; refuse numbers that the recordings do not tell apart."""
+        bread: Floats = sum((slope.T @ slope for slope in slopes), np.zeros((len(self.keys), len(self.keys))))
+        size = np.sqrt(np.diag(bread))
+        if not np.all(size > 0.0):
+            idle = self.keys[int(np.argmin(size))]
+            raise EstimationError(
+                f"fit: {idle}: expected a number that changes what is compared, got one that does not. Leave it out."
+            )
+        scaled = bread / np.outer(size, size)
+        if np.linalg.cond(scaled) > MOST_CONDITION:
+            weakest = np.abs(np.linalg.eigh(scaled)[1][:, 0])
+            alike = " and ".join(self.keys[place] for place in np.flatnonzero(weakest > 0.1))
+            raise EstimationError(
+                f"fit: expected numbers that the recordings tell apart, got {alike}, which change the motion alike. "
+                "Fit fewer of them."
+            )
+        return bread
+
+    def _slopes(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> list[Floats]:
+        """Return the derivative of each residual by each number, shape (sample, key) for each channel."""
+        columns = []
+        for place in range(len(values)):
+            step = np.zeros(len(values))
+            step[place] = 10.0 * DERIVATIVE_STEP * self.scale[place]
+            step[place] = min(step[place], *(0.5 * gap for gap in self._room(values, place) if gap > 0.0))
+            ahead, behind = (self.residuals(values + sign * step, comparisons) for sign in (1.0, -1.0))
+            columns.append([(a - b) / (2.0 * step[place]) for a, b in zip(ahead, behind, strict=True)])
+        return [np.column_stack(channel) for channel in zip(*columns, strict=True)]
+
+    def _room(self, values: Floats, place: int) -> tuple[float, float]:
+        return float(values[place] - self.lower[place]), float(self.upper[place] - values[place])
+
+    def _remarks(self, values: Floats, errors: Floats, correlation: Floats) -> list[str]:
+        remarks = []
+        for place, key in enumerate(self.keys):
+            if min(self._room(values, place)) <= 1e-6 * self.scale[place]:
+                remarks.append(
+                    f"{key} ended at its bound, {values[place]:.6g}: its error is not to be relied on"
+                )
+            for other in range(place):
+                if abs(correlation[place, other]) > 0.99:
+                    remarks.append(
+                        f"{self.keys[other]} and {key} change the motion nearly alike "
+                        f"(correlation {correlation[place, other]:.4f}): one hides in the other"
+                    )
+        return remarks
+
+
+def _name(key: str) -> str:
+    return key.rpartition(".")[2].partition("[")[0]
+
+
+def _explained(comparisons: Sequence[Sequence[Comparison]]) -> float:
+    """Return the mean squared correlation of simulated and measured signals, whatever their gains."""
+    found = []
+    for comparison in (one for compared in comparisons for one in compared):
+        pair = comparison.values[comparison.scored], comparison.simulated[comparison.scored]
+        found.append(float(np.corrcoef(*pair)[0, 1]) ** 2 if np.ptp(pair[1]) > 0.0 else 0.0)
+    return float(np.mean(found))
+
+
+def _bounds(key: str) -> tuple[float, float]:
+    name = _name(key)
+    if name in FRACTIONS:
+        return 0.0, 1.0
+    return (0.0, np.inf) if name in POSITIVE | NOT_NEGATIVE else (-np.inf, np.inf)
+
+
+def _have_settled(before: Sequence[Sequence[Comparison]], after: Sequence[Sequence[Comparison]]) -> bool:
+    pairs = [
+        (old.alignment, new.alignment)
+        for earlier, later in zip(before, after, strict=True)
+        for old, new in zip(earlier, later, strict=True)
+    ]
+    return all(
+        old.polarity == new.polarity and abs(new.lag - old.lag) <= LAG_STAYS * new.lag_error + 1e-12
+        for old, new in pairs
+    )
+
+
+def _meat(slope: Floats, residual: Floats) -> Floats:
+    """Return the covariance of sum slope * residual, correlations fading out over a lag of n^(1/2) samples."""
+    scores = slope * residual[:, None]
+    count = len(scores)
+    reach = max(1, int(np.sqrt(count)))
+    total: Floats = scores.T @ scores
+    for lag in range(1, reach + 1):
+        part = scores[lag:].T @ scores[:-lag]
+        total = total + (1.0 - lag / (reach + 1.0)) * (part + part.T)
+    return total
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """Scores of recordings, percent, by the name of their file.
+
+    Attributes
+    ----------
+    fitted, others : mapping of str to float
+        Variance accounted for, of the recordings that were fitted and of those that were not; NaN where nothing
+        happened in a record.
+    without_dynamics : mapping of str to float
+        Of the best prediction without dynamics, of all of them.
+    remarks : tuple of str
+    """
+
+    fitted: Mapping[str, float]
+    others: Mapping[str, float]
+    without_dynamics: Mapping[str, float]
+    remarks: tuple[str, ...]
+
+
+def scores_of(
+    replayers: Sequence[Replayer], comparisons: Sequence[Sequence[Comparison]], fitted: int
+) -> Scores:
+    """Return the score of each channel of each recording; a recording with several channels has several rows.
+
+    A record in which nothing happened has nothing to be scored: beside the largest motion of the same channel in any
+    of them, it has less than `LEAST_MOTION` of the energy.
+
+    Parameters
+    ----------
+    replayers, comparisons : sequences, one for each recording
+    fitted : int
+        The first so many recordings were fitted.
+    """
+    motions = [[_motion(comparison) for comparison in compared] for compared in comparisons]
+    own: dict[str, float] = {}
+    others: dict[str, float] = {}
+    naive: dict[str, float] = {}
+    remarks: list[str] = []
+    for number, (replayer, compared) in enumerate(zip(replayers, comparisons, strict=True)):
+        for place, (reading, comparison) in enumerate(zip(replayer.readings, compared, strict=True)):
+            name = Path(replayer.recording.title).name
+            name = name if len(compared) == 1 else f"{name}: {reading.channel.name}"
+            share = motions[number][place] / max(max(rows[place] for rows in motions), 1e-300)
+            moved = share > LEAST_MOTION
+            if not moved:
+                remarks.append(
+                    f"{name}: its motion has {share:.1e} of the energy of the other's: there is nothing to be scored"
+                )
+            (own if number < fitted else others)[name] = comparison.variance if moved else float("nan")
+            naive[name] = score_without_dynamics(replayer, reading, comparison)
+    return Scores(own, others, naive, tuple(remarks))
+
+
+def _motion(comparison: Comparison) -> float:
+    return float(np.var(comparison.values[comparison.scored]))

@@ -1,0 +1,120 @@
+"""The score of a replay: what it simulated beside what was measured, each compared pair by itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from vibroimpact.analysis.recording import Channel, TimeAxis
+from vibroimpact.analysis.replay.baseline import naive_variance
+from vibroimpact.analysis.replay.comparison import Comparison, compare
+from vibroimpact.analysis.replay.event import find_event
+from vibroimpact.orchestrator.drive_signal import quiet_level
+from vibroimpact.orchestrator.replay import Motion, Reading, Replayer
+
+#: Longest lag tried between channels of separate triggers, as a share of the shorter record.
+MOST_LAG_SHARE = 0.5
+
+
+def compare_motion(replayer: Replayer, motion: Motion) -> list[Comparison]:
+    """Compare what was simulated with every channel that the scene names.
+
+    Raises
+    ------
+    EstimationError
+        A channel has too little that is good, or was not simulated.
+    """
+    return [_compared(replayer, reading, motion, place) for place, reading in enumerate(replayer.readings)]
+
+
+def _compared(replayer: Replayer, reading: Reading, motion: Motion, place: int) -> Comparison:
+    replay = replayer.replay
+    channel = _within(reading.channel, replayer) if replayer.drive is None else reading.channel
+    lag, polarity = _clock(replayer, reading)
+    trains = replayer.recording.events
+    impacts = trains["impacts"].times if "impacts" in trains else None
+    return compare(
+        motion.time,
+        motion.readings[place],
+        channel,
+        most_lag=_most_lag(replayer, reading),
+        lag=lag,
+        polarity=polarity,
+        event_window=None if replay.event_window is None else (0.0, replay.event_window),
+        offset=_offset(replayer, reading),
+        windows=list(replay.windows),
+        peak_window=replay.peaks,
+        measured_events=impacts,
+        simulated_events=motion.impacts[:, 0] if len(motion.impacts) or impacts is not None else None,
+        simulated_name=reading.compared.simulated,
+    )
+
+
+def _clock(replayer: Replayer, reading: Reading) -> tuple[Literal["auto"] | float, Literal["auto"] | int]:
+    """Return lag and polarity: as the scene says, none on one clock, else to be found."""
+    replay = replayer.replay
+    if is_on_the_clock(replayer, reading):
+        return replay.lag or 0.0, replay.polarity or 1
+    return ("auto" if replay.lag is None else replay.lag), (
+        "auto" if replay.polarity is None else replay.polarity
+    )
+
+
+def is_on_the_clock(replayer: Replayer, reading: Reading) -> bool:
+    """Whether a channel was recorded on the clock that the simulation runs on: one axis, one trigger."""
+    if replayer.drive is None:
+        return True
+    driven = replayer.recording.channel(replayer.replay.channel).axis
+    axis = reading.channel.axis
+    return axis is driven or (axis.trigger != "" and axis.trigger == driven.trigger)
+
+
+def _most_lag(replayer: Replayer, reading: Reading) -> float:
+    if replayer.replay.most_lag is not None:
+        return replayer.replay.most_lag
+    if replayer.drive is None:
+        return 0.0
+    lengths = [float(times[-1] - times[0]) for times in (replayer.drive.time, reading.channel.time)]
+    return MOST_LAG_SHARE * min(lengths)
+
+
+def _offset(replayer: Replayer, reading: Reading) -> Literal["before", "none"] | float:
+    """A scene that gives its sensor an offset simulates it; else the level of rest is taken off.
+
+    That is the mean before the event or, where the record does not begin quietly, the level of an acceleration where
+    it is quietest: an acceleration has no mean in the long run; a displacement may well have one. What was simulated
+    has no offset.
+    """
+    sensor = replayer.scene.sensor
+    simulated = sensor is not None and reading.is_sensor and "offset" in sensor.model_fields_set
+    channel = reading.channel
+    if simulated or replayer.drive is None or channel.attrs.get("role") == "simulated":
+        return "none"
+    if find_event(channel).quiet is not None or reading.variable != "acceleration":
+        return "before"
+    return quiet_level(channel.si()[channel.good])
+
+
+def _within(channel: Channel, replayer: Replayer) -> Channel:
+    """Return the part of a channel that the scene's span holds."""
+    rows = (channel.time >= replayer.time[0]) & (channel.time <= replayer.time[-1])
+    axis = TimeAxis(
+        channel.time[rows],
+        channel.axis.interval,
+        channel.axis.interval_uncertainty,
+        channel.axis.source,
+        channel.axis.trigger,
+    )
+    return replace(channel, values=channel.values[rows], quality=channel.quality[rows], axis=axis)
+
+
+def score_without_dynamics(replayer: Replayer, reading: Reading, comparison: Comparison) -> float:
+    """Return the score, percent, of the best prediction without dynamics: nothing moves, or all as the base does.
+
+    The drive times the gain that suits the record best, on the same clock and the same samples.
+    """
+    drive = replayer.drive
+    if drive is None or replayer.replay.drive != "base_acceleration" or reading.variable != "acceleration":
+        return 0.0
+    most_lag, lag = _most_lag(replayer, reading), _clock(replayer, reading)[0]
+    return naive_variance(drive.time, drive.values, comparison.measured, most_lag=most_lag, lag=lag)
