@@ -133,7 +133,9 @@ def _coordinates(dataset: xr.Dataset, run_id: xr.DataArray) -> dict[str, NDArray
     """Return each coordinate of the runs as one flat column."""
     columns = {"run_id": run_id.values.ravel()}
     for name, coordinate in dataset.coords.items():
-        if name not in ("run", "period", "connection") and set(coordinate.dims) <= set(run_id.dims):
+        if name not in ("run", "period", "connection", "compared") and set(coordinate.dims) <= set(
+            run_id.dims
+        ):
             values = np.broadcast_to(
                 xr.broadcast(coordinate, run_id)[0].transpose(*run_id.dims).values, run_id.shape
             )

@@ -14,6 +14,7 @@ from vibroimpact.analysis.schema import (
     RAGGED,
     RULES,
     RUN_COLUMNS,
+    SCORE_COLUMNS,
     STICK_COLUMNS,
     Direction,
     Outcome,
@@ -67,6 +68,7 @@ _GROUPS = (
     ("stick_count", *STICK_COLUMNS),
     ("event_count", *EVENT_COLUMNS),
     ("connection", "energy_residual"),
+    ("compared", *SCORE_COLUMNS),
 )
 
 

@@ -15,7 +15,7 @@ from vibroimpact.analysis.schema import RAGGED, flat_order
 from vibroimpact.fmus.errors import DatasetError
 
 # Not along run, the same in all parts.
-_SHARED = frozenset({"connection"})
+_SHARED = frozenset({"connection", "compared"})
 # Attributes that say what the values are: parts that differ in them cannot be joined.
 _MEANING = ("units", "component_variable", "flag_meanings")
 

@@ -139,7 +139,7 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     is a scalar coordinate; one run without swept parameters has scalars only. Runs that are no grid
     (scattered or repeated points) keep the dimension `run`. Impacts, sticks, samples and events stay on their
     own dimension; `impact_run` and so on give the `run_id` each row belongs to, under any selection.
-    `energy_residual` is along `connection`, the names of the connections.
+    `energy_residual` is along `connection`, the names of the connections; scores of replays are along `compared`.
     `displacement_range` is the largest displacement minus the smallest over the recorded periods (m).
     A variable is read from the file when it is first used.
 
@@ -233,6 +233,8 @@ def _on_grid(flat: xr.Dataset) -> xr.Dataset:
     if "connection" in flat.variables:
         # In memory names may be a dimension, and then they select.
         flat = flat.swap_dims(interface="connection")
+    if "compared" in flat.variables:
+        flat = flat.swap_dims(comparison="compared")
     axes, scalars, run_id = _grid(flat)
     dims, swept = tuple(axes), swept_names(flat)
     variables: dict[str, xr.Variable] = {}
@@ -250,8 +252,7 @@ def _on_grid(flat: xr.Dataset) -> xr.Dataset:
     if "displacement_max" in flat.variables:
         variables["displacement_range"] = _displacement_range(flat, dims, run_id)
     coordinates = {"run_index": variables.pop("run_index")}
-    if "connection" in variables:
-        coordinates["connection"] = variables.pop("connection")
+    coordinates |= {name: variables.pop(name) for name in ("connection", "compared") if name in variables}
     if dims == ("run",):
         coordinates |= {name: flat.variables[name] for name in swept}
         coordinates["direction"] = xr.Variable(

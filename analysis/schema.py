@@ -78,6 +78,8 @@ class RunRecord:
     final_state : ndarray of float, shape (2 N,), or None
         Whole state of a chain or beam at the end: N displacements (m), then N velocities (m/s), of its masses
         or modes.
+    scores : ndarray of float, shape (comparison, 6), or None
+        Columns `SCORE_COLUMNS`, of each compared pair of a replay.
     """
 
     outcome: Outcome
@@ -94,6 +96,7 @@ class RunRecord:
     energy_residual: NDArray[np.float64] | None = None
     loop_residual: float | None = None
     final_state: NDArray[np.float64] | None = None
+    scores: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,6 +202,29 @@ _RULES = (
     VariableRule(
         "energy_residual", ("run", "interface"), np.float64, "J", "energy that a connection made or lost"
     ),
+    VariableRule(
+        "compared", ("comparison",), object, "1", "simulated variable and the channel it is compared with"
+    ),
+    VariableRule(
+        "variance_accounted_for",
+        ("run", "comparison"),
+        np.float64,
+        "%",
+        "share of the measured variance that the simulation accounts for",
+    ),
+    VariableRule(
+        "best_gain", ("run", "comparison"), np.float64, "1", "factor that would bring the simulation nearest"
+    ),
+    VariableRule("lag", ("run", "comparison"), np.float64, "s", "measured clock less simulated clock"),
+    VariableRule("lag_error", ("run", "comparison"), np.float64, "s", "standard error of the lag"),
+    VariableRule("polarity", ("run", "comparison"), np.float64, "1", "-1 where the channel is inverted"),
+    VariableRule(
+        "frequency_difference",
+        ("run", "comparison"),
+        np.float64,
+        "Hz",
+        "dominant frequency of the simulation less that of the measurement",
+    ),
     VariableRule("loop_residual", ("run",), np.float64, "1", "largest relative residual of algebraic loops"),
 )
 RULES: Mapping[str, VariableRule] = {rule.name: rule for rule in _RULES}
@@ -215,6 +241,7 @@ NEEDED_IMPACT_COLUMNS = IMPACT_COLUMNS[:5]
 """Columns of impacts that every file has; the others came later."""
 STICK_COLUMNS = _columns(("stick",))
 EVENT_COLUMNS = _columns(("event",))
+SCORE_COLUMNS = _columns(("run", "comparison"))
 RAGGED = {
     "impact": "impact_count",
     "stick": "stick_count",
@@ -363,12 +390,12 @@ def file_names(quantities: Sequence[str], taken: Collection[str] = RESERVED_NAME
 
 
 def unit_in(system: UnitSystem, unit: str) -> str:
-    """Return the unit that an SI unit becomes in a system of units; angles stay radians.
+    """Return the unit that an SI unit becomes in a system of units; angles stay radians, shares percent.
 
     >>> unit_in("nondimensional", "m s-1"), unit_in("nondimensional", "rad"), unit_in("SI", "m s-1")
     ('1', 'rad', 'm s-1')
     """
-    return unit if system == "SI" or unit == "rad" else "1"
+    return unit if system == "SI" or unit in ("rad", "%") else "1"
 
 
 def quantity_unit(name: str, system: UnitSystem) -> str:

@@ -24,6 +24,7 @@ from vibroimpact.analysis.schema import (
     RESERVED_NAMES,
     RULES,
     SCHEMA_VERSION,
+    SCORE_COLUMNS,
     STICK_COLUMNS,
     Direction,
     RunRecord,
@@ -59,6 +60,7 @@ def build_dataset(
     omit: Collection[str] = (),
     event_components: Sequence[str] = (),
     connections: Sequence[str] = (),
+    compared: Sequence[str] = (),
 ) -> xr.Dataset:
     """Build the one-dimensional dataset of some runs, as it is written to a file.
 
@@ -88,6 +90,8 @@ def build_dataset(
     connections : sequence of str, optional
         Force-displacement connections, as "body.displacement -> other.force", in the order of
         `RunRecord.energy_residual`. A run without residuals has NaN.
+    compared : sequence of str, optional
+        Compared pairs of a replay, in the order of `RunRecord.scores`. A run without scores has NaN.
 
     Returns
     -------
@@ -118,6 +122,7 @@ def build_dataset(
     variables |= _sample_variables(runs, samples)
     variables |= _event_variables(runs, event_components, units)
     variables |= _coupling_variables(runs, connections, units)
+    variables |= _score_variables(runs, compared, units)
     swept: _Variables = {
         name: (
             ("run",),
@@ -132,7 +137,8 @@ def build_dataset(
         "units_system": units,
         "history": "simulated by vibroimpact",
     }
-    named = ("run_index", "direction", *(("connection",) if connections else ()))
+    named: tuple[str, ...] = ("run_index", "direction")
+    named += (("connection",) if connections else ()) + (("compared",) if compared else ())
     coords = {name: variables.pop(name) for name in named} | swept
     return xr.Dataset(variables, coords=coords, attrs=described | dict(attrs or {}))
 
@@ -323,6 +329,25 @@ def _coupling_variables(
     return variables
 
 
+def _score_variables(runs: Sequence[RunRecord], compared: Sequence[str], units: UnitSystem) -> _Variables:
+    """Return the scores of replays."""
+    if not compared:
+        return {}
+    missing = np.full((len(compared), len(SCORE_COLUMNS)), np.nan)
+    rows = [missing if run.scores is None else run.scores for run in runs]
+    values = np.array(rows, dtype=np.float64).reshape(len(runs), *missing.shape)
+    variables: _Variables = {
+        "compared": (("comparison",), np.array(compared, dtype=object), attributes_of("compared", units))
+    }
+    for column, name in enumerate(SCORE_COLUMNS):
+        variables[name] = (
+            ("run", "comparison"),
+            np.ascontiguousarray(values[:, :, column]),
+            attributes_of(name, units),
+        )
+    return variables
+
+
 def _quantity_attributes(name: str, units: UnitSystem, unit_of: Mapping[str, str]) -> dict[str, Any]:
     """Return the attributes of a swept parameter or sampled variable."""
     unit = unit_in(units, unit_of[name]) if name in unit_of else quantity_unit(name, units)
@@ -367,6 +392,7 @@ def _image(dataset: xr.Dataset, compression: int) -> memoryview:
     for name, variable in dataset.variables.items():
         is_data = variable.dims[0] == "run" and name not in dataset.coords
         labels = " connection" if "interface" in variable.dims else ""
+        labels += " compared" if "comparison" in variable.dims else ""
         _store(file, str(name), variable, compression, linked + labels if is_data else None)
     return _without_padding(memoryview(file.close()))
 

@@ -91,6 +91,7 @@ def up_down(points: int = 3) -> xr.Dataset:
 
 COMPONENTS = ["body", "stop"]
 CONNECTIONS = ["body.displacement -> stop.force", "stop.displacement -> body.contact[1].force"]
+COMPARED = ["beam.sensor.acceleration ~ board", "displacement ~ gap"]
 COUPLED_UNITS = {"body.displacement": "m", "body.velocity": "m/s"}
 
 
@@ -137,6 +138,7 @@ def everything(**changes: Any) -> xr.Dataset:
     coupled = coupled_record(1.0, events=3)
     runs[0].events, runs[0].energy_residual = coupled.events, coupled.energy_residual
     runs[0].loop_residual = coupled.loop_residual
+    runs[0].scores = np.array([[98.5, 1.01, 8.3e-3, 3e-6, -1.0, 0.4], [97.0, 0.99, 0.0, 0.0, 1.0, 0.1]])
     runs[0].final_state, runs[1].final_state = np.array([1.0, -1.0, 0.5, 0.25]), np.zeros(4)
     return dataset_of(
         runs,
@@ -144,5 +146,6 @@ def everything(**changes: Any) -> xr.Dataset:
         unit_of={"stop.contact[1].force": "N"},
         event_components=COMPONENTS,
         connections=CONNECTIONS,
+        compared=COMPARED,
         **changes,
     )

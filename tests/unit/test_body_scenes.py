@@ -251,8 +251,8 @@ def test_a_body_may_start_pressed_into_a_stop_that_yields() -> None:
         (
             "[record]",
             "[sensor]\nlocation = 0.5\n[record]",
-            "sensor: expected [sensor] in a scene of a beam, got one beside a chain. "
-            "Remove [sensor]; observed_mass in [body] says which mass.",
+            "sensor.location: expected a location in a scene of a beam, got one beside a chain. "
+            "Remove it; observed_mass in [body] says which mass.",
         ),
         (
             "[record]",
@@ -316,12 +316,14 @@ def test_one_mistake_of_a_chain_is_one_clear_line(old: str, new: str, problem: s
         (
             "density = 2700\n",
             "",
-            "body: expected width, thickness, youngs_modulus, density, or flexural_rigidity and",
+            "body: expected width, thickness, youngs_modulus, density, or flexural_rigidity and mass_per_length, "
+            "or frequency and mass_per_length, ",
         ),
         (
             "density = 2700\n",
             "density = 2700\nmass_per_length = 1.0\n",
             "body: expected width, thickness, youngs_modulus, density, or flexural_rigidity and mass_per_length, "
+            "or frequency and mass_per_length, "
             "got width, thickness, youngs_modulus, density beside mass_per_length. Remove those of one way.",
         ),
         (

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from dataset_examples import (
+    COMPARED,
     CONNECTIONS,
     coupled_dataset,
     coupled_record,
@@ -280,6 +281,14 @@ def test_events_are_given_run_by_run_with_their_component_and_superdense_index(t
         part = opened.isel(mass=slice(None, None, -1), event=opened.event_index.values == 0)
         assert part.vibroimpact.events(mass=4.0).event_time.values.tolist() == [4.0, 5.0]
         assert opened.vibroimpact.events(mass=0.0).sizes["event"] == 0
+
+
+def test_scores_of_replays_are_selected_by_what_was_compared(tmp_path: Path) -> None:
+    opened = open_dataset(written(everything(), tmp_path))
+    assert opened.variance_accounted_for.dims[-1] == "compared"
+    assert opened.compared.values.tolist() == COMPARED
+    assert opened.lag.sel(compared=COMPARED[0]).values[0] == 8.3e-3
+    assert np.isnan(opened.polarity.sel(compared=COMPARED[1]).values[1])
 
 
 def test_energy_residuals_are_selected_by_the_name_of_their_connection(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.general_models import ComponentTable, ConnectionTable, EventTable, GeneralRecord
+from vibroimpact.orchestrator.replay_models import Replay
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene_errors import known_keys
 from vibroimpact.orchestrator.scene_models import (
@@ -234,6 +235,7 @@ def test_the_reference_describes_every_key_of_every_table() -> None:
         Forcing,
         Sensor,
         *STOP_MODELS.values(),
+        Replay,
         Record,
         Execution,
         AxisTable,

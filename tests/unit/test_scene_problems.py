@@ -272,7 +272,7 @@ def test_an_execution_of_a_later_version_is_refused_by_name() -> None:
     )
 
 
-@pytest.mark.parametrize("table", ["load_cell", "exciter", "noise", "daq", "replay"])
+@pytest.mark.parametrize("table", ["load_cell", "exciter", "noise", "daq"])
 def test_a_table_of_a_later_version_is_refused_not_ignored(table: str) -> None:
     (problem,) = problems_of(FORCED + f"[{table}]\nlevel = 1\n")
     assert problem.startswith(
