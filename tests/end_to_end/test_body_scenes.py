@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from campaign_scenes import assert_same_rows
+from command_line import in_this_process
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import Outcome
@@ -62,7 +61,6 @@ position = 0.0005
 transient_periods = {transient}
 recorded_periods = {recorded}
 """
-ENTRY = "from vibroimpact.orchestrator.cli import main; main()"
 SCENES = {"chain": CHAIN, "beam": BEAM}
 RIGID = "restitution = 0.7"
 YIELDING = 'law = "kelvin_voigt"\nstiffness = 2000.0\ndamping = 1.0'
@@ -282,7 +280,7 @@ def test_a_scene_is_run_and_drawn_from_the_command_line(
     names = ["displacement", "velocity", "modal_energy[1]", "modal_energy[2]"]
     Path("scene.toml").write_text(with_series(text_of(kind, recorded=1), 50.0, names))
     for arguments in (["run", "scene.toml", "-o", "run.nc"], ["plot", "run.nc", "-o", "run.png"]):
-        done = subprocess.run([sys.executable, "-c", ENTRY, *arguments], capture_output=True, text=True)
+        done = in_this_process(*arguments)
         assert (done.returncode, done.stderr) == (0, "")
     assert Path("run.png").stat().st_size > 1000
 
@@ -341,7 +339,7 @@ def test_a_beam_too_thick_for_its_theory_says_so_on_the_command_line_and_in_the_
         """
     )
     arguments = ["run", str(scene), "-o", str(output)]
-    done = subprocess.run([sys.executable, "-c", ENTRY, *arguments], capture_output=True, text=True)
+    done = in_this_process(*arguments)
     assert done.returncode == 0
     assert "warning: body: " in done.stderr
     with open_dataset(output) as dataset:

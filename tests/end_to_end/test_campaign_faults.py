@@ -20,7 +20,8 @@ from vibroimpact.analysis.dataset import Outcome, read_flat
 sys.path.insert(0, str(Path(__file__).parent))
 from campaign_process import CampaignProcess, run_campaign_process, wait_until
 
-POINTS = 1500
+POINTS, MILLISECONDS = 600, 3.0
+"""Enough that half a second of work is left when four parts are there, on either path."""
 TWO = ("--workers", "2")
 PATHS = ("independent", "up-down")
 
@@ -35,7 +36,7 @@ def uninterrupted(
     folder = tmp_path_factory.mktemp(request.param)
     scene = folder / "scene.toml"
     points = POINTS if request.param == "independent" else POINTS // 2
-    scene.write_text(frequency_text(points, request.param, 2.0))
+    scene.write_text(frequency_text(points, request.param, MILLISECONDS))
     code, out, err = run_campaign_process(scene, folder / "campaign", *TWO)
     assert code == 0, err
     assert f"{POINTS} points computed" in out
@@ -109,10 +110,9 @@ def test_ctrl_c_does_not_wait_for_a_long_point(tmp_path: Path) -> None:
     campaign.assert_nothing_lives()
 
 
-def test_ctrl_c_while_the_workers_start_leaves_nothing_behind(
-    uninterrupted: tuple[Path, Path], tmp_path: Path
-) -> None:
-    scene, _ = uninterrupted
+def test_ctrl_c_while_the_workers_start_leaves_nothing_behind(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(frequency_text(POINTS, milliseconds=MILLISECONDS))
     for delay in (0.3, 0.8, 1.3, 1.8):
         campaign = CampaignProcess(scene, tmp_path / "campaign", *TWO)
         time.sleep(delay)
@@ -125,31 +125,33 @@ def test_ctrl_c_while_the_workers_start_leaves_nothing_behind(
         campaign.assert_nothing_lives()
 
 
-def test_after_kill_9_the_workers_end_and_the_same_command_resumes_bit_identically(
-    uninterrupted: tuple[Path, Path], tmp_path: Path
-) -> None:
-    scene, expected = uninterrupted
-    folder = tmp_path / "campaign"
-    campaign = CampaignProcess(scene, folder, *TWO)
-    campaign.wait_for_parts(3)
+@pytest.fixture(scope="module")
+def killed(uninterrupted: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder that a campaign left which was killed; its processes have ended."""
+    scene, _ = uninterrupted
+    campaign = CampaignProcess(scene, tmp_path_factory.mktemp("killed") / "campaign", *TWO)
+    campaign.wait_for_parts(4)
     campaign.process.kill()
     campaign.end()
     campaign.assert_nothing_lives()
+    return campaign.folder
+
+
+def test_after_kill_9_the_workers_end_and_the_same_command_resumes_bit_identically(
+    uninterrupted: tuple[Path, Path], killed: Path, tmp_path: Path
+) -> None:
+    scene, expected = uninterrupted
+    folder = shutil.copytree(killed, tmp_path / "campaign")
     assert "were there" in resume(scene, folder)
     assert_same_rows(folder / "dataset.nc", expected)
 
 
 def test_damaged_parts_are_noticed_and_computed_again(
-    uninterrupted: tuple[Path, Path], tmp_path: Path
+    uninterrupted: tuple[Path, Path], killed: Path, tmp_path: Path
 ) -> None:
     scene, expected = uninterrupted
-    folder = tmp_path / "campaign"
-    campaign = CampaignProcess(scene, folder, *TWO)
-    campaign.wait_for_parts(4)
-    campaign.process.kill()
-    campaign.end()
-    campaign.assert_nothing_lives()
-    cut, garbled = campaign.parts()[:2]
+    folder = shutil.copytree(killed, tmp_path / "campaign")
+    cut, garbled = sorted((folder / "parts").glob("branch-*.nc"))[:2]
     cut.write_bytes(cut.read_bytes()[:1000])
     garbled.write_bytes(b"not a dataset")
     (folder / "parts" / ".left-over.nc.1.tmp").write_bytes(b"half")
@@ -192,7 +194,7 @@ def test_a_changed_comment_is_the_same_scene(uninterrupted: tuple[Path, Path], t
 
 def test_another_kind_of_machine_is_refused(tmp_path: Path) -> None:
     scene, folder = tmp_path / "scene.toml", tmp_path / "campaign"
-    scene.write_text(frequency_text(POINTS, milliseconds=2.0))
+    scene.write_text(frequency_text(POINTS, milliseconds=MILLISECONDS))
     campaign = CampaignProcess(scene, folder, *TWO)
     campaign.wait_for_parts(2)
     campaign.process.kill()
@@ -238,9 +240,9 @@ def test_a_point_that_kills_its_process_is_a_row_that_says_so(tmp_path: Path) ->
     assert rows.sizes["run"] == 60
 
 
-def test_two_campaigns_do_not_share_a_folder(uninterrupted: tuple[Path, Path], tmp_path: Path) -> None:
-    scene, _ = uninterrupted
-    folder = tmp_path / "campaign"
+def test_two_campaigns_do_not_share_a_folder(tmp_path: Path) -> None:
+    scene, folder = tmp_path / "scene.toml", tmp_path / "campaign"
+    scene.write_text(frequency_text(POINTS, milliseconds=2 * MILLISECONDS))
     first = CampaignProcess(scene, folder, *TWO)
     first.wait_for_parts(1)
     code, _, err = run_campaign_process(scene, folder, *TWO)
@@ -359,7 +361,7 @@ def test_a_full_disk_ends_the_campaign_with_a_message_and_room_lets_it_go_on(
 
 def test_a_worker_that_is_killed_again_and_again_does_not_end_the_campaign(tmp_path: Path) -> None:
     scene = tmp_path / "scene.toml"
-    scene.write_text(frequency_text(POINTS, milliseconds=2.0))
+    scene.write_text(frequency_text(POINTS, milliseconds=MILLISECONDS))
     wish = tmp_path / "kill"
     campaign = CampaignProcess(
         scene, tmp_path / "campaign", *TWO, runner="OnceDeadlyRunner", VIBROIMPACT_TEST_KILL=str(wish)

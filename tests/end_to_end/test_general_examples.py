@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import in_this_process
 from fmu_factory import bouncing_ball
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
@@ -21,8 +22,7 @@ def ran(folder: Path, name: str) -> Path:
     """Run a copy of an example in a folder and return its dataset."""
     shutil.copy(EXAMPLES / f"{name}.toml", folder)
     output = folder / f"{name}.nc"
-    command = [sys.executable, "-m", "vibroimpact.orchestrator.cli", "run", str(folder / f"{name}.toml")]
-    done = subprocess.run([*command, "-o", str(output)], capture_output=True, text=True, timeout=120)
+    done = in_this_process("run", folder / f"{name}.toml", "-o", output)
     assert done.returncode == 0, done.stderr
     return output
 

@@ -320,7 +320,7 @@ def test_a_sweep_over_the_time_of_a_crash_has_all_points_that_end_before_it(
     folder: Path, tmp_path: Path
 ) -> None:
     path = folder / "times.toml"
-    sweep = '"culprit.fault_time" = { start = 0.05, stop = 1.95, points = 20 }'
+    sweep = '"culprit.fault_time" = { start = 0.05, stop = 1.95, points = 10 }'
     text = scene_text("2.0", PATIENCE, sweep).replace(
         'fault = "none", fault_time = 0.35', 'fault = "segfault"'
     )

@@ -59,6 +59,20 @@ def pytest_runtest_call(item: pytest.Item) -> Any:
         handle.inner_test = original
 
 
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Hand over what was tried, if this process runs only a share of the tests."""
+    output = getattr(session.config, "workeroutput", None)
+    if output is not None:
+        output["property_examples"] = session.config.stash.get(COUNTS, {})
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any, error: object) -> None:
+    """Take over what a process tried that ran a share of the tests."""
+    counts = node.config.stash.setdefault(COUNTS, {})
+    counts.update(getattr(node, "workeroutput", {}).get("property_examples", {}))
+
+
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
     """Write what was tried."""
     counts = config.stash.get(COUNTS, {})
@@ -66,6 +80,6 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         return
     total = sum(tried for tried, _ in counts.values())
     terminalreporter.section(f"property tests: seed {_seed(config)}, {total} examples")
-    for name, (tried, left_out) in counts.items():
+    for name, (tried, left_out) in sorted(counts.items()):
         note = f" ({left_out} of them outside the property's range)" if left_out else ""
         terminalreporter.line(f"{tried:6d} examples{note}: {name.split('::', 1)[-1]}")
