@@ -7,7 +7,10 @@ from typing import Annotated, Any, cast
 
 import typer
 
+from vibroimpact.analysis import estimate_command, replay_fmu_command, spikes_command
 from vibroimpact.analysis.dataset import open_dataset, open_measured, unreadable
+from vibroimpact.analysis.recording_files import is_recording, open_recording
+from vibroimpact.analysis.results import results_kind
 from vibroimpact.fmus.errors import UsageError
 
 _KINDS = ("auto", "bifurcation", "run", "convergence", "portrait", "impact-map", "energies", "shapes")
@@ -16,6 +19,9 @@ _KINDS = ("auto", "bifurcation", "run", "convergence", "portrait", "impact-map",
 def register(app: typer.Typer) -> None:
     """Add the commands of this package to the command line."""
     app.command("plot")(plot)
+    estimate_command.register(app)
+    spikes_command.register(app)
+    replay_fmu_command.register(app)
 
 
 def plot(
@@ -32,7 +38,7 @@ def plot(
         int | None, typer.Option(help="run_index of the run to draw; implies --kind run.", min=0)
     ] = None,
 ) -> None:
-    """Draw a dataset: a bifurcation diagram, maps over two parameters, one run, or a ladder of macro steps.
+    """Draw a dataset: a bifurcation diagram, maps over two parameters, one run, a recording, a replay, estimates.
 
     Example: vibroimpact plot campaign/dataset.nc -o bifurcation.png
     """
@@ -41,12 +47,19 @@ def plot(
 
     if kind not in _KINDS:
         raise UsageError(f"--kind: expected one of {', '.join(_KINDS)}, got {kind!r}.")
-    with open_measured(file) if kind == "convergence" else open_dataset(file) as dataset:
-        try:
-            figure = figures.draw(dataset, cast(Any, kind), run)
-        except (OSError, RuntimeError) as problem:
-            # Values are read when first used, so a damaged file may show only here.
-            raise unreadable(file, problem) from problem
+    found = results_kind(file)
+    try:
+        if kind == "auto" and is_recording(file):
+            figure = figures.draw_recording(open_recording(file))
+        elif kind == "auto" and found is not None:
+            with open_measured(file) as results:
+                figure = figures.draw_results(results, found)
+        else:
+            with open_measured(file) if kind == "convergence" else open_dataset(file) as dataset:
+                figure = figures.draw(dataset, cast(Any, kind), run)
+    except (OSError, RuntimeError) as problem:
+        # Values are read when first used, so a damaged file may show only here.
+        raise unreadable(file, problem) from problem
     try:
         figures.save(figure, output)
     except OSError as problem:

@@ -10,10 +10,14 @@ from typing import Literal
 import xarray as xr
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.estimates import draw_estimates
+from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence
 from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, FORMATS, label, page_style, save
 from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait
+from vibroimpact.analysis.figures.recordings import draw_recording
+from vibroimpact.analysis.figures.replay import draw_replay
 from vibroimpact.analysis.figures.runs import draw_run
 from vibroimpact.analysis.figures.series import draw_series
 from vibroimpact.analysis.figures.sweeps import (
@@ -32,9 +36,14 @@ __all__ = [
     "draw",
     "draw_bifurcation",
     "draw_energies",
+    "draw_estimates",
     "draw_impact_map",
+    "draw_intervals",
     "draw_map",
     "draw_portrait",
+    "draw_recording",
+    "draw_replay",
+    "draw_results",
     "draw_run",
     "draw_series",
     "draw_shapes",
@@ -51,6 +60,23 @@ _DRAWERS = {
     "energies": draw_energies,
     "shapes": draw_shapes,
 }
+
+
+_RESULTS = {"replay": draw_replay, "estimates": draw_estimates, "spikes": draw_intervals}
+
+
+def draw_results(dataset: xr.Dataset, kind: str) -> Figure:
+    """Draw the dataset of an analysis, as `write_results` wrote it.
+
+    Raises
+    ------
+    DatasetError
+        Nothing is drawn of this kind.
+    """
+    if kind not in _RESULTS:
+        known = ", ".join(_RESULTS)
+        raise DatasetError(f"results: expected a kind that can be drawn ({known}), got {kind!r}.")
+    return _RESULTS[kind](dataset)
 
 
 def draw(dataset: xr.Dataset, kind: Kind = "auto", run: int | None = None) -> Figure:

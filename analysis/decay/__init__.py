@@ -1,0 +1,1 @@
+"""Free decays and resonances: decrement, exponential fit, damping laws, frequency response, backbone."""

@@ -1,0 +1,141 @@
+"""How frequency and damping change with the amplitude of a free decay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponential
+from vibroimpact.analysis.decay.samples import FEWEST_SAMPLES, DecaySamples
+from vibroimpact.analysis.decay.windows import FirstGuess, first_guess
+from vibroimpact.fmus.errors import EstimationError
+
+Floats = NDArray[np.float64]
+
+_FEWEST_PERIODS = 4.0
+_MOST_WINDOWS = 16
+_TENTH = 0.1
+_SMALLEST = 3.0
+"""Standard errors that the amplitude of a window must stand out by; it must exceed the rms of the residual, too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Backbone:
+    """Amplitude, frequency and damping of successive windows of a decay.
+
+    Attributes
+    ----------
+    time, amplitude : ndarray of float, shape (window,)
+        Middle of the window, s, and the amplitude there, unit of the samples.
+    angular_frequency, angular_frequency_error : ndarray of float, shape (window,)
+        Undamped natural angular frequency, rad/s.
+    damping_ratio, damping_ratio_error : ndarray of float, shape (window,)
+    periods : float
+        Length of a window.
+    """
+
+    time: Floats
+    amplitude: Floats
+    angular_frequency: Floats
+    angular_frequency_error: Floats
+    damping_ratio: Floats
+    damping_ratio_error: Floats
+    periods: float
+
+    def words(self, unit: str) -> str:
+        """Return how the frequency changes, as a sentence: the first window against those under a tenth of it."""
+        high = int(np.argmax(self.amplitude))
+        small = self.amplitude <= max(_TENTH * self.amplitude[high], float(np.min(self.amplitude)))
+        weights = 1.0 / self.angular_frequency_error[small] ** 2
+        slow = float(np.average(self.angular_frequency[small], weights=weights))
+        slow_error = float(1.0 / np.sqrt(np.sum(weights)))
+        fast, error = float(self.angular_frequency[high]), float(self.angular_frequency_error[high])
+        ends = (
+            f"{_hertz(fast, error)} at {self.amplitude[high]:.3g}{_short(unit)} to "
+            f"{_hertz(slow, slow_error)} at {np.max(self.amplitude[small]):.3g}{_short(unit)} and less"
+        )
+        change = slow / fast - 1.0
+        if abs(change) * fast < 3.0 * np.hypot(error, slow_error):
+            return f"the frequency does not change with the amplitude by more than its errors: {ends}."
+        damping = float(np.average(self.damping_ratio[small], weights=weights))
+        return (
+            f"the frequency {'rises' if change > 0 else 'falls'} by {100 * abs(change):.2g} % as the motion decays: "
+            f"{ends}; the damping ratio goes from {self.damping_ratio[high]:.3g} to {damping:.3g}."
+        )
+
+
+def _hertz(omega: float, error: float) -> str:
+    return f"{omega / (2.0 * np.pi):.6g} +- {error / (2.0 * np.pi):.1g} Hz"
+
+
+def _short(unit: str) -> str:
+    return {"1": "", "9.80665 m s-2": " g"}.get(unit, f" {unit}")
+
+
+def backbone(samples: DecaySamples, periods: float | None = None) -> Backbone:
+    """Return frequency and damping against amplitude, window by window.
+
+    In each window a decaying cosine is fitted with its own frequency and decay rate; its amplitude is that of the
+    middle. Nothing is filtered: a Hilbert transform would smear the start of the decay, where the amplitude is largest.
+
+    Parameters
+    ----------
+    samples : DecaySamples
+    periods : float, optional
+        Length of a window, in periods; by default a sixteenth of the decay, but four periods at least.
+
+    Raises
+    ------
+    EstimationError
+        Fewer than two windows can be fitted.
+    """
+    guess = first_guess(samples)
+    length = 2.0 * np.pi / guess.angular_frequency
+    total = float(samples.time[-1] - samples.time[0]) / length
+    periods = max(_FEWEST_PERIODS, total / _MOST_WINDOWS) if periods is None else periods
+    number = np.floor((samples.time - samples.time[0]) / (periods * length)).astype(int)
+    found = []
+    for part in np.split(np.arange(len(number)), np.flatnonzero(np.diff(number)) + 1):
+        fit = _window(samples, part, guess, 0.7 * periods * length)
+        if fit is not None:
+            found.append(fit)
+    if len(found) < 2:
+        raise EstimationError(
+            f"{samples.name}: expected two windows of {periods:.3g} periods with an oscillation above the noise, got "
+            f"{len(found)} in {total:.3g} periods. Widen the window of the decay."
+        )
+    frequency = [fit.natural_angular_frequency for fit in found]
+    damping = [fit.damping_ratio for fit in found]
+    return Backbone(
+        time=np.array([fit.reference_time for fit in found]),
+        amplitude=np.array([fit.amplitude.value for fit in found]),
+        angular_frequency=np.array([item.value for item in frequency]),
+        angular_frequency_error=np.array([item.standard_error for item in frequency]),
+        damping_ratio=np.array([item.value for item in damping]),
+        damping_ratio_error=np.array([item.standard_error for item in damping]),
+        periods=periods,
+    )
+
+
+def _window(
+    samples: DecaySamples, part: NDArray[np.int64], guess: FirstGuess, shortest: float
+) -> ExponentialDecay | None:
+    """Return the fit of one window; None where it is too short, or where noise is all there is."""
+    time = samples.time[part]
+    if len(part) < FEWEST_SAMPLES or time[-1] - time[0] < shortest:
+        return None
+    piece = DecaySamples(
+        time, samples.value[part], samples.unit, samples.name, float(0.5 * (time[0] + time[-1]))
+    )
+    slope = np.diff(guess.envelope.phase) / np.diff(guess.envelope.time)
+    omega = float(np.interp(piece.reference_time, guess.envelope.time[1:], slope))
+    try:
+        fit = fit_exponential(piece, FirstGuess(omega, guess.decay_rate, guess.offset, guess.envelope))
+    except EstimationError:
+        return None
+    # A frequency far from its neighbours' is that of noise, or of another mode.
+    lost = abs(fit.angular_frequency.value / omega - 1.0) > 0.2
+    least = max(_SMALLEST * fit.amplitude.standard_error, fit.test.rms)
+    return None if lost or fit.amplitude.value < least else fit

@@ -1,0 +1,40 @@
+"""A number with its doubt."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scipy.stats import t as student
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """A value, its standard error and what the error rests on.
+
+    Attributes
+    ----------
+    value, standard_error : float
+        In `unit`.
+    unit : str
+        CF unit.
+    degrees_of_freedom : float
+        Of the residual that the standard error was taken from.
+    """
+
+    value: float
+    standard_error: float
+    unit: str = "1"
+    degrees_of_freedom: float = float("inf")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Limits of the 95 % confidence interval, by Student's t.
+
+        >>> low, high = Estimate(2.0, 0.1).interval
+        >>> round(low, 3), round(high, 3)
+        (1.804, 2.196)
+        """
+        half = float(student.ppf(0.5 + CONFIDENCE / 2, self.degrees_of_freedom)) * self.standard_error
+        return self.value - half, self.value + half

@@ -1,0 +1,247 @@
+"""All that is estimated from one free decay, and the dataset of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.decay.backbone import Backbone, backbone
+from vibroimpact.analysis.decay.decrement import Decrement, logarithmic_decrement
+from vibroimpact.analysis.decay.estimate import Estimate
+from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponential
+from vibroimpact.analysis.decay.law_choice import LawChoice, choose_law
+from vibroimpact.analysis.decay.law_fit import CUBIC, LawFit
+from vibroimpact.analysis.decay.laws import ALL_LAWS, COULOMB, QUADRATIC, VISCOUS, DampingLaw, spoken
+from vibroimpact.analysis.decay.samples import DecaySamples
+from vibroimpact.analysis.decay.tables import estimate_table
+from vibroimpact.fmus.errors import EstimationError
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class FreeDecay:
+    """What one free decay gave.
+
+    Attributes
+    ----------
+    samples : DecaySamples
+    exponential : ExponentialDecay
+    decrement : Decrement or None
+    choice : LawChoice or None
+    backbone : Backbone or None
+    refusals : mapping of str to str
+        Why a method gave nothing, by method.
+    """
+
+    samples: DecaySamples
+    exponential: ExponentialDecay
+    decrement: Decrement | None = None
+    choice: LawChoice | None = None
+    backbone: Backbone | None = None
+    refusals: Mapping[str, str] = field(default_factory=dict)
+
+    def estimates(self) -> dict[str, dict[str, Estimate]]:
+        """Return the estimates by method, then quantity."""
+        found: dict[str, dict[str, Estimate]] = {}
+        if self.decrement is not None:
+            found["decrement"] = {
+                "logarithmic_decrement": self.decrement.decrement,
+                "damping_ratio": self.decrement.damping_ratio,
+                "angular_frequency": self.decrement.angular_frequency,
+            }
+        fit = self.exponential
+        found["exponential"] = {
+            "amplitude": fit.amplitude,
+            "angular_frequency": fit.angular_frequency,
+            "decay_rate": fit.decay_rate,
+            "phase": fit.phase,
+            "offset": fit.offset,
+            "natural_angular_frequency": fit.natural_angular_frequency,
+            "damping_ratio": fit.damping_ratio,
+        }
+        if self.choice is not None:
+            found["law"] = law_estimates(self.choice.best)
+        return found
+
+    def words(self) -> tuple[str, ...]:
+        """Return what a reader must know, in sentences."""
+        said = list(self.samples.remarks)
+        rate = self.exponential.decay_rate
+        if rate.interval[0] <= 0.0:
+            said.append(
+                "the motion does not decay by more than its error: it is driven, or the window too short."
+            )
+        said.append(f"the decaying cosine is {self.exponential.test.words()}.")
+        if self.decrement is not None and self.decrement.bent:
+            said.append(
+                f"the logarithm of the peaks is not a straight line (decrement about {self.decrement.first:.3g} at "
+                f"first, {self.decrement.last:.3g} at last): the damping is not viscous alone."
+            )
+        if self.choice is not None:
+            said += self.choice.words()
+        if self.backbone is not None:
+            said.append(self.backbone.words(self.samples.unit))
+        said += [f"{method}: {reason}" for method, reason in self.refusals.items()]
+        return tuple(said)
+
+    def dataset(self) -> xr.Dataset:
+        """Return estimates (method, quantity), the motion, laws, peaks and windows, each where there is one."""
+        parts = [estimate_table(self.estimates()), _motion(self)]
+        if self.decrement is not None:
+            parts.append(_peaks(self.decrement, self.samples.unit))
+        if self.choice is not None:
+            parts.append(_laws(self.choice, self.samples.unit))
+        if self.backbone is not None:
+            parts.append(_windows(self.backbone, self.samples.unit))
+        merged = xr.merge(parts, combine_attrs="override")
+        return merged.assign_attrs(
+            estimates="decay",
+            channel=self.samples.name,
+            reference_time=self.samples.reference_time,
+            best_law="" if self.choice is None else self.choice.best.law.name,
+            remarks="\n".join(self.words()),
+        )
+
+
+def estimate_decay(
+    samples: DecaySamples,
+    laws: Sequence[DampingLaw] = ALL_LAWS,
+    *,
+    cubic: bool = False,
+    periods: float | None = None,
+) -> FreeDecay:
+    """Estimate frequency, damping and damping law of a free decay by all methods.
+
+    Parameters
+    ----------
+    samples : DecaySamples
+    laws : sequence of DampingLaw
+        Tried; none: the choice of a law is left out.
+    cubic : bool
+        Fit a cubic stiffness with every law.
+    periods : float, optional
+        Length of the windows of the backbone.
+
+    Raises
+    ------
+    EstimationError
+        Nothing oscillates.
+    """
+    exponential = fit_exponential(samples)
+    refusals: dict[str, str] = {}
+
+    def tried(method: str, estimate: Callable[[], T]) -> T | None:
+        try:
+            return estimate()
+        except EstimationError as problem:
+            refusals[method] = str(problem)
+            return None
+
+    return FreeDecay(
+        samples,
+        exponential,
+        tried("decrement", lambda: logarithmic_decrement(samples)),
+        tried("law", lambda: choose_law(samples, laws, cubic=cubic, start=exponential)) if laws else None,
+        tried("backbone", lambda: backbone(samples, periods)),
+        refusals,
+    )
+
+
+def law_estimates(fit: LawFit) -> dict[str, Estimate]:
+    """Return the coefficients of a fitted law, and the damping ratio of its viscous term."""
+    known = fit.coefficients
+    found = {name: known[name] for name in ("natural_angular_frequency", "offset")}
+    for name in (VISCOUS, COULOMB, QUADRATIC, CUBIC):
+        if name in known:
+            found["decay_rate" if name == VISCOUS else name] = known[name]
+    if VISCOUS in known:
+        omega, rate = known["natural_angular_frequency"], known[VISCOUS]
+        # The relative error of the frequency is smaller than that of the rate by orders.
+        error = rate.standard_error / omega.value
+        found["damping_ratio"] = Estimate(rate.value / omega.value, error, "1", rate.degrees_of_freedom)
+    return found
+
+
+def _described(words: str, unit: str = "1") -> dict[str, str]:
+    return {"units": unit, "long_name": words}
+
+
+def _motion(decay: FreeDecay) -> xr.Dataset:
+    samples, unit = decay.samples, decay.samples.unit
+    data = {
+        "measured": ("time", samples.value, _described(f"measured {samples.name}", unit)),
+        "exponential_fit": ("time", decay.exponential.fitted, _described("fitted decaying cosine", unit)),
+    }
+    if decay.choice is not None:
+        words = f"motion under the fitted law: {spoken(decay.choice.best.law)}"
+        data["law_fit"] = ("time", decay.choice.best.fitted, _described(words, unit))
+    return xr.Dataset(data, {"time": ("time", samples.time, _described("time", "s"))})
+
+
+def _peaks(found: Decrement, unit: str) -> xr.Dataset:
+    peaks = found.peaks
+    return xr.Dataset(
+        {
+            "peak_height": ("peak", peaks.height, _described("turning points from the equilibrium", unit)),
+            "peak_height_error": ("peak", peaks.error, _described("standard error of the height", unit)),
+            "peak_number": ("peak", peaks.number, _described("half periods from the first phase")),
+        },
+        {"peak_time": ("peak", peaks.time, _described("instants of the turning points", "s"))},
+    )
+
+
+def _laws(choice: LawChoice, unit: str) -> xr.Dataset:
+    fits, samples = choice.fits, choice.effective_samples
+
+    def column(
+        words: str, values: Sequence[float | bool], of: str = "1"
+    ) -> tuple[str, object, dict[str, str]]:
+        return "law", np.array(values, dtype=np.float64), _described(words, of)
+
+    data = {
+        "aic": column("Akaike's criterion, for white residuals", [fit.aic for fit in fits]),
+        "aicc": column("Akaike's criterion, corrected for few samples", [fit.aicc for fit in fits]),
+        "effective_aic": column(
+            "Akaike's criterion with the effective number of samples",
+            [fit.effective_aic(samples) for fit in fits],
+        ),
+        "akaike_weight": column("weight by the effective criterion", choice.weights()),
+        "residual_rms": column("root mean square of the residual", [fit.test.rms for fit in fits], unit),
+        "noise_floor": column("its white part", [fit.test.noise_floor for fit in fits], unit),
+        "portmanteau_probability": column(
+            "Ljung-Box probability of white noise", [fit.test.portmanteau_probability for fit in fits]
+        ),
+        "adequate": column("1 where the residual passes for noise", [fit.test.adequate for fit in fits]),
+        "physical": column("1 where no coefficient is negative", [fit.physical for fit in fits]),
+    }
+    for term in (VISCOUS, COULOMB, QUADRATIC, CUBIC):
+        known = [fit.coefficients.get(term) for fit in fits]
+        of = next((item.unit for item in known if item is not None), None)
+        if of is not None:
+            values = [np.nan if item is None else item.value for item in known]
+            errors = [np.nan if item is None else item.standard_error for item in known]
+            data[f"law_{term}"] = column(f"{term} coefficient", values, of)
+            data[f"law_{term}_error"] = column(f"standard error of the {term} coefficient", errors, of)
+    names = ("law", [fit.law.name for fit in fits], _described("damping law"))
+    return xr.Dataset(
+        data, {"law": names, "effective_samples": ((), samples, _described("independent samples"))}
+    )
+
+
+def _windows(found: Backbone, unit: str) -> xr.Dataset:
+    columns = {
+        "window_time": (found.time, "middle of the window", "s"),
+        "window_amplitude": (found.amplitude, "amplitude in the middle of the window", unit),
+        "window_frequency": (found.angular_frequency, "natural angular frequency in the window", "rad s-1"),
+        "window_frequency_error": (found.angular_frequency_error, "standard error of it", "rad s-1"),
+        "window_damping": (found.damping_ratio, "damping ratio in the window", "1"),
+        "window_damping_error": (found.damping_ratio_error, "standard error of it", "1"),
+    }
+    return xr.Dataset(
+        {name: ("window", values, _described(words, of)) for name, (values, words, of) in columns.items()}
+    )

@@ -1,0 +1,255 @@
+"""One damping law fitted to the whole motion of a free decay."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares, nnls
+
+from vibroimpact.analysis.decay.covariance import coloured_covariance
+from vibroimpact.analysis.decay.estimate import Estimate
+from vibroimpact.analysis.decay.exponential import ExponentialDecay
+from vibroimpact.analysis.decay.half_swing import Coefficients
+from vibroimpact.analysis.decay.laws import COULOMB, QUADRATIC, VISCOUS, DampingLaw
+from vibroimpact.analysis.decay.motion import decaying_motion
+from vibroimpact.analysis.decay.residuals import ResidualTest, residual_test
+from vibroimpact.analysis.decay.samples import DecaySamples
+from vibroimpact.analysis.decay.windows import Envelope
+from vibroimpact.fmus.errors import EstimationError
+
+Floats = NDArray[np.float64]
+
+CUBIC = "cubic"
+_STEP = 1e-6
+_MOST_EVALUATIONS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class LawFit:
+    """A damping law with its fitted coefficients.
+
+    Attributes
+    ----------
+    law : DampingLaw
+    coefficients : mapping of str to Estimate
+        By name: `natural_angular_frequency`, `offset`, `amplitude` (of the turning point before the window),
+        `turning_time`, the terms of the law, and `cubic` where asked for.
+    aic, aicc : float
+        Akaike's criterion for white residuals, and with its correction for few samples.
+    residual_sum : float
+        Sum of squares, (unit of the samples)^2.
+    parameters : int
+        Number of fitted numbers, the variance of the residual included.
+    fitted : ndarray of float, shape (sample,)
+    test : ResidualTest
+    settled : bool
+        Whether the fit ended before its limit of evaluations.
+    """
+
+    law: DampingLaw
+    coefficients: Mapping[str, Estimate]
+    aic: float
+    aicc: float
+    residual_sum: float
+    parameters: int
+    fitted: Floats
+    test: ResidualTest
+    settled: bool
+
+    @property
+    def physical(self) -> bool:
+        """Whether every damping coefficient takes energy out: none is negative."""
+        return all(self.coefficients[term].value >= 0.0 for term in self.law.terms)
+
+    def effective_aic(self, samples: float) -> float:
+        """Return the criterion with the number of independent samples in place of all samples."""
+        mean = self.residual_sum / len(self.fitted)
+        return samples * float(np.log(max(mean, 1e-300))) + 2.0 * self.parameters
+
+
+class _Problem:
+    """The motion and its derivatives as functions of scaled parameters, in one pass for both.
+
+    The parameters, all of order 1 or smaller: shift of the turning point (periods / 2 pi), amplitude and offset (in
+    first amplitudes A), relative change of omega0; then lambda / omega, c / (omega^2 A), q A and mu A^2 as asked for.
+    """
+
+    def __init__(self, samples: DecaySamples, start: ExponentialDecay, names: tuple[str, ...]) -> None:
+        self.samples, self.names = samples, names
+        self.omega = start.natural_angular_frequency.value
+        self.turning, self.size, self.side = _turning_point(samples, start)
+        self.offset = start.offset.value
+        self._known: tuple[bytes, Floats, Floats] | None = None
+
+    def scales(self) -> dict[str, tuple[float, str]]:
+        """Return what one scaled unit of each parameter is, and its CF unit."""
+        unit = self.samples.unit
+        length = f"({unit})" if " " in unit else unit
+        return {
+            "turning_time": (1.0 / self.omega, "s"),
+            "amplitude": (self.size, unit),
+            "offset": (self.size, unit),
+            "natural_angular_frequency": (self.omega, "rad s-1"),
+            VISCOUS: (self.omega, "s-1"),
+            COULOMB: (self.omega**2 * self.size, "s-2" if unit == "1" else f"{unit} s-2"),
+            QUADRATIC: (1.0 / self.size, "1" if unit == "1" else f"{length}-1"),
+            CUBIC: (self.size**-2, "1" if unit == "1" else f"{length}-2"),
+        }
+
+    def origin(self) -> dict[str, float]:
+        """Return the values that scaled parameters of 0 stand for."""
+        return {
+            "turning_time": self.turning,
+            "offset": self.offset,
+            "natural_angular_frequency": self.omega,
+        }
+
+    def physical(self, parameters: Floats) -> dict[str, Floats]:
+        """Return the physical values of scaled parameters, shape (parameter, column)."""
+        scales, origin = self.scales(), self.origin()
+        return {
+            name: origin.get(name, 0.0) + scales[name][0] * row
+            for name, row in zip(self.names, parameters, strict=True)
+        }
+
+    def motion(self, parameters: Floats) -> Floats:
+        """Return the displacement of the samples, shape (sample, column)."""
+        values = self.physical(parameters)
+        nothing = np.zeros(parameters.shape[1])
+        coefficients = Coefficients(
+            values["natural_angular_frequency"],
+            *(values.get(name, nothing) for name in (VISCOUS, COULOMB, QUADRATIC, CUBIC)),
+        )
+        moved = decaying_motion(values["turning_time"], values["amplitude"], coefficients, self.samples.time)
+        return values["offset"] + self.side * moved
+
+    def _evaluated(self, parameters: Floats) -> tuple[Floats, Floats]:
+        key = parameters.tobytes()
+        if self._known is None or self._known[0] != key:
+            columns = np.hstack([parameters[:, None], parameters[:, None] + _STEP * np.eye(len(parameters))])
+            motion = self.motion(columns)
+            self._known = key, motion[:, 0] - self.samples.value, (motion[:, 1:] - motion[:, :1]) / _STEP
+        return self._known[1:]
+
+    def residual(self, parameters: Floats) -> Floats:
+        """Return fitted minus measured."""
+        return self._evaluated(parameters)[0]
+
+    def jacobian(self, parameters: Floats) -> Floats:
+        """Return the derivatives by the scaled parameters."""
+        return self._evaluated(parameters)[1]
+
+
+def _turning_point(samples: DecaySamples, start: ExponentialDecay) -> tuple[float, float, float]:
+    """Return instant, height and side of the last turning point before the first sample."""
+    omega, rate = start.angular_frequency.value, start.decay_rate.value
+    phase = start.phase.value + omega * (samples.time[0] - start.reference_time)
+    turns = np.floor(phase / np.pi)
+    time = samples.time[0] - (phase - turns * np.pi) / omega
+    height = start.amplitude.value * np.exp(-rate * (time - start.reference_time))
+    return float(time), float(height), -1.0 if turns % 2 else 1.0
+
+
+def fit_law(
+    samples: DecaySamples,
+    law: DampingLaw,
+    start: ExponentialDecay,
+    envelope: Envelope,
+    *,
+    cubic: bool = False,
+) -> LawFit:
+    """Fit a damping law by the trajectory it gives.
+
+    The equation of motion (`DampingLaw`) is integrated from turning point to turning point; nothing is averaged,
+    so that amplitude, waveform and phase all count. Coefficients are not held positive: a negative one says that
+    the data do not want this term, and where they are uncertain their interval shows it.
+
+    Parameters
+    ----------
+    samples : DecaySamples
+    law : DampingLaw
+    start : ExponentialDecay
+        Gives frequency, phase and equilibrium to start from.
+    envelope : Envelope
+        Amplitudes of the windows, from which the coefficients are guessed.
+    cubic : bool
+        Whether a cubic stiffness (`omega0^2 mu x^3`) is fitted too: the frequency then depends on the amplitude.
+
+    Returns
+    -------
+    LawFit
+
+    Raises
+    ------
+    EstimationError
+        The fit runs into damping that ends the motion before the data do.
+    """
+    names = ("turning_time", "amplitude", "offset", "natural_angular_frequency", *law.terms)
+    problem = _Problem(samples, start, names + (CUBIC,) * cubic)
+    try:
+        with np.errstate(all="ignore"):  # a trial step may damp beyond any swing; it is then shortened
+            found = least_squares(
+                problem.residual,
+                _first_values(problem, law, envelope),
+                jac=problem.jacobian,
+                x_scale="jac",
+                ftol=1e-9,
+                xtol=1e-9,
+                gtol=1e-12,
+                max_nfev=_MOST_EVALUATIONS,
+            )
+    except ValueError as problem_of_scipy:  # what it raises of values that are not finite
+        raise EstimationError(
+            f"{samples.name}: {law.name}: expected an oscillation, got damping beyond any swing. Narrow the window."
+        ) from problem_of_scipy
+    return _described(problem, law, found.x, found.fun, found.jac, found.status > 0)
+
+
+def _first_values(problem: _Problem, law: DampingLaw, envelope: Envelope) -> Floats:
+    """Return scaled start values; the coefficients from the slow equation of the amplitude.
+
+    `dA/dt = -lambda A - 2 c / (pi omega) - 4 q omega A^2 / (3 pi)`, integrated once, is linear in all of them.
+    """
+    time, size = envelope.time - problem.turning, envelope.amplitude / problem.size
+    omega = problem.omega
+    losses = {
+        VISCOUS: (1.0, size),
+        COULOMB: (2.0 / np.pi, np.ones_like(size)),
+        QUADRATIC: (4.0 / (3.0 * np.pi), size**2),
+    }
+    columns = [np.ones_like(size)]
+    for term in law.terms:
+        share, power = losses[term]
+        areas = np.concatenate([[power[0] * time[0]], 0.5 * (power[1:] + power[:-1]) * np.diff(time)])
+        columns.append(-omega * share * np.cumsum(areas))
+    # The slow equation ends where friction holds the body: what is left there is noise.
+    moving = slice(0, max(3, int(np.argmax(np.append(size < 0.02 * size[0], True)))))
+    solved, _ = nnls(np.column_stack(columns)[moving], size[moving])
+    values = [0.0, float(solved[0]) or 1.0, 0.0, 0.0, *solved[1:]]
+    return np.array(values + [0.0] * (len(problem.names) - len(values)))
+
+
+def _described(
+    problem: _Problem, law: DampingLaw, found: Floats, residual: Floats, jacobian: Floats, settled: bool
+) -> LawFit:
+    turn = problem.omega * problem.samples.mean_interval
+    fitted = problem.samples.value + residual
+    values = {name: float(row[0]) for name, row in problem.physical(found[:, None]).items()}
+    test = residual_test(-residual, float(np.max(np.abs(fitted - values["offset"]))), turn)
+    covariance, freedom = coloured_covariance(jacobian, residual, round(4.0 * np.pi / turn))
+    errors = np.sqrt(np.diag(covariance))
+    freedom = max(min(freedom, test.effective_samples - len(found)), 1.0)
+    coefficients = {
+        name: Estimate(values[name], float(error) * scale, unit, freedom)
+        for name, error in zip(problem.names, errors, strict=True)
+        for scale, unit in [problem.scales()[name]]
+    }
+    # Akaike counts what is fitted: the parameters and the variance of the residual.
+    count, numbers = len(residual), len(found) + 1
+    total = float(residual @ residual)
+    aic = count * float(np.log(max(total / count, 1e-300))) + 2.0 * numbers
+    aicc = aic + 2.0 * numbers * (numbers + 1.0) / max(count - numbers - 1.0, 1.0)
+    return LawFit(law, coefficients, aic, aicc, total, numbers, fitted, test, settled)

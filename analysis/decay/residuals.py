@@ -1,0 +1,163 @@
+"""Whether what a fit leaves over is noise: correlation, runs, noise floor; said in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, norm
+
+Floats = NDArray[np.float64]
+
+SIGNIFICANCE = 0.01
+"""A law is called inadequate where noise alone would leave such a residual once in a hundred records."""
+
+NUMERICAL_FLOOR = 1e-6
+"""Structure below this fraction of the amplitude is not told from rounding and interpolation of the model."""
+
+_FEWEST_LAGS, _MOST_LAGS = 10, 400
+
+
+@dataclass(frozen=True, slots=True)
+class ResidualTest:
+    """What the residual of a fit looks like.
+
+    Attributes
+    ----------
+    rms, noise_floor, structure : float
+        Root mean square of the residual; of its white part, from second differences; of the rest.
+    relative_structure : float
+        The structure as a fraction of the largest excursion of the measured motion.
+    lags : int
+        Lags of the Ljung-Box test.
+    portmanteau_probability : float
+        That white noise shows such autocorrelations (Ljung-Box).
+    runs_probability : float
+        That white noise changes its sign so rarely, or so often (Wald-Wolfowitz, two-sided).
+    effective_samples : float
+        Independent samples that say as much about the oscillation as these do.
+    """
+
+    rms: float
+    noise_floor: float
+    structure: float
+    relative_structure: float
+    lags: int
+    portmanteau_probability: float
+    runs_probability: float
+    effective_samples: float
+
+    @property
+    def adequate(self) -> bool:
+        """Whether the residual passes for white noise, or is below what the model computes."""
+        return self.portmanteau_probability >= SIGNIFICANCE or self.relative_structure < NUMERICAL_FLOOR
+
+    def words(self) -> str:
+        """Return the verdict as a sentence.
+
+        >>> ResidualTest(0.5, 0.5, 0.0, 0.0, 10, 0.4, 0.6, 100.0).words()
+        'adequate: the residual passes for white noise of .5 (Ljung-Box p = .40, runs p = .60)'
+        """
+        portmanteau = _probability(self.portmanteau_probability)
+        if self.portmanteau_probability >= SIGNIFICANCE:
+            runs = _probability(self.runs_probability)
+            return (
+                f"adequate: the residual passes for white noise of {_plain(self.rms)} "
+                f"(Ljung-Box p {portmanteau}, runs p {runs})"
+            )
+        if self.adequate:
+            return f"adequate: the residual is not noise, but {self.relative_structure:.1g} of the amplitude: rounding"
+        return (
+            f"inadequate: the residual is not noise (Ljung-Box p {portmanteau}); "
+            f"{_plain(self.structure)} of its {_plain(self.rms)} rms is structure over a noise floor of "
+            f"{_plain(self.noise_floor)}, {100 * self.relative_structure:.2g} % of the largest excursion"
+        )
+
+
+def _plain(number: float) -> str:
+    text = f"{number:.3g}"
+    return text[1:] if text.startswith("0.") else text
+
+
+def _probability(number: float) -> str:
+    return "< .0001" if number < 1e-4 else f"= {number:.2f}".replace("0.", ".", 1)
+
+
+def residual_test(residual: Floats, excursion: float, turn: float) -> ResidualTest:
+    """Test a residual against white noise.
+
+    Parameters
+    ----------
+    residual : ndarray of float, shape (sample,)
+        Measured minus fitted, in the order of time.
+    excursion : float
+        Largest excursion of the motion from its equilibrium, in the same unit.
+    turn : float
+        Phase of the oscillation per sample, rad: the test looks over two periods of it.
+
+    Returns
+    -------
+    ResidualTest
+    """
+    count = len(residual)
+    lags = int(np.clip(4.0 * np.pi / turn, _FEWEST_LAGS, min(_MOST_LAGS, count // 4)))
+    correlation = autocorrelation(residual, lags)
+    statistic = count * (count + 2.0) * float(np.sum(correlation**2 / (count - np.arange(1, lags + 1))))
+    variance = float(np.mean(residual**2))
+    floor = min(float(np.mean(np.diff(residual, 2) ** 2)) / 6.0, variance)
+    structure = float(np.sqrt(variance - floor))
+    return ResidualTest(
+        rms=float(np.sqrt(variance)),
+        noise_floor=float(np.sqrt(floor)),
+        structure=structure,
+        relative_structure=structure / excursion if excursion > 0.0 else 0.0,
+        lags=lags,
+        portmanteau_probability=float(chi2.sf(statistic, lags)),
+        runs_probability=_runs_probability(residual),
+        effective_samples=effective_samples(residual, turn),
+    )
+
+
+def autocorrelation(residual: Floats, lags: int) -> Floats:
+    """Return the autocorrelation at lags 1 to `lags`; the mean is not removed (a fit's residual has none)."""
+    power = float(residual @ residual)
+    if power == 0.0:
+        return np.zeros(lags)
+    size = 1 << int(np.ceil(np.log2(len(residual) + lags)))
+    spectrum = np.abs(np.fft.rfft(residual, size)) ** 2
+    correlation: Floats = np.fft.irfft(spectrum, size)[1 : lags + 1] / power
+    return correlation
+
+
+def _runs_probability(residual: Floats) -> float:
+    above = residual > np.median(residual)
+    plus, minus = float(np.count_nonzero(above)), float(np.count_nonzero(~above))
+    total = plus + minus
+    runs = 1.0 + np.count_nonzero(np.diff(above.astype(np.int8)))
+    mean = 1.0 + 2.0 * plus * minus / total
+    variance = (mean - 1.0) * (mean - 2.0) / (total - 1.0)
+    return 1.0 if variance <= 0.0 else float(2.0 * norm.sf(abs(runs - mean) / np.sqrt(variance)))
+
+
+def effective_samples(residual: Floats, turn: float) -> float:
+    """Return how many independent samples know as much about the oscillation as the correlated ones.
+
+    `n / (1 + 2 sum_l rho_l cos(l turn))`: the density of the residual's spectrum at the oscillation's frequency,
+    against its mean. The sum is taken period by period and ends at the first period that adds nothing.
+
+    Parameters
+    ----------
+    residual : ndarray of float, shape (sample,)
+    turn : float
+        Phase of the oscillation per sample, rad.
+    """
+    period = max(2, round(2.0 * np.pi / turn))
+    blocks = min(len(residual) // 3, 4000) // period
+    if blocks < 1:
+        return float(len(residual))
+    lags = np.arange(1, blocks * period + 1)
+    demodulated = (autocorrelation(residual, len(lags)) * np.cos(turn * lags)).reshape(blocks, period).sum(1)
+    ends = np.flatnonzero(demodulated <= 0.0)
+    total = 1.0 + 2.0 * float(np.sum(demodulated[: ends[0] if len(ends) else blocks]))
+    return len(residual) / max(total, 1.0)

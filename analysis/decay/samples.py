@@ -1,0 +1,106 @@
+"""The part of a channel in which a body decays freely, as pairs of instant and value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.recording import Channel
+from vibroimpact.fmus.errors import UsageError
+
+Floats = NDArray[np.float64]
+
+FEWEST_SAMPLES = 16
+"""Below this the five unknowns of a decaying cosine are not fitted."""
+
+
+@dataclass(frozen=True, slots=True)
+class DecaySamples:
+    """Good samples of a free decay; their times are used as they are, evenly spaced or not.
+
+    Attributes
+    ----------
+    time : ndarray of float, shape (sample,)
+        s, ascending.
+    value : ndarray of float, shape (sample,)
+        In `unit`.
+    unit, name : str
+        CF unit and name of the channel.
+    reference_time : float
+        s; amplitudes and phases of fits refer to it: the start of the window that was asked for.
+    remarks : tuple of str
+        What was left out, and why.
+    """
+
+    time: Floats
+    value: Floats
+    unit: str = "1"
+    name: str = "displacement"
+    reference_time: float = 0.0
+    remarks: tuple[str, ...] = field(default=())
+
+    @property
+    def mean_interval(self) -> float:
+        """Mean sampling interval, s."""
+        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
+
+
+def decay_samples(channel: Channel, start: float | None = None, stop: float | None = None) -> DecaySamples:
+    """Take the window of a channel in which the body decays.
+
+    Parameters
+    ----------
+    channel : Channel
+    start, stop : float or None
+        s, both included. Without a start the decay begins at the largest excursion, unless that is within the
+        first twentieth of the record: then nothing is cut.
+
+    Raises
+    ------
+    UsageError
+        The window is empty, or holds too few good samples.
+    """
+    time, good = channel.time, channel.good
+    if not np.any(good):
+        raise UsageError(f"{channel.name}: expected good samples, got none: all are missing or clipped.")
+    remarks = []
+    if start is None:
+        start, cut = _largest_excursion(time[good], channel.values[good])
+        remarks += [f"the decay is taken from the largest excursion, at {start:.6g} s; --from sets it."] * cut
+    remarks += clock_remark(channel)
+    stop = float(time[-1]) if stop is None else stop
+    chosen = (time >= start) & (time <= stop)
+    bad = int(np.count_nonzero(chosen & ~good))
+    if bad:
+        remarks.append(f"{bad} clipped or missing samples of the window are left out.")
+    chosen &= good
+    if np.count_nonzero(chosen) < FEWEST_SAMPLES:
+        raise UsageError(
+            f"{channel.name}: expected {FEWEST_SAMPLES} good samples or more from {start:g} to {stop:g} s, got "
+            f"{np.count_nonzero(chosen)}; the channel runs from {time[0]:g} to {time[-1]:g} s. Widen --from and --to."
+        )
+    return DecaySamples(
+        time[chosen], channel.values[chosen], channel.unit, channel.name, float(start), tuple(remarks)
+    )
+
+
+def clock_remark(channel: Channel) -> list[str]:
+    """Return the warning that all frequencies share the doubt of the clock, where it has one."""
+    doubt = channel.axis.interval_uncertainty
+    if doubt == 0.0:
+        return []
+    return [
+        f"{channel.name}: the clock of this recording is uncertain by {100 * doubt:.2g} %, and with it every frequency "
+        "and decay rate; the standard errors do not count that. Damping ratios do not change."
+    ]
+
+
+def _largest_excursion(time: Floats, value: Floats) -> tuple[float, bool]:
+    """Return where the decay begins, and whether something before it is cut off."""
+    excursion = np.abs(value - np.median(value[len(value) // 2 :]))
+    peak = float(time[int(np.argmax(excursion))])
+    if peak <= time[0] + 0.05 * (time[-1] - time[0]):
+        return float(time[0]), False
+    return peak, True

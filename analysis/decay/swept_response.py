@@ -1,0 +1,93 @@
+"""The frequency response that a simulated sweep of the forcing frequency draws."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.decay.resonance import Curve
+from vibroimpact.analysis.reading import read_flat
+from vibroimpact.analysis.schema import Outcome
+from vibroimpact.fmus.errors import DatasetError
+
+Floats = NDArray[np.float64]
+
+_FEWEST_RUNS = 8
+
+
+def swept_response(
+    path: str | os.PathLike[str],
+    drive_amplitude: float = 1.0,
+    drive_unit: str = "1",
+    band: tuple[float, float] | None = None,
+) -> tuple[Curve, tuple[str, ...]]:
+    """Return the amplitude against the forcing frequency over the runs of a campaign, and remarks.
+
+    The amplitude is half of the range of the displacement, over the amplitude of the drive; runs that hit a stop are
+    left out, for they have no frequency response.
+
+    Parameters
+    ----------
+    path : path
+        Dataset of a campaign that sweeps `forcing.angular_frequency` or `forcing.frequency`.
+    drive_amplitude : float
+        In `drive_unit`; 1: the modal constant then contains it.
+    drive_unit : str
+        CF unit: `N`, or `1`.
+    band : tuple of float, optional
+        Hz; runs outside are left out.
+
+    Raises
+    ------
+    DatasetError
+        Nothing is swept, no extrema are recorded, or too few runs remain.
+    """
+    flat = read_flat(path)
+    name = next((name for name in ("angular_frequency", "frequency") if name in flat.coords), None)
+    if name is None or "displacement_max" not in flat:
+        raise DatasetError(
+            f"{os.fspath(path)}: expected a sweep of the forcing frequency with extrema, got none. "
+            "Sweep forcing.angular_frequency and record extrema."
+        )
+    others = [str(key) for key in flat.coords if key not in (name, "direction", "run_index")]
+    half = 0.5 * (flat.displacement_max.values - flat.displacement_min.values)
+    free = flat.outcome.values == int(Outcome.ok)
+    if "impact_count" in flat:
+        free &= flat.impact_count.values == 0
+    free &= np.all(np.isfinite(half), axis=1)
+    scale = 2.0 * np.pi if name == "frequency" else 1.0
+    if band is not None:
+        hertz = flat[name].values * scale / (2.0 * np.pi)
+        free &= (hertz >= band[0]) & (hertz <= band[1])
+    if np.count_nonzero(free) < _FEWEST_RUNS:
+        raise DatasetError(
+            f"{os.fspath(path)}: expected {_FEWEST_RUNS} runs or more that touch no stop, got {np.count_nonzero(free)} "
+            f"of {len(free)}. Sweep a wider range, or with less forcing."
+        )
+    omega = np.asarray(flat[name].values[free] * scale, dtype=np.float64)
+    amplitude = np.mean(half[free], axis=1) / drive_amplitude
+    order = np.argsort(omega, kind="stable")
+    remarks = _remarks(int(np.count_nonzero(~free)), others, half[free])
+    unit = (
+        "1"
+        if flat.attrs.get("units_system") == "nondimensional"
+        else "kg-1"
+        if drive_unit == "N"
+        else "m s-2"
+    )
+    curve = Curve(omega[order], amplitude[order], np.zeros(len(order)), "displacement", unit)
+    return curve, remarks
+
+
+def _remarks(left_out: int, others: list[str], half: Floats) -> tuple[str, ...]:
+    said = []
+    if left_out:
+        said.append(f"{left_out} runs that hit a stop, or did not finish, are left out.")
+    if others:
+        said.append(f"{', '.join(others)} is swept too: runs of all its values are taken together.")
+    spread = float(np.max(np.ptp(half, axis=1) / np.max(half)))
+    if spread > 1e-6:
+        said.append(f"amplitudes still change by {spread:.1g} between periods: the transients are not over.")
+    return tuple(said)

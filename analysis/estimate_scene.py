@@ -1,0 +1,240 @@
+"""What `vibroimpact estimate` takes from the scene of a simulated run, and what its options add."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.analysis.estimation.physics import Forcing, Known
+from vibroimpact.analysis.reading import read_flat
+from vibroimpact.analysis.recording import Channel, Recording
+from vibroimpact.analysis.recording_files import is_recording
+from vibroimpact.fmus.errors import UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class ImpactOptions:
+    """What a person says about impacting motion; None: not said.
+
+    Attributes
+    ----------
+    forcing_frequency, natural_frequency : float or None
+        Hz.
+    angular_frequency : float or None
+        Of the force, rad/s.
+    amplitude, static_deflection : float or None
+        Force, N, and force over stiffness, unit of the channel.
+    phase : float or None
+        rad.
+    stop : float or None
+        Unit of the channel.
+    damping_ratio : float or None
+    mass : float or None
+        kg.
+    offset : float or None
+        What the channel reads at rest, in its unit.
+    """
+
+    forcing_frequency: float | None = None
+    angular_frequency: float | None = None
+    amplitude: float | None = None
+    static_deflection: float | None = None
+    phase: float | None = None
+    stop: float | None = None
+    natural_frequency: float | None = None
+    damping_ratio: float | None = None
+    mass: float | None = None
+    offset: float | None = None
+
+    def given(self) -> list[str]:
+        """Return the names of the options that were given."""
+        return [
+            "--" + item.name.replace("_", "-")
+            for item in fields(self)
+            if getattr(self, item.name) is not None
+        ]
+
+
+def chosen_kind(data: Path, kind: str, run: int | None, drive: str | None, options: ImpactOptions) -> str:
+    """Return the kind of estimation: the one named, or what the data are."""
+    if kind != "auto":
+        return kind
+    if drive is not None:
+        return "response"
+    if options.given():
+        return "impacts"
+    if is_recording(data):
+        return "decay"
+    flat = read_flat(data)
+    swept = {"angular_frequency", "frequency"} & {str(name) for name in flat.coords}
+    if run is None and flat.sizes["run"] > 1 and swept:
+        return "response"
+    rows = slice(None) if run is None else flat.run_index.values == run
+    return "impacts" if "impact_count" in flat and np.any(flat.impact_count.values[rows] > 0) else "decay"
+
+
+def refuse_far_options(
+    kind: str, impacts: ImpactOptions, response: Mapping[str, Any], law: str, cubic: bool
+) -> None:
+    """Refuse options of another kind than the one that is estimated: they would do nothing.
+
+    Raises
+    ------
+    UsageError
+        With the names of these options.
+    """
+    far = []
+    if kind != "impacts":
+        far += impacts.given()
+    if kind != "response":
+        far += [name for name, value in response.items() if value is not None]
+    if kind != "decay":
+        far += ["--law"] * (law != "all") + ["--cubic"] * cubic
+    if far:
+        raise UsageError(
+            f"--kind {kind}: expected none of the options of other kinds, got {', '.join(far)}. "
+            "Leave them out, or choose another --kind."
+        )
+
+
+def scene_of(attrs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of the scene of a simulated dataset; empty where there is none."""
+    try:
+        return tomllib.loads(str(attrs.get("scene", "")))
+    except tomllib.TOMLDecodeError:
+        return {}
+
+
+def run_scene(data: Path, run: int | None, recording: Recording) -> dict[str, Any]:
+    """Return the scene of one run, swept values in their places; empty for a recording."""
+    if not recording.attrs.get("simulated"):
+        return {}
+    scene = scene_of(recording.attrs)
+    flat = read_flat(data)
+    row = 0 if run is None else flat.run_index.values.tolist().index(run)
+    for key in scene.get("sweep", {}):
+        table, _, name = str(key).partition(".")
+        coordinate = next((c for c in (name, str(key).replace(".", "_")) if c in flat.coords), None)
+        if coordinate is not None and isinstance(scene.get(table, {}), dict):
+            scene.setdefault(table, {})[name] = float(flat[coordinate].values[row])
+    return scene
+
+
+def forcing_and_known(
+    data: Path, run: int | None, recording: Recording, options: ImpactOptions
+) -> tuple[Forcing, Known]:
+    """Return the force, and what is known of oscillator and stop: from the options, else from the scene.
+
+    Of the scene only forcing and stop are taken: what an experiment would know too. Stiffness and damping are left to
+    be estimated, unless options say them.
+
+    Raises
+    ------
+    UsageError
+        The forcing frequency is not known, or options contradict each other.
+    """
+    scene = run_scene(data, run, recording)
+    natural = None if options.natural_frequency is None else 2.0 * math.pi * options.natural_frequency
+    forcing = Forcing(
+        _angular_frequency(scene, options),
+        _static_deflection(scene, options, natural),
+        options.phase if options.phase is not None else _scene_phase(scene),
+    )
+    stops = scene.get("stop", [])
+    stop = stops[0] if isinstance(stops, list) and len(stops) == 1 else {}
+    position = options.stop if options.stop is not None else stop.get("position")
+    known = Known(
+        damping_ratio=options.damping_ratio,
+        natural_frequency=natural,
+        stop_position=None if position is None else float(position),
+        # A simulated body rests at 0; an instrument may read anything there.
+        offset=0.0 if options.offset is None and scene else options.offset,
+        # An option about another stop leaves the side to the signal.
+        side=str(stop.get("side", "upper")) if stop and options.stop is None else None,
+    )
+    return forcing, known
+
+
+def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> float:
+    if options.forcing_frequency is not None and options.angular_frequency is not None:
+        raise UsageError(
+            "--forcing-frequency: expected it without --angular-frequency, got both. Leave one out."
+        )
+    table = scene.get("forcing", {})
+    for value, factor in (
+        (options.angular_frequency, 1.0),
+        (options.forcing_frequency, 2.0 * math.pi),
+        (table.get("angular_frequency"), 1.0),
+        (table.get("frequency"), 2.0 * math.pi),
+    ):
+        if value is not None:
+            if not value > 0.0:
+                raise UsageError(f"forcing frequency: expected a positive number, got {value:g}.")
+            return float(value) * factor
+    raise UsageError(
+        "--kind impacts: expected the frequency of the force, got none. Give --forcing-frequency (Hz) or "
+        "--angular-frequency (rad/s)."
+    )
+
+
+def _scene_phase(scene: Mapping[str, Any]) -> float | None:
+    return float(scene["forcing"].get("phase", 0.0)) if "forcing" in scene else None
+
+
+def _static_deflection(
+    scene: Mapping[str, Any], options: ImpactOptions, natural: float | None
+) -> float | None:
+    if options.static_deflection is not None:
+        return options.static_deflection
+    if options.amplitude is not None:
+        if options.mass is None or natural is None:
+            raise UsageError(
+                "--amplitude: expected --mass and --natural-frequency with it, got not both. "
+                "Give them, or --static-deflection."
+            )
+        return options.amplitude / (options.mass * natural**2)
+    force, stiffness = scene.get("forcing", {}).get("amplitude"), scene.get("body", {}).get("stiffness")
+    known = isinstance(force, int | float) and isinstance(stiffness, int | float) and stiffness > 0
+    return float(force) / float(stiffness) if known else None
+
+
+def cut(channel: Channel, start: float | None, stop: float | None) -> Channel:
+    """Return the part of a channel from start to stop (s); clocks stay as they are.
+
+    Raises
+    ------
+    UsageError
+        Nothing is left.
+    """
+    if start is None and stop is None:
+        return channel
+    low = -math.inf if start is None else start
+    high = math.inf if stop is None else stop
+    chosen = (channel.time >= low) & (channel.time <= high)
+    if not np.any(chosen):
+        raise UsageError(
+            f"{channel.name}: expected samples from {low:g} to {high:g} s, got none; the channel runs from "
+            f"{channel.time[0]:g} to {channel.time[-1]:g} s. Widen --from and --to."
+        )
+    axis = type(channel.axis)(
+        channel.time[chosen],
+        channel.axis.interval,
+        channel.axis.interval_uncertainty,
+        channel.axis.source,
+        channel.axis.trigger,
+    )
+    return type(channel)(
+        channel.name,
+        channel.values[chosen],
+        channel.unit,
+        axis,
+        channel.quality[chosen],
+        channel.label,
+        channel.attrs,
+    )

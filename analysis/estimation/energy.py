@@ -1,0 +1,384 @@
+"""Energy balance of half orbits: restitution, damping and forcing amplitude (thesis eqs. 4.2 to 4.20), any motion.
+
+A flight is halved at its deepest point, where y' = 0 and y = y_m. Per unit mass, with y counted from the offset,
+g0 = wn^2 y_st, F = int cos(Omega t + psi) y' dt and D = int y'^2 dt over the half:
+
+    before an impact   V^2     = wn^2 (y_m^2 - y_s^2) + 2 g0 F - 4 zeta wn D      (thesis eq. 4.14)
+    after an impact    (r V)^2 = wn^2 (y_m^2 - y_s^2) - 2 g0 F + 4 zeta wn D
+
+so that r^2 = sum (r V)^2 / sum V^2 over the impacts. For P(1,1) this is thesis eq. 4.13. No velocity at an end is
+needed where damping and forcing are known. F is y cos at the ends plus Omega int y sin: no derivative. Only D needs
+y', whose noise adds to it: that is subtracted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibroimpact.analysis.estimation.flight_fit import pairs_of
+from vibroimpact.analysis.estimation.noise import Floats
+from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.estimation.segments import Flight, Signal
+from vibroimpact.analysis.estimation.smoothing import Smoother, smoother
+from vibroimpact.fmus.errors import EstimationError
+
+Drawn = Mapping[str, Floats]
+
+# A refinement of the deepest point ends after so many Newton steps.
+_NEWTON_STEPS = 4
+# Unknowns whose columns are more alike than this cannot be told apart.
+_DEPENDENT = 1e3
+# Speeds squared below this part of the largest have the weight that it would have.
+_SLOW = 0.04
+
+
+@dataclass(frozen=True, slots=True)
+class HalfMaps:
+    """The weights of a flight's samples in the quantities of one half.
+
+    Attributes
+    ----------
+    sign : float
+        1 before an impact (from the deepest point to the end), -1 after one.
+    edge : float
+        Time of the impact, s.
+    edge_value, edge_slope, deepest : ndarray, shape (sample,)
+        Spline's value and slope at the impact, and its value at the deepest point.
+    waves : ndarray, shape (2, sample)
+        Omega int y sin and -Omega int y cos over the half, so that F is their share of the inside.
+    speeds : ndarray, shape (node, sample)
+        Slopes, times the root of the weights of their squares: D = sum of squares.
+    turning : float
+        Time of the deepest point, s.
+    """
+
+    sign: float
+    edge: float
+    edge_value: Floats
+    edge_slope: Floats
+    deepest: Floats
+    waves: Floats
+    speeds: Floats
+    turning: float
+
+
+@dataclass(frozen=True, slots=True)
+class HalfEnergies:
+    """Energies of half orbits, for one set of samples or for many draws; shape (draw, half) each.
+
+    Attributes
+    ----------
+    elastic : ndarray
+        y_m^2 - y_s^2.
+    work_cos, work_sin : ndarray
+        int cos(Omega t) y' dt and int -sin(Omega t) y' dt from the deepest point to the impact, or from the impact
+        to the deepest point with the other sign: what adds to the speed at the impact.
+    drag : ndarray
+        int y'^2 dt with the sign of its effect on the speed at the impact: negative after one.
+    speed_squared : ndarray
+        Square of the measured slope at the impact.
+    """
+
+    elastic: Floats
+    work_cos: Floats
+    work_sin: Floats
+    drag: Floats
+    speed_squared: Floats
+
+    def energy(self, p: Parameters, drawn: Drawn | None = None) -> Floats:
+        """Return V^2 before impacts and (r V)^2 after them, from the half orbits alone.
+
+        Parameters
+        ----------
+        p : Parameters
+        drawn : mapping or None
+            Values that differ between draws, by name, shape (draw,).
+        """
+        value = _values(p, drawn)
+        square = value["natural_frequency"] ** 2
+        work = np.cos(value["phase"]) * self.work_cos + np.sin(value["phase"]) * self.work_sin
+        found: Floats = square * (self.elastic + 2.0 * value["static_deflection"] * work)
+        return found - 4.0 * value["damping_ratio"] * value["natural_frequency"] * self.drag
+
+
+def _values(p: Parameters, drawn: Drawn | None) -> dict[str, Floats]:
+    """Return the parameters, shape (draw, 1) or (1, 1), so that they multiply arrays of shape (draw, half)."""
+    names = ("natural_frequency", "damping_ratio", "static_deflection", "phase")
+    given = drawn or {}
+    return {name: np.asarray(given.get(name, getattr(p, name)), dtype=float).reshape(-1, 1) for name in names}
+
+
+class EnergyBalance:
+    """The half orbits of all flights of a record, ready for its samples or for other draws of their noise.
+
+    Parameters
+    ----------
+    signal : Signal
+    flights : sequence of Flight
+    angular_frequency : float
+        Of the force, rad/s.
+    window : float
+        Of the smoothing, s.
+    """
+
+    def __init__(
+        self, signal: Signal, flights: Sequence[Flight], angular_frequency: float, window: float
+    ) -> None:
+        self.signal, self.flights = signal, list(flights)
+        self.pairs = pairs_of(self.flights)
+        self.angular_frequency = angular_frequency
+        self.smoothers = [smoother(signal, flight, window) for flight in flights]
+        self.halves = [half for one in self.smoothers for half in _halves(one, signal, angular_frequency)]
+        self.noise = self._noise()
+
+    def _noise(self) -> float:
+        """Return the standard deviation of the samples about their splines."""
+        squares = freedom = 0.0
+        for one in self.smoothers:
+            index = one.flight.index
+            samples = self.signal.values[index]
+            rests = samples - one.row(self.signal.time[index]) @ samples
+            squares += float(rests @ rests)
+            freedom += len(index) - one.gain.shape[0]
+        return math.sqrt(squares / max(freedom, 1.0))
+
+    def energies(
+        self, samples: Floats, parameters: Parameters, stop_position: float | None
+    ) -> tuple[HalfEnergies, Floats]:
+        """Return the energies of the halves, ordered after and before an impact for each flight, and the stop.
+
+        Parameters
+        ----------
+        samples : ndarray, shape (draw, sample)
+            Of the whole record.
+        parameters : Parameters
+            For the offset, and to first order the acceleration at the ends.
+        stop_position : float or None
+            None: the level where flights meet.
+        """
+        parts = [
+            samples[:, half_flight.index] - parameters.offset for half_flight in self.flights for _ in (0, 1)
+        ]
+        value = np.stack([y @ h.edge_value for y, h in zip(parts, self.halves, strict=True)], 1)
+        slope = np.stack([y @ h.edge_slope for y, h in zip(parts, self.halves, strict=True)], 1)
+        deepest = np.stack([y @ h.deepest for y, h in zip(parts, self.halves, strict=True)], 1)
+        waves = np.stack([y @ h.waves.T for y, h in zip(parts, self.halves, strict=True)], 1)
+        drag = np.stack(
+            [np.sum((y @ h.speeds.T) ** 2, axis=1) for y, h in zip(parts, self.halves, strict=True)], 1
+        )
+        sign = np.array([half.sign for half in self.halves])
+        stop = self._stop(value, slope) if stop_position is None else np.full(len(samples), stop_position)
+        stop = stop - (0.0 if stop_position is None else parameters.offset)
+        # the flight was cut at about the impact: what is missing to the stop, to first order
+        missing = stop[:, None] - value
+        edge = self.angular_frequency * np.array([half.edge for half in self.halves])
+        turn = self.angular_frequency * np.array([half.turning for half in self.halves])
+        # int cos y' = [y cos] + Omega int y sin from the turning point to the impact, or the other way
+        bounds_cos = stop[:, None] * np.cos(edge) - deepest * np.cos(turn)
+        bounds_sin = -stop[:, None] * np.sin(edge) + deepest * np.sin(turn)
+        variance = self.noise**2
+        square_noise = np.array([float(half.deepest @ half.deepest) for half in self.halves]) * variance
+        drag_noise = np.array([float(np.sum(half.speeds**2)) for half in self.halves]) * variance
+        slope_noise = np.array([float(half.edge_slope @ half.edge_slope) for half in self.halves]) * variance
+        # value and slope at an end have their noise in common
+        edge_noise = np.array([float(half.edge_value @ half.edge_slope) for half in self.halves]) * variance
+        pull = self._acceleration(parameters, stop[:, None], slope, edge)
+        found = HalfEnergies(
+            deepest**2 - square_noise - stop[:, None] ** 2,
+            bounds_cos + sign * waves[:, :, 0],
+            bounds_sin + sign * waves[:, :, 1],
+            sign * (drag - drag_noise + sign * (slope * missing + edge_noise)),
+            slope**2 - slope_noise + 2.0 * pull * missing,
+        )
+        return found, stop + parameters.offset
+
+    def _acceleration(self, p: Parameters, y: Floats, v: Floats, angle: Floats) -> Floats:
+        square = p.natural_frequency**2
+        load = square * p.static_deflection * np.cos(angle + p.phase)
+        found: Floats = load - 2.0 * p.damping_ratio * p.natural_frequency * v - square * y
+        return found
+
+    def _stop(self, value: Floats, slope: Floats) -> Floats:
+        """Return the mean level where flights meet, from the offset; shape (draw,)."""
+        levels = []
+        for one, other in self.pairs:
+            end, start = 2 * one + 1, 2 * other
+            late = 0.0 if one != other else self._short_by(self.flights[one])
+            shift = (value[:, end] + late * slope[:, end] - value[:, start]) / (
+                slope[:, start] - slope[:, end]
+            )
+            levels.append(value[:, end] + (late + shift) * slope[:, end])
+        return np.asarray(np.mean(levels, axis=0), dtype=np.float64)
+
+    def _short_by(self, flight: Flight) -> float:
+        """Return what a flight that meets itself, P(1,q), is short of whole periods, s."""
+        period = 2.0 * math.pi / self.angular_frequency
+        return max(1, round(flight.duration / period)) * period - flight.duration
+
+    def restitution(self, energy: Floats) -> Floats:
+        """Return r from the energies of the halves, over all impacts between flights; shape (draw,).
+
+        Raises
+        ------
+        EstimationError
+            The residual energy is negative or larger than the kinetic energy at the impacts.
+        """
+        before = np.sum([energy[:, 2 * one + 1] for one, _ in self.pairs], axis=0)
+        after = np.sum([energy[:, 2 * other] for _, other in self.pairs], axis=0)
+        ratio = after / np.where(before > 0.0, before, np.nan)
+        if not (np.isfinite(ratio[0]) and ratio[0] >= 0.0):
+            raise EstimationError(
+                f"energy balance: expected a residual energy between 0 and the kinetic energy at the impacts, "
+                f"got energies (per unit mass) of {before[0] / 2:.4g} before and {after[0] / 2:.4g} after them. "
+                "Damping, forcing or mass at the contact are not what the motion shows."
+            )
+        found: Floats = np.sqrt(np.where(ratio >= 0.0, ratio, np.nan))
+        return found
+
+
+def _halves(one: Smoother, signal: Signal, angular_frequency: float) -> list[HalfMaps]:
+    """Return the maps after the impact at the start of a flight, and before that at its end."""
+    flight = one.flight
+    samples = signal.values[flight.index]
+    turning = _turning_time(one, samples)
+    deepest = one.row(np.array([turning]))[0]
+    found = []
+    for sign, low, high in ((-1.0, flight.start, turning), (1.0, turning, flight.end)):
+        edge = flight.start if sign < 0.0 else flight.end
+        node, weight = one.integration(low, high)
+        rows = one.row(node)
+        angle = angular_frequency * node
+        waves = angular_frequency * np.stack(
+            [(weight * np.sin(angle)) @ rows, (weight * np.cos(angle)) @ rows]
+        )
+        speeds = np.sqrt(weight)[:, None] * one.row(node, 1)
+        at = np.array([edge])
+        found.append(HalfMaps(sign, edge, one.row(at)[0], one.row(at, 1)[0], deepest, waves, speeds, turning))
+    return found
+
+
+def _turning_time(one: Smoother, samples: Floats) -> float:
+    """Return the time at which the spline of a flight is furthest from the stop, s."""
+    flight = one.flight
+    grid = np.linspace(flight.start, flight.end, 65)[1:-1]
+    time = float(grid[np.argmin(one.row(grid) @ samples)])
+    for _ in range(_NEWTON_STEPS):
+        at = np.array([time])
+        slope, bend = float((one.row(at, 1) @ samples)[0]), float((one.row(at, 2) @ samples)[0])
+        if bend <= 0.0:
+            break
+        time = float(np.clip(time - slope / bend, flight.start, flight.end))
+    return time
+
+
+def unknowns_by_speed(
+    halves: HalfEnergies, p: Parameters, unknown: Sequence[str], drawn: Drawn | None = None
+) -> tuple[Floats, float]:
+    """Return what the speeds measured at the impacts say of damping or forcing, by weighted least squares.
+
+    Parameters
+    ----------
+    halves : HalfEnergies
+    p : Parameters
+        Values of what is known.
+    unknown : sequence of str
+        Of damping_ratio, static_deflection, and phase (with static_deflection: as cos and sin parts).
+    drawn : mapping or None
+        Values that differ between draws, by name, shape (draw,).
+
+    Returns
+    -------
+    values : ndarray, shape (draw, unknown)
+        In the order given.
+    condition : float
+        Ratio of the largest to the smallest singular value of the columns, each scaled to 1.
+
+    Raises
+    ------
+    EstimationError
+        The columns are as good as dependent, as for P(1,1) with more than two unknowns.
+    """
+    value = _values(p, drawn)
+    square, drag = value["natural_frequency"] ** 2, -4.0 * value["natural_frequency"] * halves.drag
+    work = np.cos(value["phase"]) * halves.work_cos + np.sin(value["phase"]) * halves.work_sin
+    columns, rest = [], halves.speed_squared - square * halves.elastic
+    if "damping_ratio" in unknown:
+        columns.append(drag)
+    else:
+        rest = rest - value["damping_ratio"] * drag
+    if "phase" in unknown:
+        columns.extend([2.0 * square * halves.work_cos, 2.0 * square * halves.work_sin])
+    elif "static_deflection" in unknown:
+        columns.append(2.0 * square * work)
+    else:
+        rest = rest - 2.0 * square * value["static_deflection"] * work
+    matrix = np.stack(columns, axis=2)
+    # the square of a slope is the less certain the larger it is
+    speeds = np.abs(halves.speed_squared[0])
+    weight = 1.0 / np.sqrt(np.maximum(speeds, _SLOW * np.max(speeds)))
+    matrix, rest = matrix * weight[:, None], rest * weight
+    condition = float(np.linalg.cond(matrix[0] / np.linalg.norm(matrix[0], axis=0)))
+    if matrix.shape[1] < matrix.shape[2] or not condition < _DEPENDENT:
+        raise EstimationError(
+            f"energy balance: expected half orbits that separate {', '.join(unknown)}, got condition {condition:.3g}. "
+            "Give one of them, or take motion of several impact velocities."
+        )
+    solution = np.einsum("dij,dj->di", np.linalg.pinv(matrix), rest)
+    return _named(solution, unknown), condition
+
+
+def _named(solution: Floats, unknown: Sequence[str]) -> Floats:
+    """Return amplitude and phase in place of their cos and sin parts, in the order asked for."""
+    if "phase" not in unknown:
+        return solution
+    cosine, sine = solution[:, -2], solution[:, -1]
+    values = {"static_deflection": np.hypot(cosine, sine), "phase": np.arctan2(sine, cosine)}
+    if "damping_ratio" in unknown:
+        values["damping_ratio"] = solution[:, 0]
+    return np.stack([values[name] for name in unknown], axis=1)
+
+
+def sensitivities(
+    restitution: float, speed: float, drag: float, half_drag: float, natural_frequency: float
+) -> dict[str, float]:
+    """Return how errors of the speed V, or of a known damping ratio, move the estimates of P(1,1).
+
+    From V^2 (1 - r^2) / 2 = fe - 2 zeta wn D and thesis eq. 4.14, D over the flight and D* from its deepest point on.
+
+    Parameters
+    ----------
+    restitution, speed : float
+        r and V.
+    drag, half_drag : float
+        D and D*.
+    natural_frequency : float
+        rad/s.
+
+    Returns
+    -------
+    dict
+        `restitution_per_relative_velocity` (damping known), `restitution_per_damping_ratio_velocity_measured`,
+        `restitution_per_damping_ratio_velocity_from_half_orbit`, `joint_damping_ratio_per_relative_velocity`,
+        `joint_restitution_per_relative_velocity`.
+
+    Examples
+    --------
+    >>> found = sensitivities(0.8, 2.0, 3.0, 1.5, 10.0)
+    >>> round(found["restitution_per_relative_velocity"], 12)
+    0.45
+    """
+    r, square, wn = restitution, speed**2, natural_frequency
+    return {
+        "restitution_per_relative_velocity": (1.0 - r * r) / r,
+        "restitution_per_damping_ratio_velocity_measured": 2.0 * wn * drag / (r * square),
+        "restitution_per_damping_ratio_velocity_from_half_orbit": 2.0
+        * wn
+        * (drag - (1.0 - r * r) * half_drag)
+        / (r * square),
+        "joint_damping_ratio_per_relative_velocity": -square / (2.0 * wn * half_drag),
+        "joint_restitution_per_relative_velocity": (1.0 - r * r - drag / half_drag) / r,
+    }

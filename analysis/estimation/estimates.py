@@ -1,0 +1,151 @@
+"""What an estimation from impacting motion returns: one row for each method and quantity, as a table or a dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import xarray as xr
+
+METHODS = (
+    "energy_known_damping",
+    "energy_joint",
+    "energy_amplitude",
+    "weak_form",
+    "trajectory",
+    "period_one",
+)
+"""In the order in which they are shown; `period_one` gives start values only, without an interval."""
+
+QUANTITIES: Mapping[str, tuple[str, str]] = {
+    "restitution": ("1", "coefficient of restitution"),
+    "energy_loss_factor": ("1", "restitution if all loss that is not the known damping were at the impact"),
+    "damping_ratio": ("1", "damping over critical damping"),
+    "natural_frequency": ("rad s-1", "undamped natural angular frequency"),
+    "static_deflection": ("channel", "force amplitude over stiffness"),
+    "phase": ("rad", "phase of the force at time 0"),
+    "angular_frequency": ("rad s-1", "angular frequency of the force on the recording's clock"),
+    "stop_position": ("channel", "position of the stop"),
+    "offset": ("channel", "reading at rest"),
+    "impact_velocity": ("channel s-1", "root mean square speed of approach"),
+}
+"""Unit (`channel`: that of the displacement) and meaning."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """One number with its doubt.
+
+    Attributes
+    ----------
+    value, standard_error : float
+    low, high : float
+        Ends of the interval; NaN where none is stated.
+    """
+
+    value: float
+    standard_error: float = np.nan
+    low: float = np.nan
+    high: float = np.nan
+
+    def covers(self, truth: float) -> bool:
+        """Tell whether the interval holds a value."""
+        return self.low <= truth <= self.high
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a method gave no answer: the message of its EstimationError."""
+
+    method: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class ImpactEstimates:
+    """Estimates of all methods from one record of impacting motion.
+
+    Attributes
+    ----------
+    channel : str
+        Name of the displacement.
+    unit : str
+        Its CF unit.
+    values : dict
+        Estimates by method, then quantity.
+    conditioning : dict
+        How far an error of the data or of what is held moves an estimate (thesis eqs. 4.14 to 4.20): name to number.
+    facts : dict
+        Impacts, flights, window, noise, side, ...: name to number or word.
+    refusals : tuple of Refusal
+    remarks : tuple of str
+        What a reader must know.
+    confidence : float
+        Of the intervals.
+    impact_times : ndarray, shape (impact,)
+        s.
+    """
+
+    channel: str
+    unit: str
+    values: Mapping[str, Mapping[str, Estimate]]
+    conditioning: Mapping[str, float] = field(default_factory=dict)
+    facts: Mapping[str, float | str] = field(default_factory=dict)
+    refusals: tuple[Refusal, ...] = ()
+    remarks: tuple[str, ...] = ()
+    confidence: float = 0.95
+    impact_times: np.ndarray[tuple[int], np.dtype[np.float64]] = field(default_factory=lambda: np.empty(0))
+
+    def unit_of(self, quantity: str) -> str:
+        """Return the unit of a quantity, the channel's filled in."""
+        unit = QUANTITIES[quantity][0]
+        return unit.replace("channel", self.unit if self.unit != "1" else "").strip() or "1"
+
+    def dataset(self) -> xr.Dataset:
+        """Return dims method and quantity; estimate, standard_error, interval_low, interval_high.
+
+        Units differ by quantity, so the variables carry `1` and the coordinate `unit` says each quantity's own.
+        Conditioning, facts, refusals and remarks are attributes.
+        """
+        methods = [name for name in METHODS if name in self.values]
+        quantities = [name for name in QUANTITIES if any(name in self.values[method] for method in methods)]
+        nothing = Estimate(np.nan)
+        table = [
+            [self.values[method].get(quantity, nothing) for quantity in quantities] for method in methods
+        ]
+        fields = {
+            "estimate": ("value", "estimate, in the unit of its quantity"),
+            "standard_error": ("standard_error", "standard error of the estimate"),
+            "interval_low": ("low", f"lower end of the {self.confidence:.0%} interval"),
+            "interval_high": ("high", f"upper end of the {self.confidence:.0%} interval"),
+        }
+        data = {
+            name: (
+                ("method", "quantity"),
+                np.array([[getattr(cell, key) for cell in row] for row in table]).reshape(
+                    len(methods), len(quantities)
+                ),
+                {"units": "1", "long_name": words},
+            )
+            for name, (key, words) in fields.items()
+        }
+        label = {"units": "1"}
+        coords = {
+            "method": ("method", methods, {**label, "long_name": "method of estimation"}),
+            "quantity": ("quantity", quantities, {**label, "long_name": "estimated quantity"}),
+            "unit": ("quantity", [self.unit_of(q) for q in quantities], {**label, "long_name": "unit of it"}),
+            "impact_time": ("impact", self.impact_times, {"units": "s", "long_name": "instants of impact"}),
+        }
+        return xr.Dataset(data, coords, self._attributes())
+
+    def _attributes(self) -> dict[str, str | float]:
+        """Return what belongs to the whole table."""
+        return {
+            "channel": self.channel,
+            "confidence": self.confidence,
+            "remarks": "\n".join(self.remarks),
+            "refusals": "\n".join(f"{refusal.method}: {refusal.reason}" for refusal in self.refusals),
+            **{f"conditioning_{name}": value for name, value in self.conditioning.items()},
+            **dict(self.facts),
+        }

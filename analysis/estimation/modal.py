@@ -1,0 +1,266 @@
+"""Bodies of several modes: measured coordinates projected on modes, then weak form and restitution (thesis 6.3).
+
+With mass-normalised shapes the kinetic energy is half the sum of the squares of the modal velocities. At an impact at
+a point of shape phi, displacements stay and the speed of the point changes from V to -r V; with the contact mass
+m_c = 1 / (phi . phi) the energy lost is RE = sum_j (q_j'(before)^2 - q_j'(after)^2) / 2 = (1 - r^2) m_c V^2 / 2, so
+that r = sqrt(1 - RE / KE), KE = m_c V^2 / 2 (thesis eq. 6.38). Modes that are left out take energy that then counts as
+lost: the restitution of too few modes is too low.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import t as student
+
+from vibroimpact.analysis.estimation.estimates import Estimate
+from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight, pairs_of
+from vibroimpact.analysis.estimation.noise import Floats, noise_level
+from vibroimpact.analysis.estimation.physics import Forcing, Parameters
+from vibroimpact.analysis.estimation.segments import Flight, Segmentation, Signal, segment
+from vibroimpact.analysis.estimation.weak_form import (
+    linear_estimate,
+    robust_weak_form,
+    weak_form,
+    weighted_flights,
+)
+from vibroimpact.fmus.errors import EstimationError
+
+_WORST_PROJECTION = 1e6
+
+
+@dataclass(frozen=True, slots=True)
+class ModalEstimates:
+    """What impacting motion says of a body of several modes.
+
+    Attributes
+    ----------
+    damping_ratio, natural_frequency, force : tuple of Estimate
+        Of each mode; rad/s, and N kg^(-1/2).
+    restitution : Estimate
+        From the speeds of the contact point.
+    restitution_from_energy : Estimate
+        From the residual energy and the contact mass: equal to the other where all modes are there.
+    contact_mass : float
+        1 / (phi . phi), kg: of the modes in use.
+    impacts : int
+        With a usable flight on both sides.
+    """
+
+    damping_ratio: tuple[Estimate, ...]
+    natural_frequency: tuple[Estimate, ...]
+    force: tuple[Estimate, ...]
+    restitution: Estimate
+    restitution_from_energy: Estimate
+    contact_mass: float
+    impacts: int
+
+
+def modal_coordinates(displacements: Floats, shapes: Floats) -> Floats:
+    """Return the modal displacements that sensors saw, by least squares.
+
+    Parameters
+    ----------
+    displacements : ndarray, shape (sensor, sample)
+        m.
+    shapes : ndarray, shape (sensor, mode)
+        Displacement of each sensor's point for unit modal displacements, kg^(-1/2).
+
+    Returns
+    -------
+    ndarray, shape (mode, sample)
+        kg^(1/2) m.
+
+    Raises
+    ------
+    EstimationError
+        Fewer sensors than modes, or sensors that do not tell the modes apart.
+
+    Examples
+    --------
+    >>> modal_coordinates(np.array([[1.0], [3.0]]), np.array([[1.0, 1.0], [1.0, -1.0]])).tolist()
+    [[2.0], [-1.0]]
+    """
+    sensors, modes = shapes.shape
+    condition = math.inf if sensors < modes else float(np.linalg.cond(shapes))
+    if not condition < _WORST_PROJECTION:
+        raise EstimationError(
+            f"modal coordinates: expected at least as many sensors as modes, at points that tell the modes apart, got "
+            f"{sensors} sensors, {modes} modes, condition {condition:.3g}. Leave out modes or add sensors."
+        )
+    return np.asarray(np.linalg.lstsq(shapes, displacements, rcond=None)[0], dtype=np.float64)
+
+
+def restitution_from_energy(residual: float, kinetic: float) -> float:
+    """Return r = sqrt(1 - RE / KE) (thesis eq. 6.38).
+
+    Raises
+    ------
+    EstimationError
+        Not 0 <= RE <= KE: the data or the contact mass contradict themselves; nothing is clipped.
+
+    Examples
+    --------
+    >>> round(restitution_from_energy(0.64, 1.0), 12)
+    0.6
+    """
+    if not 0.0 <= residual <= kinetic:
+        raise EstimationError(
+            f"restitution: expected 0 <= residual energy <= kinetic energy of the contact mass, got {residual:.4g} and "
+            f"{kinetic:.4g} J. Contact mass, shapes or damping are not what the motion shows."
+        )
+    return math.sqrt(1.0 - residual / kinetic)
+
+
+def estimate_modes(
+    time: Floats,
+    coordinates: Floats,
+    contact_shape: Floats,
+    forcing: Forcing,
+    *,
+    fastest: float,
+    stop_position: float | None = None,
+    side: str | None = None,
+    draws: int = 20,
+    confidence: float = 0.95,
+    seed: int = 0,
+) -> ModalEstimates:
+    """Estimate every mode and the restitution from modal coordinates of impacting motion.
+
+    Parameters
+    ----------
+    time : ndarray, shape (sample,)
+        s.
+    coordinates : ndarray, shape (mode, sample)
+        See `modal_coordinates`.
+    contact_shape : ndarray, shape (mode,)
+        Displacement of the contact point for unit modal displacements, kg^(-1/2).
+    forcing : Forcing
+        Angular frequency and phase; amplitudes are estimated for each mode.
+    fastest : float
+        Natural angular frequency of the highest mode, about, rad/s.
+    stop_position, side
+        As in `Known`.
+    draws, confidence, seed
+        Of the noise, for the intervals.
+
+    Raises
+    ------
+    EstimationError
+        No impacts, flights that a mode does not follow, or energies that contradict themselves.
+    """
+    contact = contact_shape @ coordinates
+    good = np.isfinite(contact)
+    cut = segment(time, contact, good, fastest=fastest, side=side, stop_position=stop_position)
+    flights = [flight for flight in cut.flights if flight.usable]
+    if not flights:
+        raise EstimationError("modes: expected flights of at least 10 samples between impacts, got none.")
+    noise = [noise_level(row, good) for row in coordinates]
+    flights = _followed(cut, coordinates, flights, forcing, fastest, noise)
+    modes, fitted = _all_modes(cut, coordinates, flights, forcing, fastest, noise)
+    found = _numbers(modes, fitted, contact_shape, flights)
+    motion = coordinates.copy()
+    for row, fits in zip(motion, fitted, strict=True):
+        for one in fits:
+            row[one.flight.index] -= one.rests
+    generator = np.random.default_rng(seed)
+    drawn = []
+    for _ in range(draws):
+        errors = np.array(noise)[:, None] * generator.standard_normal(coordinates.shape)
+        again = _all_modes(cut, motion + errors, flights, forcing, fastest, noise)
+        drawn.append(_numbers(*again, contact_shape, flights))
+    errors = np.std(drawn, axis=0, ddof=1)
+    reach = errors * float(student.ppf(0.5 + confidence / 2.0, draws - 1))
+    estimates = [
+        Estimate(*row) for row in np.column_stack([found, errors, found - reach, found + reach]).tolist()
+    ]
+    count = len(modes)
+    return ModalEstimates(
+        tuple(estimates[:count]),
+        tuple(estimates[count : 2 * count]),
+        tuple(estimates[2 * count : 3 * count]),
+        estimates[-2],
+        estimates[-1],
+        1.0 / float(contact_shape @ contact_shape),
+        len(pairs_of(flights)),
+    )
+
+
+def _of_mode(cut: Segmentation, row: Floats, noise: float) -> Signal:
+    return Signal(cut.signal.time, row, cut.signal.good, cut.signal.interval, 1.0, noise)
+
+
+def _asked(forcing: Forcing, fastest: float) -> tuple[Parameters, list[str]]:
+    """Return start values, and what is estimated of each mode."""
+    free = ["damping_ratio", "natural_frequency", "static_deflection"]
+    free += ["phase"] if forcing.phase is None else []
+    return Parameters(1.0, 0.0, fastest, forcing.angular_frequency, 1.0, forcing.phase or 0.0, 0.0), free
+
+
+def _followed(
+    cut: Segmentation,
+    coordinates: Floats,
+    flights: list[Flight],
+    forcing: Forcing,
+    fastest: float,
+    noise: Sequence[float],
+) -> list[Flight]:
+    """Return the flights that every mode follows: in the others an impact was not seen."""
+    start, free = _asked(forcing, fastest)
+    kept = set(range(len(flights)))
+    for row, level in zip(coordinates, noise, strict=True):
+        tested = weighted_flights(_of_mode(cut, row, level), flights, fastest)
+        kept &= set(robust_weak_form(tested, start, free, level)[1])
+    if not kept:
+        raise EstimationError(
+            "modes: expected flights that every mode follows, got none. Modes are lacking, or impacts were not seen."
+        )
+    return [flights[k] for k in sorted(kept)]
+
+
+def _all_modes(
+    cut: Segmentation,
+    coordinates: Floats,
+    flights: Sequence[Flight],
+    forcing: Forcing,
+    fastest: float,
+    noise: Sequence[float],
+) -> tuple[list[Parameters], list[list[FittedFlight]]]:
+    """Return the weak form's parameters of each mode, and its flights on the exact flow."""
+    modes, fitted = [], []
+    start, free = _asked(forcing, fastest)
+    for row, level in zip(coordinates, noise, strict=True):
+        signal = _of_mode(cut, row, level)
+        tested = weighted_flights(signal, flights, fastest)
+        first = linear_estimate(tested, forcing.angular_frequency, start, free)
+        found = weak_form(tested, first, free).parameters
+        found = replace(found, damping_ratio=max(found.damping_ratio, 0.0))
+        modes.append(found)
+        fitted.append([fit_flight(signal, flight, found) for flight in flights])
+    return modes, fitted
+
+
+def _numbers(
+    modes: Sequence[Parameters],
+    fitted: Sequence[Sequence[FittedFlight]],
+    contact_shape: Floats,
+    flights: Sequence[Flight],
+) -> Floats:
+    """Return damping ratios, natural frequencies, forces, and restitution from speeds and from energies."""
+    pairs = pairs_of(flights)
+    before = np.array([[mode[one].end_state[1] for mode in fitted] for one, _ in pairs])
+    after = np.array([[mode[other].state[1] for mode in fitted] for _, other in pairs])
+    speed, rebound = before @ contact_shape, after @ contact_shape
+    by_speed = -float(rebound @ speed) / float(speed @ speed)
+    residual = 0.5 * float(np.sum(before**2) - np.sum(after**2))
+    kinetic = 0.5 * float(speed @ speed) / float(contact_shape @ contact_shape)
+    by_energy = restitution_from_energy(residual, kinetic)
+    return np.array(
+        [mode.damping_ratio for mode in modes]
+        + [mode.natural_frequency for mode in modes]
+        + [mode.natural_frequency**2 * mode.static_deflection for mode in modes]
+        + [by_speed, by_energy]
+    )

@@ -1,0 +1,74 @@
+"""The noise of a smooth signal with a few kinks, and the window that suits it: both from the samples alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.errors import EstimationError
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# Differences of these orders are tried: with each, a smooth signal falls by its radians per sample, noise does not.
+_ORDERS = range(2, 9)
+# Median of |x| for normal x of unit variance.
+_MEDIAN_OF_MODULUS = 0.6744897501960817
+# Noise below this part of the peak is rounding.
+_ROUNDING = 1e-13
+_FEWEST_SAMPLES = 20
+_FEWEST_IN_WINDOW = 6
+# Of a one-sided cubic least-squares fit of m samples at interval h, at its end: standard error of the slope is
+# sqrt(1200 / m^3) sigma / h; the slope of the part of y'''' that it leaves out is y'''' (m h)^3 / 84.
+_SLOPE_NOISE = math.sqrt(1200.0)
+_SLOPE_BIAS = 1.0 / 84.0
+
+
+def noise_level(values: Floats, good: Mask) -> float:
+    """Return the standard deviation of white noise on a smooth signal, in its unit.
+
+    The smallest of the medians of |differences| of orders 2 to 8, each over its own noise gain: kinks touch only a
+    few differences, which the median leaves out.
+
+    Raises
+    ------
+    EstimationError
+        Fewer than 20 neighbouring good samples.
+    """
+    found = []
+    for order in _ORDERS:
+        whole = np.lib.stride_tricks.sliding_window_view(good, order + 1).all(axis=1)
+        differences = np.diff(values, order)[whole]
+        if len(differences) >= _FEWEST_SAMPLES:
+            gain = math.sqrt(math.comb(2 * order, order)) * _MEDIAN_OF_MODULUS
+            found.append(float(np.median(np.abs(differences))) / gain)
+    if not found:
+        raise EstimationError(
+            f"noise: expected at least {_FEWEST_SAMPLES} good samples in a row, got fewer. "
+            "Give a longer part of the recording."
+        )
+    return max(min(found), _ROUNDING * float(np.ptp(values[good])))
+
+
+def one_sided_window(noise: float, interval: float, size: float, fastest: float, longest: float) -> float:
+    """Return the window (s) in which a one-sided cubic has the best slope at its end.
+
+    Parameters
+    ----------
+    noise, size : float
+        Standard deviation of the noise, and amplitude of the motion.
+    interval : float
+        Of the samples, s.
+    fastest : float
+        Angular frequency of the fastest smooth part, rad/s.
+    longest : float
+        Not longer than this, s.
+    """
+    count = np.arange(_FEWEST_IN_WINDOW, max(_FEWEST_IN_WINDOW + 1, int(longest / interval) + 1))
+    width = count * interval
+    error = np.hypot(
+        _SLOPE_NOISE * noise / (count**1.5 * interval), _SLOPE_BIAS * size * fastest**4 * width**3
+    )
+    return float(width[np.argmin(error)])

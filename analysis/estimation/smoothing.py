@@ -1,0 +1,102 @@
+"""Velocities of flights by regression splines: one-sided at both ends, windows fixed in time, chosen from the noise.
+
+Each flight has its own least-squares spline with knots one window apart, so that no impact is smoothed over and there
+are no end effects but the larger noise of one-sided derivatives. Values, slopes and integrals are linear or quadratic
+in the samples, and what the noise adds to the squares is known and subtracted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from vibroimpact.analysis.estimation.noise import Floats
+from vibroimpact.analysis.estimation.segments import Flight, Signal
+from vibroimpact.fmus.errors import EstimationError
+
+_DEGREE = 5
+_GAUSS_POINTS = 6
+# Windows tried, in periods of the fastest motion.
+_WINDOWS = (4.0, 2.0, 1.0, 0.75, 0.5, 0.35, 0.25, 0.18, 0.125, 0.09, 0.06)
+_SAMPLES_PER_COEFFICIENT = 2.0
+_FLIGHTS_TRIED = 5
+# What a coefficient costs in units of the noise variance: 2 would be Mallows' Cp, which at times takes far too many.
+_PRICE = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Smoother:
+    """The linear maps from the samples of one flight to its spline.
+
+    Attributes
+    ----------
+    flight : Flight
+    gain : ndarray, shape (coefficient, sample)
+    knots : ndarray
+        s, about the start of the flight.
+    """
+
+    flight: Flight
+    gain: Floats
+    knots: Floats
+
+    def row(self, time: Floats, order: int = 0) -> Floats:
+        """Return the weights of the samples for the value, or a derivative, at times; shape (time, sample)."""
+        count = len(self.knots) - _DEGREE - 1
+        basis = BSpline(self.knots, np.eye(count), _DEGREE, extrapolate=True)
+        part = basis(np.asarray(time) - self.flight.start, nu=order)
+        weights: Floats = part @ self.gain
+        return weights
+
+    def integration(self, start: float, end: float) -> tuple[Floats, Floats]:
+        """Return times and weights of an integral over a part of the flight that is exact for the spline's square."""
+        inner = np.unique(self.knots) + self.flight.start
+        edges = np.concatenate([[start], inner[(inner > start) & (inner < end)], [end]])
+        node, weight = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+        half = 0.5 * np.diff(edges)
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        return (middle[:, None] + half[:, None] * node).ravel(), (half[:, None] * weight).ravel()
+
+
+def smoother(signal: Signal, flight: Flight, window: float) -> Smoother:
+    """Return the spline of a flight with knots about one window apart."""
+    spans = max(1, round(flight.duration / window))
+    inner = np.linspace(0.0, flight.duration, spans + 1)
+    knots = np.concatenate([np.zeros(_DEGREE), inner, np.full(_DEGREE, flight.duration)])
+    design = BSpline.design_matrix(signal.time[flight.index] - flight.start, knots, _DEGREE).toarray()
+    return Smoother(flight, np.linalg.pinv(design), knots)
+
+
+def choose_window(signal: Signal, flights: Sequence[Flight], fastest: float) -> float:
+    """Return the window (s) with the least sum of squared rests and of a price for each coefficient.
+
+    Raises
+    ------
+    EstimationError
+        The flights have too few samples for a spline.
+    """
+    costs: dict[float, float] = {}
+    for periods in _WINDOWS:
+        window = periods * 2.0 * math.pi / fastest
+        squares = count = 0.0
+        for flight in flights[:_FLIGHTS_TRIED]:
+            coefficients = max(1, round(flight.duration / window)) + _DEGREE
+            if len(flight.index) < _SAMPLES_PER_COEFFICIENT * coefficients:
+                break
+            one = smoother(signal, flight, window)
+            samples = signal.values[flight.index]
+            rests = samples - one.row(signal.time[flight.index]) @ samples
+            squares += float(rests @ rests)
+            count += coefficients
+        else:
+            costs[window] = squares / signal.noise**2 + _PRICE * count
+    if not costs:
+        raise EstimationError(
+            "energy balance: expected flights of at least 12 samples, got shorter ones. "
+            "Use the weak form or the trajectory fit, or a higher sampling rate."
+        )
+    return min(costs, key=lambda window: costs[window])

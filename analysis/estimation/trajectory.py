@@ -1,0 +1,394 @@
+"""Whole trajectories through impacts fitted to the samples: maximum likelihood for white noise.
+
+The record is cut at the deepest points of some flights into pieces of several impacts; each piece has its own start
+state, and all share the parameters. Within a piece the exact flow is followed from contact to contact. Pieces are as
+long as the motion allows: chaotic motion forgets its start after some impacts, periodic motion need not be cut.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight
+from vibroimpact.analysis.estimation.noise import Floats
+from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.estimation.segments import Flight, Segmentation, Signal
+from vibroimpact.fmus.core import motion, next_contact
+from vibroimpact.fmus.errors import EstimationError
+
+#: Impacts in a piece: the first of these with which the samples are followed within their noise.
+SPANS = (12, 6, 3, 1)
+#: More impacts than these are not fitted at once.
+MOST_IMPACTS = 60
+# Rests may be so many times the noise of the single flights before a fit is called not adequate.
+_ADEQUATE = 1.5
+_HOPELESS = 4.0
+# A fit is tried only where its start is not further off than this part of the motion's size.
+_NEAR = 0.1
+_STEP = 1e-7
+# Contacts closer than this over the natural period are chatter, which is left to the body itself.
+_CHATTER = 1e-5
+_FEWEST_IN_HEAD = 5
+_MOST_TRIALS = 20
+# Pieces whose rests are larger than typical by more than so many standard errors are left out, up to this part.
+_BEYOND_CHANCE = 5.0
+_MOST_ODD = 0.34
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """Samples that are followed from one start state.
+
+    Attributes
+    ----------
+    index : ndarray of int, shape (sample,)
+        The good samples.
+    state : tuple of float
+        Displacement from the offset and velocity at the first of them.
+    impacts : int
+        Detected in it.
+    """
+
+    index: NDArray[np.intp]
+    state: tuple[float, float]
+    impacts: int
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """What the fit found.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    names : tuple of str
+        Estimated, in the order of `covariance`.
+    covariance : ndarray, shape (name, name)
+    noise : float
+        Standard deviation of the rests.
+    adequate : bool
+        The rests are not much larger than the noise of the single flights.
+    pieces : tuple of Piece
+        With their fitted start states.
+    span : int
+        Impacts in a piece at most.
+    """
+
+    parameters: Parameters
+    names: tuple[str, ...]
+    covariance: Floats
+    noise: float
+    adequate: bool
+    pieces: tuple[Piece, ...]
+    span: int
+
+    def standard_error(self, name: str) -> float:
+        """Return the standard error of one parameter."""
+        k = self.names.index(name)
+        return math.sqrt(float(self.covariance[k, k]))
+
+
+def follow(signal: Signal, piece: Piece, parameters: Parameters) -> Floats:
+    """Return the displacements of a piece on the exact flow, through all its impacts, at its samples."""
+    time = signal.time[piece.index]
+    body, stop = parameters.oscillator(), parameters.stop_position - parameters.offset
+    found = np.empty(len(time))
+    now, state, done = float(time[0]), (min(piece.state[0], stop), piece.state[1]), 0
+    shortest = _CHATTER * 2.0 * math.pi / parameters.natural_frequency
+    while done < len(time):
+        phase = parameters.phase_at(now)
+        contact = next_contact(body, state, stop, float(time[-1]) - now, phase=phase)
+        if contact is not None and contact.time < shortest and state[0] == stop:
+            rest = motion(
+                body,
+                state,
+                time[done:] - now,
+                position=stop,
+                restitution=min(max(parameters.restitution, 0.0), 1.0),
+                phase=phase,
+            )
+            found[done:] = rest[0]
+            break
+        until = len(time) if contact is None else int(np.searchsorted(time, now + contact.time, side="right"))
+        if until > done:
+            instants = np.maximum(time[done:until] - now, 0.0)
+            found[done:until] = motion(body, state, instants, phase=phase)[0]
+        if contact is None:
+            break
+        done, now = until, now + contact.time
+        state = (stop, -parameters.restitution * contact.velocity)
+    return found + parameters.offset
+
+
+def pieces_of(
+    segmentation: Segmentation, fitted: Sequence[FittedFlight], parameters: Parameters, span: int
+) -> list[Piece]:
+    """Cut the runs of fitted flights that follow each other at the deepest points of every `span`-th flight.
+
+    Where a flight between was left out, an impact was not seen: nothing is followed through it.
+    """
+    pieces: list[Piece] = []
+    for run in _runs(fitted):
+        if sum(piece.impacts for piece in pieces) >= MOST_IMPACTS:
+            break
+        pieces.extend(_cut(segmentation, run, parameters, span))
+    return pieces
+
+
+def _runs(fitted: Sequence[FittedFlight]) -> list[list[FittedFlight]]:
+    """Return the flights in groups of those that follow each other."""
+    runs: list[list[FittedFlight]] = []
+    for one in fitted:
+        if not runs or one.flight.first != runs[-1][-1].flight.first + 1 or len(runs[-1]) >= MOST_IMPACTS:
+            runs.append([])
+        runs[-1].append(one)
+    return runs
+
+
+def _cut(
+    segmentation: Segmentation, run: list[FittedFlight], parameters: Parameters, span: int
+) -> list[Piece]:
+    """Return the pieces of one run, with the motion before its first and after its last impact where there is any."""
+    signal, impacts = segmentation.signal, segmentation.impacts
+    head = _head(signal, impacts[0].time, parameters) if run[0].flight.first == 0 else None
+    cuts = [head or _first(signal, run[0], parameters)]
+    counts = [run[0].flight.first + (0 if head else 1)]
+    for one in run:
+        if one.flight.first + 1 - counts[-1] >= span:
+            cuts.append(_deepest(signal, one, parameters))
+            counts.append(one.flight.first + 1)
+    last = run[-1].flight
+    end = int(last.index[-1]) + 1
+    if last.first + 2 == len(impacts):
+        # as long as a flight: in more, an impact may not have been seen
+        length = float(np.median([one.flight.duration for one in run]))
+        end = int(np.searchsorted(signal.time, last.end + length))
+        counts.append(len(impacts))
+    else:
+        counts.append(last.first + 1)
+    ends = [cut[0] for cut in cuts[1:]] + [end]
+    good = np.flatnonzero(signal.good)
+    return [
+        Piece(good[(good >= first) & (good < stop)], state, after - before)
+        for (first, state), stop, before, after in zip(cuts, ends, counts[:-1], counts[1:], strict=True)
+        if np.count_nonzero((good >= first) & (good < stop)) >= _FEWEST_IN_HEAD
+    ]
+
+
+def _first(signal: Signal, one: FittedFlight, parameters: Parameters) -> tuple[int, tuple[float, float]]:
+    """Return the first sample of a flight, and the fitted state there."""
+    return _state_at(signal, one, parameters, int(one.flight.index[0]))
+
+
+def _state_at(
+    signal: Signal, one: FittedFlight, parameters: Parameters, place: int
+) -> tuple[int, tuple[float, float]]:
+    """Return a sample of a flight, and the fitted state there."""
+    x, v = motion(
+        parameters.oscillator(),
+        (float(one.state[0]), float(one.state[1])),
+        [float(signal.time[place]) - one.flight.start],
+        phase=parameters.phase_at(one.flight.start),
+    )
+    return place, (float(x[0]), float(v[0]))
+
+
+def _deepest(signal: Signal, one: FittedFlight, parameters: Parameters) -> tuple[int, tuple[float, float]]:
+    """Return the sample where a flight is furthest from its stop, and the fitted state there."""
+    index = one.flight.index
+    return _state_at(signal, one, parameters, int(index[np.argmin(signal.values[index] - one.rests)]))
+
+
+def _head(
+    signal: Signal, first_impact: float, parameters: Parameters
+) -> tuple[int, tuple[float, float]] | None:
+    """Return a start before the first impact, None where there are too few samples."""
+    index = np.flatnonzero(signal.good & (signal.time < first_impact))
+    if len(index) < _FEWEST_IN_HEAD:
+        return None
+    place = int(index[np.argmin(signal.values[index])])
+    index = index[index >= place]
+    if len(index) < _FEWEST_IN_HEAD or np.any(np.diff(index) > 1):
+        return None
+    head = Flight(float(signal.time[place]), first_impact, index, -1, True)
+    state = fit_flight(signal, head, parameters).state
+    return place, (float(state[0]), float(state[1]))
+
+
+def fit_trajectory(
+    segmentation: Segmentation,
+    fitted: Sequence[FittedFlight],
+    start: Parameters,
+    free: Sequence[str],
+    noise: float,
+    spans: Sequence[int] = SPANS,
+) -> Trajectory:
+    """Fit parameters and start states to all samples.
+
+    Parameters
+    ----------
+    segmentation : Segmentation
+    fitted : sequence of FittedFlight
+        For the start states.
+    start : Parameters
+        Start values, and the values of what is held.
+    free : sequence of str
+        Names of the parameters that are estimated.
+    noise : float
+        Of the single flights' fits, to judge by.
+    spans : sequence of int
+        Impacts in a piece, tried in turn.
+
+    Raises
+    ------
+    EstimationError
+        The model does not follow the samples with pieces of any length.
+    """
+    size = 0.5 * float(np.ptp(segmentation.signal.values[segmentation.signal.good]))
+    scale = np.array([_size(start, name, size) for name in free])
+    best: Trajectory | None = None
+    tried: set[int] = set()
+    for span in spans:
+        pieces = pieces_of(segmentation, fitted, start, span)
+        if len(pieces) in tried:
+            continue
+        tried.add(len(pieces))
+        problem = _Problem(segmentation.signal, pieces, start, tuple(free), scale, size)
+        if span > spans[-1] and problem.distance() > _NEAR * size:
+            continue
+        trial = problem.solve(noise, span)
+        odd = problem.misfits(trial)
+        if odd and len(odd) <= _MOST_ODD * len(pieces):
+            kept = [piece for k, piece in enumerate(trial.pieces) if k not in odd]
+            again = _Problem(segmentation.signal, kept, trial.parameters, tuple(free), scale, size)
+            trial = again.solve(noise, span)
+        if best is None or trial.noise < best.noise:
+            best = trial
+        if trial.adequate:
+            return trial
+    if best is None or best.noise > _HOPELESS * noise + 1e-9 * size:
+        rest = math.inf if best is None else best.noise
+        raise EstimationError(
+            f"trajectory: expected rests of the size of the noise ({noise:.3g}), got {rest:.3g}. The model of one "
+            "oscillator with a constant restitution does not follow these impacts."
+        )
+    return best
+
+
+def _size(parameters: Parameters, name: str, size: float) -> float:
+    """Return the size of changes of a parameter."""
+    sizes = {
+        "restitution": 0.1,
+        "damping_ratio": 0.1,
+        "natural_frequency": 0.1 * parameters.natural_frequency,
+        "angular_frequency": 1e-3 * parameters.angular_frequency,
+        "phase": 0.1,
+    }
+    return sizes.get(name, 0.1 * size)
+
+
+class _Problem:
+    """The least-squares problem: unknowns are the free parameters, then displacement and velocity of each piece."""
+
+    def __init__(
+        self,
+        signal: Signal,
+        pieces: list[Piece],
+        start: Parameters,
+        names: tuple[str, ...],
+        scale: Floats,
+        size: float,
+    ) -> None:
+        self.signal, self.pieces, self.start, self.names = signal, pieces, start, names
+        speed = size * max(start.angular_frequency, start.natural_frequency)
+        self.scale = np.concatenate([scale, np.tile([0.1 * size, 0.1 * speed], len(pieces))])
+        self.origin = np.array(
+            [getattr(start, name) for name in names] + [x for p in pieces for x in p.state]
+        )
+        self.rows = np.cumsum([0, *(len(piece.index) for piece in pieces)])
+
+    def parameters(self, x: Floats) -> Parameters:
+        values = self.origin + self.scale * x
+        changes: dict[str, Any] = {
+            name: float(value) for name, value in zip(self.names, values, strict=False)
+        }
+        return replace(self.start, **changes)
+
+    def piece(self, x: Floats, k: int) -> Piece:
+        first = len(self.names) + 2 * k
+        state = (self.origin + self.scale * x)[first : first + 2]
+        return replace(self.pieces[k], state=(float(state[0]), float(state[1])))
+
+    def rests_of(self, x: Floats, k: int, parameters: Parameters | None = None) -> Floats:
+        piece = self.piece(x, k)
+        model = follow(self.signal, piece, parameters or self.parameters(x))
+        rests: Floats = self.signal.values[piece.index] - model
+        return rests
+
+    def rests(self, x: Floats) -> Floats:
+        parameters = self.parameters(x)
+        return np.concatenate([self.rests_of(x, k, parameters) for k in range(len(self.pieces))])
+
+    def distance(self) -> float:
+        return float(np.sqrt(np.mean(self.rests(np.zeros(len(self.origin))) ** 2)))
+
+    def jacobian(self, x: Floats) -> Floats:
+        """Return differences; a piece's start state moves that piece only."""
+        jacobian = np.zeros((self.rows[-1], len(x)))
+        base = self.rests(x)
+        for j in range(len(x)):
+            moved = x.copy()
+            moved[j] += _STEP
+            parameters = self.parameters(moved)
+            shared = j < len(self.names)
+            for k in range(len(self.pieces)) if shared else [(j - len(self.names)) // 2]:
+                rows = slice(self.rows[k], self.rows[k + 1])
+                jacobian[rows, j] = (self.rests_of(moved, k, parameters) - base[rows]) / _STEP
+        return jacobian
+
+    def solve(self, noise: float, span: int) -> Trajectory:
+        unit = max(noise, 1e-300)
+        found: Any = least_squares(
+            lambda x: self.rests(x) / unit,
+            np.zeros(len(self.origin)),
+            jac=lambda x: self.jacobian(x) / unit,
+            method="lm",
+            xtol=1e-11,
+            ftol=1e-9,
+            gtol=1e-12,
+            max_nfev=_MOST_TRIALS,
+        )
+        freedom = max(self.rows[-1] - len(self.origin), 1)
+        sigma = math.sqrt(float(np.sum(self.rests(found.x) ** 2)) / freedom)
+        jacobian = self.jacobian(found.x)
+        inverse = np.linalg.pinv(jacobian.T @ jacobian) * np.outer(self.scale, self.scale)
+        covariance: Floats = sigma**2 * np.asarray(inverse, dtype=np.float64)
+        count = len(self.names)
+        size = float(np.max(np.abs(self.signal.values[self.signal.good])))
+        return Trajectory(
+            self.parameters(found.x),
+            self.names,
+            covariance[:count, :count],
+            sigma,
+            sigma <= _ADEQUATE * noise + 1e-5 * size,
+            tuple(self.piece(found.x, k) for k in range(len(self.pieces))),
+            span,
+        )
+
+    def misfits(self, trajectory: Trajectory) -> list[int]:
+        """Return the pieces whose rests are larger than those of the typical piece, beyond chance."""
+        rests = [
+            self.signal.values[piece.index] - follow(self.signal, piece, trajectory.parameters)
+            for piece in trajectory.pieces
+        ]
+        squares = np.array([float(np.mean(one**2)) for one in rests])
+        counts = np.array([len(one) for one in rests])
+        limit = float(np.median(squares)) * (1.0 + _BEYOND_CHANCE * np.sqrt(2.0 / counts))
+        return np.flatnonzero(squares > limit).tolist()

@@ -1,0 +1,437 @@
+"""The derivative-free weak form: damping, natural frequency and forcing from flights, without a derivative of data.
+
+On one flight, with test functions w_k that vanish at both ends with all derivatives that matter,
+
+    int y w_k'' - 2 zeta wn int y w_k' + wn^2 (int (y - y0) w_k - y_st int w_k cos(Omega t + psi)) = 0
+
+holds for the exact motion, whatever the impacts at its ends are. With samples y of noise sigma the left sides have the
+covariance sigma^2 G, G = L L', L the weights of the samples. Their G-weighted least squares is the maximum of the
+likelihood of the flights: more test functions never hurt, and the noise in the columns (errors in variables), which
+biases the plain linear least squares, does not bias it to first order.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.polynomial.legendre import legder, legval
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from vibroimpact.analysis.estimation.noise import Floats
+from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.estimation.segments import Flight, Signal
+from vibroimpact.fmus.errors import EstimationError
+
+#: Power of s (1 - s) in the test functions: ends smooth enough for sums of samples to be integrals.
+POWER = 5
+# Test functions on each flight: so many, and so many more for each radian of the fastest motion ...
+_FEWEST_FUNCTIONS, _FUNCTIONS_PER_RADIAN = 3, 1.0
+# ... but a function for so many samples at most.
+_SAMPLES_PER_FUNCTION = 4
+# Eigenvalues of G below this part of the largest are left out: those functions are the sum of others.
+_DEPENDENT = 1e-8
+# A flight follows the model while the mean square of its whitened rests is below this many times that of the noise.
+_MISFIT = 4.0
+# While some do not, this part of the flights, the worst, is left out at a time.
+_LEFT_OUT = 0.25
+_FEWEST_KEPT = 0.2
+_FUNCTIONS_OF_START = 3
+_MOST_CLOCKS = 500
+# Sums of samples are integrals to about this part of the motion's size.
+_EXACT = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class WeightedFlight:
+    """A flight with its test functions.
+
+    Attributes
+    ----------
+    time, values : ndarray, shape (sample,)
+    weights : ndarray, shape (3, function, sample)
+        Of the samples in the integrals with w, w' and w''.
+    """
+
+    time: Floats
+    values: Floats
+    weights: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class WeakForm:
+    """What the weak form found.
+
+    Attributes
+    ----------
+    parameters : Parameters
+        With the held values filled in; restitution and stop are those given.
+    names : tuple of str
+        Estimated, in the order of `covariance`.
+    covariance : ndarray, shape (name, name)
+    influence : list of ndarray, shape (name, sample)
+        Change of the estimates for a change of the samples of each flight, to first order.
+    noise : float
+        Standard deviation of the noise that the rests show.
+    misfit : ndarray, shape (flight,)
+        Mean square of the whitened rests of each flight: the noise squared for good ones.
+    """
+
+    parameters: Parameters
+    names: tuple[str, ...]
+    covariance: Floats
+    influence: list[Floats]
+    noise: float
+    misfit: Floats
+
+
+def functions_for(duration: float, samples: int, fastest: float) -> int:
+    """Return how many test functions a flight takes."""
+    wanted = _FEWEST_FUNCTIONS + math.ceil(_FUNCTIONS_PER_RADIAN * fastest * duration)
+    return max(2, min(wanted, samples // _SAMPLES_PER_FUNCTION))
+
+
+def weighted(time: Floats, values: Floats, functions: int, power: int = POWER) -> WeightedFlight:
+    """Return a flight with its test functions s^p (1-s)^p Legendre_k(2 s - 1), s from 0 to 1 over its samples.
+
+    Parameters
+    ----------
+    time, values : ndarray, shape (sample,)
+        s and unit of the displacement; the integrals are sums by the trapezoidal rule, exact to the order of `power`.
+    functions : int
+        How many.
+    power : int
+        At least 3.
+    """
+    length = float(time[-1] - time[0])
+    s = (time - time[0]) / length
+    weight = np.empty_like(time)
+    weight[1:-1] = 0.5 * (time[2:] - time[:-2])
+    weight[0] = weight[-1] = 0.0
+    rows = _functions(s, functions, power) * (weight / length ** np.arange(3)[:, None])[:, None, :]
+    return WeightedFlight(time, values, rows)
+
+
+def _functions(s: Floats, functions: int, power: int) -> Floats:
+    """Return s^p (1-s)^p Legendre_k(2 s - 1), scaled to one size, and two derivatives; shape (3, function, sample)."""
+    basis = np.eye(functions)
+    legendre = np.stack(
+        [2.0**order * legval(2.0 * s - 1.0, legder(basis, order) if order else basis) for order in range(3)]
+    )
+    product = s * (1.0 - s)
+    envelope = np.stack(
+        [
+            product**power,
+            power * product ** (power - 1) * (1.0 - 2.0 * s),
+            power * product ** (power - 2) * ((power - 1) * (1.0 - 2.0 * s) ** 2 - 2.0 * product),
+        ]
+    )
+    size = 4.0**power * np.sqrt(2.0 * np.arange(functions) + 1.0)[:, None]
+    found: Floats = size * np.stack(
+        [
+            envelope[0] * legendre[0],
+            envelope[1] * legendre[0] + envelope[0] * legendre[1],
+            envelope[2] * legendre[0] + 2.0 * envelope[1] * legendre[1] + envelope[0] * legendre[2],
+        ]
+    )
+    return found
+
+
+def weighted_flights(signal: Signal, flights: Sequence[Flight], fastest: float) -> list[WeightedFlight]:
+    """Return the usable flights with their test functions."""
+    return [
+        weighted(
+            signal.time[flight.index],
+            signal.values[flight.index],
+            functions_for(flight.duration, len(flight.index), fastest),
+        )
+        for flight in flights
+        if flight.usable
+    ]
+
+
+def linear_estimate(
+    flights: Sequence[WeightedFlight], angular_frequency: float, known: Parameters, free: Sequence[str]
+) -> Parameters:
+    """Return the plain linear least squares of the weak form: the start of `weak_form`.
+
+    Parameters
+    ----------
+    flights : sequence of WeightedFlight
+    angular_frequency : float
+        Of the force, rad/s.
+    known : Parameters
+        Values of all that is not free.
+    free : sequence of str
+        Of damping_ratio, natural_frequency, static_deflection, phase, offset.
+    """
+    columns, target = _linear_system(flights, angular_frequency, known, free)
+    scale = np.linalg.norm(columns, axis=0)
+    if not np.all(scale > 0.0):
+        raise EstimationError("weak form: expected motion that depends on all free parameters, got none.")
+    solution = np.linalg.lstsq(columns / scale, target, rcond=None)[0] / scale
+    return _from_linear(solution, known, free)
+
+
+def _linear_system(
+    flights: Sequence[WeightedFlight], angular_frequency: float, known: Parameters, free: Sequence[str]
+) -> tuple[Floats, Floats]:
+    """Return columns for (2 zeta wn, wn^2, wn^2 y_st (cos psi, sin psi), wn^2 y0) as far as free, and their target."""
+    stiffness = known.natural_frequency**2
+    drag = 2.0 * known.damping_ratio * known.natural_frequency
+    force = known.static_deflection
+    blocks, targets = [], []
+    for whole in flights:
+        # the lowest functions only: unweighted, the highest would count most
+        flight = WeightedFlight(whole.time, whole.values, whole.weights[:, : _FUNCTIONS_OF_START + len(free)])
+        plain, first, second = flight.weights @ flight.values
+        angle = angular_frequency * flight.time
+        waves = [flight.weights[0] @ np.cos(angle), -flight.weights[0] @ np.sin(angle)]
+        one = flight.weights[0].sum(axis=1)
+        loads = [force * (math.cos(known.phase) * waves[0] + math.sin(known.phase) * waves[1])]
+        elastic = plain - (0.0 if "offset" in free else known.offset * one)
+        wave_free = "static_deflection" in free or "phase" in free
+        if not wave_free:
+            elastic = elastic - loads[0]
+        columns, rest = [], -second
+        if "damping_ratio" in free:
+            columns.append(-first)
+        elif "natural_frequency" not in free:
+            rest = rest + drag * first
+        if "natural_frequency" in free:
+            damped = 0.0 if "damping_ratio" in free else 2.0 * known.damping_ratio * known.natural_frequency
+            columns.append(elastic)
+            rest = rest + damped * first
+        else:
+            rest = rest - stiffness * elastic
+        if "phase" in free:
+            columns.extend(-wave for wave in waves)
+        elif wave_free:
+            columns.append(-math.cos(known.phase) * waves[0] - math.sin(known.phase) * waves[1])
+        if "offset" in free:
+            columns.append(-one)
+        blocks.append(np.column_stack(columns) if columns else np.empty((len(rest), 0)))
+        targets.append(rest)
+    return np.concatenate(blocks), np.concatenate(targets)
+
+
+def _from_linear(solution: Floats, known: Parameters, free: Sequence[str]) -> Parameters:
+    """Return parameters from the solution of the linear system."""
+    values = list(solution)
+    drag = values.pop(0) if "damping_ratio" in free else None
+    square = values.pop(0) if "natural_frequency" in free else known.natural_frequency**2
+    if not square > 0.0:
+        raise EstimationError(
+            f"weak form: expected a positive stiffness, got a natural frequency squared of {square:.4g} (rad/s)^2. "
+            "The flights do not follow a spring: give the natural frequency, or look at the signal."
+        )
+    natural = math.sqrt(square)
+    found = replace(known, natural_frequency=natural)
+    if drag is not None:
+        found = replace(found, damping_ratio=float(drag) / (2.0 * natural))
+    if "phase" in free:
+        cosine, sine = float(values.pop(0)), float(values.pop(0))
+        found = replace(found, phase=math.atan2(sine, cosine))
+        if "static_deflection" in free:
+            found = replace(found, static_deflection=math.hypot(cosine, sine) / square)
+    elif "static_deflection" in free:
+        found = replace(found, static_deflection=float(values.pop(0)) / square)
+    if "offset" in free:
+        found = replace(found, offset=float(values.pop(0)) / square)
+    return found
+
+
+def weak_form(flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str]) -> WeakForm:
+    """Return the G-weighted least squares of the weak form.
+
+    Parameters
+    ----------
+    flights : sequence of WeightedFlight
+    start : Parameters
+        Start values, and the values of what is held.
+    free : sequence of str
+        Names of the parameters that are estimated.
+
+    Raises
+    ------
+    EstimationError
+        No flights, or fewer equations than unknowns, or data that do not determine them.
+    """
+    stacked = _Stacked(flights)
+    if stacked.rows <= len(free):
+        raise EstimationError(
+            f"weak form: expected more than {len(free)} equations, got {stacked.rows} from {len(flights)} flights. "
+            "Give a longer recording."
+        )
+    scale = _scales(start, free)
+    origin = np.array([getattr(start, name) for name in free])
+
+    def rests(x: Floats) -> Floats:
+        return stacked.whitened(_with(start, free, origin + scale * x)).ravel()
+
+    noise = max(float(np.linalg.norm(rests(np.zeros(len(free))))) / math.sqrt(stacked.rows), 1e-300)
+    found: Any = least_squares(
+        lambda x: rests(x) / noise, np.zeros(len(free)), method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13
+    )
+    best = _with(start, free, origin + scale * found.x)
+    whitened = stacked.whitened(best)
+    sigma = float(np.linalg.norm(whitened)) / math.sqrt(stacked.rows - len(free))
+    jacobian = found.jac * noise / scale
+    gain, singular = _pseudo_inverse(jacobian, scale)
+    if singular:
+        raise EstimationError(
+            f"weak form: expected motion that separates {', '.join(free)}, got flights that do not. "
+            "Hold one of them at a known value."
+        )
+    influence = stacked.influence(best, gain)
+    return WeakForm(best, tuple(free), sigma**2 * gain @ gain.T, influence, sigma, stacked.misfit(best))
+
+
+def robust_weak_form(
+    flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str], noise: float
+) -> tuple[WeakForm, list[int]]:
+    """Return the weak form over the flights that follow the model, and their places among all.
+
+    A flight with an impact that was not seen does not. The worst are left out until all that are kept follow within
+    the noise; then all are judged once more.
+
+    Parameters
+    ----------
+    flights, start, free
+        As in `weak_form`; the start is for what is held.
+    noise : float
+        Standard deviation, from the samples alone.
+    """
+    linear = [name for name in free if name != "angular_frequency"]
+    kept = list(range(len(flights)))
+    fewest = max(1, math.ceil(_FEWEST_KEPT * len(flights)))
+
+    def fit() -> WeakForm:
+        chosen = [flights[k] for k in kept]
+        first = linear_estimate(chosen, start.angular_frequency, start, linear) if linear else start
+        return weak_form(chosen, first, free)
+
+    found = fit()
+    smallest = max(noise, _EXACT * float(np.max(np.abs(flights[0].values)))) ** 2
+    while len(kept) > fewest and float(np.max(found.misfit)) > _MISFIT * smallest:
+        order = np.argsort(found.misfit)
+        count = max(fewest, min(len(kept) - 1, math.ceil((1.0 - _LEFT_OUT) * len(kept))))
+        good = set(order[:count].tolist()) | set(np.flatnonzero(found.misfit <= _MISFIT * smallest).tolist())
+        kept = [k for place, k in enumerate(kept) if place in good]
+        found = fit()
+    limit = _MISFIT * max(smallest, float(np.median(found.misfit)))
+    misfit = _Stacked(flights).misfit(found.parameters)
+    again = np.flatnonzero(misfit <= limit).tolist()
+    if again and again != kept:
+        kept = again
+        found = fit()
+    return found, kept
+
+
+def _scales(start: Parameters, free: Sequence[str]) -> Floats:
+    """Return a size for each parameter, so that the unknowns of the search are of one size."""
+    size = {
+        "damping_ratio": 0.1,
+        "natural_frequency": 0.1 * start.natural_frequency,
+        "static_deflection": 0.1 * abs(start.static_deflection) or 1.0,
+        "phase": 0.1,
+        "angular_frequency": 1e-3 * start.angular_frequency,
+        "offset": 0.1 * abs(start.static_deflection) or 1.0,
+    }
+    return np.array([size[name] for name in free])
+
+
+def _with(parameters: Parameters, names: Sequence[str], values: NDArray[np.float64]) -> Parameters:
+    changes: dict[str, Any] = {name: float(value) for name, value in zip(names, values, strict=True)}
+    return replace(parameters, **changes)
+
+
+def _pseudo_inverse(jacobian: Floats, scale: Floats) -> tuple[Floats, bool]:
+    """Return the pseudo-inverse of a Jacobian, and whether its columns (scaled) are as good as dependent."""
+    u, s, vt = np.linalg.svd(jacobian * scale, full_matrices=False)
+    singular = not s[-1] > 1e-9 * s[0]
+    s = np.maximum(s, 1e-300)
+    inverse: Floats = scale[:, None] * ((vt.T / s) @ u.T)
+    return inverse, singular
+
+
+class _Stacked:
+    """All flights in arrays of one shape, padded with zeros: a trial of parameters is a few array operations."""
+
+    def __init__(self, flights: Sequence[WeightedFlight]) -> None:
+        self.flights = list(flights)
+        functions = max((flight.weights.shape[1] for flight in flights), default=0)
+        samples = max((len(flight.time) for flight in flights), default=0)
+        count = len(self.flights)
+        self.weights = np.zeros((3, count, functions, samples))
+        self.time, self.values = np.zeros((count, samples)), np.zeros((count, samples))
+        self.pad = np.zeros((count, functions))
+        for j, flight in enumerate(flights):
+            k, n = flight.weights.shape[1:]
+            self.weights[:, j, :k, :n] = flight.weights
+            self.time[j, :n], self.values[j, :n] = flight.time, flight.values
+            self.pad[j, k:] = 1.0
+        self.ranks = functions - self.pad.sum(axis=1)
+        self.rows = int(self.ranks.sum())
+        # all products of weights that G is made of, and the integrals of the samples
+        self.products = np.einsum("ajkn,bjln->abjkl", self.weights, self.weights)
+        self.integrals = np.einsum("ajkn,jn->ajk", self.weights, self.values)
+        self.ones = self.weights[0].sum(axis=2)
+        self.identity = np.eye(functions) * self.pad[:, :, None]
+
+    def factors(self, p: Parameters) -> Floats:
+        """Return the factors of the integrals with w, w', w''."""
+        return np.array([p.natural_frequency**2, -2.0 * p.damping_ratio * p.natural_frequency, 1.0])
+
+    def roots(self, p: Parameters) -> Floats:
+        """Return the Cholesky factors of G, shape (flight, function, function)."""
+        factors = self.factors(p)
+        gram = np.einsum("a,b,abjkl->jkl", factors, factors, self.products)
+        largest = np.einsum("jkk->j", gram)[:, None, None]
+        roots: Floats = np.linalg.cholesky(
+            gram + self.identity * largest + _DEPENDENT * largest * np.eye(gram.shape[1])
+        )
+        return roots
+
+    def whitened(self, p: Parameters) -> Floats:
+        """Return the rests, of unit covariance for unit noise, shape (flight, function)."""
+        factors = self.factors(p)
+        wave = p.static_deflection * np.cos(p.angular_frequency * self.time + p.phase)
+        load = np.einsum("jkn,jn->jk", self.weights[0], wave) + p.offset * self.ones
+        rests = np.einsum("a,ajk->jk", factors, self.integrals) - p.natural_frequency**2 * load
+        solved: Floats = np.linalg.solve(self.roots(p), rests[:, :, None])[:, :, 0]
+        return solved
+
+    def misfit(self, p: Parameters) -> Floats:
+        """Return the mean square of the whitened rests of each flight."""
+        squares: Floats = np.sum(self.whitened(p) ** 2, axis=1) / self.ranks
+        return squares
+
+    def influence(self, p: Parameters, gain: Floats) -> list[Floats]:
+        """Return d parameters / d samples of each flight: -gain * whitened weights."""
+        weights = np.einsum("a,ajkn->jkn", self.factors(p), self.weights)
+        whitened = np.linalg.solve(self.roots(p), weights)
+        parts = gain.reshape(gain.shape[0], *whitened.shape[:2])
+        return [-parts[:, j] @ whitened[j][:, : len(flight.time)] for j, flight in enumerate(self.flights)]
+
+
+def with_own_clock(
+    flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str], spread: float = 5e-3
+) -> Parameters:
+    """Return the start with the angular frequency near its own that the flights fit best, by a scan.
+
+    Over a long record a slightly wrong clock puts the force out of phase; steps are a quarter radian over the record.
+    """
+    length = max(float(flight.time[-1]) for flight in flights) - float(flights[0].time[0])
+    steps = min(_MOST_CLOCKS, math.ceil(spread * start.angular_frequency * length / 0.25))
+    trials = start.angular_frequency * (1.0 + spread * np.linspace(-1.0, 1.0, 2 * steps + 1))
+    costs = []
+    for trial in trials:
+        columns, target = _linear_system(flights, float(trial), start, free)
+        solution = np.linalg.lstsq(columns, target, rcond=None)[0] if columns.size else np.empty(0)
+        costs.append(float(np.linalg.norm(target - columns @ solution)))
+    return replace(start, angular_frequency=float(trials[int(np.argmin(costs))]))

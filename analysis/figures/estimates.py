@@ -1,0 +1,232 @@
+"""Figures of estimates: a free decay and its laws, a frequency response, or methods side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, canvas, page_style
+from vibroimpact.fmus.errors import DatasetError
+
+_PANEL_MM = 32
+_NARROWEST = 1e-4
+"""Of the values: differences below are not worth a panel."""
+_SYMBOLS = {"9.80665 m s-2": "g", "1": "-", "m s-2": "m/s²", "m s-1": "m/s"}
+
+
+def draw_estimates(dataset: xr.Dataset) -> Figure:
+    """Draw the dataset of `vibroimpact estimate`: what it shows follows from what was estimated.
+
+    Raises
+    ------
+    DatasetError
+        If it is no such dataset.
+    """
+    drawers = {"decay": _draw_decay, "response": _draw_response, "impacts": _draw_methods}
+    kind = str(dataset.attrs.get("estimates", ""))
+    if kind not in drawers:
+        raise DatasetError(
+            f"figure: expected estimates of a decay, a response or impacts, got {kind or 'none'!r}. "
+            "Make them with `vibroimpact estimate`."
+        )
+    with page_style():
+        return drawers[kind](dataset)
+
+
+def _symbol(variable: xr.DataArray) -> str:
+    unit = str(variable.attrs.get("units", "1"))
+    return _SYMBOLS.get(unit, unit)
+
+
+def _draw_decay(dataset: xr.Dataset) -> Figure:
+    """Draw motion, residuals and peaks over time, then frequency and damping over amplitude."""
+    panels = [_draw_motion, _draw_residuals]
+    panels += [_draw_peaks] * ("peak_height" in dataset)
+    windows = [_draw_frequency, _draw_damping] if "window" in dataset.dims else []
+    figure = canvas(14 + _PANEL_MM * (len(panels) + len(windows)))
+    axes = figure.subplots(len(panels) + len(windows), 1, squeeze=False)[:, 0]
+    for axis, draw in zip(axes, panels + windows, strict=True):
+        draw(axis, dataset)
+    for axis in axes[: len(panels)]:
+        axis.set_xlim(float(dataset.time[0]), float(dataset.time[-1]))
+        axis.set_xlabel("time (s)" if axis is axes[len(panels) - 1] else "")
+        axis.tick_params(labelbottom=axis is axes[len(panels) - 1])
+    for axis in axes[len(panels) :]:
+        axis.set_xlim(left=0.0)
+        axis.tick_params(labelbottom=axis is axes[-1])
+    if windows:
+        axes[-1].set_xlabel(f"amplitude ({_symbol(dataset.window_amplitude)})")
+    return figure
+
+
+def _draw_motion(axis: Axes, dataset: xr.Dataset) -> None:
+    axis.plot(dataset.time, dataset.measured, color=LINE, linewidth=0.5, rasterized=True, label="measured")
+    best = _best_fit(dataset)
+    axis.plot(dataset.time, best, color=MARK, linewidth=0.4, linestyle="--", rasterized=True, label="fitted")
+    axis.set_ylabel(f"{dataset.attrs['channel'].replace('_', ' ')} ({_symbol(dataset.measured)})")
+    _name_above(axis)
+
+
+def _best_fit(dataset: xr.Dataset) -> xr.DataArray:
+    return dataset["law_fit" if "law_fit" in dataset else "exponential_fit"]
+
+
+def _draw_residuals(axis: Axes, dataset: xr.Dataset) -> None:
+    """Draw what is left over: noise shows as a band, a wrong law as a pattern."""
+    residual = dataset.measured - dataset.exponential_fit
+    axis.plot(dataset.time, residual, color=STOP, linewidth=0.4, rasterized=True, label="cosine")
+    if "law_fit" in dataset:
+        residual = dataset.measured - dataset.law_fit
+        axis.plot(dataset.time, residual, color=MARK, linewidth=0.4, rasterized=True, label="best law")
+    axis.axhline(0.0, color="k", linewidth=0.3)
+    axis.set_ylabel(f"residual ({_symbol(dataset.measured)})")
+    _name_above(axis)
+
+
+def _name_above(axis: Axes) -> None:
+    """Name the lines in a row above their panel, where no data can be."""
+    axis.legend(
+        frameon=False,
+        ncols=3,
+        # On the right: the power of ten of an axis stands on the left.
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        borderaxespad=0.1,
+        columnspacing=1.0,
+        handlelength=1.5,
+    )
+
+
+def _draw_peaks(axis: Axes, dataset: xr.Dataset) -> None:
+    height, number = dataset.peak_height.values, dataset.peak_number.values
+    axis.errorbar(
+        dataset.peak_time,
+        height,
+        yerr=dataset.peak_height_error,
+        fmt=".",
+        markersize=2,
+        color=LINE,
+        elinewidth=0.4,
+        label="turning points",
+    )
+    decrement = float(dataset.estimate.sel({"method": "decrement", "quantity": "logarithmic_decrement"}))
+    # The line of the fit: its level is the weighted mean of the logarithms about it.
+    line = -0.5 * decrement * (number - number[0])
+    level = np.average(np.log(height) - line, weights=height**2)
+    axis.plot(dataset.peak_time, np.exp(level + line), color=MARK, linewidth=0.6, label="one decrement")
+    axis.set_yscale("log")
+    axis.set_ylabel(f"peaks ({_symbol(dataset.measured)})")
+    axis.legend(frameon=False, loc="lower left", borderaxespad=0.1)
+
+
+def _draw_frequency(axis: Axes, dataset: xr.Dataset) -> None:
+    turn = 2.0 * np.pi
+    _errorbars(
+        axis,
+        dataset.window_amplitude.values,
+        dataset.window_frequency.values / turn,
+        dataset.window_frequency_error.values / turn,
+    )
+    axis.set_ylabel("frequency (Hz)")
+    axis.ticklabel_format(axis="y", useOffset=False)
+
+
+def _draw_damping(axis: Axes, dataset: xr.Dataset) -> None:
+    _errorbars(
+        axis,
+        dataset.window_amplitude.values,
+        dataset.window_damping.values,
+        dataset.window_damping_error.values,
+    )
+    axis.set_ylabel("damping ratio (-)")
+    axis.ticklabel_format(axis="y", useOffset=False)
+
+
+def _errorbars(axis: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray) -> None:
+    axis.errorbar(x, y, yerr=1.96 * error, fmt="o", markersize=2, color=LINE, elinewidth=0.6, capsize=1.5)
+    # One bad window must not press all others flat.
+    middle = np.median(y)
+    reach = 1.3 * float(np.percentile(np.abs(y - middle) + error, 85)) or 1.0
+    low, high = float(np.min(y - 2 * error)), float(np.max(y + 2 * error))
+    low, high = max(middle - 2 * reach, low), min(middle + 2 * reach, high)
+    _limit(axis.set_ylim, low, high)
+
+
+def _draw_response(dataset: xr.Dataset) -> Figure:
+    """Draw |H| with its fit near the resonance, and the coherence of a measured response."""
+    # One segment has the coherence 1 by construction.
+    measured = "h1_magnitude" in dataset
+    coherent = measured and bool(np.any(dataset.coherence < 1.0 - 1e-9))
+    figure = canvas(8 + (1.6 + coherent) * _PANEL_MM)
+    axes = figure.subplots(1 + coherent, 1, squeeze=False, sharex=True)[:, 0]
+    hertz = dataset.angular_frequency / (2.0 * np.pi)
+    error = dataset.response_error.values
+    axes[0].errorbar(
+        hertz,
+        dataset.response,
+        yerr=np.minimum(1.96 * error, 0.9 * dataset.response.values) if np.any(error > 0) else None,
+        fmt=".",
+        markersize=2.5,
+        color=LINE,
+        elinewidth=0.4,
+        label="measured" if measured else "simulated",
+    )
+    axes[0].plot(hertz, dataset.fitted_response, color=MARK, label="fitted resonance")
+    axes[0].set_yscale("log")
+    axes[0].set_ylabel(f"response ({_symbol(dataset.response)})")
+    axes[0].legend(frameon=False, loc="best", borderaxespad=0.3)
+    if coherent:
+        near = (dataset.frequency >= hertz[0]) & (dataset.frequency <= hertz[-1])
+        axes[1].plot(dataset.frequency[near], dataset.coherence[near], color=LINE)
+        axes[1].set_ylabel("coherence (-)")
+        axes[1].set_ylim(0.0, 1.05)
+    axes[-1].set_xlabel("frequency (Hz)")
+    axes[-1].set_xlim(float(hertz[0]), float(hertz[-1]))
+    return figure
+
+
+def _draw_methods(dataset: xr.Dataset) -> Figure:
+    """Draw each quantity in a panel of its own: the methods that give it side by side, with their intervals."""
+    panels = []
+    for name in dataset["quantity"].values:
+        chosen = dataset.sel(quantity=name)
+        panels.append(chosen.isel(method=np.flatnonzero(np.isfinite(chosen.estimate.values))))
+    panels = [chosen for chosen in panels if chosen.sizes["method"]]
+    rows = [1 + chosen.sizes["method"] for chosen in panels] or [1]
+    figure = canvas(6 + 10 * len(rows) + 3.2 * sum(rows))
+    axes = figure.subplots(len(rows), 1, squeeze=False, height_ratios=rows)[:, 0]
+    for axis, chosen in zip(axes, panels, strict=False):
+        _draw_intervals(axis, chosen, list(dataset["method"].values))
+    return figure
+
+
+def _draw_intervals(axis: Axes, chosen: xr.Dataset, methods: list[str]) -> None:
+    """Draw values as points and their intervals as bars; a value without an interval is open."""
+    names = [str(name) for name in chosen["method"].values]
+    ends = []
+    for place, name in enumerate(names):
+        value = float(chosen.estimate[place])
+        low, high = float(chosen.interval_low[place]), float(chosen.interval_high[place])
+        bounded = np.isfinite(low) and np.isfinite(high)
+        colour = COLOURS[methods.index(name) % len(COLOURS)]
+        if bounded:
+            axis.plot([low, high], [place, place], color=colour, linewidth=1.0)
+        axis.plot([value], [place], "o", markersize=3, color=colour, fillstyle="full" if bounded else "none")
+        ends += [low, value, high]
+    axis.set_yticks(np.arange(len(names)), [name.replace("_", " ") for name in names])
+    axis.set_ylim(len(names) - 0.4, -0.6)
+    _limit(axis.set_xlim, float(np.nanmin(ends)), float(np.nanmax(ends)))
+    axis.ticklabel_format(axis="x", useOffset=False)
+    axis.locator_params(axis="x", nbins=5)
+    unit = str(chosen["unit"].values)
+    axis.set_xlabel(f"{str(chosen['quantity'].values).replace('_', ' ')} ({_SYMBOLS.get(unit, unit)})")
+
+
+def _limit(setter: Callable[[float, float], object], low: float, high: float) -> None:
+    """Set limits with a margin, and never so near each other that rounding fills the panel."""
+    margin = max(0.08 * (high - low), _NARROWEST * max(abs(low), abs(high)), 1e-300)
+    setter(low - margin, high + margin)

@@ -1,0 +1,117 @@
+"""What the estimates must reach on the synthetic example of thesis 4.2.5, and that their intervals are honest."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from impact_records import THESIS, WORKED, record_of
+
+from vibroimpact.analysis.estimation import Known, estimate_impacts
+
+NOISE = 0.01
+NOMINAL = 0.95
+
+
+@cache
+def estimates_of(case, count):
+    """Return the estimates from records of a case that differ in their noise."""
+    parameters, known, methods, forcing = CASES[case]
+    record = record_of(parameters, periods=8)
+    return [
+        estimate_impacts(
+            record.channel(NOISE, seed),
+            record.forcing(**forcing),
+            known,
+            methods=methods,
+            seed=seed,
+            draws=30,
+        )
+        for seed in range(count)
+    ]
+
+
+def values_of(found, method, quantity):
+    return np.array([one.values[method][quantity].value for one in found if method in one.values])
+
+
+def test_restitution_with_damping_known_is_within_a_half_percent_on_average():
+    # 100 samples in a period, noise of 1 % of the peak, 30 draws; one record is eight periods
+    values = values_of(estimates_of("damping and stop known", 30), "energy_known_damping", "restitution")
+    assert abs(np.mean(values) - 0.89) < 0.005
+    # and each draw by itself
+    assert np.max(np.abs(values - 0.89)) < 0.005
+
+
+def test_joint_estimates_are_within_the_targets_on_average():
+    found = estimates_of("nothing known but the force", 40)[:30]
+    methods = ["energy_joint", "weak_form", "trajectory"]
+    for method in methods:
+        assert len(values_of(found, method, "restitution")) >= 28
+        assert abs(np.mean(values_of(found, method, "restitution")) - 0.89) < 0.03, method
+        assert abs(np.mean(values_of(found, method, "damping_ratio")) - 0.1) < 0.02, method
+    # the better the method, the smaller the scatter
+    scatter = [np.std(values_of(found, method, "damping_ratio")) for method in methods]
+    assert scatter[0] > scatter[1] > scatter[2]
+
+
+def covered(case, count):
+    """Return how many intervals hold the truth, and how many there are, by method and quantity."""
+    parameters, known, methods, forcing = CASES[case]
+    record = record_of(parameters, periods=8)
+    counts = {}
+    exact = estimate_impacts(
+        record.channel(), record.forcing(**forcing), known, methods=methods, draws=10
+    ).values
+    for one in estimates_of(case, count):
+        for method, values in one.values.items():
+            for quantity, estimate in values.items():
+                # speeds and loss factor are of the noiseless record; the others are its parameters
+                truth = getattr(record.truth, quantity, None)
+                if truth is None:
+                    truth = exact[method if method in exact else "weak_form"][quantity].value
+                if quantity == "phase":
+                    truth += 2.0 * np.pi * round((estimate.value - truth) / (2.0 * np.pi))
+                hits, total = counts.get((method, quantity), (0, 0))
+                counts[method, quantity] = hits + estimate.covers(truth), total + 1
+    # a method that refuses some of the records has chosen the others
+    return {key: hits / total for key, (hits, total) in counts.items() if total >= 0.95 * count}
+
+
+CASES = {
+    "nothing known but the force": (
+        THESIS,
+        Known(),
+        ["energy_known_damping", "energy_joint", "weak_form", "trajectory"],
+        {},
+    ),
+    "damping and stop known": (
+        THESIS,
+        Known(damping_ratio=0.1, natural_frequency=32.81, stop_position=0.0),
+        ["energy_known_damping", "energy_joint", "energy_amplitude", "weak_form", "trajectory"],
+        {},
+    ),
+    "force unknown": (
+        WORKED,
+        Known(),
+        ["weak_form", "trajectory"],
+        {"static_deflection": None, "phase": None},
+    ),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
+def test_intervals_hold_the_truth_in_90_to_99_percent_of_200_records(case):
+    shares = covered(case, 200)
+    assert len(shares) >= 8
+    for key, share in shares.items():
+        assert 0.90 <= share <= 0.99, (key, share)
+
+
+def test_intervals_hold_the_truth_in_most_of_40_records():
+    shares = covered("nothing known but the force", 40)
+    assert len(shares) >= 12
+    # 34 or fewer of 40 would be seen once in 150 times
+    for key, share in shares.items():
+        assert share >= 34 / 40, (key, share)
+    assert abs(np.mean(list(shares.values())) - NOMINAL) < 0.04
