@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from vibroimpact.analysis.outputs import refuse_outputs
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
 if TYPE_CHECKING:
@@ -103,6 +104,7 @@ def estimate(
         mass,
         offset,
     )
+    refuse_outputs([data], output, figure)
     kind = chosen_kind(data, kind, run, drive, impacts)
     refuse_far_options(kind, impacts, {"--drive": drive, "--band": band, "--segment": segment}, law, cubic)
     # Piped, a table is as wide as it needs to be.

@@ -24,8 +24,8 @@ from vibroimpact.analysis.schema import CONVENTIONS, RAGGED, file_name_of
 from vibroimpact.analysis.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
 
-_QUALITY = "_quality"
-_EVENT = "_event"
+QUALITY_ENDING = "_quality"
+EVENT_ENDING = "_event"
 # What damaged bytes lead the libraries below to; a text that is not UTF-8 is a ValueError.
 _DAMAGE = (OSError, RuntimeError, ValueError, AttributeError, LookupError, TypeError, MemoryError)
 MOST_VALUES = 10**8
@@ -53,7 +53,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str]) -> None:
     OSError
         The file cannot be written, with the reason of the operating system.
     """
-    problems = list(_problems(recording))
+    problems = list(problems_of(recording))
     if problems:
         raise DatasetError("\n".join(f"recording: {problem}" for problem in problems))
     file = netCDF4.Dataset("recording.nc", "w", format="NETCDF4", memory=1)
@@ -76,30 +76,6 @@ def write_recording(recording: Recording, path: str | os.PathLike[str]) -> None:
         variable.setncatts({"units": scalar.unit, "long_name": scalar.label or name})
         variable[...] = scalar.value
     write_atomically(path, bytes(file.close()))
-
-
-def _problems(recording: Recording) -> Iterable[str]:
-    """Yield what contradicts the schema."""
-    names = [*recording.channels, *recording.events, *recording.scalars]
-    if not names:
-        yield "expected a channel, an event train or a single value, got none."
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        yield f"{name}: expected each name once, got it again."
-    for name in names:
-        if file_name_of(name) != name or not name[0].isalpha() or name.startswith("time"):
-            yield f"{name}: expected letters, digits and underscores, a letter first, and not `time`."
-        if name.endswith((_QUALITY, _EVENT)):
-            yield f"{name}: expected a name that does not end in {_QUALITY} or {_EVENT}, as flags and dimensions do."
-    for name, channel in recording.channels.items():
-        length = len(channel.axis.time)
-        for what, got in (("values", channel.values.shape), ("quality", channel.quality.shape)):
-            if got != (length,):
-                yield f"{name}: {what}: expected the shape ({length},) of its time axis, got {got}."
-        if not np.all(np.isfinite(channel.axis.time)) or not np.all(np.diff(channel.axis.time) > 0.0):
-            yield f"{name}: time: expected finite instants that ascend strictly, got others."
-    for name, train in recording.events.items():
-        if not np.all(np.isfinite(train.times)) or not np.all(np.diff(train.times) >= 0.0):
-            yield f"{name}: times: expected finite instants that ascend, got others."
 
 
 def _store_channels(file: netCDF4.Dataset, recording: Recording) -> None:
@@ -139,7 +115,7 @@ def _store_channel(file: netCDF4.Dataset, dimension: str, channel: Channel) -> N
     variable[...] = channel.values
     if not np.any(channel.quality):
         return
-    name = channel.name + _QUALITY
+    name = channel.name + QUALITY_ENDING
     variable.setncattr("ancillary_variables", name)
     flags = file.createVariable(name, "u1", (dimension,), compression="zlib", complevel=1)
     flags.setncatts(
@@ -154,7 +130,7 @@ def _store_channel(file: netCDF4.Dataset, dimension: str, channel: Channel) -> N
 
 
 def _store_events(file: netCDF4.Dataset, train: EventTrain) -> None:
-    dimension = train.name + _EVENT
+    dimension = train.name + EVENT_ENDING
     file.createDimension(dimension, len(train.times))
     variable = file.createVariable(train.name, "f8", (dimension,))
     variable.setncatts({"units": "s", "long_name": train.label or train.name, "event_train": 1})
@@ -211,7 +187,7 @@ def _read(file: netCDF4.Dataset, path: str | os.PathLike[str]) -> Recording:
         file.variables, key=lambda name: wanted.index(name) if name in wanted else len(wanted)
     ):
         variable = file.variables[name]
-        if name in axes or (name.endswith(_QUALITY) and name.removesuffix(_QUALITY) in file.variables):
+        if name in axes or (name.endswith(QUALITY_ENDING) and name.removesuffix(QUALITY_ENDING) in file.variables):
             continue
         if variable.dimensions == ():
             scalars[name] = SingleValue(float(variable[...]), str(variable.units), str(variable.long_name))
@@ -226,7 +202,7 @@ def _read(file: netCDF4.Dataset, path: str | os.PathLike[str]) -> Recording:
             )
     attrs = {key: file.getncattr(key) for key in file.ncattrs() if key != "variable_order"}
     recording = Recording(channels, events, scalars, attrs | {"opened_from": os.fspath(path)})
-    problems = list(_problems(recording))
+    problems = list(problems_of(recording))
     if problems:
         raise DatasetError("\n".join(f"{os.fspath(path)}: {problem}" for problem in problems))
     return recording
@@ -250,7 +226,7 @@ def _others(variable: Any) -> dict[str, Any]:
 def _read_channel(file: netCDF4.Dataset, name: str, axis: TimeAxis) -> Channel:
     variable: Any = file.variables[name]
     values = np.asarray(variable[...], dtype=np.float64)
-    stored: Any = file.variables.get(name + _QUALITY)
+    stored: Any = file.variables.get(name + QUALITY_ENDING)
     quality = np.zeros(len(values), np.uint8) if stored is None else np.asarray(stored[...], np.uint8)
     unit = str(variable.units)
     measured_unit(

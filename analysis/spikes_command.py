@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vibroimpact.analysis.outputs import refuse_outputs
 from vibroimpact.fmus.errors import UsageError
 
 if TYPE_CHECKING:
@@ -81,6 +82,7 @@ def spikes(
     from vibroimpact.analysis.results import write_results
     from vibroimpact.analysis.spikes import Mechanics, SpikeSettings
 
+    refuse_outputs([data], output, figure)
     part = threshold is not None and threshold.strip().endswith("%")
     settings = SpikeSettings(
         method=method,

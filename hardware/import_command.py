@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from vibroimpact.analysis.outputs import refuse_outputs
 from vibroimpact.fmus.errors import UsageError
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def import_files(
     }
     given = checked({key: value for key, value in written.items() if value not in (None, [])}, "command line")
     common = None if settings is None else read_settings(settings)
-    _check_outputs(files, output, figure)
+    refuse_outputs(files, output, figure)
     recording = import_recording(files, given, common)
     _write(recording, output, figure)
     show_recording(recording, output, figure)
@@ -113,22 +113,6 @@ def _span(text: str, option: str) -> list[float]:
             f"--{option}: expected START:END in s, got {text[:60]!r}. For example 0:30."
         ) from None
     return [begin, end]
-
-
-def _check_outputs(files: Sequence[Path], output: Path, figure: Path | None) -> None:
-    """Refuse to write over what is read, before anything is read."""
-    for target in (output, figure):
-        if target is not None and any(_same(target, file) for file in files):
-            raise UsageError(f"{target}: expected a new file, got one that is read. Choose another name.")
-    if figure is not None and figure.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise UsageError(f"--figure: expected a name ending in .png, .pdf or .svg, got {figure.name!r}.")
-
-
-def _same(one: Path, other: Path) -> bool:
-    try:
-        return one.samefile(other)
-    except OSError:
-        return False
 
 
 def _write(recording: Recording, output: Path, figure: Path | None) -> None:

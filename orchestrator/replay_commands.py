@@ -60,10 +60,13 @@ def replay(
 
     Example: vibroimpact replay examples/board.toml a0.nc -o a0_replay.nc --fit body.damping_ratio --score a1.nc
     """
+    from vibroimpact.analysis.outputs import refuse_outputs
     from vibroimpact.fmus.errors import UsageError
     from vibroimpact.orchestrator.scene import load_scene
 
     loaded = load_scene(scene)
+    if output is not None and output.suffix == ".nc":
+        refuse_outputs([scene, *(recordings or []), *(score or [])], output, figure)
     if output is None:
         raise UsageError(
             "--output: expected a dataset (.nc) or the folder of a campaign, got nothing. Add -o."

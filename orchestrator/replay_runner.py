@@ -74,7 +74,9 @@ class ReplayRunner:
         self, replayer: Replayer, motion: Motion, comparisons: list[Comparison], seconds: float
     ) -> RunRecord:
         displacement, velocity, state = replayer.final_state()
-        told = [*motion.warnings, *(f"{c.measured.name}: {text}" for c in comparisons for text in c.remarks)]
+        # what was not scored is the same for all points; an alignment that is doubtful is not
+        doubts = [f"{c.measured.name}: {text}" for c in comparisons for text in c.alignment.remarks]
+        told = [*motion.warnings, *doubts]
         impacts = self._scene.record.impacts
         return RunRecord(
             outcome=Outcome.ok,

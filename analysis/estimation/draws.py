@@ -6,6 +6,7 @@ that came from the weak form vary with the same noise.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -25,6 +26,8 @@ from vibroimpact.fmus.errors import EstimationError
 _FINE = 0.15
 _SAMPLES_PER_SPAN = 6
 _MOST_FAILED = 0.1
+# Of these the noiseless motion has known values.
+_FITTED = ("restitution", "damping_ratio", "static_deflection")
 
 Estimator = Callable[[EnergyBalance, HalfEnergies, Floats, Parameters, Drawn], Mapping[str, Floats]]
 
@@ -150,9 +153,12 @@ def with_intervals(
                 f"{len(change) - len(known)} of {len(change)} draws of it. Give more of what is known."
             )
         error = inflation * float(np.std(known, ddof=1))
+        if name in _FITTED:
+            # what smoothing and first-order ends make of the noiseless motion: all there is without noise
+            error = math.hypot(error, float(exact[name][0]) - getattr(p, name))
         centre = float(value[0] - np.mean(known))
         reach = float(student.ppf(0.5 + confidence / 2.0, len(known) - 1)) * error
-        reach *= np.sqrt(1.0 + 1.0 / len(known))
+        reach *= math.sqrt(1.0 + 1.0 / len(known))
         found[name] = Estimate(centre, error, centre - reach, centre + reach)
     return found
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from scipy.stats import norm
@@ -16,28 +16,17 @@ from vibroimpact.analysis.estimation.draws import (
     resample,
     with_intervals,
 )
-from vibroimpact.analysis.estimation.energy import sensitivities
 from vibroimpact.analysis.estimation.estimates import METHODS, Estimate, ImpactEstimates, Refusal
-from vibroimpact.analysis.estimation.flight_fit import FlightFit, fit_flights
-from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.period_one import period_one
-from vibroimpact.analysis.estimation.physics import Forcing, Known, Parameters
-from vibroimpact.analysis.estimation.segments import Flight, Segmentation, segment
-from vibroimpact.analysis.estimation.trajectory import Trajectory, fit_trajectory
-from vibroimpact.analysis.estimation.weak_form import (
-    WeakForm,
-    robust_weak_form,
-    weighted_flights,
-    with_own_clock,
-)
+from vibroimpact.analysis.estimation.physics import Forcing, Known
+from vibroimpact.analysis.estimation.prepared import Prepared, prepare
+from vibroimpact.analysis.estimation.remarks import conditioning_of, facts_of, remarks_of
+from vibroimpact.analysis.estimation.trajectory import fit_trajectory
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.fmus.errors import EstimationError
 
-# Correlation of neighbouring rests beyond so many standard errors widens the intervals.
-_CORRELATED = 3.0
 # A damping ratio of fewer standard errors than this is not told from restitution, or from the force.
 _CLEAR = 3.0
-_LEAST_DAMPING = 1e-6
 
 
 def estimate_impacts(
@@ -87,56 +76,58 @@ def estimate_impacts(
     held = known or Known()
     _check(methods, draws, confidence)
     _check_known(held)
-    record = _prepared(channel, forcing, held, window)
-    values: dict[str, dict[str, Estimate]] = {}
-    refusals: list[Refusal] = []
-
-    def attempt(method: str, run: Callable[[], dict[str, Estimate]]) -> None:
-        if method not in methods:
-            return
-        try:
-            values[method] = run()
-        except EstimationError as problem:
-            refusals.append(Refusal(method, str(problem)))
-
-    z = float(norm.ppf(0.5 + confidence / 2.0))
-    attempt("weak_form", lambda: _weak_values(record, held, z))
-    attempt("trajectory", lambda: _trajectory_values(record, held, z))
-    energy_methods = [name for name in methods if name.startswith("energy")]
-    resampled: Resampled | None = None
-    try:
-        resampled = _resampled(record, held, draws, seed) if energy_methods else None
-    except EstimationError as problem:
-        refusals.extend(Refusal(name, str(problem)) for name in energy_methods)
-    if resampled is not None:
-        for name in energy_methods:
-            attempt(
-                name,
-                lambda name=name: _energy_values(
-                    name, resampled, forcing, held, confidence, record.inflation
-                ),  # type: ignore[misc]
-            )
-    attempt(
-        "period_one",
-        lambda: period_one(
-            record.segmentation, record.parameters.natural_frequency, record.parameters.offset
-        ),
-    )
+    record = prepare(channel, forcing, held, window)
+    values, refusals, resampled = _attempted(record, forcing, held, methods, draws, confidence, seed)
+    sign = record.segmentation.signal.sign
     return ImpactEstimates(
         channel.name,
         channel.unit,
-        {
-            name: _as_measured(values[name], record.segmentation.signal.sign)
-            for name in METHODS
-            if name in values
-        },
-        _conditioning(record, resampled),
-        _facts(record, resampled),
+        {name: _as_measured(values[name], sign) for name in METHODS if name in values},
+        conditioning_of(record, resampled),
+        facts_of(record, resampled),
         tuple(refusals),
-        tuple(_remarks(record, forcing, held, values)),
+        remarks_of(record, forcing, held, values),
         confidence,
         np.array([impact.time for impact in record.segmentation.impacts]),
     )
+
+
+def _attempted(
+    record: Prepared,
+    forcing: Forcing,
+    held: Known,
+    methods: Sequence[str],
+    draws: int,
+    confidence: float,
+    seed: int,
+) -> tuple[dict[str, dict[str, Estimate]], list[Refusal], Resampled | None]:
+    """Return what each method says, why others refuse, and the draws of the energy balance."""
+    z = float(norm.ppf(0.5 + confidence / 2.0))
+    natural, offset = record.parameters.natural_frequency, record.parameters.offset
+    ways: dict[str, Callable[[], dict[str, Estimate]]] = {
+        "weak_form": lambda: _weak_values(record, held, z),
+        "trajectory": lambda: _trajectory_values(record, held, z),
+        "period_one": lambda: period_one(record.segmentation, natural, offset),
+    }
+    refusals: list[Refusal] = []
+    energies = [name for name in methods if name.startswith("energy")]
+    resampled: Resampled | None = None
+    try:
+        resampled = _resampled(record, draws, seed) if energies else None
+    except EstimationError as problem:
+        refusals = [Refusal(name, str(problem)) for name in energies]
+    if resampled is not None:
+        for name in energies:
+            ways[name] = partial(_energy_values, name, resampled, forcing, held, confidence, record.inflation)
+    values: dict[str, dict[str, Estimate]] = {}
+    for name, run in ways.items():
+        if name not in methods:
+            continue
+        try:
+            values[name] = run()
+        except EstimationError as problem:
+            refusals.append(Refusal(name, str(problem)))
+    return values, refusals, resampled
 
 
 def _check(methods: Sequence[str], draws: int, confidence: float) -> None:
@@ -158,133 +149,11 @@ def _check_known(held: Known) -> None:
         raise EstimationError(f'side: expected upper or lower, got "{held.side}".')
 
 
-@dataclass(slots=True)
-class _Record:
-    """A record with what all methods share: segmentation, weak form and the exact flow on each flight."""
-
-    segmentation: Segmentation
-    flights: list[Flight]
-    weak: WeakForm | None
-    fit: FlightFit
-    parameters: Parameters
-    stop: float | None
-    free: tuple[str, ...]
-    left_out: int
-    correlation: float
-    inflation: float
-    trajectory: Trajectory | None = None
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.weak.names if self.weak else ()
-
-    @property
-    def influence(self) -> list[Floats]:
-        return self.weak.influence if self.weak else []
-
-
-def _prepared(channel: Channel, forcing: Forcing, held: Known, window: float | None) -> _Record:
-    """Cut a record, find what the weak form says and fit the exact flow to each flight."""
-    fastest = max(forcing.angular_frequency, held.natural_frequency or 0.0)
-    segmentation = segment(
-        channel.time,
-        np.where(channel.good, channel.values, 0.0),
-        channel.good,
-        fastest=fastest,
-        side=held.side,
-        stop_position=held.stop_position,
-        window=window,
-    )
-    sign = segmentation.signal.sign
-    stop = None if held.stop_position is None else sign * held.stop_position
-    start, free = _start(forcing, held, segmentation, sign)
-    flights = [flight for flight in segmentation.flights if flight.usable]
-    if not flights:
-        raise EstimationError(
-            f"estimate: expected flights of at least 10 samples between impacts, got none between "
-            f"{len(segmentation.impacts)} impacts. Use a higher sampling rate."
-        )
-    weak, flights, left_out = _weak(segmentation, flights, start, free, fastest)
-    parameters = weak.parameters if weak else start
-    # noise may put weak damping below zero, where there is no flow
-    parameters = replace(parameters, damping_ratio=max(parameters.damping_ratio, _LEAST_DAMPING))
-    fit = fit_flights(
-        segmentation.signal,
-        flights,
-        parameters,
-        stop,
-        weak.names if weak else (),
-        weak.influence if weak else (),
-    )
-    parameters = replace(
-        parameters,
-        restitution=min(max(fit.reading.restitution, 0.0), 1.0),
-        stop_position=fit.reading.stop_position,
-    )
-    correlation, inflation = _coloured(fit)
-    return _Record(segmentation, flights, weak, fit, parameters, stop, free, left_out, correlation, inflation)
-
-
-def _start(
-    forcing: Forcing, held: Known, segmentation: Segmentation, sign: float
-) -> tuple[Parameters, tuple[str, ...]]:
-    """Return the held values (start values for the others), and the names of what is estimated."""
-    unknown = {
-        "damping_ratio": held.damping_ratio is None,
-        "natural_frequency": held.natural_frequency is None,
-        "static_deflection": forcing.static_deflection is None,
-        "phase": forcing.phase is None,
-        "angular_frequency": forcing.clock_drifts,
-        "offset": held.offset is None,
-    }
-    # mirrored for a lower stop: the force then has the opposite sign
-    phase = (forcing.phase or 0.0) + (0.0 if sign > 0.0 else math.pi)
-    parameters = Parameters(
-        1.0,
-        0.0 if held.damping_ratio is None else held.damping_ratio,
-        held.natural_frequency or forcing.angular_frequency,
-        forcing.angular_frequency,
-        1.0 if forcing.static_deflection is None else forcing.static_deflection,
-        phase,
-        segmentation.stop_position,
-        sign * (held.offset or 0.0),
-    )
-    return parameters, tuple(name for name, is_free in unknown.items() if is_free)
-
-
-def _weak(
-    segmentation: Segmentation,
-    flights: list[Flight],
-    start: Parameters,
-    free: tuple[str, ...],
-    fastest: float,
-) -> tuple[WeakForm | None, list[Flight], int]:
-    """Return the weak form over the flights that follow the model, those flights, and how many do not."""
-    if not free:
-        return None, flights, 0
-    whole = weighted_flights(segmentation.signal, flights, fastest)
-    if "angular_frequency" in free:
-        start = with_own_clock(whole, start, [name for name in free if name != "angular_frequency"])
-    found, kept = robust_weak_form(whole, start, free, segmentation.signal.noise)
-    return found, [flights[k] for k in kept], len(flights) - len(kept)
-
-
-def _coloured(fit: FlightFit) -> tuple[float, float]:
-    """Return the correlation of neighbouring rests, and the factor by which it widens standard errors."""
-    product = sum(float(one.rests[1:] @ one.rests[:-1]) for one in fit.fitted)
-    square = sum(float(one.rests @ one.rests) for one in fit.fitted)
-    count = sum(len(one.rests) for one in fit.fitted)
-    correlation = product / square if square > 0.0 else 0.0
-    if correlation * math.sqrt(count) < _CORRELATED:
-        return correlation, 1.0
-    return correlation, math.sqrt((1.0 + correlation) / (1.0 - min(correlation, 0.99)))
-
-
 def _with_normal(value: float, error: float, z: float) -> Estimate:
     return Estimate(value, error, value - z * error, value + z * error)
 
 
-def _weak_values(record: _Record, held: Known, z: float) -> dict[str, Estimate]:
+def _weak_values(record: Prepared, held: Known, z: float) -> dict[str, Estimate]:
     """Return what weak form and flights say."""
     errors = record.fit.standard_errors
     found = {
@@ -304,7 +173,7 @@ def _weak_values(record: _Record, held: Known, z: float) -> dict[str, Estimate]:
     return found
 
 
-def _trajectory_values(record: _Record, held: Known, z: float) -> dict[str, Estimate]:
+def _trajectory_values(record: Prepared, held: Known, z: float) -> dict[str, Estimate]:
     """Return what the fit of whole trajectories says."""
     free = ("restitution", *record.free, *(("stop_position",) if held.stop_position is None else ()))
     found = fit_trajectory(record.segmentation, record.fit.fitted, record.parameters, free, record.fit.noise)
@@ -315,7 +184,7 @@ def _trajectory_values(record: _Record, held: Known, z: float) -> dict[str, Esti
     }
 
 
-def _resampled(record: _Record, held: Known, draws: int, seed: int) -> Resampled:
+def _resampled(record: Prepared, draws: int, seed: int) -> Resampled:
     return resample(
         record.segmentation.signal,
         record.fit.fitted,
@@ -370,96 +239,3 @@ def _as_measured(values: dict[str, Estimate], sign: float) -> dict[str, Estimate
         shift = turned - 2.0 * math.pi * math.floor(turned / (2.0 * math.pi)) - one.value
         found["phase"] = Estimate(one.value + shift, one.standard_error, one.low + shift, one.high + shift)
     return found
-
-
-def _conditioning(record: _Record, resampled: Resampled | None) -> dict[str, float]:
-    """Return the sensitivities of the energy balance at the estimates."""
-    if resampled is None:
-        return {}
-    drag = np.abs(resampled.exact[0].drag[0])
-    reading = record.fit.reading
-    flight, half = float(np.mean(drag[0::2] + drag[1::2])), float(np.mean(drag[1::2]))
-    if not (reading.restitution > 0.0 and half > 0.0):
-        return {}
-    natural = record.parameters.natural_frequency
-    return sensitivities(reading.restitution, reading.impact_velocity, flight, half, natural)
-
-
-def _facts(record: _Record, resampled: Resampled | None) -> dict[str, float | str]:
-    """Return what the record is like."""
-    cut = record.segmentation
-    peak = float(np.max(np.abs(cut.signal.values[cut.signal.good] - record.parameters.offset)))
-    facts: dict[str, float | str] = {
-        "impacts": float(len(cut.impacts)),
-        "flights_used": float(len(record.flights)),
-        "flights_left_out": float(len(cut.flights) - len(record.flights)),
-        "noise": record.fit.noise,
-        "noise_over_peak": record.fit.noise / peak,
-        "noise_correlation": record.correlation,
-        "window": cut.window,
-        "side": "upper" if cut.signal.sign > 0.0 else "lower",
-        "restitution_scatter": _scatter(record),
-    }
-    if resampled is not None:
-        facts["smoothing_window"] = resampled.window
-    if record.trajectory is not None:
-        facts["trajectory_pieces"] = float(len(record.trajectory.pieces))
-        facts["trajectory_noise"] = record.trajectory.noise
-    return facts
-
-
-def _scatter(record: _Record) -> float:
-    """Return the standard deviation of the restitution of single impacts; NaN of less than two."""
-    ratios = [
-        -other.state[1] / one.end_state[1]
-        for one, other in zip(record.fit.fitted, record.fit.fitted[1:], strict=False)
-        if other.flight.first == one.flight.first + 1
-    ]
-    return float(np.std(ratios, ddof=1)) if len(ratios) > 1 else math.nan
-
-
-def _remarks(
-    record: _Record, forcing: Forcing, held: Known, values: dict[str, dict[str, Estimate]]
-) -> Sequence[str]:
-    """Return what a reader must know."""
-    remarks = []
-    if record.fit.reading.periodic:
-        remarks.append("No impact has a usable flight on both sides: P(1,1) was assumed.")
-    if record.left_out:
-        remarks.append(
-            f"{record.left_out} flights do not follow the model and were left out: an impact in them was not seen, "
-            "or it is not one oscillator there."
-        )
-    if record.inflation > 1.0:
-        remarks.append(
-            f"Neighbouring rests are correlated ({record.correlation:.2f}): coloured noise or motion that the model "
-            f"lacks. Standard errors are {record.inflation:.2f} times those of white noise."
-        )
-    if record.trajectory is not None and not record.trajectory.adequate:
-        hint = (
-            ""
-            if forcing.clock_drifts
-            else " If the clocks of force and recording differ, say so (clock_drifts)."
-        )
-        remarks.append(
-            f"The fitted trajectories leave rests of {record.trajectory.noise:.3g}, the single flights only "
-            f"{record.fit.noise:.3g}: restitution or forcing is not constant, and the intervals of the trajectory fit "
-            f"are too narrow.{hint}"
-        )
-    energy = [name for name in values if name.startswith("energy")]
-    if energy and record.names:
-        remarks.append(
-            f"The energy balance took {', '.join(record.names)} from the weak form where it does not estimate them; "
-            "their doubt is in its intervals."
-        )
-    if energy and held.damping_ratio is None:
-        remarks.append(
-            "No damping ratio was given: the energy balance with known damping gives the energy-loss factor, "
-            "which counts all damping as loss at the impact."
-        )
-    if "period_one" in values:
-        remarks.append(
-            "period_one assumes undamped free motion between impacts: a start value without an interval, "
-            "off by several percent for driven, damped motion."
-        )
-    return remarks

@@ -10,7 +10,7 @@ lost: the restitution of too few modes is too low.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,7 +81,7 @@ def modal_coordinates(displacements: Floats, shapes: Floats) -> Floats:
 
     Examples
     --------
-    >>> modal_coordinates(np.array([[1.0], [3.0]]), np.array([[1.0, 1.0], [1.0, -1.0]])).tolist()
+    >>> modal_coordinates(np.array([[1.0], [3.0]]), np.array([[1.0, 1.0], [1.0, -1.0]])).round(12).tolist()
     [[2.0], [-1.0]]
     """
     sensors, modes = shapes.shape
@@ -156,27 +156,18 @@ def estimate_modes(
     good = np.isfinite(contact)
     cut = segment(time, contact, good, fastest=fastest, side=side, stop_position=stop_position)
     flights = [flight for flight in cut.flights if flight.usable]
-    if not flights:
-        raise EstimationError("modes: expected flights of at least 10 samples between impacts, got none.")
     noise = [noise_level(row, good) for row in coordinates]
     flights = _followed(cut, coordinates, flights, forcing, fastest, noise)
     modes, fitted = _all_modes(cut, coordinates, flights, forcing, fastest, noise)
     found = _numbers(modes, fitted, contact_shape, flights)
-    motion = coordinates.copy()
-    for row, fits in zip(motion, fitted, strict=True):
-        for one in fits:
-            row[one.flight.index] -= one.rests
-    generator = np.random.default_rng(seed)
-    drawn = []
-    for _ in range(draws):
-        errors = np.array(noise)[:, None] * generator.standard_normal(coordinates.shape)
-        again = _all_modes(cut, motion + errors, flights, forcing, fastest, noise)
-        drawn.append(_numbers(*again, contact_shape, flights))
+    drawn = [
+        _numbers(*_all_modes(cut, draw, flights, forcing, fastest, noise), contact_shape, flights)
+        for draw in _draws(coordinates, fitted, noise, draws, seed)
+    ]
     errors = np.std(drawn, axis=0, ddof=1)
     reach = errors * float(student.ppf(0.5 + confidence / 2.0, draws - 1))
-    estimates = [
-        Estimate(*row) for row in np.column_stack([found, errors, found - reach, found + reach]).tolist()
-    ]
+    rows = np.column_stack([found, errors, found - reach, found + reach]).tolist()
+    estimates = [Estimate(*row) for row in rows]
     count = len(modes)
     return ModalEstimates(
         tuple(estimates[:count]),
@@ -187,6 +178,23 @@ def estimate_modes(
         1.0 / float(contact_shape @ contact_shape),
         len(pairs_of(flights)),
     )
+
+
+def _draws(
+    coordinates: Floats,
+    fitted: Sequence[Sequence[FittedFlight]],
+    noise: Sequence[float],
+    draws: int,
+    seed: int,
+) -> Iterator[Floats]:
+    """Yield the fitted motion with other draws of the noise."""
+    motion = coordinates.copy()
+    for row, fits in zip(motion, fitted, strict=True):
+        for one in fits:
+            row[one.flight.index] -= one.rests
+    generator = np.random.default_rng(seed)
+    for _ in range(draws):
+        yield motion + np.array(noise)[:, None] * generator.standard_normal(coordinates.shape)
 
 
 def _of_mode(cut: Segmentation, row: Floats, noise: float) -> Signal:
@@ -210,6 +218,8 @@ def _followed(
 ) -> list[Flight]:
     """Return the flights that every mode follows: in the others an impact was not seen."""
     start, free = _asked(forcing, fastest)
+    if not flights:
+        raise EstimationError("modes: expected flights of at least 10 samples between impacts, got none.")
     kept = set(range(len(flights)))
     for row, level in zip(coordinates, noise, strict=True):
         tested = weighted_flights(_of_mode(cut, row, level), flights, fastest)

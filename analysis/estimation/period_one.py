@@ -12,6 +12,7 @@ from vibroimpact.fmus.errors import EstimationError
 
 # Flights whose lengths differ by more than this part are not those of P(1,1).
 _SAME_LENGTH = 0.05
+_OTHER_LENGTHS = 0.2
 
 
 def natural_frequency_of(stop_position: float, deepest: float, flight_time: float) -> float:
@@ -33,7 +34,7 @@ def stop_position_of(natural_frequency: float, deepest: float, flight_time: floa
 
     Examples
     --------
-    >>> round(stop_position_of(3.141592653589793, 1.0, 1.0), 12)
+    >>> abs(round(stop_position_of(3.141592653589793, 1.0, 1.0), 12))
     0.0
     """
     return -deepest * math.cos(0.5 * natural_frequency * flight_time)
@@ -48,7 +49,9 @@ def period_one(segmentation: Segmentation, natural_frequency: float, offset: flo
         The motion is not P(1,1), or its deepest point is not further from rest than the stop.
     """
     lengths = np.array([flight.duration for flight in segmentation.flights])
-    if float(np.ptp(lengths)) > _SAME_LENGTH * float(np.mean(lengths)):
+    typical = float(np.median(lengths))
+    # a few impacts may not have been seen
+    if np.mean(np.abs(lengths - typical) > _SAME_LENGTH * typical) > _OTHER_LENGTHS:
         raise EstimationError(
             f"period_one: expected flights of one length, got {lengths.min():.4g} to {lengths.max():.4g} s. "
             "Only P(1,1) motion gives these start values."
@@ -61,7 +64,7 @@ def period_one(segmentation: Segmentation, natural_frequency: float, offset: flo
     ]
     depth, length, stop = (
         float(np.median(depths)),
-        float(np.mean(lengths)),
+        typical,
         segmentation.stop_position - offset,
     )
     if not depth > abs(stop):

@@ -19,6 +19,7 @@ from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrai
 from vibroimpact.analysis.figures.recordings import draw_recording
 from vibroimpact.analysis.figures.replay import draw_replay
 from vibroimpact.analysis.figures.runs import draw_run
+from vibroimpact.analysis.figures.scores import draw_scores
 from vibroimpact.analysis.figures.series import draw_series
 from vibroimpact.analysis.figures.sweeps import (
     draw_bifurcation,
@@ -45,6 +46,7 @@ __all__ = [
     "draw_replay",
     "draw_results",
     "draw_run",
+    "draw_scores",
     "draw_series",
     "draw_shapes",
     "label",
@@ -87,8 +89,9 @@ def draw(dataset: xr.Dataset, kind: Kind = "auto", run: int | None = None) -> Fi
     dataset : xarray.Dataset
     kind : {"auto", "bifurcation", "run", "convergence", "portrait", "impact-map", "energies", "shapes"}
         `auto` draws a single run where nothing is swept or a run is named, else a bifurcation diagram, or
-        colour maps over two swept parameters. `convergence`: see `convergence`. `portrait`, `impact-map`: one
-        run in the phase plane, and its impacts by phase and velocity. `energies`, `shapes`: of the modes.
+        colour maps over two swept parameters; of a campaign of replays its scores. `convergence`: see
+        `convergence`. `portrait`, `impact-map`: one run in the phase plane, and its impacts by phase and velocity.
+        `energies`, `shapes`: of the modes.
     run : int, optional
         `run_index` of the run to draw.
 
@@ -110,6 +113,8 @@ def draw(dataset: xr.Dataset, kind: Kind = "auto", run: int | None = None) -> Fi
             return draw_run(dataset, run)
         if kind in _DRAWERS:
             return _DRAWERS[kind](dataset, run)
+        if kind == "auto" and "variance_accounted_for" in dataset:
+            return draw_scores(dataset)
         if len(swept) == 1:
             return draw_bifurcation(dataset)
         if len(swept) == 2:

@@ -15,7 +15,14 @@ from vibroimpact.fmus.errors import DatasetError
 _PANEL_MM = 32
 _NARROWEST = 1e-4
 """Of the values: differences below are not worth a panel."""
-_SYMBOLS = {"9.80665 m s-2": "g", "1": "-", "m s-2": "m/s²", "m s-1": "m/s"}
+_SYMBOLS = {
+    "9.80665 m s-2": "g",
+    "1": "-",
+    "m s-2": "m/s²",
+    "m s-1": "m/s",
+    "m N-1": "m/N",
+    "rad s-1": "rad/s",
+}
 
 
 def draw_estimates(dataset: xr.Dataset) -> Figure:
@@ -175,7 +182,7 @@ def _draw_response(dataset: xr.Dataset) -> Figure:
         elinewidth=0.4,
         label="measured" if measured else "simulated",
     )
-    axes[0].plot(hertz, dataset.fitted_response, color=MARK, label="fitted resonance")
+    axes[0].plot(hertz, dataset.fitted_response, color=MARK, label="fitted resonance", zorder=3)
     axes[0].set_yscale("log")
     axes[0].set_ylabel(f"response ({_symbol(dataset.response)})")
     axes[0].legend(frameon=False, loc="best", borderaxespad=0.3)

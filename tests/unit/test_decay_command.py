@@ -80,7 +80,7 @@ def test_one_law_or_none_can_be_asked_for(decay: Path, capsys: pytest.CaptureFix
         (["--channel", "arm", "--kind", "impacts"], "expected the frequency of the force, got none"),
         (["--channel", "arm", "--amplitude", "2", "--angular-frequency", "3"], "--amplitude: expected --mass"),
         (["--drive", "force", "--window", "flat"], "--window: expected one of bartlett, hann, boxcar"),
-        (["--channel", "arm", "-o", "/nowhere/estimates.nc"], "could not be written"),
+        (["--channel", "arm", "-o", "/nowhere/estimates.nc"], "expected a place where a file can be written"),
         (["--channel", "arm", "--figure", "estimates.bmp"], "expected a name ending in .png"),
     ],
 )  # fmt: skip

@@ -219,3 +219,15 @@ def test_motion_of_several_impacts_in_several_periods_gives_the_truth(ratio, sto
         for name, truth in (("restitution", 0.8), ("damping_ratio", 0.02), ("stop_position", stop)):
             assert values[name].value == pytest.approx(truth, abs=4.0 * values[name].standard_error)
             assert values[name].standard_error < 0.01
+
+
+def test_a_clock_that_drifts_is_hinted_at_and_found_when_asked_for():
+    record = record_of(THESIS, periods=60)
+    channel = record.channel(0.005)
+    wrong = record.forcing(angular_frequency=64.32 * 1.001)
+    found = estimate_impacts(channel, wrong, methods=["weak_form"])
+    assert any("clock_drifts" in remark for remark in found.remarks)
+    asked = record.forcing(angular_frequency=64.32 * 1.001, clock_drifts=True)
+    values = estimate_impacts(channel, asked, methods=["trajectory"]).values["trajectory"]
+    assert values["angular_frequency"].value == pytest.approx(64.32, rel=1e-5)
+    assert values["restitution"].value == pytest.approx(0.89, abs=0.004)

@@ -203,4 +203,4 @@ def test_an_output_that_cannot_be_written_is_told(
     pair: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert command(pair[0], "-o", pair[0].parent / "nowhere" / "x.nc") == 2
-    assert "could not be written" in capsys.readouterr().err
+    assert "expected a place where a file can be written" in capsys.readouterr().err

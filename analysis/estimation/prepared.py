@@ -1,0 +1,180 @@
+"""What all methods share: a record cut at its impacts, its weak form, and the exact flow on each flight."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vibroimpact.analysis.estimation.flight_fit import FlightFit, fit_flights
+from vibroimpact.analysis.estimation.noise import Floats
+from vibroimpact.analysis.estimation.physics import Forcing, Known, Parameters
+from vibroimpact.analysis.estimation.segments import Flight, Segmentation, segment
+from vibroimpact.analysis.estimation.trajectory import Trajectory
+from vibroimpact.analysis.estimation.weak_form import (
+    WeakForm,
+    robust_weak_form,
+    weighted_flights,
+    with_own_clock,
+)
+from vibroimpact.analysis.recording import Channel
+from vibroimpact.fmus.errors import EstimationError
+
+# Correlation of neighbouring rests beyond so many standard errors widens the intervals.
+_CORRELATED = 3.0
+_LEAST_DAMPING = 1e-6
+
+
+@dataclass(slots=True)
+class Prepared:
+    """A record with what all methods share.
+
+    Attributes
+    ----------
+    segmentation : Segmentation
+    flights : list of Flight
+        Those that follow the model.
+    weak : WeakForm or None
+        None: nothing was left to estimate.
+    fit : FlightFit
+    parameters : Parameters
+        What is held, and what weak form and flights say of the rest.
+    stop : float or None
+        The known stop, mirrored where it is a lower one.
+    free : tuple of str
+        What the weak form estimates.
+    left_out : int
+        Flights that do not follow the model.
+    correlation, inflation : float
+        Of neighbouring rests, and the factor by which it widens standard errors.
+    trajectory : Trajectory or None
+        Set when it was fitted.
+    """
+
+    segmentation: Segmentation
+    flights: list[Flight]
+    weak: WeakForm | None
+    fit: FlightFit
+    parameters: Parameters
+    stop: float | None
+    free: tuple[str, ...]
+    left_out: int
+    correlation: float
+    inflation: float
+    trajectory: Trajectory | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What the weak form estimated."""
+        return self.weak.names if self.weak else ()
+
+    @property
+    def influence(self) -> list[Floats]:
+        """How that changes with the samples of each flight."""
+        return self.weak.influence if self.weak else []
+
+
+def prepare(channel: Channel, forcing: Forcing, held: Known, window: float | None) -> Prepared:
+    """Cut a record, find what the weak form says and fit the exact flow to each flight.
+
+    Raises
+    ------
+    EstimationError
+        No impacts were found, or no flight between them follows a forced oscillator.
+    """
+    fastest = max(forcing.angular_frequency, held.natural_frequency or 0.0)
+    segmentation = segment(
+        channel.time,
+        np.where(channel.good, channel.values, 0.0),
+        channel.good,
+        fastest=fastest,
+        side=held.side,
+        stop_position=held.stop_position,
+        window=window,
+    )
+    sign = segmentation.signal.sign
+    stop = None if held.stop_position is None else sign * held.stop_position
+    start, free = _start(forcing, held, segmentation, sign)
+    flights = [flight for flight in segmentation.flights if flight.usable]
+    if not flights:
+        raise EstimationError(
+            f"estimate: expected flights of at least 10 samples between impacts, got none between "
+            f"{len(segmentation.impacts)} impacts. Use a higher sampling rate."
+        )
+    weak, flights, left_out = _weak(segmentation, flights, start, free, fastest)
+    parameters = weak.parameters if weak else start
+    # noise may put weak damping below zero, where there is no flow
+    parameters = replace(parameters, damping_ratio=max(parameters.damping_ratio, _LEAST_DAMPING))
+    fit = fit_flights(
+        segmentation.signal,
+        flights,
+        parameters,
+        stop,
+        weak.names if weak else (),
+        weak.influence if weak else (),
+    )
+    parameters = replace(
+        parameters,
+        restitution=min(max(fit.reading.restitution, 0.0), 1.0),
+        stop_position=fit.reading.stop_position,
+    )
+    correlation, inflation = _coloured(fit)
+    return Prepared(
+        segmentation, flights, weak, fit, parameters, stop, free, left_out, correlation, inflation
+    )
+
+
+def _start(
+    forcing: Forcing, held: Known, segmentation: Segmentation, sign: float
+) -> tuple[Parameters, tuple[str, ...]]:
+    """Return the held values (start values for the others), and the names of what is estimated."""
+    unknown = {
+        "damping_ratio": held.damping_ratio is None,
+        "natural_frequency": held.natural_frequency is None,
+        "static_deflection": forcing.static_deflection is None,
+        "phase": forcing.phase is None,
+        "angular_frequency": forcing.clock_drifts,
+        "offset": held.offset is None,
+    }
+    # mirrored for a lower stop: the force then has the opposite sign
+    phase = (forcing.phase or 0.0) + (0.0 if sign > 0.0 else math.pi)
+    parameters = Parameters(
+        1.0,
+        0.0 if held.damping_ratio is None else held.damping_ratio,
+        held.natural_frequency or forcing.angular_frequency,
+        forcing.angular_frequency,
+        1.0 if forcing.static_deflection is None else forcing.static_deflection,
+        phase,
+        segmentation.stop_position,
+        sign * (held.offset or 0.0),
+    )
+    return parameters, tuple(name for name, is_free in unknown.items() if is_free)
+
+
+def _weak(
+    segmentation: Segmentation,
+    flights: list[Flight],
+    start: Parameters,
+    free: tuple[str, ...],
+    fastest: float,
+) -> tuple[WeakForm | None, list[Flight], int]:
+    """Return the weak form over the flights that follow the model, those flights, and how many do not."""
+    if not free:
+        return None, flights, 0
+    whole = weighted_flights(segmentation.signal, flights, fastest)
+    if "angular_frequency" in free:
+        start = with_own_clock(whole, start, [name for name in free if name != "angular_frequency"])
+    found, kept = robust_weak_form(whole, start, free, segmentation.signal.noise)
+    return found, [flights[k] for k in kept], len(flights) - len(kept)
+
+
+def _coloured(fit: FlightFit) -> tuple[float, float]:
+    """Return the correlation of neighbouring rests, and the factor by which it widens standard errors."""
+    product = sum(float(one.rests[1:] @ one.rests[:-1]) for one in fit.fitted)
+    square = sum(float(one.rests @ one.rests) for one in fit.fitted)
+    count = sum(len(one.rests) for one in fit.fitted)
+    correlation = product / square if square > 0.0 else 0.0
+    if correlation * math.sqrt(count) < _CORRELATED:
+        return correlation, 1.0
+    return correlation, math.sqrt((1.0 + correlation) / (1.0 - min(correlation, 0.99)))

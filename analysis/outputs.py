@@ -1,0 +1,51 @@
+"""Looks at the files that a command is to write before it reads and computes, so that nothing is done in vain."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+
+from vibroimpact.fmus.errors import UsageError
+
+FIGURE_ENDINGS = (".png", ".pdf", ".svg")
+
+
+def refuse_outputs(read: Iterable[Path], output: Path | None, figure: Path | None = None) -> None:
+    """Refuse outputs that would overwrite what is read, have no folder, or whose ending is that of no figure.
+
+    Parameters
+    ----------
+    read : iterable of Path
+        Files that the command reads.
+    output, figure : Path or None
+        What it is to write.
+
+    Raises
+    ------
+    UsageError
+        With the file and what to do.
+    """
+    files = list(read)
+    for target in (output, figure):
+        if target is None:
+            continue
+        if any(_same(target, file) for file in files):
+            raise UsageError(f"{target}: expected a new file, got one that is read. Choose another name.")
+        if target.is_dir():
+            raise UsageError(f"{target}: expected a place where a file can be written, got a folder.")
+        if not os.access(target.parent, os.W_OK | os.X_OK):
+            got = "one that cannot be written to" if target.parent.is_dir() else "no folder of that name"
+            raise UsageError(
+                f"{target}: expected a place where a file can be written, got {got}: {target.parent}."
+            )
+    if figure is not None and figure.suffix.lower() not in FIGURE_ENDINGS:
+        endings = ", ".join(FIGURE_ENDINGS)
+        raise UsageError(f"--figure: expected a name ending in {endings}, got {figure.name[:60]!r}.")
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False
