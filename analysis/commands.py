@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -11,7 +11,11 @@ from vibroimpact.analysis import estimate_command, replay_fmu_command, spikes_co
 from vibroimpact.analysis.dataset import open_dataset, open_measured, unreadable
 from vibroimpact.analysis.recording_files import is_recording, open_recording
 from vibroimpact.analysis.results import results_kind
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import DatasetError, UsageError
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
 
 _KINDS = ("auto", "bifurcation", "run", "convergence", "portrait", "impact-map", "energies", "shapes")
 
@@ -53,7 +57,7 @@ def plot(
             figure = figures.draw_recording(open_recording(file))
         elif kind == "auto" and found is not None:
             with open_measured(file) as results:
-                figure = figures.draw_results(results, found)
+                figure = _drawn(results, found, file)
         else:
             with open_measured(file) if kind == "convergence" else open_dataset(file) as dataset:
                 figure = figures.draw(dataset, cast(Any, kind), run)
@@ -65,3 +69,20 @@ def plot(
     except OSError as problem:
         raise UsageError(f"{output}: could not be written: {problem.strerror or problem}.") from problem
     typer.echo(f"Figure written to {output}.")
+
+
+def _drawn(results: xr.Dataset, kind: str, file: Path) -> Figure:
+    """Return the figure of what an analysis found; results may lack what their figure shows, or be another's."""
+    from vibroimpact.analysis import figures
+
+    if kind == "spikes" and "interval" not in results:
+        raise UsageError(
+            f"{file}: expected at least three spikes, whose intervals can be drawn, got fewer. "
+            "`vibroimpact spikes --figure` draws them beside the signal."
+        )
+    try:
+        return figures.draw_results(results, kind)
+    except (LookupError, ValueError, TypeError, AttributeError) as problem:
+        raise DatasetError(
+            f"{file}: expected what `vibroimpact {kind}` writes, got other contents: {str(problem)[:200]}"
+        ) from problem

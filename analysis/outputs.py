@@ -9,6 +9,8 @@ from pathlib import Path
 from vibroimpact.fmus.errors import UsageError
 
 FIGURE_ENDINGS = (".png", ".pdf", ".svg")
+LONGEST_NAME = 200
+"""Bytes: most file systems take 255, and what is half-written has a longer name."""
 
 
 def refuse_outputs(read: Iterable[Path], output: Path | None, figure: Path | None = None) -> None:
@@ -27,9 +29,18 @@ def refuse_outputs(read: Iterable[Path], output: Path | None, figure: Path | Non
         With the file and what to do.
     """
     files = list(read)
+    if output is not None and output == figure:
+        raise UsageError(
+            f"{output}: expected two files for dataset and figure, got one. Choose another name."
+        )
     for target in (output, figure):
         if target is None:
             continue
+        if len(os.fsencode(target.name)) > LONGEST_NAME:
+            raise UsageError(
+                f"{target.name[:60]}...: expected a name of {LONGEST_NAME} bytes at most, "
+                f"got {len(os.fsencode(target.name))}."
+            )
         if any(_same(target, file) for file in files):
             raise UsageError(f"{target}: expected a new file, got one that is read. Choose another name.")
         if target.is_dir():

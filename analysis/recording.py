@@ -199,7 +199,10 @@ class Recording:
 
 
 def _chosen(found: Mapping[str, T], name: str | None, what: str, title: str) -> T:
-    names = ", ".join(found) if found else "none"
+    if not found:
+        wanted = "one" if name is None else f'"{name}"'
+        raise DatasetError(f"{title}: {what}: expected {wanted}, got a file without any.")
+    names = ", ".join(found)
     if name is None:
         if len(found) == 1:
             return next(iter(found.values()))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import netCDF4
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.atomic import write_atomically
 from vibroimpact.analysis.reading import read_flat, unreadable
@@ -20,12 +22,11 @@ from vibroimpact.analysis.recording import (
     SingleValue,
     TimeAxis,
 )
-from vibroimpact.analysis.schema import CONVENTIONS, RAGGED, file_name_of
+from vibroimpact.analysis.recording_rules import EVENT_ENDING, QUALITY_ENDING, problems_of
+from vibroimpact.analysis.schema import CONVENTIONS, RAGGED
 from vibroimpact.analysis.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
 
-QUALITY_ENDING = "_quality"
-EVENT_ENDING = "_event"
 # What damaged bytes lead the libraries below to; a text that is not UTF-8 is a ValueError.
 _DAMAGE = (OSError, RuntimeError, ValueError, AttributeError, LookupError, TypeError, MemoryError)
 MOST_VALUES = 10**8
@@ -172,13 +173,18 @@ def is_recording(path: str | os.PathLike[str]) -> bool:
 
 
 def _read(file: netCDF4.Dataset, path: str | os.PathLike[str]) -> Recording:
+    if str(file.recording_schema) != RECORDING_SCHEMA:
+        raise DatasetError(
+            f"{os.fspath(path)}: recording_schema: expected {RECORDING_SCHEMA}, "
+            f"got {str(file.recording_schema)[:60]!r}. Import the measurement again with this version."
+        )
     if sum(int(variable.size) for variable in file.variables.values()) > MOST_VALUES:
         raise DatasetError(f"{os.fspath(path)}: expected at most {MOST_VALUES} values, got more.")
-    axes = {
-        name: _read_axis(variable)
-        for name, variable in file.variables.items()
-        if variable.dimensions == (name,) and name.startswith("time")
-    }
+    axes = {}
+    for name, variable in file.variables.items():
+        if variable.dimensions == (name,) and name.startswith("time"):
+            with _about(path, name):
+                axes[name] = _read_axis(variable)
     channels: dict[str, Channel] = {}
     events: dict[str, EventTrain] = {}
     scalars: dict[str, SingleValue] = {}
@@ -187,25 +193,50 @@ def _read(file: netCDF4.Dataset, path: str | os.PathLike[str]) -> Recording:
         file.variables, key=lambda name: wanted.index(name) if name in wanted else len(wanted)
     ):
         variable = file.variables[name]
-        if name in axes or (name.endswith(QUALITY_ENDING) and name.removesuffix(QUALITY_ENDING) in file.variables):
+        if name in axes or (
+            name.endswith(QUALITY_ENDING) and name.removesuffix(QUALITY_ENDING) in file.variables
+        ):
             continue
-        if variable.dimensions == ():
-            scalars[name] = SingleValue(float(variable[...]), str(variable.units), str(variable.long_name))
-        elif "event_train" in variable.ncattrs():
-            events[name] = _read_events(name, variable)
-        elif variable.dimensions[0] in axes:
-            channels[name] = _read_channel(file, name, axes[variable.dimensions[0]])
-        else:
-            raise DatasetError(
-                f"{os.fspath(path)}: {name}: expected a channel on a time axis, an event train or a single value, "
-                f"got dimensions {variable.dimensions}."
-            )
+        with _about(path, name):
+            _check_attributes(variable)
+            if variable.dimensions == ():
+                scalars[name] = SingleValue(
+                    float(variable[...]), str(variable.units), str(variable.long_name)
+                )
+            elif "event_train" in variable.ncattrs():
+                events[name] = _read_events(name, variable)
+            elif variable.dimensions[0] in axes:
+                channels[name] = _read_channel(file, name, axes[variable.dimensions[0]])
+            else:
+                raise DatasetError(
+                    "expected a channel on a time axis, an event train or a single value, "
+                    f"got dimensions {variable.dimensions}."
+                )
     attrs = {key: file.getncattr(key) for key in file.ncattrs() if key != "variable_order"}
     recording = Recording(channels, events, scalars, attrs | {"opened_from": os.fspath(path)})
     problems = list(problems_of(recording))
     if problems:
         raise DatasetError("\n".join(f"{os.fspath(path)}: {problem}" for problem in problems))
     return recording
+
+
+@contextmanager
+def _about(path: str | os.PathLike[str], name: str) -> Iterator[None]:
+    """Say in which file and variable is what cannot be read."""
+    try:
+        yield
+    except DatasetError as problem:
+        raise DatasetError(f"{os.fspath(path)}: {name}: {problem}") from problem
+    except (ValueError, TypeError) as problem:
+        raise DatasetError(
+            f"{os.fspath(path)}: {name}: expected numbers and attributes as recordings have them, got: {problem}."
+        ) from problem
+
+
+def _check_attributes(variable: Any) -> None:
+    for key in ("units", "long_name"):
+        if key not in variable.ncattrs():
+            raise DatasetError(f"expected the attribute {key}, got none.")
 
 
 def _read_axis(variable: Any) -> TimeAxis:
@@ -227,12 +258,19 @@ def _read_channel(file: netCDF4.Dataset, name: str, axis: TimeAxis) -> Channel:
     variable: Any = file.variables[name]
     values = np.asarray(variable[...], dtype=np.float64)
     stored: Any = file.variables.get(name + QUALITY_ENDING)
-    quality = np.zeros(len(values), np.uint8) if stored is None else np.asarray(stored[...], np.uint8)
+    quality = np.zeros(len(values), np.uint8) if stored is None else _quality(np.asarray(stored[...]))
     unit = str(variable.units)
     measured_unit(
         unit
     )  # a unit that nothing can be made of is refused here, not in the middle of an analysis
     return Channel(name, values, unit, axis, quality, str(variable.long_name), _others(variable))
+
+
+def _quality(flags: NDArray[Any]) -> NDArray[np.uint8]:
+    known = sum(int(flag) for flag in Quality)
+    if flags.dtype.kind not in "iu" or np.any((flags < 0) | (flags > known)):
+        raise DatasetError(f"quality: expected whole numbers from 0 to {known}, got others.")
+    return flags.astype(np.uint8)
 
 
 def _read_events(name: str, variable: Any) -> EventTrain:
@@ -263,7 +301,11 @@ def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Record
     """
     if is_recording(path):
         return open_recording(path)
-    flat = read_flat(path)
+    try:
+        flat = read_flat(path)
+    except DatasetError as problem:
+        hint = " `vibroimpact import` makes a recording of the file of an instrument."
+        raise DatasetError(f"{problem}{hint if os.path.isfile(path) else ''}") from problem
     indices = flat.run_index.values.tolist()
     if run is None and len(indices) > 1:
         raise DatasetError(

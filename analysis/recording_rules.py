@@ -20,8 +20,12 @@ AGREEMENT = 0.01
 def problems_of(recording: Recording) -> Iterable[str]:
     """Yield what contradicts the schema, a line each, `NAME: what: expected ..., got ....`"""
     yield from _names(recording)
+    axes: set[int] = set()
     for name, channel in recording.channels.items():
         yield from (f"{name}: {problem}" for problem in _of_channel(channel))
+        if id(channel.axis) not in axes:  # channels that share one share its problems
+            yield from (f"{name}: time: {problem}" for problem in _of_axis(channel.axis))
+        axes.add(id(channel.axis))
     for name, train in recording.events.items():
         yield from (f"{name}: {problem}" for problem in _of_train(train))
 
@@ -47,7 +51,6 @@ def _of_channel(channel: Channel) -> Iterator[str]:
     for what, got in (("values", channel.values.shape), ("quality", channel.quality.shape)):
         if got != (length,):
             yield f"{what}: expected the shape ({length},) of its time axis, got {got}."
-    yield from _of_axis(channel.axis)
     most = _largest(channel.values)
     if most > LARGEST or 0.0 < most < SMALLEST:
         yield (
@@ -62,20 +65,20 @@ def _largest(values: Floats) -> float:
 
 def _of_axis(axis: TimeAxis) -> Iterator[str]:
     if not np.all(np.isfinite(axis.time)) or not np.all(np.diff(axis.time) > 0.0):
-        yield "time: expected finite instants that ascend strictly, got others."
+        yield "expected finite instants that ascend strictly, got others."
         return
     if not (isfinite(axis.interval_uncertainty) and axis.interval_uncertainty >= 0.0):
-        yield f"time: interval_uncertainty: expected a number >= 0, got {axis.interval_uncertainty:g}."
+        yield f"interval_uncertainty: expected a number >= 0, got {axis.interval_uncertainty:g}."
         return
     if axis.interval is None:
         return
     if not (isfinite(axis.interval) and axis.interval > 0.0):
-        yield f"time: sampling_interval: expected a number > 0, got {axis.interval:g}."
+        yield f"sampling_interval: expected a number > 0, got {axis.interval:g}."
     elif len(axis.time) > 1:
         mean = float(axis.time[-1] - axis.time[0]) / (len(axis.time) - 1)
         if abs(mean / axis.interval - 1.0) > AGREEMENT + axis.interval_uncertainty:
             yield (
-                f"time: sampling_interval: expected about the mean distance of the instants, {mean:g} s, "
+                f"sampling_interval: expected about the mean distance of the instants, {mean:g} s, "
                 f"got {axis.interval:g}."
             )
 

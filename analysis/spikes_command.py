@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vibroimpact.analysis.outputs import refuse_outputs
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import EstimationError, UsageError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -79,6 +79,7 @@ def spikes(
     from rich.console import Console
 
     from vibroimpact.analysis.recording_files import open_signals
+    from vibroimpact.analysis.recording_rules import masked_spans
     from vibroimpact.analysis.results import write_results
     from vibroimpact.analysis.spikes import Mechanics, SpikeSettings
 
@@ -104,12 +105,16 @@ def spikes(
     for remark in recording.remarks:
         console.print(remark, style="yellow", markup=False, highlight=False)
     report = None
-    if events is not None or not recording.channels:
-        dataset = _trains(console, recording.event_train(events), forcing_period, count_bin, seams)
-    else:
-        report, dataset = _spikes(
-            console, recording, channel, settings, mechanics, (forcing_period, count_bin, seams)
-        )
+    try:
+        if events is not None or not recording.channels:
+            train = recording.event_train(events)
+            dataset = _trains(console, train, forcing_period, count_bin, seams, masked_spans(train))
+        else:
+            report, dataset = _spikes(
+                console, recording, channel, settings, mechanics, (forcing_period, count_bin, seams)
+            )
+    except EstimationError as problem:
+        raise EstimationError(f"{data}: {problem}") from problem
     dataset = dataset.assign_attrs(source=data.name)
     if output is not None:
         write_results(dataset, output, kind="spikes")

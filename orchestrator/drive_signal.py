@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 
 #: Parts that a channel is cut into to find its quietest.
 QUIET_PARTS = 20
+#: Steps of one replay: a minute or more of processor time.
+MOST_STEPS = 10**7
 #: SI units of what can be driven.
 DRIVEN_UNITS = {"base_acceleration": "m s-2", "force": "N"}
 
@@ -125,13 +127,27 @@ def step_instants(signal_time: Floats, finest: float, end: float) -> Floats:
     end : float
         Where to stop, s; beyond the last sample the steps are `finest` or the drive's last, whichever is shorter.
 
+    Raises
+    ------
+    DatasetError
+        There would be more than `MOST_STEPS`: clocks that are far apart, or a hole of hours.
+
     Examples
     --------
     >>> step_instants(np.array([0.0, 1.0, 3.0]), 1.0, 4.0).tolist()
     [0.0, 1.0, 2.0, 3.0, 4.0]
     """
     steps = np.diff(signal_time)
-    parts = np.maximum(1, np.ceil(steps / finest * (1.0 - 1e-9))).astype(np.int64)
+    length = min(finest, float(steps[-1]))
+    shares = np.maximum(1.0, np.ceil(steps / finest * (1.0 - 1e-9)))
+    beyond = max(0.0, float(np.ceil((end - signal_time[-1]) / length * (1.0 - 1e-9))))
+    if float(np.sum(shares)) + beyond > MOST_STEPS:
+        raise DatasetError(
+            f"replay: expected at most {MOST_STEPS:g} steps, got {float(np.sum(shares)) + beyond:g} of {finest:g} s "
+            f"from {signal_time[0]:g} to {max(end, float(signal_time[-1])):g} s. "
+            "Look at the instants of the channels, or give replay.stop."
+        )
+    parts = shares.astype(np.int64)
     within = np.concatenate(
         [
             start + step * np.arange(count) / count
@@ -139,8 +155,6 @@ def step_instants(signal_time: Floats, finest: float, end: float) -> Floats:
         ]
         + [signal_time[-1:]]
     )
-    length = min(finest, float(steps[-1]))
-    beyond = int(np.ceil((end - signal_time[-1]) / length * (1.0 - 1e-9)))
-    after = signal_time[-1] + length * np.arange(1, max(0, beyond) + 1)
+    after = signal_time[-1] + length * np.arange(1, int(beyond) + 1)
     instants: Floats = np.concatenate([within, after])
     return instants

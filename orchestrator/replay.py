@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -25,6 +26,7 @@ from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError, Us
 from vibroimpact.orchestrator.body_record import DeadlineReached, ImpactLimitReached
 from vibroimpact.orchestrator.drive_signal import DriveSignal, drive_of, step_instants
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
+from vibroimpact.orchestrator.replay_covariance import drawn_noise, quiet_noise
 from vibroimpact.orchestrator.replay_models import Compared, Replay
 from vibroimpact.orchestrator.replay_rules import plain_variable
 from vibroimpact.orchestrator.scene import Scene
@@ -178,8 +180,23 @@ class Replayer:
         """What a reader must know of the recording and of the drive."""
         return (*self.recording.remarks, *(self.drive.remarks if self.drive is not None else ()))
 
-    def simulate(self, values: Mapping[str, float] | None = None) -> Motion:
+    @cached_property
+    def drive_noise(self) -> Floats | None:
+        """What the drive shows before its event, in its SI unit; None where it never rests or a component plays it."""
+        if self.replay.drive is None or self._folder is not None:
+            return None
+        return quiet_noise(self.recording.channel(self.replay.channel))
+
+    def simulate(
+        self, values: Mapping[str, float] | None = None, noise: np.random.Generator | None = None
+    ) -> Motion:
         """Simulate the replay with other values of some keys of the scene.
+
+        Parameters
+        ----------
+        values : mapping of str to float, optional
+        noise : Generator, optional
+            Draws noise as before the event, which the drive gets on top.
 
         Raises
         ------
@@ -190,7 +207,7 @@ class Replayer:
         session = self._session
         session.begin(values)
         try:
-            rows = self._follow(session)
+            rows = self._follow(session, noise)
         except (ImpactLimitReached, DeadlineReached) as ended:
             limit = "impact_limit" if isinstance(ended, ImpactLimitReached) else "deadline"
             raise ComponentError(
@@ -205,11 +222,15 @@ class Replayer:
         readings = tuple(reading.of(rows[:, column], scene) for column, reading in enumerate(self.readings))
         return Motion(self.time, readings, impacts, sticks, session.warnings)
 
-    def _follow(self, session: Session) -> Floats:
+    def _follow(self, session: Session, noise: np.random.Generator | None) -> Floats:
         relative = self.time - self.time[0]
         if self._folder is not None or self._values is None:
             return session.follow(relative)  # a Replay drives the body, or nothing does
-        return session.follow(relative, self.replay.drive, self._values)
+        values, drive = self._values, self.drive
+        if noise is not None and drive is not None and self.drive_noise is not None:
+            drawn = drawn_noise(self.drive_noise, len(drive.time), noise)
+            values = values + np.interp(self.time, drive.time, drawn, left=0.0, right=0.0)
+        return session.follow(relative, self.replay.drive, values)
 
     def final_state(self) -> tuple[float, float, Floats | None]:
         """Return displacement (m), velocity (m/s) and, of chains and beams, the whole state at the end."""
@@ -262,11 +283,20 @@ def opened_replays(scene: Scene, paths: Sequence[Path], execution: str = "auto")
     replayers: list[Replayer] = []
     try:
         for path in paths:
-            replayers.append(Replayer(scene, open_signals(path), execution=execution))
+            recording = open_signals(path)
+            try:
+                replayers.append(Replayer(scene, recording, execution=execution))
+            except DatasetError as problem:
+                raise named(problem, path) from problem
         yield replayers
     finally:
         for replayer in replayers:
             replayer.close()
+
+
+def named(problem: DatasetError, path: Path) -> DatasetError:
+    """Return a problem of a recording with the name of its file in front."""
+    return problem if str(problem).startswith(str(path)) else DatasetError(f"{path}: {problem}")
 
 
 def _cut(times: Floats, start: float | None, stop: float | None) -> Floats:

@@ -31,7 +31,7 @@ def register(app: typer.Typer) -> None:
 
 
 def replay(
-    scene: Annotated[Path, typer.Argument(help="Scene file (TOML) with a [replay] table.")],
+    scene: Annotated[Path, typer.Argument(help=r"Scene file (TOML) with a \[replay] table.")],
     recordings: Annotated[
         list[Path] | None,
         typer.Argument(help="Recordings to replay, and to fit to; left out, those that the scene names."),
@@ -40,8 +40,8 @@ def replay(
         Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc); of a campaign its folder.")
     ] = None,
     fit: Annotated[
-        str, typer.Option(help="Numbers of the scene to fit: body.damping_ratio,sensor.gain")
-    ] = "",
+        str | None, typer.Option(help="Numbers of the scene to fit: body.damping_ratio,sensor.gain")
+    ] = None,
     score: Annotated[
         list[Path] | None, typer.Option(help="Recording to score that was not fitted on; may be repeated.")
     ] = None,
@@ -81,13 +81,17 @@ def replay(
         raise UsageError(
             f"{scene}: sweep: expected no sweep for one dataset. Give a folder with -o for a campaign."
         )
+    if figure is not None and loaded.replay is not None and not loaded.replay.compare:
+        raise UsageError(
+            f"--figure: expected a scene that compares something, got {scene} without. Add compare."
+        )
     _to_dataset(loaded, recordings or [], score or [], output, fit, figure, execution or loaded.execution.how)
 
 
-def _refuse_with_campaign(fit: str, *others: object) -> None:
+def _refuse_with_campaign(*others: object) -> None:
     from vibroimpact.fmus.errors import UsageError
 
-    if fit or any(others):
+    if any(other is not None for other in others):
         raise UsageError(
             "--output: expected a dataset (.nc) beside --fit, --score, --figure or --execution, got a "
             "folder. Campaigns replay; they do not fit."
@@ -152,7 +156,7 @@ def _to_dataset(
     recordings: Sequence[Path],
     scored: Sequence[Path],
     output: Path,
-    fit: str,
+    fit: str | None,
     figure: Path | None,
     execution: str,
 ) -> None:
@@ -163,7 +167,7 @@ def _to_dataset(
 
     began = time.perf_counter()
     paths = _paths(with_recordings(scene, recordings))
-    if scored and not fit:
+    if scored and fit is None:
         raise UsageError(
             "--score: expected --fit beside it: a recording is scored with numbers fitted on others."
         )
@@ -183,7 +187,12 @@ def _paths(scene: Scene) -> list[Path]:
 
 
 def _replays(
-    stack: ExitStack, scene: Scene, paths: Sequence[Path], scored: Sequence[Path], fit: str, execution: str
+    stack: ExitStack,
+    scene: Scene,
+    paths: Sequence[Path],
+    scored: Sequence[Path],
+    fit: str | None,
+    execution: str,
 ) -> tuple[ReplayFit | None, Verdict | None, list[Replayed]]:
     from vibroimpact.analysis.replay.trust import trust
     from vibroimpact.orchestrator.replay import opened_replays
@@ -191,7 +200,7 @@ def _replays(
     from vibroimpact.orchestrator.replay_output import Replayed
     from vibroimpact.orchestrator.replay_scoring import compare_motion
 
-    keys = fit_keys(scene, fit) if fit else ()
+    keys = fit_keys(scene, fit) if fit is not None else ()
     # a number that the scene leaves at its default counts as written from now on
     scene = scene.with_values({key: scene.value(key) for key in keys})
     replayers = stack.enter_context(opened_replays(scene, [*paths, *scored], execution))

@@ -20,6 +20,7 @@ from vibroimpact.analysis.replay.alignment import Interpolated
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.fmus.errors import ComponentError, EstimationError, UsageError
 from vibroimpact.orchestrator.replay import Replayer
+from vibroimpact.orchestrator.replay_covariance import LagSlopes, covariance_of, lag_slopes
 from vibroimpact.orchestrator.replay_scoring import compare_motion, score_without_dynamics
 from vibroimpact.orchestrator.scene import Scene
 
@@ -41,8 +42,12 @@ LEAST_MOTION = 1e-4
 MOST_ALIGNMENTS = 6
 #: Condition of the scaled normal matrix above which two numbers are one: their difference is derivative noise.
 MOST_CONDITION = 1e8
+#: A number that changes what is compared by less than this share, were it doubled, does not change it: rounding.
+LEAST_CHANGE = 1e-9
 #: The lag stays where it moves by less than this share of its own error.
 LAG_STAYS = 0.1
+#: Draws of the noise of what drives: standard errors from it are good to about 1/sqrt(2 draws), a sixth.
+NOISE_DRAWS, NOISE_SEED = 20, 5
 #: Step of the numeric derivatives, relative to the larger of a number and its scale.
 DERIVATIVE_STEP = 1e-5
 
@@ -56,7 +61,8 @@ class ReplayFit:
     keys : tuple of str
     start, values, standard_error : ndarray, shape (key,)
         Each in the unit of its key. The errors are those of least squares with residuals that are correlated in
-        time (Newey and West): they hold where the model is right, and do not see what a wrong one misses.
+        time, of the lags found beside, and of noise of the drive as it shows before the event: they hold where the
+        model is right, and do not see what a wrong one misses.
     correlation : ndarray, shape (key, key)
         Of the errors.
     comparisons : tuple of list of Comparison
@@ -122,8 +128,10 @@ def fit_replay(
 
     Raises
     ------
+    UsageError
+        Nothing is compared.
     EstimationError
-        Nothing is compared, the data say nothing of a number, or the search does not end.
+        The data say nothing of a number, or the search does not end.
     """
     return _Fit(replayers, tuple(keys), told).run()
 
@@ -135,7 +143,7 @@ class _Fit:
         self.replayers, self.keys, self.told = replayers, keys, told
         scene = replayers[0].scene
         if not replayers[0].readings:
-            raise EstimationError(
+            raise UsageError(
                 f"{scene.source}: replay.compare: expected something to fit to, got nothing. Add compare = [...]."
             )
         self.start = np.array([scene.value(key) for key in keys])
@@ -192,12 +200,20 @@ class _Fit:
         self.simulations += 1
         return dict(zip(self.keys, values.tolist(), strict=True))
 
-    def residuals(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> list[Floats]:
-        """Return the residual of each channel over its own standard deviation, lag and polarity held."""
+    def residuals(
+        self,
+        values: Floats,
+        comparisons: Sequence[Sequence[Comparison]],
+        random: np.random.Generator | None = None,
+    ) -> list[Floats]:
+        """Return the residual of each channel over its own standard deviation, lag and polarity held.
+
+        With `random`, what drives has noise as before its event, drawn anew, on top.
+        """
         numbers = self._numbers(values)
         found = []
         for replayer, compared in zip(self.replayers, comparisons, strict=True):
-            motion = replayer.simulate(numbers)
+            motion = replayer.simulate(numbers, random)
             for reading, comparison in zip(motion.readings, compared, strict=True):
                 at = comparison.measured.time[comparison.scored] - comparison.alignment.lag
                 simulated = comparison.alignment.polarity * Interpolated(motion.time, reading)(at)
@@ -229,24 +245,36 @@ class _Fit:
             ) from error
 
     def covariance(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> Floats:
-        """Return the covariance of the numbers, with residuals that are correlated in time (Newey and West)."""
+        """Return the covariance of the numbers, see `replay_covariance`."""
         residuals = self.residuals(values, comparisons)
         slopes = self._slopes(values, comparisons)
-        bread = self.refuse_alike(slopes)
-        inverse = np.linalg.inv(bread)
-        meat = sum(
-            (_meat(slope, residual) for slope, residual in zip(slopes, residuals, strict=True)),
-            np.zeros_like(bread),
-        )
-        covariance: Floats = inverse @ meat @ inverse
-        return covariance
+        self.refuse_alike(slopes)
+        disturbances: list[list[Floats]] = []
+        if any(replayer.drive_noise is not None for replayer in self.replayers):
+            random = np.random.default_rng(NOISE_SEED)
+            for _ in range(NOISE_DRAWS):
+                disturbed = self.residuals(values, comparisons, random)
+                disturbances.append([a - b for a, b in zip(disturbed, residuals, strict=True)])
+        return covariance_of(slopes, self._lag_slopes(values, comparisons), residuals, disturbances)
+
+    def _lag_slopes(
+        self, values: Floats, comparisons: Sequence[Sequence[Comparison]]
+    ) -> list[LagSlopes | None]:
+        found: list[LagSlopes | None] = []
+        for replayer, compared in zip(self.replayers, comparisons, strict=True):
+            motion = replayer.simulate(self._numbers(values))
+            for reading, comparison in zip(motion.readings, compared, strict=True):
+                size = float(np.std(comparison.values[comparison.scored]))
+                found.append(lag_slopes(comparison, Interpolated(motion.time, reading), size))
+        return found
 
     def refuse_alike(self, slopes: Sequence[Floats]) -> Floats:
         """Return the normal matrix of the slopes; refuse numbers that the recordings do not tell apart."""
         bread: Floats = sum((slope.T @ slope for slope in slopes), np.zeros((len(self.keys), len(self.keys))))
         size = np.sqrt(np.diag(bread))
-        if not np.all(size > 0.0):
-            idle = self.keys[int(np.argmin(size))]
+        moved = size * self.scale / np.sqrt(sum(len(slope) for slope in slopes))
+        if not np.all(moved > LEAST_CHANGE):
+            idle = self.keys[int(np.argmin(moved))]
             raise EstimationError(
                 f"fit: {idle}: expected a number that changes what is compared, got one that does not. Leave it out."
             )
@@ -320,18 +348,6 @@ def _have_settled(before: Sequence[Sequence[Comparison]], after: Sequence[Sequen
         old.polarity == new.polarity and abs(new.lag - old.lag) <= LAG_STAYS * new.lag_error + 1e-12
         for old, new in pairs
     )
-
-
-def _meat(slope: Floats, residual: Floats) -> Floats:
-    """Return the covariance of sum slope * residual, correlations fading out over a lag of n^(1/2) samples."""
-    scores = slope * residual[:, None]
-    count = len(scores)
-    reach = max(1, int(np.sqrt(count)))
-    total: Floats = scores.T @ scores
-    for lag in range(1, reach + 1):
-        part = scores[lag:].T @ scores[:-lag]
-        total = total + (1.0 - lag / (reach + 1.0)) * (part + part.T)
-    return total
 
 
 @dataclass(frozen=True, slots=True)

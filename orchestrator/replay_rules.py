@@ -53,6 +53,13 @@ def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:
     if replay.drive == "force" and isinstance(draft.body, ChainBody):
         hint = "A force on one mass is not replayed yet; the base's acceleration is."
         yield Problem("replay.drive", '"base_acceleration" for a chain', '"force"', hint)
+    spans = [("replay.peaks", replay.peaks)] if replay.peaks is not None else []
+    spans += [(f"replay.windows[{place}]", span) for place, span in enumerate(replay.windows, start=1)]
+    for where, span in spans:
+        if span[1] <= span[0]:
+            yield Problem(
+                where, "a span [start, stop] that ends after its start", f"{span[0]:g} to {span[1]:g}"
+            )
     if replay.start is not None and replay.stop is not None and replay.stop <= replay.start:
         yield Problem("replay.stop", "a time after replay.start", quoted(replay.stop))
 

@@ -14,8 +14,8 @@ import numpy as np
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.recording_files import open_signals
 from vibroimpact.analysis.replay.comparison import Comparison
-from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.replay import Motion, Replayer, recording_of, replay_table
+from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.orchestrator.replay import Motion, Replayer, named, recording_of, replay_table
 from vibroimpact.orchestrator.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.replay_scoring import compare_motion
 from vibroimpact.orchestrator.scene import Scene
@@ -52,7 +52,10 @@ class ReplayRunner:
     def _replayer(self, number: int) -> Replayer:
         if number not in self._replayers:
             path = self._paths[number - 1]
-            self._replayers[number] = Replayer(self._scene, open_signals(path), execution=self.execution)
+            try:
+                self._replayers[number] = Replayer(self._scene, open_signals(path), execution=self.execution)
+            except DatasetError as problem:
+                raise named(problem, path) from problem
         return self._replayers[number]
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:

@@ -9,6 +9,7 @@ from vibroimpact.analysis.recording import Channel, TimeAxis
 from vibroimpact.analysis.replay.baseline import naive_variance
 from vibroimpact.analysis.replay.comparison import Comparison, compare
 from vibroimpact.analysis.replay.event import find_event
+from vibroimpact.fmus.errors import EstimationError
 from vibroimpact.orchestrator.drive_signal import quiet_level
 from vibroimpact.orchestrator.replay import Motion, Reading, Replayer
 
@@ -24,7 +25,12 @@ def compare_motion(replayer: Replayer, motion: Motion) -> list[Comparison]:
     EstimationError
         A channel has too little that is good, or was not simulated.
     """
-    return [_compared(replayer, reading, motion, place) for place, reading in enumerate(replayer.readings)]
+    try:
+        return [
+            _compared(replayer, reading, motion, place) for place, reading in enumerate(replayer.readings)
+        ]
+    except EstimationError as problem:
+        raise EstimationError(f"{replayer.recording.title}: {problem}") from problem
 
 
 def _compared(replayer: Replayer, reading: Reading, motion: Motion, place: int) -> Comparison:
@@ -70,12 +76,14 @@ def is_on_the_clock(replayer: Replayer, reading: Reading) -> bool:
 
 
 def _most_lag(replayer: Replayer, reading: Reading) -> float:
-    if replayer.replay.most_lag is not None:
-        return replayer.replay.most_lag
+    given = replayer.replay.most_lag
     if replayer.drive is None:
-        return 0.0
-    lengths = [float(times[-1] - times[0]) for times in (replayer.drive.time, reading.channel.time)]
-    return MOST_LAG_SHARE * min(lengths)
+        return given or 0.0
+    clocks = replayer.drive.time, reading.channel.time
+    if given is None:
+        return MOST_LAG_SHARE * min(float(times[-1] - times[0]) for times in clocks)
+    # beyond this the records do not overlap: nothing could be found there
+    return min(given, max(abs(clocks[0][-1] - clocks[1][0]), abs(clocks[1][-1] - clocks[0][0])))
 
 
 def _offset(replayer: Replayer, reading: Reading) -> Literal["before", "none"] | float:

@@ -27,6 +27,9 @@ from vibroimpact.fmus.errors import EstimationError
 
 # A damping ratio of fewer standard errors than this is not told from restitution, or from the force.
 _CLEAR = 3.0
+# Speeds read off at impacts whose instants are less certain than this (rad of the fastest motion) are those of another
+# instant, by more than their stated error.
+_INSTANT_DOUBT = 0.03
 
 
 def estimate_impacts(
@@ -118,7 +121,7 @@ def _attempted(
         refusals = [Refusal(name, str(problem)) for name in energies]
     if resampled is not None:
         for name in energies:
-            ways[name] = partial(_energy_values, name, resampled, forcing, held, confidence, record.inflation)
+            ways[name] = partial(_energy_values, name, record, resampled, forcing, held, confidence)
     values: dict[str, dict[str, Estimate]] = {}
     for name, run in ways.items():
         if name not in methods:
@@ -184,6 +187,17 @@ def _trajectory_values(record: Prepared, held: Known, z: float) -> dict[str, Est
     }
 
 
+def _check_instants(method: str, record: Prepared) -> None:
+    """Refuse to read speeds off at impacts whose instants are not known well enough."""
+    fastest = max(record.parameters.angular_frequency, record.parameters.natural_frequency)
+    doubt = fastest * float(np.median([impact.time_error for impact in record.segmentation.impacts]))
+    if doubt > _INSTANT_DOUBT:
+        raise EstimationError(
+            f"{method}: expected instants of impact known to {_INSTANT_DOUBT} rad of the fastest motion, got "
+            f"{doubt:.2g}. Weak impacts in this noise have no certain speeds: use the weak form or the trajectories."
+        )
+
+
 def _resampled(record: Prepared, draws: int, seed: int) -> Resampled:
     return resample(
         record.segmentation.signal,
@@ -199,16 +213,17 @@ def _resampled(record: Prepared, draws: int, seed: int) -> Resampled:
 
 
 def _energy_values(
-    method: str, resampled: Resampled, forcing: Forcing, held: Known, confidence: float, inflation: float
+    method: str, record: Prepared, resampled: Resampled, forcing: Forcing, held: Known, confidence: float
 ) -> dict[str, Estimate]:
     """Return what one of the energy balances says."""
     if method == "energy_known_damping":
-        return with_intervals(resampled, known_damping(held.damping_ratio), confidence, inflation)
+        return with_intervals(resampled, known_damping(held.damping_ratio), confidence, record.inflation)
+    _check_instants(method, record)
     unknown = ["damping_ratio"]
     if method == "energy_amplitude":
         unknown = [] if held.damping_ratio is not None else ["damping_ratio"]
         unknown += ["static_deflection"] + (["phase"] if forcing.phase is None else [])
-    found = with_intervals(resampled, by_speeds(unknown), confidence, inflation)
+    found = with_intervals(resampled, by_speeds(unknown), confidence, record.inflation)
     damping = found.get("damping_ratio")
     # judged by the size that the weak form gives: judged by its own, only chance excesses would pass
     if damping is not None and not resampled.parameters.damping_ratio > _CLEAR * damping.standard_error:

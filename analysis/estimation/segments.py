@@ -21,6 +21,8 @@ _JUMPS_BEYOND = 5.0
 # ... and from this many times what motion of the largest size and the fastest rate makes of it.
 _BIAS_BEYOND = 1.5
 _FEWEST_IN_FLIGHT = 10
+# A sampling step off the median by this part is a gap or a repeated sample: no kink is looked for across it.
+_UNEVEN = 0.5
 _REFINEMENTS = 4
 # A kink that meets its neighbours' level worse than this many standard errors is not at the stop.
 _LEVEL_BEYOND = 8.0
@@ -153,12 +155,13 @@ def segment(
         Too few samples, or fewer than two impacts.
     """
     noise = noise_level(values, good)
-    interval = float(time[-1] - time[0]) / (len(time) - 1)
+    steps = np.diff(time)
+    interval = float(np.median(steps))
     size = 0.5 * float(np.ptp(values[good]))
     longest = 0.25 * 2.0 * math.pi / fastest
     width = window if window is not None else one_sided_window(noise, interval, size, fastest, longest)
     count = max(6, round(width / interval))
-    jump = _jumps(values, good, count, interval)
+    jump = _jumps(values, good, np.abs(steps - interval) < _UNEVEN * interval, count, interval)
     sign = _side_sign(jump, side)
     signal = Signal(time, sign * values, good, interval, sign, noise)
     error, bias = _hinge_errors(noise, size, fastest, count, interval)
@@ -186,10 +189,11 @@ def _hinge(count: int) -> Floats:
     return weights
 
 
-def _jumps(values: Floats, good: Mask, count: int, interval: float) -> Floats:
+def _jumps(values: Floats, good: Mask, even: Mask, count: int, interval: float) -> Floats:
     """Return the jump of the velocity in the middle of each sampling interval; NaN where it is not known."""
     windows = np.lib.stride_tricks.sliding_window_view(np.where(good, values, 0.0), 2 * count)
     whole = np.lib.stride_tricks.sliding_window_view(good, 2 * count).all(axis=1)
+    whole &= np.lib.stride_tricks.sliding_window_view(even, 2 * count - 1).all(axis=1)
     jump = np.full(len(values) - 1, np.nan)
     jump[count - 1 : len(values) - count] = np.where(whole, windows @ _hinge(count), np.nan) / interval
     return jump

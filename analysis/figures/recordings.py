@@ -65,7 +65,8 @@ def draw_recording(recording: Recording) -> Figure:
 def _share_time(axes: Sequence[Axes], channels: Sequence[Channel]) -> None:
     """Write the instants once below each group of panels that have one axis."""
     for place, (axis, channel) in enumerate(zip(axes, channels, strict=True)):
-        axis.set_xlim(channel.time[0], channel.time[-1])
+        if len(channel.time) > 1:
+            axis.set_xlim(channel.time[0], channel.time[-1])
         last = place + 1 == len(channels) or channels[place + 1].axis is not channel.axis
         axis.tick_params(labelbottom=last)
         if last:

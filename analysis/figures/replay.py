@@ -49,7 +49,11 @@ def draw_replay(dataset: xr.Dataset, comparison: str | None = None) -> Figure:
     DatasetError
         There is no such comparison.
     """
-    names = [str(name) for name in dataset["comparison"].values]
+    names = [str(name) for name in dataset["comparison"].values] if "comparison" in dataset else []
+    if not names:
+        raise DatasetError(
+            "figure: comparison: expected one at least, got none. Replay a scene with compare."
+        )
     name = names[0] if comparison is None else comparison
     if name not in names:
         raise DatasetError(f'figure: comparison: expected one of {", ".join(names)}, got "{name}".')

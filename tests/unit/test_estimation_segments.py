@@ -105,6 +105,17 @@ def test_a_gap_spoils_only_the_flights_that_it_touches():
     assert len([flight for flight in found.flights if flight.usable]) >= len(whole.flights) - 2
 
 
+def test_a_jump_of_the_time_axis_is_no_impact():
+    record = record_of(THESIS, periods=12)
+    channel = record.channel(1e-3)
+    kept = np.r_[0:430, 480:1200]
+    found = segment(channel.time[kept], channel.values[kept], np.ones(len(kept), bool), fastest=64.32)
+    whole = [impact.time for impact in cut(record, 1e-3).impacts]
+    for impact in found.impacts:
+        assert min(abs(impact.time - instant) for instant in whole) < 0.1 * record.time[1]
+    assert len(found.impacts) >= len(whole) - 1
+
+
 def test_free_motion_without_impacts_is_refused():
     time = np.linspace(0.0, 10.0, 1000)
     values = np.sin(2.0 * time) + 0.01 * np.random.default_rng(1).standard_normal(1000)
