@@ -9,13 +9,15 @@ import typer
 
 from vibroimpact.analysis import estimate_command, replay_fmu_command, spikes_command
 from vibroimpact.analysis.dataset import open_dataset, open_measured, unreadable
+from vibroimpact.analysis.outputs import writing
 from vibroimpact.analysis.recording_files import is_recording, open_recording
 from vibroimpact.analysis.results import results_kind
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
 if TYPE_CHECKING:
     import xarray as xr
-    from matplotlib.figure import Figure
+
+    from vibroimpact.analysis.figures import Figure
 
 _KINDS = ("auto", "bifurcation", "run", "convergence", "portrait", "impact-map", "energies", "shapes")
 
@@ -53,7 +55,7 @@ def plot(
         raise UsageError(f"--kind: expected one of {', '.join(_KINDS)}, got {kind!r}.")
     found = results_kind(file)
     try:
-        if kind == "auto" and is_recording(file):
+        if kind == "auto" and run is None and is_recording(file):
             figure = figures.draw_recording(open_recording(file))
         elif kind == "auto" and found is not None:
             with open_measured(file) as results:
@@ -64,10 +66,8 @@ def plot(
     except (OSError, RuntimeError) as problem:
         # Values are read when first used, so a damaged file may show only here.
         raise unreadable(file, problem) from problem
-    try:
+    with writing(output):
         figures.save(figure, output)
-    except OSError as problem:
-        raise UsageError(f"{output}: could not be written: {problem.strerror or problem}.") from problem
     typer.echo(f"Figure written to {output}.")
 
 

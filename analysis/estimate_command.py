@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from vibroimpact.analysis.outputs import refuse_outputs
+from vibroimpact.analysis.outputs import refuse_outputs, writing
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
 if TYPE_CHECKING:
@@ -77,6 +77,13 @@ def estimate(
     offset: Annotated[
         float | None, typer.Option(help="What the channel reads at rest, where it is known.")
     ] = None,
+    clock_drifts: Annotated[
+        bool,
+        typer.Option(
+            "--clock-drifts",
+            help="Clocks of force and recording differ: the forcing frequency is fitted, within 0.5 %.",
+        ),
+    ] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
 ) -> None:
@@ -103,10 +110,23 @@ def estimate(
         damping_ratio,
         mass,
         offset,
+        clock_drifts,
     )
     refuse_outputs([data], output, figure)
     kind = chosen_kind(data, kind, run, drive, impacts)
-    refuse_far_options(kind, impacts, {"--drive": drive, "--band": band, "--segment": segment}, law, cubic)
+    refuse_far_options(
+        kind,
+        impacts,
+        {
+            "--drive": drive is not None,
+            "--band": band is not None,
+            "--segment": segment is not None,
+            "--form": form != "auto",
+            "--window": window != "bartlett",
+            "--estimator": estimator != "h1",
+        },
+        {"--law": law != "all", "--cubic": cubic, "--periods": periods is not None},
+    )
     # Piped, a table is as wide as it needs to be.
     console = Console(soft_wrap=False, width=None if Console().is_terminal else 160)
     try:
@@ -261,7 +281,7 @@ def _written(console: Console, dataset: xr.Dataset, output: Path | None, figure:
     for path, what in ((output, "Estimates"), (figure, "Figure")):
         if path is None:
             continue
-        try:
+        with writing(path):
             if path is output:
                 write_results(dataset, path, kind="estimates")
             else:
@@ -270,6 +290,4 @@ def _written(console: Console, dataset: xr.Dataset, output: Path | None, figure:
                 from vibroimpact.analysis.figures.estimates import draw_estimates
 
                 save(draw_estimates(dataset), path)
-        except OSError as problem:
-            raise UsageError(f"{path}: could not be written: {problem.strerror or problem}.") from problem
         console.print(f"{what} written to {path}.", highlight=False, markup=False)

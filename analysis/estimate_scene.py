@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -15,7 +16,18 @@ from vibroimpact.analysis.estimation.physics import Forcing, Known
 from vibroimpact.analysis.reading import read_flat
 from vibroimpact.analysis.recording import Channel, Recording
 from vibroimpact.analysis.recording_files import is_recording
+from vibroimpact.analysis.schema import file_name_of
 from vibroimpact.fmus.errors import UsageError
+
+#: A table among several: `stop[1]`.
+_NUMBERED = re.compile(r"(\w+)\[(\d+)\]")
+
+
+_ABOVE_0 = "a number > 0"
+_OPTION_RULES = {
+    **dict.fromkeys(("forcing_frequency", "angular_frequency", "natural_frequency", "mass"), _ABOVE_0),
+    "damping_ratio": "a number >= 0",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +51,8 @@ class ImpactOptions:
         kg.
     offset : float or None
         What the channel reads at rest, in its unit.
+    clock_drifts : bool
+        The forcing frequency is a start value only.
     """
 
     forcing_frequency: float | None = None
@@ -51,13 +65,23 @@ class ImpactOptions:
     damping_ratio: float | None = None
     mass: float | None = None
     offset: float | None = None
+    clock_drifts: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value in ((item.name, getattr(self, item.name)) for item in fields(self)):
+            rule = _OPTION_RULES.get(name, "a finite number")
+            low = 0.0 if name in _OPTION_RULES else -math.inf
+            if isinstance(value, float) and not (math.isfinite(value) and value >= low):
+                raise UsageError(f"--{name.replace('_', '-')}: expected {rule}, got {value:g}.")
+            if value == 0.0 and rule == _ABOVE_0:
+                raise UsageError(f"--{name.replace('_', '-')}: expected {rule}, got 0.")
 
     def given(self) -> list[str]:
         """Return the names of the options that were given."""
         return [
             "--" + item.name.replace("_", "-")
             for item in fields(self)
-            if getattr(self, item.name) is not None
+            if getattr(self, item.name) is not item.default
         ]
 
 
@@ -80,9 +104,17 @@ def chosen_kind(data: Path, kind: str, run: int | None, drive: str | None, optio
 
 
 def refuse_far_options(
-    kind: str, impacts: ImpactOptions, response: Mapping[str, Any], law: str, cubic: bool
+    kind: str, impacts: ImpactOptions, response: Mapping[str, bool], decay: Mapping[str, bool]
 ) -> None:
     """Refuse options of another kind than the one that is estimated: they would do nothing.
+
+    Parameters
+    ----------
+    kind : str
+        That is estimated.
+    impacts : ImpactOptions
+    response, decay : mapping of str to bool
+        Options of these kinds, and whether each was given.
 
     Raises
     ------
@@ -92,10 +124,9 @@ def refuse_far_options(
     far = []
     if kind != "impacts":
         far += impacts.given()
-    if kind != "response":
-        far += [name for name, value in response.items() if value is not None]
-    if kind != "decay":
-        far += ["--law"] * (law != "all") + ["--cubic"] * cubic
+    for other, options in (("response", response), ("decay", decay)):
+        if kind != other:
+            far += [name for name, given in options.items() if given]
     if far:
         raise UsageError(
             f"--kind {kind}: expected none of the options of other kinds, got {', '.join(far)}. "
@@ -119,11 +150,23 @@ def run_scene(data: Path, run: int | None, recording: Recording) -> dict[str, An
     flat = read_flat(data)
     row = 0 if run is None else flat.run_index.values.tolist().index(run)
     for key in scene.get("sweep", {}):
-        table, _, name = str(key).partition(".")
-        coordinate = next((c for c in (name, str(key).replace(".", "_")) if c in flat.coords), None)
-        if coordinate is not None and isinstance(scene.get(table, {}), dict):
-            scene.setdefault(table, {})[name] = float(flat[coordinate].values[row])
+        owner, _, name = str(key).rpartition(".")
+        coordinate = next((c for c in (name, file_name_of(str(key))) if c in flat.coords), None)
+        table = _table_of(scene, owner)
+        if coordinate is not None and table is not None:
+            table[name] = float(flat[coordinate].values[row])
     return scene
+
+
+def _table_of(scene: dict[str, Any], owner: str) -> dict[str, Any] | None:
+    """Return the table of a swept key, `body` or `stop[1]`; None where the scene has none such."""
+    numbered = _NUMBERED.fullmatch(owner)
+    if numbered is None:
+        table = scene.setdefault(owner, {})
+    else:
+        tables, place = scene.get(numbered[1], []), int(numbered[2]) - 1
+        table = tables[place] if isinstance(tables, list) and 0 <= place < len(tables) else None
+    return table if isinstance(table, dict) else None
 
 
 def forcing_and_known(
@@ -145,6 +188,7 @@ def forcing_and_known(
         _angular_frequency(scene, options),
         _static_deflection(scene, options, natural),
         options.phase if options.phase is not None else _scene_phase(scene),
+        options.clock_drifts,
     )
     stops = scene.get("stop", [])
     stop = stops[0] if isinstance(stops, list) and len(stops) == 1 else {}
@@ -184,7 +228,11 @@ def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> floa
 
 
 def _scene_phase(scene: Mapping[str, Any]) -> float | None:
-    return float(scene["forcing"].get("phase", 0.0)) if "forcing" in scene else None
+    if "forcing" not in scene:
+        return None
+    # relative to a base that accelerates forward, the body is pushed backward
+    turned = math.pi if scene["forcing"].get("kind") == "base_acceleration" else 0.0
+    return float(scene["forcing"].get("phase", 0.0)) + turned
 
 
 def _static_deflection(
@@ -199,9 +247,12 @@ def _static_deflection(
                 "Give them, or --static-deflection."
             )
         return options.amplitude / (options.mass * natural**2)
-    force, stiffness = scene.get("forcing", {}).get("amplitude"), scene.get("body", {}).get("stiffness")
-    known = isinstance(force, int | float) and isinstance(stiffness, int | float) and stiffness > 0
-    return float(force) / float(stiffness) if known else None
+    forcing, body = scene.get("forcing", {}), scene.get("body", {})
+    per_amplitude = {"force": 1.0, "base_acceleration": body.get("mass")}.get(forcing.get("kind", "force"))
+    numbers = (forcing.get("amplitude"), per_amplitude, body.get("stiffness"))
+    if not all(isinstance(number, int | float) for number in numbers) or not body["stiffness"] > 0:
+        return None
+    return float(forcing["amplitude"] * per_amplitude / body["stiffness"])
 
 
 def cut(channel: Channel, start: float | None, stop: float | None) -> Channel:
@@ -216,25 +267,10 @@ def cut(channel: Channel, start: float | None, stop: float | None) -> Channel:
         return channel
     low = -math.inf if start is None else start
     high = math.inf if stop is None else stop
-    chosen = (channel.time >= low) & (channel.time <= high)
-    if not np.any(chosen):
+    part = channel.between(low, high)
+    if not len(part.time):
         raise UsageError(
             f"{channel.name}: expected samples from {low:g} to {high:g} s, got none; the channel runs from "
             f"{channel.time[0]:g} to {channel.time[-1]:g} s. Widen --from and --to."
         )
-    axis = type(channel.axis)(
-        channel.time[chosen],
-        channel.axis.interval,
-        channel.axis.interval_uncertainty,
-        channel.axis.source,
-        channel.axis.trigger,
-    )
-    return type(channel)(
-        channel.name,
-        channel.values[chosen],
-        channel.unit,
-        axis,
-        channel.quality[chosen],
-        channel.label,
-        channel.attrs,
-    )
+    return part

@@ -1,9 +1,10 @@
-"""Looks at the files that a command is to write before it reads and computes, so that nothing is done in vain."""
+"""The files that a command is to write: looked at before it reads and computes, and named where writing fails."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
@@ -53,6 +54,28 @@ def refuse_outputs(read: Iterable[Path], output: Path | None, figure: Path | Non
     if figure is not None and figure.suffix.lower() not in FIGURE_ENDINGS:
         endings = ", ".join(FIGURE_ENDINGS)
         raise UsageError(f"--figure: expected a name ending in {endings}, got {figure.name[:60]!r}.")
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn what keeps a file from being written, such as a full disk, into an error with its name.
+
+    Raises
+    ------
+    UsageError
+        Of an OSError within.
+
+    Examples
+    --------
+    >>> with writing(Path("a.nc")):
+    ...     raise OSError(28, "No space left on device")
+    Traceback (most recent call last):
+    vibroimpact.fmus.errors.UsageError: a.nc: could not be written: No space left on device.
+    """
+    try:
+        yield
+    except OSError as problem:
+        raise UsageError(f"{path}: could not be written: {problem.strerror or problem}.") from problem
 
 
 def _same(one: Path, other: Path) -> bool:

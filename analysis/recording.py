@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntFlag
 from typing import Any, TypeVar
 
@@ -114,6 +114,12 @@ class Channel:
             (self.quality & ~np.uint8(Quality.suspect)) == 0
         )
         return chosen
+
+    def between(self, start: float, stop: float) -> Channel:
+        """Return the samples from start to stop (s), both included; the clock stays as it is."""
+        rows = (self.time >= start) & (self.time <= stop)
+        axis = replace(self.axis, time=self.time[rows])
+        return replace(self, values=self.values[rows], quality=self.quality[rows], axis=axis)
 
     def si(self) -> Floats:
         """Return the values in the SI unit of their kind (`g` becomes m/s^2)."""

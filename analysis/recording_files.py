@@ -300,6 +300,10 @@ def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Record
         No such file, no such run, or a run without time series and impacts.
     """
     if is_recording(path):
+        if run is not None:
+            raise DatasetError(
+                f"{os.fspath(path)}: --run: expected none of a recording, got {run}. Leave it out."
+            )
         return open_recording(path)
     try:
         flat = read_flat(path)

@@ -39,9 +39,11 @@ def replay(
 
     Example: vibroimpact fmu replay a0.nc --channel base --si -o a0.fmu
     """
+    from vibroimpact.analysis.outputs import refuse_outputs
     from vibroimpact.analysis.recording_files import open_signals
     from vibroimpact.fmus.replay_fmu import build_replay
 
+    refuse_outputs([recording], output)
     source = open_signals(recording, run)
     chosen = _chosen(source, channel or ())
     build_replay({item.name: replay_signal(item, si=si) for item in chosen}, output)

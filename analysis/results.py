@@ -52,9 +52,8 @@ def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: st
     ]
     if problems:
         raise DatasetError("\n".join(problems))
-    described = dataset.assign_attrs(
-        Conventions=CONVENTIONS, results_schema=RESULTS_SCHEMA, results_kind=kind, **dataset.attrs
-    )
+    identity = {"Conventions": CONVENTIONS, "results_schema": RESULTS_SCHEMA, "results_kind": kind}
+    described = dataset.assign_attrs(dataset.attrs | identity)
     encoding: dict[Any, dict[str, Any]] = {
         name: {"_FillValue": np.nan if name not in dataset.coords else None}
         for name, variable in dataset.variables.items()

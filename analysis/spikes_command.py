@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vibroimpact.analysis.outputs import refuse_outputs
+from vibroimpact.analysis.outputs import refuse_outputs, writing
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
 if TYPE_CHECKING:
@@ -117,10 +117,12 @@ def spikes(
         raise EstimationError(f"{data}: {problem}") from problem
     dataset = dataset.assign_attrs(source=data.name)
     if output is not None:
-        write_results(dataset, output, kind="spikes")
+        with writing(output):
+            write_results(dataset, output, kind="spikes")
         console.print(f"Dataset written to {output}.", highlight=False)
     if figure is not None:
-        _draw(report, dataset, figure)
+        with writing(figure):
+            _draw(report, dataset, figure)
         console.print(f"Figure written to {figure}.", highlight=False)
 
 

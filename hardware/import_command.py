@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from vibroimpact.analysis.outputs import refuse_outputs
+from vibroimpact.analysis.outputs import refuse_outputs, writing
 from vibroimpact.fmus.errors import UsageError
 
 if TYPE_CHECKING:
@@ -122,10 +122,8 @@ def _write(recording: Recording, output: Path, figure: Path | None) -> None:
     if figure is not None:
         targets[figure] = lambda: _draw(recording, figure)
     for target, write in targets.items():
-        try:
+        with writing(target):
             write()
-        except OSError as problem:
-            raise UsageError(f"{target}: could not be written: {problem.strerror or problem}.") from problem
 
 
 def _draw(recording: Recording, path: Path) -> None:

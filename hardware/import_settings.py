@@ -136,10 +136,6 @@ class ImportSettings(BaseModel):
             raise ValueError("order")
         return masked
 
-    def updated(self, other: ImportSettings) -> ImportSettings:
-        """Return these settings with what the other ones say in their place."""
-        return self.model_copy(update={key: getattr(other, key) for key in other.model_fields_set})
-
 
 def checked(values: Mapping[str, Any], source: str) -> ImportSettings:
     """Return settings, or one error with all that is wrong with them.

@@ -159,7 +159,7 @@ def _by_instants(instants: Floats, column: Column, declared: Sequence[float], le
         raise DatasetError(
             f"{column.label}: expected an instant for each of {length} rows, got {len(instants)}, unevenly spaced."
         )
-    return _uneven(instants, column)
+    return _uneven(instants)
 
 
 def _has_few_holes(instants: Floats) -> bool:
@@ -251,7 +251,7 @@ def _told_line(line: _Line, instants: Floats, length: int) -> list[str]:
     return told
 
 
-def _uneven(instants: Floats, column: Column) -> Placement:
+def _uneven(instants: Floats) -> Placement:
     """Place rows by instants that are not even: gaps, jitter, repetitions, disorder."""
     row, suspect, remarks = _in_order(instants)
     time = instants[row]

@@ -296,7 +296,8 @@ def opened_replays(scene: Scene, paths: Sequence[Path], execution: str = "auto")
 
 def named(problem: DatasetError, path: Path) -> DatasetError:
     """Return a problem of a recording with the name of its file in front."""
-    return problem if str(problem).startswith(str(path)) else DatasetError(f"{path}: {problem}")
+    # always a new one: an error that is its own cause sends whoever walks along the causes round in circles
+    return DatasetError(str(problem) if str(problem).startswith(str(path)) else f"{path}: {problem}")
 
 
 def _cut(times: Floats, start: float | None, stop: float | None) -> Floats:

@@ -71,6 +71,10 @@ def replay(
         raise UsageError(
             "--output: expected a dataset (.nc) or the folder of a campaign, got nothing. Add -o."
         )
+    if output.name.lower().endswith(".nc") and output.suffix != ".nc":
+        raise UsageError(
+            f"{output}: expected a dataset NAME.nc or the folder of a campaign, got neither. Choose another name."
+        )
     if output.suffix != ".nc":
         _refuse_with_campaign(fit, score, figure, execution)
         _campaign(with_recordings(loaded, recordings or []), output, workers, scheduler)

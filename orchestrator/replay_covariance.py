@@ -22,6 +22,9 @@ from vibroimpact.fmus.errors import EstimationError
 
 Floats = NDArray[np.float64]
 
+#: Samples from which noise is learned.
+FEWEST_QUIET = 100
+
 
 @dataclass(frozen=True, slots=True)
 class LagSlopes:
@@ -70,7 +73,7 @@ def covariance_of(
         Of the residual of each channel by each number.
     lags : sequence of LagSlopes or None
     residuals : sequence of ndarray, shape (sample,)
-        Correlated in time (Newey and West, lags up to the root of the number of samples).
+        Correlated in time.
     disturbances : sequence of sequences of ndarray, shape (sample,)
         Draws of what noise of the drives does to the residuals of all channels: its response rings for longer than
         any estimate from one record's residual can see.
@@ -84,28 +87,46 @@ def covariance_of(
         derivatives.append(np.hstack([slope, by_lags[0]]))
         weights.append(np.hstack([slope, by_lags[1]]))
     bread = sum(w.T @ d for w, d in zip(weights, derivatives, strict=True))
-    meat = sum(_meat(weight, residual) for weight, residual in zip(weights, residuals, strict=True))
+    inverse = np.linalg.inv(bread)
+    drives = np.zeros_like(bread)
     for drawn in disturbances:
         score = sum(weight.T @ one for weight, one in zip(weights, drawn, strict=True))
-        meat = meat + np.outer(score, score) / len(disturbances)
-    inverse = np.linalg.inv(bread)
-    covariance: Floats = (inverse @ meat @ inverse.T)[:keys, :keys]
+        drives += np.outer(score, score) / len(disturbances)
+    meats = [_meats(weight, residual) for weight, residual in zip(weights, residuals, strict=True)]
+    changing, steady = (
+        (inverse @ (sum(kind) + drives) @ inverse.T)[:keys, :keys] for kind in zip(*meats, strict=True)
+    )
+    larger = np.sqrt(np.maximum(1.0, np.diag(steady) / np.maximum(np.diag(changing), np.finfo(float).tiny)))
+    covariance: Floats = changing * np.outer(larger, larger)
     return covariance
 
 
-def _meat(weight: Floats, residual: Floats) -> Floats:
-    """Return the covariance of sum weight * residual, correlations fading out over a lag of n^(1/2) samples."""
+def _meats(weight: Floats, residual: Floats) -> tuple[Floats, Floats]:
+    """Return the covariance of sum weight * residual twice, correlations fading out over n^(1/2) samples.
+
+    First with a residual that may change (Newey and West): it sees a model that is wrong during the event. It is too
+    small where few samples have all the weight, for there their sum is 0 by the fit itself. So also with a residual of
+    one autocovariance all over the record.
+    """
     scores = weight * residual[:, None]
-    reach = max(1, int(np.sqrt(len(scores))))
-    total: Floats = scores.T @ scores
+    count = len(scores)
+    reach = min(count - 1, max(1, int(np.sqrt(count))))
+    changing: Floats = scores.T @ scores
+    steady: Floats = (weight.T @ weight) * float(residual @ residual) / count
     for lag in range(1, reach + 1):
+        fading = 1.0 - lag / (reach + 1.0)
         part = scores[lag:].T @ scores[:-lag]
-        total = total + (1.0 - lag / (reach + 1.0)) * (part + part.T)
-    return total
+        changing = changing + fading * (part + part.T)
+        part = (weight[lag:].T @ weight[:-lag]) * float(residual[lag:] @ residual[:-lag]) / count
+        steady = steady + fading * (part + part.T)
+    return changing, steady
 
 
 def quiet_noise(channel: Channel) -> Floats | None:
-    """Return what a channel shows before its event, in its SI unit, without its mean; None where it never rests."""
+    """Return what a channel shows before its event, in its SI unit, without drift.
+
+    None where it does not rest for `FEWEST_QUIET` samples: a record may begin with the foot of its pulse.
+    """
     if channel.attrs.get("role") == "simulated":
         return None
     try:
@@ -115,7 +136,12 @@ def quiet_noise(channel: Channel) -> Floats | None:
     if quiet is None:
         return None
     rows = (channel.time >= quiet[0]) & (channel.time <= quiet[1]) & channel.good
-    noise: Floats = channel.si()[rows] - np.mean(channel.si()[rows])
+    values = channel.si()[rows]
+    if len(values) < FEWEST_QUIET:
+        return None
+    # a drift is none of the noise
+    place = np.linspace(-1.0, 1.0, len(values))
+    noise: Floats = values - np.polyval(np.polyfit(place, values, 1), place)
     return noise if np.any(noise) else None
 
 

@@ -169,7 +169,7 @@ class _Fit:
         covariance = self.covariance(values, comparisons)
         errors = np.sqrt(np.diag(covariance))
         correlation = covariance / np.outer(errors, errors)
-        remarks += self._remarks(values, errors, correlation)
+        remarks += self._remarks(values, correlation)
         return ReplayFit(
             self.keys, self.start, values, errors, correlation, comparisons, alignments, self.simulations,
             tuple(remarks),
@@ -268,8 +268,8 @@ class _Fit:
                 found.append(lag_slopes(comparison, Interpolated(motion.time, reading), size))
         return found
 
-    def refuse_alike(self, slopes: Sequence[Floats]) -> Floats:
-        """Return the normal matrix of the slopes; refuse numbers that the recordings do not tell apart."""
+    def refuse_alike(self, slopes: Sequence[Floats]) -> None:
+        """Refuse numbers that the recordings do not tell apart, by the normal matrix of their slopes."""
         bread: Floats = sum((slope.T @ slope for slope in slopes), np.zeros((len(self.keys), len(self.keys))))
         size = np.sqrt(np.diag(bread))
         moved = size * self.scale / np.sqrt(sum(len(slope) for slope in slopes))
@@ -286,23 +286,24 @@ class _Fit:
                 f"fit: expected numbers that the recordings tell apart, got {alike}, which change the motion alike. "
                 "Fit fewer of them."
             )
-        return bread
 
     def _slopes(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> list[Floats]:
         """Return the derivative of each residual by each number, shape (sample, key) for each channel."""
         columns = []
         for place in range(len(values)):
-            step = np.zeros(len(values))
-            step[place] = 10.0 * DERIVATIVE_STEP * self.scale[place]
-            step[place] = min(step[place], *(0.5 * gap for gap in self._room(values, place) if gap > 0.0))
-            ahead, behind = (self.residuals(values + sign * step, comparisons) for sign in (1.0, -1.0))
-            columns.append([(a - b) / (2.0 * step[place]) for a, b in zip(ahead, behind, strict=True)])
+            step = 10.0 * DERIVATIVE_STEP * self.scale[place]
+            # beside a bound the difference is one-sided: beyond it the body refuses its parameters
+            below, above = (min(step, room) for room in self._room(values, place))
+            along = np.eye(len(values))[place]
+            ahead = self.residuals(values + above * along, comparisons)
+            behind = self.residuals(values - below * along, comparisons)
+            columns.append([(a - b) / (above + below) for a, b in zip(ahead, behind, strict=True)])
         return [np.column_stack(channel) for channel in zip(*columns, strict=True)]
 
     def _room(self, values: Floats, place: int) -> tuple[float, float]:
         return float(values[place] - self.lower[place]), float(self.upper[place] - values[place])
 
-    def _remarks(self, values: Floats, errors: Floats, correlation: Floats) -> list[str]:
+    def _remarks(self, values: Floats, correlation: Floats) -> list[str]:
         remarks = []
         for place, key in enumerate(self.keys):
             if min(self._room(values, place)) <= 1e-6 * self.scale[place]:

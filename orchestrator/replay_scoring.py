@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Literal
 
-from vibroimpact.analysis.recording import Channel, TimeAxis
+from vibroimpact.analysis.recording import Floats
 from vibroimpact.analysis.replay.baseline import naive_variance
 from vibroimpact.analysis.replay.comparison import Comparison, compare
 from vibroimpact.analysis.replay.event import find_event
@@ -35,7 +34,9 @@ def compare_motion(replayer: Replayer, motion: Motion) -> list[Comparison]:
 
 def _compared(replayer: Replayer, reading: Reading, motion: Motion, place: int) -> Comparison:
     replay = replayer.replay
-    channel = _within(reading.channel, replayer) if replayer.drive is None else reading.channel
+    channel = reading.channel
+    if replayer.drive is None:
+        channel = channel.between(float(replayer.time[0]), float(replayer.time[-1]))
     lag, polarity = _clock(replayer, reading)
     trains = replayer.recording.events
     impacts = trains["impacts"].times if "impacts" in trains else None
@@ -79,11 +80,15 @@ def _most_lag(replayer: Replayer, reading: Reading) -> float:
     given = replayer.replay.most_lag
     if replayer.drive is None:
         return given or 0.0
-    clocks = replayer.drive.time, reading.channel.time
+    driven, measured = (_span(times) for times in (replayer.drive.time, reading.channel.time))
     if given is None:
-        return MOST_LAG_SHARE * min(float(times[-1] - times[0]) for times in clocks)
+        return MOST_LAG_SHARE * min(driven[1] - driven[0], measured[1] - measured[0])
     # beyond this the records do not overlap: nothing could be found there
-    return min(given, max(abs(clocks[0][-1] - clocks[1][0]), abs(clocks[1][-1] - clocks[0][0])))
+    return min(given, max(abs(driven[1] - measured[0]), abs(measured[1] - driven[0])))
+
+
+def _span(times: Floats) -> tuple[float, float]:
+    return float(times[0]), float(times[-1])
 
 
 def _offset(replayer: Replayer, reading: Reading) -> Literal["before", "none"] | float:
@@ -101,19 +106,6 @@ def _offset(replayer: Replayer, reading: Reading) -> Literal["before", "none"] |
     if find_event(channel).quiet is not None or reading.variable != "acceleration":
         return "before"
     return quiet_level(channel.si()[channel.good])
-
-
-def _within(channel: Channel, replayer: Replayer) -> Channel:
-    """Return the part of a channel that the scene's span holds."""
-    rows = (channel.time >= replayer.time[0]) & (channel.time <= replayer.time[-1])
-    axis = TimeAxis(
-        channel.time[rows],
-        channel.axis.interval,
-        channel.axis.interval_uncertainty,
-        channel.axis.source,
-        channel.axis.trigger,
-    )
-    return replace(channel, values=channel.values[rows], quality=channel.quality[rows], axis=axis)
 
 
 def score_without_dynamics(replayer: Replayer, reading: Reading, comparison: Comparison) -> float:

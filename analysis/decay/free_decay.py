@@ -17,7 +17,7 @@ from vibroimpact.analysis.decay.law_choice import LawChoice, choose_law
 from vibroimpact.analysis.decay.law_fit import CUBIC, LawFit
 from vibroimpact.analysis.decay.laws import ALL_LAWS, COULOMB, QUADRATIC, VISCOUS, DampingLaw, spoken
 from vibroimpact.analysis.decay.samples import DecaySamples
-from vibroimpact.analysis.decay.tables import estimate_table
+from vibroimpact.analysis.decay.tables import table_of
 from vibroimpact.fmus.errors import EstimationError
 
 T = TypeVar("T")
@@ -91,7 +91,7 @@ class FreeDecay:
 
     def dataset(self) -> xr.Dataset:
         """Return estimates (method, quantity), the motion, laws, peaks and windows, each where there is one."""
-        parts = [estimate_table(self.estimates()), _motion(self)]
+        parts = [table_of(self.estimates()), _motion(self)]
         if self.decrement is not None:
             parts.append(_peaks(self.decrement, self.samples.unit))
         if self.choice is not None:

@@ -10,7 +10,7 @@ import xarray as xr
 from vibroimpact.analysis.decay.estimate import Estimate
 from vibroimpact.analysis.decay.frequency_response import FrequencyResponse
 from vibroimpact.analysis.decay.resonance import Resonance
-from vibroimpact.analysis.decay.tables import estimate_table
+from vibroimpact.analysis.decay.tables import table_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ class ResponseEstimates:
             return {"units": unit, "long_name": words}
 
         parts = [
-            estimate_table(self.estimates()),
+            table_of(self.estimates()),
             xr.Dataset(
                 {
                     "response": ("line", fit.magnitude, described("magnitude of the response", self.unit)),

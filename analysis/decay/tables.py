@@ -10,6 +10,7 @@ import xarray as xr
 
 from vibroimpact.analysis.decay.estimate import CONFIDENCE, Estimate
 from vibroimpact.analysis.decay.laws import spoken
+from vibroimpact.analysis.estimate_table import estimate_table
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -29,34 +30,17 @@ METHOD_WORDS = {
 }
 
 
-def estimate_table(estimates: Mapping[str, Mapping[str, Estimate]]) -> xr.Dataset:
-    """Return estimates on the dimensions method and quantity.
-
-    Units differ by quantity, so the variables carry `1` and the coordinate `unit` says each quantity's own.
-    """
-    methods = list(estimates)
-    quantities = list(dict.fromkeys(name for found in estimates.values() for name in found))
-    units = [next(found[name].unit for found in estimates.values() if name in found) for name in quantities]
-    nothing = Estimate(float("nan"), float("nan"))
-    cells = [[estimates[method].get(name, nothing) for name in quantities] for method in methods]
-    values = np.array([[(cell.value, cell.standard_error, *cell.interval) for cell in row] for row in cells])
-    words = (
-        "estimate, in the unit of its quantity",
-        "standard error of the estimate",
-        f"lower end of the {CONFIDENCE:.0%} interval",
-        f"upper end of the {CONFIDENCE:.0%} interval",
-    )
-    names = ("estimate", "standard_error", "interval_low", "interval_high")
-    data = {
-        name: (("method", "quantity"), values[:, :, place], {"units": "1", "long_name": words[place]})
-        for place, name in enumerate(names)
+def table_of(estimates: Mapping[str, Mapping[str, Estimate]]) -> xr.Dataset:
+    """Return estimates by method, then quantity, on these dimensions; see `estimate_table`."""
+    units: dict[str, str] = {}
+    for found in estimates.values():
+        for name, item in found.items():
+            units.setdefault(name, item.unit)
+    cells = {
+        method: {name: (item.value, item.standard_error, *item.interval) for name, item in found.items()}
+        for method, found in estimates.items()
     }
-    coords = {
-        "method": ("method", methods, {"units": "1", "long_name": "method of estimation"}),
-        "quantity": ("quantity", quantities, {"units": "1", "long_name": "estimated quantity"}),
-        "unit": ("quantity", units, {"units": "1", "long_name": "unit of the quantity"}),
-    }
-    return xr.Dataset(data, coords)
+    return estimate_table(cells, units, CONFIDENCE)
 
 
 def shown(value: float, error: float) -> tuple[str, str]:
@@ -85,7 +69,8 @@ def _table(title: str, columns: Mapping[str, str]) -> Table:
 
     table = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
     for name, justify in columns.items():
-        table.add_column(name, justify=justify, no_wrap=name not in ("coefficients",))  # type: ignore[arg-type]
+        # rich wants literals, which values of a dict are not
+        table.add_column(name, justify=justify, no_wrap=name != "coefficients")  # type: ignore[arg-type]
     return table
 
 
@@ -157,7 +142,7 @@ def _print_laws(console: Console, decay: FreeDecay) -> None:
         verdict = "noise" if fit.test.adequate else "not noise"
         table.add_row(
             spoken(fit.law),
-            f"+{fit.aic - lowest:.1f}" if fit is not choice.best else f"{lowest:.1f}",
+            f"{fit.aic - lowest:+.1f}" if fit is not choice.best else f"{lowest:.1f}",
             f"{fit.effective_aic(choice.effective_samples) - lowest_effective:+.1f}",
             f"{weight:.3f}",
             f"{fit.test.rms:.4g}",

@@ -63,6 +63,8 @@ def first_guess(samples: DecaySamples) -> FirstGuess:
     decay_rate = 0.0
     for _ in range(3):
         envelope = windowed_cosines(samples, omega, decay_rate)
+        if len(envelope.time) < 2:
+            break  # one window has no slope
         weights = envelope.amplitude
         slope = np.polyfit(envelope.time, envelope.phase, 1, w=weights)[0]
         omega = float(slope) if 0.5 * omega < slope < 2.0 * omega else omega

@@ -2,7 +2,20 @@
 
 A displacement that hits a stop is cut at its impacts, found from the signal alone; then energy balance, weak form and
 a fit of whole trajectories each say what restitution, damping, natural frequency and forcing are, side by side with
-95 % intervals. docs/estimation.md says how to read them.
+95 % intervals. docs/estimation.md says how to read them. For bodies of several modes: `estimate_modes`.
+
+Examples
+--------
+>>> import numpy as np
+>>> from vibroimpact.analysis.recording import Channel, TimeAxis
+>>> from vibroimpact.fmus.core import Oscillator, motion
+>>> body = Oscillator(damping=1.0, stiffness=400.0, amplitude=600.0, angular_frequency=35.0)
+>>> time = np.arange(0.0, 3.0, 0.002)
+>>> displacement, _ = motion(body, (-1.0, 0.0), time, position=0.4, restitution=0.8)
+>>> tip = Channel("tip", displacement, "m", TimeAxis(time, 0.002), np.zeros(len(time), np.uint8))
+>>> found = estimate_impacts(tip, Forcing(35.0, phase=0.0), methods=["weak_form"])
+>>> round(found.values["weak_form"]["restitution"].value, 3)
+0.8
 """
 
 from vibroimpact.analysis.estimation.estimates import (
@@ -13,6 +26,12 @@ from vibroimpact.analysis.estimation.estimates import (
     Refusal,
 )
 from vibroimpact.analysis.estimation.impacts import estimate_impacts
+from vibroimpact.analysis.estimation.modal import (
+    ModalEstimates,
+    estimate_modes,
+    modal_coordinates,
+    restitution_from_energy,
+)
 from vibroimpact.analysis.estimation.physics import Forcing, Known
 from vibroimpact.analysis.estimation.report import print_impacts
 
@@ -23,7 +42,11 @@ __all__ = [
     "Forcing",
     "ImpactEstimates",
     "Known",
+    "ModalEstimates",
     "Refusal",
     "estimate_impacts",
+    "estimate_modes",
+    "modal_coordinates",
     "print_impacts",
+    "restitution_from_energy",
 ]

@@ -29,7 +29,7 @@ _MOST_FAILED = 0.1
 # Of these the noiseless motion has known values.
 _FITTED = ("restitution", "damping_ratio", "static_deflection")
 
-Estimator = Callable[[EnergyBalance, HalfEnergies, Floats, Parameters, Drawn], Mapping[str, Floats]]
+Estimator = Callable[[EnergyBalance, HalfEnergies, Parameters, Drawn], Mapping[str, Floats]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Resampled:
     parameters : Parameters
         What the methods take as known.
     measured, exact, drawn : tuple
-        HalfEnergies, stop positions (draw,), and the values that differ between draws.
+        HalfEnergies, and the values that differ between draws.
     window : float
         Of the smoothing, s.
     """
@@ -51,9 +51,9 @@ class Resampled:
     balance: EnergyBalance
     fine: EnergyBalance
     parameters: Parameters
-    measured: tuple[HalfEnergies, Floats, Drawn]
-    exact: tuple[HalfEnergies, Floats, Drawn]
-    drawn: tuple[HalfEnergies, Floats, Drawn]
+    measured: tuple[HalfEnergies, Drawn]
+    exact: tuple[HalfEnergies, Drawn]
+    drawn: tuple[HalfEnergies, Drawn]
     window: float
 
 
@@ -108,9 +108,9 @@ def resample(
         balance,
         fine,
         parameters,
-        (*balance.energies(signal.values[None], parameters, stop_position), {}),
-        (*fine.energies(motion[None], parameters, stop_position), {}),
-        (*drawn, varied),
+        (balance.energies(signal.values[None], parameters, stop_position), {}),
+        (fine.energies(motion[None], parameters, stop_position), {}),
+        (drawn, varied),
         window,
     )
 
@@ -124,7 +124,7 @@ def with_intervals(
     ----------
     resampled : Resampled
     estimator : callable
-        From balance, energies, stops, parameters and drawn values to values by name, shape (draw,).
+        From balance, energies, parameters and drawn values to values by name, shape (draw,).
     confidence : float
         Of the intervals.
     inflation : float
@@ -136,11 +136,9 @@ def with_intervals(
         As the estimator's, or it fails on more than a tenth of the draws.
     """
     p = resampled.parameters
-    measured = estimator(
-        resampled.balance, resampled.measured[0], resampled.measured[1], p, resampled.measured[2]
-    )
-    exact = estimator(resampled.fine, resampled.exact[0], resampled.exact[1], p, resampled.exact[2])
-    drawn = estimator(resampled.balance, resampled.drawn[0], resampled.drawn[1], p, resampled.drawn[2])
+    measured = estimator(resampled.balance, resampled.measured[0], p, resampled.measured[1])
+    exact = estimator(resampled.fine, resampled.exact[0], p, resampled.exact[1])
+    drawn = estimator(resampled.balance, resampled.drawn[0], p, resampled.drawn[1])
     found = {}
     for name, value in measured.items():
         change = drawn[name] - exact[name][0]
@@ -167,7 +165,7 @@ def known_damping(damping_ratio: float | None) -> Estimator:
     """Return the estimator of restitution with the damping known, and of the energy-loss factor without any."""
 
     def estimate(
-        balance: EnergyBalance, halves: HalfEnergies, stop: Floats, p: Parameters, drawn: Drawn
+        balance: EnergyBalance, halves: HalfEnergies, p: Parameters, drawn: Drawn
     ) -> dict[str, Floats]:
         lossless = dict(drawn) | {"damping_ratio": np.zeros(1)}
         found = {"energy_loss_factor": balance.restitution(halves.energy(p, lossless))}
@@ -184,7 +182,7 @@ def by_speeds(unknown: Sequence[str]) -> Estimator:
     """Return the estimator of restitution together with damping or forcing, from the speeds at the impacts."""
 
     def estimate(
-        balance: EnergyBalance, halves: HalfEnergies, stop: Floats, p: Parameters, drawn: Drawn
+        balance: EnergyBalance, halves: HalfEnergies, p: Parameters, drawn: Drawn
     ) -> dict[str, Floats]:
         values, _ = unknowns_by_speed(halves, p, unknown, drawn)
         found = {name: values[:, k] for k, name in enumerate(unknown)}

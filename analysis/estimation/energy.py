@@ -49,7 +49,7 @@ class HalfMaps:
     edge_value, edge_slope, deepest : ndarray, shape (sample,)
         Spline's value and slope at the impact, and its value at the deepest point.
     waves : ndarray, shape (2, sample)
-        Omega int y sin and -Omega int y cos over the half, so that F is their share of the inside.
+        Omega int y sin and Omega int y cos over the half: what int cos y' and -int sin y' have beside their ends.
     speeds : ndarray, shape (node, sample)
         Slopes, times the root of the weights of their squares: D = sum of squares.
     turning : float
@@ -146,10 +146,8 @@ class EnergyBalance:
             freedom += len(index) - one.gain.shape[0]
         return math.sqrt(squares / max(freedom, 1.0))
 
-    def energies(
-        self, samples: Floats, parameters: Parameters, stop_position: float | None
-    ) -> tuple[HalfEnergies, Floats]:
-        """Return the energies of the halves, ordered after and before an impact for each flight, and the stop.
+    def energies(self, samples: Floats, parameters: Parameters, stop_position: float | None) -> HalfEnergies:
+        """Return the energies of the halves, ordered after and before an impact for each flight.
 
         Parameters
         ----------
@@ -187,14 +185,13 @@ class EnergyBalance:
         # value and slope at an end have their noise in common
         edge_noise = np.array([float(half.edge_value @ half.edge_slope) for half in self.halves]) * variance
         pull = self._acceleration(parameters, stop[:, None], slope, edge)
-        found = HalfEnergies(
+        return HalfEnergies(
             deepest**2 - square_noise - stop[:, None] ** 2,
             bounds_cos + sign * waves[:, :, 0],
             bounds_sin + sign * waves[:, :, 1],
             sign * (drag - drag_noise + sign * (slope * missing + edge_noise)),
             slope**2 - slope_noise + 2.0 * pull * missing,
         )
-        return found, stop + parameters.offset
 
     def _acceleration(self, p: Parameters, y: Floats, v: Floats, angle: Floats) -> Floats:
         square = p.natural_frequency**2

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
 
 import numpy as np
 import xarray as xr
+
+from vibroimpact.analysis.estimate_table import estimate_table
 
 METHODS = (
     "energy_known_damping",
@@ -110,34 +112,14 @@ class ImpactEstimates:
         """
         methods = [name for name in METHODS if name in self.values]
         quantities = [name for name in QUANTITIES if any(name in self.values[method] for method in methods)]
-        nothing = Estimate(np.nan)
-        table = [
-            [self.values[method].get(quantity, nothing) for quantity in quantities] for method in methods
-        ]
-        fields = {
-            "estimate": ("value", "estimate, in the unit of its quantity"),
-            "standard_error": ("standard_error", "standard error of the estimate"),
-            "interval_low": ("low", f"lower end of the {self.confidence:.0%} interval"),
-            "interval_high": ("high", f"upper end of the {self.confidence:.0%} interval"),
+        cells = {
+            method: {name: astuple(one) for name, one in self.values[method].items()} for method in methods
         }
-        data = {
-            name: (
-                ("method", "quantity"),
-                np.array([[getattr(cell, key) for cell in row] for row in table]).reshape(
-                    len(methods), len(quantities)
-                ),
-                {"units": "1", "long_name": words},
-            )
-            for name, (key, words) in fields.items()
-        }
-        label = {"units": "1"}
-        coords = {
-            "method": ("method", methods, {**label, "long_name": "method of estimation"}),
-            "quantity": ("quantity", quantities, {**label, "long_name": "estimated quantity"}),
-            "unit": ("quantity", [self.unit_of(q) for q in quantities], {**label, "long_name": "unit of it"}),
-            "impact_time": ("impact", self.impact_times, {"units": "s", "long_name": "instants of impact"}),
-        }
-        return xr.Dataset(data, coords, self._attributes())
+        table = estimate_table(cells, {name: self.unit_of(name) for name in quantities}, self.confidence)
+        attrs = {"units": "s", "long_name": "instants of impact"}
+        return table.assign_coords(impact_time=("impact", self.impact_times, attrs)).assign_attrs(
+            self._attributes()
+        )
 
     def _attributes(self) -> dict[str, str | float]:
         """Return what belongs to the whole table."""

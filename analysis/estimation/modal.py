@@ -30,6 +30,8 @@ from vibroimpact.analysis.estimation.weak_form import (
 from vibroimpact.fmus.errors import EstimationError
 
 _WORST_PROJECTION = 1e6
+# Energies that contradict each other by fewer standard errors than this do so by noise: a nearly elastic stop.
+_BEYOND_NOISE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +152,8 @@ def estimate_modes(
     Raises
     ------
     EstimationError
-        No impacts, flights that a mode does not follow, or energies that contradict themselves.
+        No impacts, flights that a mode does not follow, or energies that contradict themselves by more than noise
+        can: within it a nearly elastic stop may show a restitution above 1.
     """
     contact = contact_shape @ coordinates
     good = np.isfinite(contact)
@@ -165,6 +168,8 @@ def estimate_modes(
         for draw in _draws(coordinates, fitted, noise, draws, seed)
     ]
     errors = np.std(drawn, axis=0, ddof=1)
+    if not found[-1] - _BEYOND_NOISE * errors[-1] <= 1.0:
+        restitution_from_energy(*_energies(fitted, contact_shape, flights))  # which refuses
     reach = errors * float(student.ppf(0.5 + confidence / 2.0, draws - 1))
     rows = np.column_stack([found, errors, found - reach, found + reach]).tolist()
     estimates = [Estimate(*row) for row in rows]
@@ -260,17 +265,32 @@ def _numbers(
     flights: Sequence[Flight],
 ) -> Floats:
     """Return damping ratios, natural frequencies, forces, and restitution from speeds and from energies."""
-    pairs = pairs_of(flights)
-    before = np.array([[mode[one].end_state[1] for mode in fitted] for one, _ in pairs])
-    after = np.array([[mode[other].state[1] for mode in fitted] for _, other in pairs])
+    before, after = _speeds(fitted, flights)
     speed, rebound = before @ contact_shape, after @ contact_shape
     by_speed = -float(rebound @ speed) / float(speed @ speed)
-    residual = 0.5 * float(np.sum(before**2) - np.sum(after**2))
-    kinetic = 0.5 * float(speed @ speed) / float(contact_shape @ contact_shape)
-    by_energy = restitution_from_energy(residual, kinetic)
+    residual, kinetic = _energies(fitted, contact_shape, flights)
+    by_energy = math.sqrt(1.0 - residual / kinetic) if residual <= kinetic else math.nan
     return np.array(
         [mode.damping_ratio for mode in modes]
         + [mode.natural_frequency for mode in modes]
         + [mode.natural_frequency**2 * mode.static_deflection for mode in modes]
         + [by_speed, by_energy]
     )
+
+
+def _speeds(fitted: Sequence[Sequence[FittedFlight]], flights: Sequence[Flight]) -> tuple[Floats, Floats]:
+    """Return the modal velocities before and after each impact, shape (impact, mode)."""
+    pairs = pairs_of(flights)
+    before = np.array([[mode[one].end_state[1] for mode in fitted] for one, _ in pairs])
+    after = np.array([[mode[other].state[1] for mode in fitted] for _, other in pairs])
+    return before, after
+
+
+def _energies(
+    fitted: Sequence[Sequence[FittedFlight]], contact_shape: Floats, flights: Sequence[Flight]
+) -> tuple[float, float]:
+    """Return the residual energy of all impacts and the kinetic energy of the contact mass before them, J."""
+    before, after = _speeds(fitted, flights)
+    speed = before @ contact_shape
+    residual = 0.5 * float(np.sum(before**2) - np.sum(after**2))
+    return residual, 0.5 * float(speed @ speed) / float(contact_shape @ contact_shape)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.robust import robust_sigma
 from vibroimpact.fmus.errors import EstimationError
 
 Floats = NDArray[np.float64]
@@ -14,8 +15,6 @@ Mask = NDArray[np.bool_]
 
 # Differences of these orders are tried: with each, a smooth signal falls by its radians per sample, noise does not.
 _ORDERS = range(2, 9)
-# Median of |x| for normal x of unit variance.
-_MEDIAN_OF_MODULUS = 0.6744897501960817
 # Noise below this part of the peak is rounding.
 _ROUNDING = 1e-13
 _FEWEST_SAMPLES = 20
@@ -42,8 +41,7 @@ def noise_level(values: Floats, good: Mask) -> float:
         whole = np.lib.stride_tricks.sliding_window_view(good, order + 1).all(axis=1)
         differences = np.diff(values, order)[whole]
         if len(differences) >= _FEWEST_SAMPLES:
-            gain = math.sqrt(math.comb(2 * order, order)) * _MEDIAN_OF_MODULUS
-            found.append(float(np.median(np.abs(differences))) / gain)
+            found.append(robust_sigma(differences) / math.sqrt(math.comb(2 * order, order)))
     if not found:
         raise EstimationError(
             f"noise: expected at least {_FEWEST_SAMPLES} good samples in a row, got fewer. "

@@ -73,7 +73,7 @@ def remarks_of(
 
 def _of_flights(record: Prepared, forcing: Forcing) -> Iterator[str]:
     """Yield what the flights and their rests show."""
-    clocks = " If the clocks of force and recording may differ, say so (clock_drifts)."
+    clocks = " If the clocks of force and recording may differ, say so (clock_drifts, --clock-drifts)."
     clocks = "" if forcing.clock_drifts else clocks
     if record.fit.reading.periodic:
         yield "No impact has a usable flight on both sides: P(1,1) was assumed."

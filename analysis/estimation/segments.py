@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.estimation.noise import Floats, Mask, noise_level, one_sided_window
+from vibroimpact.analysis.robust import robust_sigma
 from vibroimpact.fmus.errors import EstimationError
 
 # A jump of the velocity counts from this many standard errors on ...
@@ -30,7 +31,6 @@ _LEVEL_BEYOND = 8.0
 _LEVEL_OF_SIZE = 0.02
 # Samples within so many standard errors of an impact's instant are in no flight.
 _DOUBTFUL = 2.5
-_NORMAL_MAD = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
@@ -327,7 +327,7 @@ def _consistent(impacts: list[Impact], noise: float, count: int, size: float) ->
         return impacts
     levels = np.array([impact.level for impact in impacts])
     middle = float(np.median(levels))
-    scatter = _NORMAL_MAD * float(np.median(np.abs(levels - middle)))
+    scatter = robust_sigma(levels - middle)
     limit = max(_LEVEL_BEYOND * max(scatter, 4.0 * noise / math.sqrt(count)), _LEVEL_OF_SIZE * size)
     return [impact for impact in impacts if abs(impact.level - middle) <= limit]
 

@@ -14,7 +14,7 @@ from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence
 from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
-from vibroimpact.analysis.figures.page import COLUMN_WIDTH, FORMATS, label, page_style, save
+from vibroimpact.analysis.figures.page import COLUMN_WIDTH, label, page_style, save
 from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait
 from vibroimpact.analysis.figures.recordings import draw_recording
 from vibroimpact.analysis.figures.replay import draw_replay
@@ -31,7 +31,7 @@ from vibroimpact.fmus.errors import DatasetError
 
 __all__ = [
     "COLUMN_WIDTH",
-    "FORMATS",
+    "Figure",
     "Kind",
     "convergence",
     "draw",

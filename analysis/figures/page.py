@@ -16,13 +16,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.atomic import write_atomically
+from vibroimpact.analysis.outputs import FIGURE_ENDINGS
 from vibroimpact.fmus.errors import UsageError
 
 Floats = npt.NDArray[np.float64]
 
 _MM = 1 / 25.4
 COLUMN_WIDTH = 85 * _MM
-FORMATS = (".png", ".pdf", ".svg")
 _DPI = 300
 _STYLE: dict[str, Any] = {
     "font.size": 8,
@@ -69,9 +69,9 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
         If the file cannot be written.
     """
     ending = Path(path).suffix.lower()
-    if ending not in FORMATS:
+    if ending not in FIGURE_ENDINGS:
         raise UsageError(
-            f"{os.fspath(path)}: expected a name ending in {', '.join(FORMATS)}, got {ending or 'none'!r}."
+            f"{os.fspath(path)}: expected a name ending in {', '.join(FIGURE_ENDINGS)}, got {ending or 'none'!r}."
         )
     content = io.BytesIO()
     with page_style():

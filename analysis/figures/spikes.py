@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -112,7 +114,7 @@ def _draw_close_up(axis: Axes, report: SpikeReport) -> None:
     _legend(axis)
 
 
-def _line(axis: Axes, time: np.ndarray, values: np.ndarray, **style: object) -> None:
+def _line(axis: Axes, time: np.ndarray, values: np.ndarray, **style: Any) -> None:
     """Draw a line; a long one by the extremes of equal parts, which look the same."""
     if len(time) > _MOST_POINTS:
         length = -(-len(time) // (_MOST_POINTS // 4))
@@ -120,7 +122,7 @@ def _line(axis: Axes, time: np.ndarray, values: np.ndarray, **style: object) -> 
         lowest, highest = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
         values = np.stack([lowest, highest], axis=1).ravel()
         time = np.repeat(time[starts], 2)
-    axis.plot(time, values, rasterized=True, **style)  # type: ignore[arg-type]
+    axis.plot(time, values, rasterized=True, **style)
 
 
 def _legend(axis: Axes) -> None:

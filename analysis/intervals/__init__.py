@@ -1,6 +1,13 @@
 """Interspike intervals: how regular they are, what motion they show, what is missing, and their dimension.
 
 Start at `interval_report`; it calls one module for each question.
+
+Examples
+--------
+>>> import numpy as np
+>>> report = interval_report(np.cumsum(np.tile([0.4, 1.6], 50)), forcing_period=1.0)
+>>> report.attrs["cycle"][:6], round(float(report["coefficient_of_variation"]), 2)
+('P(2,2)', 0.6)
 """
 
 from vibroimpact.analysis.intervals.printing import print_intervals

@@ -120,11 +120,12 @@ def _tolerance(train: IntervalTrain) -> float:
 def _repeats_after(intervals: Floats, tolerance: float) -> int:
     """Return the smallest p for which most intervals are the same p later; 0: none.
 
-    Most, not all: some spikes may be missed.
+    Most, not all: some spikes may be missed. A cycle of p must be known as a whole: masked intervals may leave none.
     """
     for count in range(1, min(LONGEST_CYCLE, len(intervals) // FEWEST_REPEATS) + 1):
         change = np.abs(intervals[count:] - intervals[:-count])
         known = change[np.isfinite(change)]
-        if len(known) and np.mean(known < tolerance) >= MOSTLY:
+        whole = np.isfinite(np.lib.stride_tricks.sliding_window_view(intervals, count).sum(axis=1))
+        if len(known) and np.any(whole) and np.mean(known < tolerance) >= MOSTLY:
             return count
     return 0

@@ -180,12 +180,8 @@ def _plateau(sums: CorrelationSums) -> str:
     )
 
 
-def distinct_intervals(train: IntervalTrain) -> int:
-    """Return how many different intervals there are, those that differ by rounding alone being one."""
-    return len(np.unique(_rounded(train)))
-
-
 def _rounded(train: IntervalTrain) -> Floats:
+    """Return the intervals, those that differ by rounding alone being one, s; NaN where masked."""
     quantum = max(float(np.max(np.abs(train.times))) * ROUNDING, float(np.finfo(np.float64).tiny))
     steps: Floats = np.rint(train.separated / quantum)
     # two roundings may part what is the same: join steps that are neighbours

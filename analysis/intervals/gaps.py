@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
+from vibroimpact.analysis.robust import robust_sigma
 
 # Intervals on either side of one that make its median.
 NEIGHBOURS = 10
@@ -20,8 +21,6 @@ LONGEST_BEAT = 1.5
 # Robust coefficient of variation about the local median up to which one beat and two can be told apart.
 NEARLY_PERIODIC = 0.2
 FEWEST_INTERVALS = 10
-# Median absolute deviation to standard deviation, of a normal distribution.
-MAD_TO_SIGMA = 1.4826
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +73,7 @@ def find_gaps(train: IntervalTrain) -> Gaps:
         return Gaps(nothing, nothing, ratio, float("nan"), "most events of some neighbourhood coincide")
     ratio[train.kept] = intervals / typical
     centred = ratio[train.kept]
-    spread = float(MAD_TO_SIGMA * np.median(np.abs(centred - np.median(centred))))
+    spread = robust_sigma(centred - np.median(centred))
     if spread > NEARLY_PERIODIC:
         reason = (
             f"the train is not nearly periodic: its intervals scatter by {100 * spread:.0f} % about their local "

@@ -16,6 +16,7 @@ from scipy.stats import beta
 
 from vibroimpact.analysis.intervals.density import interval_density
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
+from vibroimpact.analysis.robust import robust_sigma
 
 FEWEST_EVENTS = 30
 # Events whose phases are averaged for the place of the lattice: it may drift, slowly.
@@ -167,7 +168,7 @@ def _running_sum(values: NDArray[np.complex128]) -> NDArray[np.complex128]:
 
 def _widths(offset: Floats, resolution: float) -> tuple[float, float]:
     """Return the jitter, and how far from its place an event may be, in intervals."""
-    jitter = 1.4826 * float(np.median(np.abs(offset)))
+    jitter = robust_sigma(offset)
     return jitter, max(SIGMAS * jitter, NEAREST, 1.5 * resolution)
 
 
@@ -188,6 +189,8 @@ def _shares(
     double = clear & (steps == 0)
     between = np.where(clear, np.diff(true) - 1, 0)
     places = int(steps[clear].sum())
+    if not places:
+        return no_lattice(train, "masked spans leave no two places of it side by side")
     empty = int(np.maximum(steps[clear] - 1, 0).sum())
     extra = int(between.sum())
     # a spurious event within `width` of a place is taken for a true one, or stands in for a missed one

@@ -115,9 +115,15 @@ def interval_train(
         )
     observed = _window(instants, window)
     touched = _touched(instants, spans)
-    if np.all(touched):
-        raise EstimationError("intervals: expected one without a masked instant in it, got none. Mask less.")
+    if not np.any(np.diff(instants)[~touched] > 0.0):
+        raise EstimationError(
+            "intervals: expected one of more than 0 s without a masked instant in it, got none. Mask less."
+        )
     return IntervalTrain(instants, observed, window is not None, spans, ~touched, float(resolution))
+
+
+MOST_SEAMS = 10_000
+"""Recordings are joined from hours or days, and each seam costs an interval."""
 
 
 def seams(period: float, window: Span, half_width: float = 0.0) -> tuple[Span, ...]:
@@ -140,6 +146,11 @@ def seams(period: float, window: Span, half_width: float = 0.0) -> tuple[Span, .
     if not period > 0.0 or not half_width >= 0.0:
         raise UsageError(
             f"seams: expected a period > 0 s and a half width >= 0 s, got {period} and {half_width}."
+        )
+    if (window[1] - window[0]) / period > MOST_SEAMS:
+        raise UsageError(
+            f"seams: expected at most {MOST_SEAMS} of them in {window[1] - window[0]:g} s, got one each {period:g} s. "
+            "Give the length of a part, s."
         )
     first, last = int(np.floor(window[0] / period)) + 1, int(np.ceil(window[1] / period))
     return tuple((k * period - half_width, k * period + half_width) for k in range(first, last))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
+from vibroimpact.fmus.errors import UsageError
 
 # Bins of the standard error of a rate, and places of the first bin tried for a Fano factor.
 RATE_BINS, OFFSETS = 20, 20
@@ -105,9 +106,18 @@ def usual_bin(train: IntervalTrain) -> float:
     return float(f"{mean:.0e}")
 
 
+MOST_BINS = 10**7
+"""Beyond it counts are 0 and 1 in any recording, and memory is all that they fill."""
+
+
 def bin_counts(train: IntervalTrain, width: float, offset: float = 0.0) -> Floats:
     """Return the counts in the bins that lie in the window and touch no masked span."""
     start, end = train.window[0] + offset, train.window[1]
+    if (end - start) / width > MOST_BINS:
+        raise UsageError(
+            f"intervals: count_bin: expected at most {MOST_BINS:g} bins in {end - start:g} s, "
+            f"got a bin of {width:g} s. Give a longer one."
+        )
     number = int((end - start) / width + ROUNDING)
     if number < 1:
         return np.empty(0)

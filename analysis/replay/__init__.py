@@ -1,4 +1,16 @@
-"""How a simulated response is compared with a measured one; `docs/replay_scores.md` says it in words."""
+"""How a simulated response is compared with a measured one; `docs/replay_scores.md` says it in words.
+
+Examples
+--------
+>>> import numpy as np
+>>> from vibroimpact.analysis.recording import Channel, TimeAxis
+>>> time = np.arange(2000) * 1e-4
+>>> ring = np.where(time > 0.05, np.exp(-30.0 * (time - 0.05)) * np.sin(300.0 * (time - 0.05)), 0.0)
+>>> board = Channel("board", 0.3 + ring, "m s-2", TimeAxis(time, 1e-4), np.zeros(2000, np.uint8))
+>>> found = compare(time, 0.9 * ring, board, lag=0.0, polarity=1)
+>>> round(found.variance, 1), round(found.offset, 6)
+(99.0, 0.3)
+"""
 
 from __future__ import annotations
 

@@ -80,16 +80,14 @@ def find_event(measured: Channel) -> Event:
     level = max(ONSET_LEVEL * float(np.max(deviation)), NOISE_FACTOR * noise)
     first = int(np.argmax(deviation >= level))
     if deviation[first] >= level and first >= len(head):
-        event = _after_rest(measured, time, values, rest, noise, first)
+        event = _after_rest(time, values, rest, noise, first)
         if event is not None:
             return event
     end = _end_of_energy(time, values - np.mean(values))
     return Event(float(time[0]), end, 0.0, np.nan, None, _period(time, values, float(time[0]), end))
 
 
-def _after_rest(
-    measured: Channel, time: Floats, values: Floats, rest: float, noise: float, first: int
-) -> Event | None:
+def _after_rest(time: Floats, values: Floats, rest: float, noise: float, first: int) -> Event | None:
     """Return the event that begins at sample `first`; None where what is before it is too short to be a rest."""
     # a slow precursor between the noise and the onset belongs to neither
     leaves = int(np.argmax(np.abs(values - rest) > NOISE_FACTOR * noise))

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.robust import robust_sigma
+
 Floats = NDArray[np.float64]
 
-#: Median absolute deviation of normal noise times this is its standard deviation.
-MAD_TO_SIGMA = 1.482602218505602
 #: A median of fewer samples is no offset.
 _FEWEST_SAMPLES = 32
 #: Of a block, this part must be free of spikes for its median to be used.
@@ -20,18 +20,6 @@ _LEAST_FREE = 0.25
 _WORTH = 0.05
 #: Windows are at least this many times the longest spike, which then moves their median by 3 % of the noise.
 _SPIKES_IN_WINDOW = 20
-
-
-def robust_sigma(values: Floats) -> float:
-    """Return the standard deviation of the noise in a signal at rest most of the time: 1.4826 MAD about 0.
-
-    Examples
-    --------
-    >>> quiet = np.tile([-1.0, 1.0], 50)
-    >>> round(robust_sigma(np.append(quiet, 1000.0)), 4)
-    1.4826
-    """
-    return float(MAD_TO_SIGMA * np.median(np.abs(values))) if values.size else 0.0
 
 
 def running_median(values: Floats, window: int, used: NDArray[np.bool_] | None = None) -> Floats:

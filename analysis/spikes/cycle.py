@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import get_window
 
-from vibroimpact.analysis.spikes.baseline import MAD_TO_SIGMA, robust_sigma, running_median
+from vibroimpact.analysis.robust import MAD_TO_SIGMA, robust_sigma
+from vibroimpact.analysis.spikes.baseline import running_median
+from vibroimpact.fmus.errors import UsageError
 
 Floats = NDArray[np.float64]
 
@@ -79,6 +81,11 @@ def find_cycle(values: Floats, period: float | None = None) -> Cycle:
     """
     level = values - running_median(values, max(len(values) // 4, 1))
     if period is not None:
+        if not 2.0 <= period <= 0.5 * (len(values) - 1):
+            raise UsageError(
+                f"period: expected two samples at least and half the record at most, got {period:g} samples of "
+                f"{len(values)}. Give another --period."
+            )
         return _folded(values, period, f"a period of {period:g} samples was asked for")
     first = _strongest_line(level)
     if first is None:

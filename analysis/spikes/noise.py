@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from vibroimpact.analysis.spikes.baseline import robust_sigma
+from vibroimpact.analysis.robust import robust_sigma
 
 Floats = NDArray[np.float64]
 

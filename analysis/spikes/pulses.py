@@ -102,7 +102,7 @@ def measure_pulses(found: Identification, foot: float = FOOT, waveform: str = "a
 
     The impulse is integrated from foot to foot, where the pulse has fallen to 5 % of its peak (or to three
     standard deviations of the noise), and divided by the part of the whole that the best waveform has between these:
-    .9987 of a half-sine, .9953 of a haversine, .9856 of a bell. So it does not depend on the threshold, and neither
+    .9987 of a half-sine, .9952 of a haversine, .9856 of a bell. So it does not depend on the threshold, and neither
     ringing nor drift far from the pulse enters it.
 
     Parameters

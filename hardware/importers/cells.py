@@ -143,7 +143,7 @@ def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str) -> lis
     """
     quick = _read_regular(lines, delimiter, decimal)
     if quick is not None:
-        return [_sorted_out(values) for values in quick]
+        return [sorted_out(values) for values in quick]
     rows = [split_line(line, delimiter) for line in lines]
     return [_read_column(cells, decimal) for cells in zip_longest(*rows, fillvalue="")]
 
@@ -165,8 +165,13 @@ def _read_regular(lines: Sequence[str], delimiter: str | None, decimal: str) -> 
     return np.ascontiguousarray(table.T) if len(table) == len(lines) else None
 
 
-def _sorted_out(values: Floats) -> Cells:
-    """Take away the numbers that stand for overrange or for no sample."""
+def sorted_out(values: Floats) -> Cells:
+    """Return a column of numbers in which those that stand for overrange, or for no sample, are NaN.
+
+    >>> column = sorted_out(np.array([1.0, 9.9e37, 9.91e37, -np.inf]))
+    >>> column.values, column.overrange
+    (array([ 1., nan, nan, nan]), array([False,  True, False,  True]))
+    """
     missing = np.isclose(values, NOT_A_NUMBER, rtol=1e-4, atol=0.0)
     overrange = (np.isinf(values) | (np.abs(values) > OVERRANGE_FROM)) & ~missing
     if not np.any(overrange | missing):
@@ -192,9 +197,9 @@ def _read_column(cells: Sequence[str], decimal: str) -> Cells:
             marked[row] = True
         elif not is_marker(cell):
             strange.append((row, cell.strip()[:_LONGEST_QUOTE]))
-    sorted_out = _sorted_out(values)
-    overrange = marked if sorted_out.overrange is None else marked | sorted_out.overrange
-    return Cells(sorted_out.values, overrange if np.any(overrange) else None, strange)
+    numbers = sorted_out(values)
+    overrange = marked if numbers.overrange is None else marked | numbers.overrange
+    return Cells(numbers.values, overrange if np.any(overrange) else None, strange)
 
 
 def _read_dates(cells: Sequence[str]) -> Cells:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.importers.cells import OVERRANGE_FROM
+from vibroimpact.hardware.importers.cells import sorted_out
 from vibroimpact.hardware.importers.labels import is_time_name, seconds_in
 from vibroimpact.hardware.importers.probe import check_survives
 from vibroimpact.hardware.importers.table import (
@@ -160,11 +160,11 @@ def _time(variable: _Variable, attrs: dict[str, Any]) -> Column:
 
 def _column(variable: _Variable) -> Column:
     assert variable.values is not None
-    overrange = np.isinf(variable.values) | (np.abs(variable.values) > OVERRANGE_FROM)
+    numbers = sorted_out(variable.values)
     return Column(
         variable.name,
-        np.where(overrange, np.nan, variable.values),
+        numbers.values,
         variable.unit,
-        overrange if np.any(overrange) else None,
+        numbers.overrange,
         attrs={} if variable.label == variable.name else {"source_label": variable.label},
     )

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.importers.cells import OVERRANGE_FROM
+from vibroimpact.hardware.importers.cells import sorted_out
 from vibroimpact.hardware.importers.labels import is_time_name
 from vibroimpact.hardware.importers.probe import check_survives
-from vibroimpact.hardware.importers.table import MOST_COLUMNS, MOST_SAMPLES, Column, Floats, RawFile, Table
+from vibroimpact.hardware.importers.table import MOST_COLUMNS, MOST_SAMPLES, Column, RawFile, Table
 
 _RATES = frozenset(
     {"fs", "samplerate", "sample_rate", "sampling_rate", "samplingrate", "samplingfrequency"}
@@ -132,8 +132,5 @@ def _columns(name: str, values: Any, remarks: list[str]) -> list[Column]:
 
 
 def _column(name: str, values: Any, unit: str = "") -> Column:
-    numbers: Floats = np.array(values, dtype=np.float64)
-    overrange = np.isinf(numbers) | (np.abs(numbers) > OVERRANGE_FROM)
-    if not np.any(overrange):
-        return Column(name, numbers, unit)
-    return Column(name, np.where(overrange, np.nan, numbers), unit, overrange)
+    numbers = sorted_out(np.array(values, dtype=np.float64))
+    return Column(name, numbers.values, unit, numbers.overrange)

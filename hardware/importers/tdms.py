@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.importers.cells import OVERRANGE_FROM
+from vibroimpact.hardware.importers.cells import sorted_out
 from vibroimpact.hardware.importers.labels import is_time_name
 from vibroimpact.hardware.importers.table import MOST_COLUMNS, Column, Floats, RawFile, Table
 
@@ -135,12 +135,12 @@ def _column(channel: Any, values: Floats, origin: np.datetime64 | None, remarks:
     said = "wf_samples is the size of a block, not the length: the samples are counted"
     if samples is not None and samples != len(values) and said not in remarks:
         remarks.append(said)
-    overrange = ~np.isfinite(values) & ~np.isnan(values) | (np.abs(values) > OVERRANGE_FROM)
+    numbers = sorted_out(values)
     return Column(
         channel.name,
-        np.where(overrange, np.nan, values),
+        numbers.values,
         str(known.get("unit_string", "")),
-        overrange if np.any(overrange) else None,
+        numbers.overrange,
         increment if increment is not None and 0.0 < increment < np.inf else None,
         (_number(known.get("wf_start_offset")) or 0.0) + late,
         f"start {start}" if late else "",

@@ -100,6 +100,8 @@ def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(fol
         (("one.nc", "-o", "x.nc", "--score", "two.nc"), "--score: expected --fit beside it"),
         (("one.nc", "-o", "folder", "--fit", "sensor.gain"), "Campaigns replay; they do not fit"),
         (("one.nc", "-o", "no/such/x.nc"), "expected a place where a file can be written"),
+        (("one.nc", "-o", "x.nc", "--fit", ""), "--fit: expected keys such as"),
+        (("one.nc", "-o", "X.NC"), "expected a dataset NAME.nc or the folder of a campaign"),
     ],
 )
 def test_misuse_is_one_line_exit_code_2_and_no_file(

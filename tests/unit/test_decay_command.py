@@ -81,6 +81,11 @@ def test_one_law_or_none_can_be_asked_for(decay: Path, capsys: pytest.CaptureFix
         (["--channel", "arm", "--amplitude", "2", "--angular-frequency", "3"], "--amplitude: expected --mass"),
         (["--drive", "force", "--window", "flat"], "--window: expected one of bartlett, hann, boxcar"),
         (["--channel", "arm", "-o", "/nowhere/estimates.nc"], "expected a place where a file can be written"),
+        (["--kind", "impacts", "--damping-ratio", "-1"], "--damping-ratio: expected a number >= 0, got -1"),
+        (["--kind", "impacts", "--natural-frequency", "nan"], "--natural-frequency: expected a number > 0, got nan"),
+        (["--kind", "impacts", "--mass", "0"], "--mass: expected a number > 0, got 0"),
+        (["--kind", "impacts", "--offset", "inf"], "--offset: expected a finite number, got inf"),
+        (["--channel", "arm", "--run", "3"], "--run: expected none of a recording, got 3"),
         (["--channel", "arm", "--figure", "estimates.bmp"], "expected a name ending in .png"),
     ],
 )  # fmt: skip
@@ -125,6 +130,37 @@ def test_an_impacting_run_takes_forcing_and_stop_from_its_scene(
         assert float(best.sel(quantity="restitution")) == pytest.approx(0.8, abs=1e-4)
         assert float(best.sel(quantity="damping_ratio")) == pytest.approx(0.03, abs=1e-4)
     assert (tmp_path / "found.png").read_bytes().startswith(PNG)
+
+
+def test_each_run_of_a_sweep_of_the_stop_is_estimated_with_its_own_stop(tmp_path: Path) -> None:
+    swept = tmp_path / "stops.nc"
+    run_scene(parse_scene(BODY + IMPACTING + SWEPT_STOP, "stops.toml"), swept)
+    assert estimate(swept, "--run", "1", "-o", tmp_path / "found.nc") == 0
+    with xr.open_dataset(tmp_path / "found.nc") as found:
+        best = found.estimate.sel({"method": "trajectory"})
+        # Held at the stop that the scene has written, the trajectories would not follow the motion.
+        assert float(best.sel(quantity="restitution")) == pytest.approx(0.8, abs=1e-4)
+
+
+def test_an_accelerated_base_is_the_force_of_the_mass_turned_round(tmp_path: Path) -> None:
+    # The load per mass of the scene above, 4 N on 2 kg: relative to the base the motion differs in its sign only.
+    based = IMPACTING.replace("amplitude = 4.0", 'kind = "base_acceleration"\namplitude = 2.0')
+    run_scene(parse_scene(BODY + based, "base.toml"), tmp_path / "base.nc")
+    assert estimate(tmp_path / "base.nc", "-o", tmp_path / "found.nc") == 0
+    with xr.open_dataset(tmp_path / "found.nc") as found:
+        best = found.estimate.sel({"method": "trajectory"})
+        assert float(best.sel(quantity="restitution")) == pytest.approx(0.8, abs=1e-4)
+        assert float(best.sel(quantity="damping_ratio")) == pytest.approx(0.03, abs=1e-4)
+
+
+def test_a_clock_that_drifts_has_its_frequency_fitted_when_asked_for(tmp_path: Path) -> None:
+    run = tmp_path / "impacts.nc"
+    run_scene(parse_scene(BODY + IMPACTING, "impacts.toml"), run)
+    # The scene says 35 rad/s; the generator of an experiment would say something else.
+    assert estimate(run, "--angular-frequency", "35.03", "--clock-drifts", "-o", tmp_path / "found.nc") == 0
+    with xr.open_dataset(tmp_path / "found.nc") as found:
+        best = found.estimate.sel({"method": "trajectory"})
+        assert float(best.sel(quantity="angular_frequency")) == pytest.approx(35.0, rel=1e-6)
 
 
 BODY = """
@@ -175,3 +211,7 @@ impacts = true
 time_series = { rate = 1200, variables = ["displacement"] }
 """
 )
+SWEPT_STOP = """
+[sweep]
+"stop[1].position" = { values = [-0.002, 0.002] }
+"""

@@ -23,7 +23,7 @@ def balance_of(parameters, per_period=400, periods=6):
     )
     flights = [flight for flight in found.flights if flight.usable]
     balance = EnergyBalance(found.signal, flights, w, FINE * 2.0 * math.pi / w)
-    halves, _ = balance.energies(channel.values[None], record.truth, parameters.stop_position)
+    halves = balance.energies(channel.values[None], record.truth, parameters.stop_position)
     return record.truth, balance, halves
 
 

@@ -169,19 +169,19 @@ def test_unknown_method_is_refused_with_the_names():
         estimate_impacts(record.channel(), record.forcing(), methods=["energy"])
 
 
-def chain(noise=0.0, modes=2):
+def chain(noise=0.0, restitution=0.55, seed=0):
     """Return a two-mass chain (m = k = 1, c = .2) against a stop at the outer mass, and its modal truth."""
     square, shapes = np.linalg.eigh(np.array([[2.0, -1.0], [-1.0, 1.0]]))
     natural, force = np.sqrt(square), shapes.T @ np.array([0.7, 0.1])
     step, start = 2.0 * math.pi / 0.9 / 120, 6000
     displacement = np.empty((2, 1200))
-    stop = Stop(shapes[1], 0.3, restitution=0.55)
+    stop = Stop(shapes[1], 0.3, restitution=restitution)
     with Structure(Modes(natural, 0.1 * natural, force, 0.9), [stop], [0, 0], [0, 0]) as body:
         body.advance(start * step)
         for k in range(displacement.shape[1]):
             displacement[:, k] = shapes @ body.displacement
             body.advance(step)
-    errors = noise * np.random.default_rng(0).standard_normal(displacement.shape)
+    errors = noise * np.random.default_rng(seed).standard_normal(displacement.shape)
     return step * np.arange(1200), displacement + errors, shapes, natural, force
 
 
@@ -197,6 +197,15 @@ def test_modes_of_a_chain_and_its_restitution_are_found_from_both_sensors():
     assert found.restitution.value == pytest.approx(0.55, abs=5e-3)
     # two roads: speeds of the contact point, and residual energy with the contact mass
     assert found.restitution_from_energy.value == pytest.approx(found.restitution.value, abs=5e-3)
+
+
+def test_a_nearly_elastic_stop_is_estimated_though_noise_alone_would_let_it_gain_energy():
+    # restitution .995 with a standard error of .003: draws of the noise gain energy, the record does not
+    time, displacement, shapes, _, _ = chain(noise=5e-3, restitution=0.995, seed=1)
+    coordinates = modal_coordinates(displacement, shapes)
+    found = estimate_modes(time, coordinates, shapes[1], Forcing(0.9, phase=0.0), fastest=1.7)
+    assert found.restitution_from_energy.covers(0.995)
+    assert found.restitution_from_energy.standard_error < 0.006
 
 
 def test_energies_that_contradict_each_other_are_reported_not_clipped():

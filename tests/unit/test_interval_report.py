@@ -116,7 +116,25 @@ def test_the_theiler_window_and_the_embedding_are_options_and_stated() -> None:
 
 def test_a_train_that_is_masked_everywhere_has_no_report() -> None:
     with pytest.raises(EstimationError, match="Mask less"):
+        interval_report(np.repeat(np.arange(4.0), 2), masked=between(np.arange(4.0)))
+    with pytest.raises(EstimationError, match="Mask less"):
         interval_report(np.arange(10.0), masked=seams(1.0, (0.0, 9.5), 0.0))
+
+
+def between(times: Floats) -> list[tuple[float, float]]:
+    """Return a seam in the middle of each interval."""
+    return [(middle, middle) for middle in (0.5 * (times[1:] + times[:-1])).tolist()]
+
+
+def test_intervals_whose_neighbours_are_all_masked_show_no_cycle_and_no_lattice() -> None:
+    # Every second interval is masked: the others are alike two on, but no two in a row are known.
+    beats = np.arange(40.0)
+    alternate = interval_report(beats[:20], masked=between(beats[:20])[::2])
+    assert alternate.attrs["cycle"].startswith("the intervals repeat after no cycle")
+    # One interval is left, as long as the lattice's but between two spurious spikes.
+    shifted = np.sort(np.append(np.delete(beats, 11), [10.5, 11.5]))
+    alone = interval_report(shifted, masked=[s for s in between(shifted) if s[0] != 11.0])
+    assert "no two places of it side by side" in alone.attrs["lattice"]
 
 
 def test_the_verdict_on_slopes_follows_their_surrogate() -> None:

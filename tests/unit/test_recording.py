@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +26,7 @@ from vibroimpact.analysis.recording_files import (
     open_signals,
     write_recording,
 )
+from vibroimpact.analysis.recording_rules import problems_of
 from vibroimpact.analysis.results import results_kind, write_results
 from vibroimpact.analysis.units import measured_unit, unit_label
 from vibroimpact.fmus.errors import DatasetError
@@ -93,6 +97,12 @@ def test_the_file_is_one_that_xarray_reads(tmp_path: Path) -> None:
         ({"values": np.zeros(2)}, r"values: expected the shape \(3,\) of its time axis, got \(2,\)"),
         ({"name": "2nd"}, "expected letters, digits and underscores"),
         ({"name": "time_left"}, "and not `time`"),
+        ({"interval": 0.0}, "time: sampling_interval: expected a number > 0, got 0"),
+        ({"interval": np.nan}, "time: sampling_interval: expected a number > 0, got nan"),
+        ({"interval": 17.0}, "expected about the mean distance of the instants, 1 s, got 17"),
+        ({"doubt": -1.0}, "interval_uncertainty: expected a number >= 0, got -1"),
+        ({"values": np.full(3, 1e200)}, r"values: expected a largest magnitude .* got 1e\+200"),
+        ({"values": np.array([np.nan, 1e-200, 0.0])}, "values: expected a largest magnitude .* got 1e-200"),
     ],
 )
 def test_what_contradicts_the_schema_is_refused_and_no_file_is_left(
@@ -100,11 +110,77 @@ def test_what_contradicts_the_schema_is_refused_and_no_file_is_left(
 ) -> None:
     parts: dict[str, object] = {"time": np.array([0.0, 1.0, 2.0]), "values": np.zeros(3), "name": "gap"}
     parts |= change
-    axis = TimeAxis(np.asarray(parts["time"]), None)
+    axis = TimeAxis(np.asarray(parts["time"]), parts.get("interval"), parts.get("doubt", 0.0))  # type: ignore[arg-type]
     channel = Channel(str(parts["name"]), np.asarray(parts["values"]), "V", axis, np.zeros(3, np.uint8))
     with pytest.raises(DatasetError, match=told):
         write_recording(Recording({channel.name: channel}), tmp_path / "r.nc")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_channels_of_one_axis_share_is_told_once() -> None:
+    axis = TimeAxis(np.array([0.0, 1.0]), -1.0)
+    both = {name: Channel(name, np.zeros(2), "V", axis, np.zeros(2, np.uint8)) for name in ("a", "b")}
+    assert len(list(problems_of(Recording(both)))) == 1
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"window": (10.0, 2.0)}, "beats: window: expected a start before an end, got 10 to 2 s"),
+        ({"attrs": {"masked": [1.0, 2.0, 3.0]}}, "beats: masked: expected start, end, start, end"),
+        ({"attrs": {"masked": "abc"}}, "beats: masked: expected start, end, start, end"),
+        ({"attrs": {"masked": [2.0, 1.0]}}, "beats: masked: expected spans with a start before an end"),
+        ({"resolution": np.nan}, "beats: resolution: expected a number >= 0, got nan"),
+        ({"times": np.zeros((2, 2))}, "beats: times: expected one dimension, got 2"),
+    ],
+)
+def test_an_event_train_that_contradicts_itself_is_refused(change: dict[str, Any], told: str) -> None:
+    train = replace(EventTrain("beats", np.array([1.0, 2.0])), **change)
+    (problem,) = problems_of(Recording({}, {"beats": train}))
+    assert problem.startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told"),
+    [
+        (
+            lambda file: file["gap"].attrs.pop("long_name"),
+            r"spoilt\.nc: gap: expected the attribute long_name",
+        ),
+        (
+            lambda file: file["gap"].attrs.update(units="elephants"),
+            r"spoilt\.nc: gap: unit: expected a unit",
+        ),
+        (
+            lambda file: file["time"].attrs.update(sampling_interval="fast"),
+            r"spoilt\.nc: time: expected numbers",
+        ),
+        (
+            lambda file: file.attrs.update(recording_schema="9"),
+            r"spoilt\.nc: recording_schema: expected 1, got '9'",
+        ),
+        (
+            lambda file: file["board_quality"].values.fill(77),
+            "board: quality: expected whole numbers",
+        ),
+    ],
+)
+def test_a_spoilt_recording_is_refused_with_file_and_variable(
+    spoil: Callable[[xr.Dataset], None], told: str, tmp_path: Path
+) -> None:
+    write_recording(example(), tmp_path / "r.nc")
+    with xr.open_dataset(tmp_path / "r.nc", decode_cf=False) as whole:
+        file = whole.load()
+    spoil(file)
+    file.to_netcdf(tmp_path / "spoilt.nc")
+    with pytest.raises(DatasetError, match=told):
+        open_recording(tmp_path / "spoilt.nc")
+
+
+def test_a_file_of_an_instrument_is_sent_to_import(tmp_path: Path) -> None:
+    (tmp_path / "acc.txt").write_text("0.0 1.0\n0.1 2.0\n")
+    with pytest.raises(DatasetError, match="`vibroimpact import` makes a recording"):
+        open_signals(tmp_path / "acc.txt")
 
 
 def test_channels_are_asked_for_by_name_with_a_hint() -> None:
@@ -127,6 +203,9 @@ def test_a_run_of_a_simulated_dataset_is_a_recording_too(tmp_path: Path) -> None
     np.testing.assert_array_equal(channel.time, runs[1].samples[:, 0])  # type: ignore[index]
     np.testing.assert_array_equal(channel.values, runs[1].samples[:, 1])  # type: ignore[index]
     np.testing.assert_array_equal(second.event_train("impacts").times, runs[1].impacts[:, 0])  # type: ignore[index]
+    write_recording(example(), tmp_path / "r.nc")
+    with pytest.raises(DatasetError, match=r"r\.nc: --run: expected none of a recording, got 7"):
+        open_signals(tmp_path / "r.nc", 7)
     with pytest.raises(DatasetError, match="expected a run_index from 0 to 1, got 7"):
         open_signals(tmp_path / "runs.nc", 7)
 

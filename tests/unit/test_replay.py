@@ -13,12 +13,14 @@ from tolerance import PARTITION
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.analysis.recording_files import open_signals
 from vibroimpact.analysis.results import write_results
-from vibroimpact.fmus.errors import DatasetError, EstimationError, SceneError
+from vibroimpact.fmus.errors import DatasetError, EstimationError, SceneError, UsageError
 from vibroimpact.fmus.modes import beam_modes
 from vibroimpact.fmus.structure import Modes, Structure
+from vibroimpact.orchestrator.cli import main
 from vibroimpact.orchestrator.drive_signal import drive_of, quiet_level, step_instants
-from vibroimpact.orchestrator.replay import Replayer, opened_replays
-from vibroimpact.orchestrator.replay_fit import fit_keys, fit_replay, scores_of
+from vibroimpact.orchestrator.replay import Replayer, named, opened_replays
+from vibroimpact.orchestrator.replay_covariance import covariance_of, drawn_noise
+from vibroimpact.orchestrator.replay_fit import ReplayFit, fit_keys, fit_replay, scores_of
 from vibroimpact.orchestrator.replay_output import Replayed, replay_dataset
 from vibroimpact.orchestrator.replay_scoring import compare_motion
 from vibroimpact.orchestrator.scene import Scene, parse_scene
@@ -239,6 +241,127 @@ def test_the_dataset_of_a_replay_holds_signals_scores_and_the_fit(tmp_path: Path
         known = np.isfinite(residual)
         np.testing.assert_allclose((measured - found.board_simulated.values)[known], residual[known])
         assert {"drive_1", "recording", "use"} <= set(found.variables)
+
+
+def test_noise_of_the_drive_is_in_the_standard_errors(tmp_path: Path) -> None:
+    # what it excites rings on for hundreds of samples: without it the errors were 16 times too small
+    reading = simulated({"body.frequency": 823.0}, tmp_path)
+    random = np.random.default_rng(9)
+    path = written(
+        tmp_path / "noisy.nc",
+        channel("base", TIME, pulse(TIME) + random.normal(0.0, 40.0, len(TIME)), trigger="one"),
+        channel("board", TIME, reading + random.normal(0.0, 2.0, len(TIME)), trigger="one"),
+    )
+    with opened_replays(scene(), [path]) as replayers:
+        noise = replayers[0].drive_noise
+        fit = fit_replay(replayers, ["body.frequency"])
+        quiet = covariance_of(*_linear(replayers[0], fit), [])
+    assert noise is not None
+    assert np.std(noise) == pytest.approx(40.0, rel=0.2)
+    assert fit.standard_error[0] > 4.0 * np.sqrt(quiet[0, 0])
+    assert abs(fit.values[0] - 823.0) < 3.0 * fit.standard_error[0]
+
+
+def _linear(replayer: Replayer, fit: ReplayFit) -> tuple[list[Floats], list[None], list[Floats]]:
+    """Return slope and residual of the one channel by the one number that was fitted."""
+    (comparison,) = fit.comparisons[0]
+    size, step = np.std(comparison.values), 0.1
+    ahead, behind = (
+        replayer.simulate({fit.keys[0]: float(fit.values[0]) + sign * step}).readings[0] for sign in (1, -1)
+    )
+    return [((behind - ahead) / (2.0 * step * size))[:, None]], [None], [comparison.residual / size]
+
+
+def test_few_samples_with_all_the_weight_have_honest_errors() -> None:
+    # the mean of 20 of 2,000 white samples: its standard error is 1/sqrt(20), and that of Newey and West about 0
+    weight = np.zeros((2000, 1))
+    weight[:20] = 1.0
+    found = []
+    for seed in range(20):
+        values = np.random.default_rng(seed).normal(0.0, 1.0, 2000)
+        values[:20] -= np.mean(values[:20])
+        found.append(float(covariance_of([weight], [None], [values], [])[0, 0]))
+    assert np.mean(found) == pytest.approx(1.0 / 20.0, rel=0.1)
+
+
+def test_drawn_noise_has_the_spectrum_of_its_sample() -> None:
+    random = np.random.default_rng(4)
+    sample = np.convolve(
+        random.normal(0.0, 1.0, 400), np.ones(4) / 2.0, mode="valid"
+    )  # rolls off, variance 1
+    drawn = drawn_noise(sample, 50_000, random)
+    assert np.std(drawn) == pytest.approx(np.std(sample), rel=0.1)
+    assert np.corrcoef(drawn[1:], drawn[:-1])[0, 1] == pytest.approx(0.75, abs=0.05)
+
+
+def test_clocks_that_are_far_apart_are_refused_before_anything_is_simulated() -> None:
+    with pytest.raises(DatasetError, match=r"expected at most 1e\+07 steps, got 5e\+10"):
+        step_instants(TIME, 2e-5, 1e6)
+    with pytest.raises(DatasetError, match="Look at the instants of the channels"):
+        step_instants(np.array([0.0, 2e-5, 1e9]), 2e-5, 0.0)
+
+
+def test_a_channel_that_cannot_drive_is_told_with_its_file(tmp_path: Path) -> None:
+    path = written(tmp_path / "v.nc", channel("base", TIME, pulse(TIME), "V"), channel("board", TIME, TIME))
+    with (
+        pytest.raises(DatasetError, match=r"v\.nc: base: expected a channel in"),
+        opened_replays(scene(), [path]),
+    ):
+        pass
+
+
+def test_a_problem_with_its_file_is_a_new_error(tmp_path: Path) -> None:
+    # raised from itself it would be its own cause, and a worker of a campaign would never get it packed
+    problem = DatasetError(f"{tmp_path}: expected")
+    assert str(named(problem, tmp_path)) == str(problem)
+    assert named(problem, tmp_path) is not problem
+
+
+def test_a_number_that_changes_nothing_is_refused(tmp_path: Path) -> None:
+    # with its frequency given, the length of a board on a moving base is nothing that an accelerometer sees
+    path = recorded(tmp_path)
+    with (
+        opened_replays(scene(), [path]) as replayers,
+        pytest.raises(EstimationError, match=r"body\.length: expected"),
+    ):
+        fit_replay(replayers, ["body.frequency", "body.length"])
+
+
+def test_a_lag_larger_than_the_records_is_as_large_as_they_are(tmp_path: Path) -> None:
+    path = recorded(tmp_path)
+    found = []
+    for more in ("", "most_lag = 1e12"):
+        with opened_replays(scene(BOARD + more), [path]) as (replayer,):
+            found.append(compare_motion(replayer, replayer.simulate())[0].alignment.lag)
+    assert found[1] == pytest.approx(found[0], abs=1e-9)
+
+
+def test_spans_that_end_before_they_start_are_problems_of_the_scene() -> None:
+    with pytest.raises(SceneError) as told:
+        scene(BOARD + "peaks = [3.0, 1.0]\nwindows = [[0.0, 1.0], [0.2, 0.1]]\n")
+    assert [line.split(": ")[1] for line in told.value.problems] == ["replay.peaks", "replay.windows[2]"]
+
+
+def test_a_replay_that_compared_nothing_has_no_figure_and_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with opened_replays(scene(BOARD[: BOARD.index("compare")]), [recorded(tmp_path)]) as (replayer,):
+        dataset = replay_dataset([Replayed(replayer, replayer.simulate(), [], "replayed")])
+    write_results(dataset, tmp_path / "alone.nc", kind="replay")
+    with pytest.raises(SystemExit) as left:
+        main(["plot", str(tmp_path / "alone.nc"), "-o", str(tmp_path / "x.png")])
+    assert left.value.code == 2
+    assert "expected one at least, got none" in capsys.readouterr().err
+    assert not (tmp_path / "x.png").exists()
+
+
+def test_a_fit_of_nothing_that_is_compared_is_misuse(tmp_path: Path) -> None:
+    alone = scene(BOARD[: BOARD.index("compare")])
+    with (
+        opened_replays(alone, [recorded(tmp_path)]) as replayers,
+        pytest.raises(UsageError, match="Add compare"),
+    ):
+        fit_replay(replayers, ["sensor.gain"])
 
 
 FORCED = """

@@ -376,6 +376,16 @@ def exit_code(*arguments: str | Path) -> int:
     return int(caught.value.code or 0)
 
 
+def test_the_command_does_not_write_over_the_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = recording(tmp_path)
+    before = source.read_bytes()
+    assert exit_code("fmu", "replay", source, "-o", source) == 2
+    assert "expected a new file, got one that is read" in capsys.readouterr().err
+    assert source.read_bytes() == before
+
+
 def test_the_command_makes_an_fmu_in_si_units(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], opened: Callable[..., Player]
 ) -> None:
@@ -398,7 +408,7 @@ def test_the_command_makes_an_fmu_in_si_units(
         (("absent.nc", "-o", "a.fmu"), "absent.nc: expected a dataset file"),
         (
             ("recording.nc", "-o", "recording.nc/a.fmu"),
-            "recording.nc/a.fmu: expected a file that can be written",
+            "recording.nc/a.fmu: expected a place where a file can be written",
         ),
     ],
 )

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from vibroimpact.analysis import spikes_command
 from vibroimpact.analysis.recording import EventTrain, Recording
 from vibroimpact.analysis.recording_files import write_recording
-from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.errors import DatasetError, EstimationError, UsageError
 
 RATE = 20_000.0
 #: 40 half-sines of 1 ms and peak 2 N, .05 s apart.
@@ -41,6 +41,46 @@ def spikes(*arguments: str | Path) -> str:
         raise done.exception
     assert done.exit_code == 0, done.output
     return str(done.output)
+
+
+def test_masked_parts_of_an_observation_are_not_looked_at(tmp_path: Path) -> None:
+    # a beat each second, none from 40 to 60 s because nobody looked: no gap
+    beats = np.array([float(n) for n in range(1, 100) if not 40 < n < 60])
+    for name, attrs in (("seen", {}), ("masked", {"masked": np.array([40.0, 60.0])})):
+        train = EventTrain("beats", beats, (0.0, 100.0), attrs=attrs)
+        write_recording(Recording({}, {"beats": train}), tmp_path / f"{name}.nc")
+        spikes(tmp_path / f"{name}.nc", "-o", tmp_path / f"{name}_spikes.nc")
+    with (
+        xr.open_dataset(tmp_path / "seen_spikes.nc") as seen,
+        xr.open_dataset(tmp_path / "masked_spikes.nc") as masked,
+    ):
+        assert seen.attrs["masked_spans"] == 0
+        assert masked.attrs["masked_spans"] == 1
+        assert masked["duration"].item() == pytest.approx(seen["duration"].item() - 20.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("--events", "neuron", "--count-bin", "1e-9"), r"count_bin: expected at most 1e\+07 bins"),
+        (("--events", "neuron", "--seams", "1e-9"), "seams: expected at most 10000 of them"),
+        (
+            ("--channel", "cell", "--period", "1e9"),
+            "period: expected two samples at least and half the record",
+        ),
+    ],
+)
+def test_spans_of_another_scale_are_refused_before_they_fill_the_memory(
+    record: Path, arguments: tuple[str, ...], told: str
+) -> None:
+    with pytest.raises(UsageError, match=told):
+        spikes(record, *arguments)
+
+
+def test_too_few_events_are_refused_with_the_file(tmp_path: Path) -> None:
+    write_recording(Recording({}, {"beats": EventTrain("beats", np.array([1.0]))}), tmp_path / "few.nc")
+    with pytest.raises(EstimationError, match=r"few\.nc: intervals: expected at least 3 events"):
+        spikes(tmp_path / "few.nc")
 
 
 def test_the_command_prints_writes_and_draws_what_the_spikes_are(record: Path, tmp_path: Path) -> None:

@@ -4,8 +4,8 @@
  *
  * With amplitude a:  frequency = natural (1 + frequency_slope a),
  *                    damping ratio = ratio + damping_slope a + damping_reciprocal / a.
- * damping_slope is quadratic damping (of m x'' + b |x'| x': 4 b w / (3 pi m) per unit of 2 w ratio),
- * damping_reciprocal is dry friction.
+ * Quadratic damping, m x'' + b |x'| x', is damping_slope = 4 b / (3 pi m); dry friction of the force f is
+ * damping_reciprocal = 2 f / (pi m natural^2).
  */
 #ifndef VIBROIMPACT_AMPLITUDE_H
 #define VIBROIMPACT_AMPLITUDE_H
