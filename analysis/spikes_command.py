@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -19,6 +20,20 @@ if TYPE_CHECKING:
 
 #: Fewer spikes have no statistics of intervals.
 _FEWEST_FOR_INTERVALS = 3
+
+#: Of the correlation dimension: `intervals.dimension` has the same, and takes long to load.
+_EMBEDDING, _THEILER = 6, 1
+
+
+@dataclass(frozen=True, slots=True)
+class _IntervalOptions:
+    """What the command line says of the intervals between spikes; see `interval_report`."""
+
+    forcing_period: float | None
+    count_bin: float | None
+    seams: float | None
+    embedding: int
+    theiler: int
 
 
 def register(app: typer.Typer) -> None:
@@ -71,6 +86,12 @@ def spikes(
     forcing_period: Annotated[float | None, typer.Option(help="By which intervals are folded, s.")] = None,
     count_bin: Annotated[float | None, typer.Option(help="Bin of the Fano factor, s.")] = None,
     seams: Annotated[float | None, typer.Option(help="Mask the intervals over multiples of this, s.")] = None,
+    embedding: Annotated[
+        int, typer.Option(help="Largest embedding of the correlation dimension.", min=2)
+    ] = _EMBEDDING,
+    theiler: Annotated[
+        int, typer.Option(help="Theiler window: vectors no further apart than this are no pair.", min=0)
+    ] = _THEILER,
 ) -> None:
     """Find impacts and shocks in a signal: instants, peaks, impulses, contact times, intervals.
 
@@ -99,6 +120,7 @@ def spikes(
         rms_window=rms_window,
         period=period,
     )
+    intervals = _IntervalOptions(forcing_period, count_bin, seams, embedding, theiler)
     mechanics = Mechanics(mass, restitution, sensitivity, _numbers(known_impulses), waveform=waveform)
     recording = open_signals(data, run)
     console = Console()
@@ -108,11 +130,9 @@ def spikes(
     try:
         if events is not None or not recording.channels:
             train = recording.event_train(events)
-            dataset = _trains(console, train, forcing_period, count_bin, seams, masked_spans(train))
+            dataset = _trains(console, train, intervals, masked_spans(train))
         else:
-            report, dataset = _spikes(
-                console, recording, channel, settings, mechanics, (forcing_period, count_bin, seams)
-            )
+            report, dataset = _spikes(console, recording, channel, settings, mechanics, intervals)
     except EstimationError as problem:
         raise EstimationError(f"{data}: {problem}") from problem
     dataset = dataset.assign_attrs(source=data.name)
@@ -148,7 +168,7 @@ def _spikes(
     channel: str | None,
     settings: SpikeSettings,
     mechanics: Mechanics,
-    intervals: tuple[float | None, float | None, float | None],
+    intervals: _IntervalOptions,
 ) -> tuple[SpikeReport, xr.Dataset]:
     """Find and print the spikes of a channel, and their intervals where there are enough."""
     import xarray as xr
@@ -165,7 +185,7 @@ def _spikes(
         return report, dataset
     # what was observed begins with the first spike: before it, one may have been cut off
     train = EventTrain("spikes", dataset["spike_time"].values)
-    more = _trains(console, train, *intervals, unobserved(report))
+    more = _trains(console, train, intervals, unobserved(report))
     remarks = "\n".join(each.attrs["remarks"] for each in (dataset, more) if each.attrs.get("remarks"))
     merged = xr.merge([dataset, more], combine_attrs="drop_conflicts", join="outer", compat="override")
     return report, merged.assign_attrs(remarks=remarks)
@@ -174,23 +194,23 @@ def _spikes(
 def _trains(
     console: Console,
     train: EventTrain,
-    forcing_period: float | None,
-    count_bin: float | None,
-    seam_period: float | None,
+    options: _IntervalOptions,
     masked: tuple[tuple[float, float], ...] = (),
 ) -> xr.Dataset:
     """Print and return what the intervals of a train tell."""
     from vibroimpact.analysis.intervals import interval_report, print_intervals, seams
 
-    if seam_period is not None and len(train.times):
-        masked += seams(seam_period, train.window or (float(train.times[0]), float(train.times[-1])))
+    if options.seams is not None and len(train.times):
+        masked += seams(options.seams, train.window or (float(train.times[0]), float(train.times[-1])))
     dataset = interval_report(
         train.times,
         window=train.window,
         masked=masked,
-        forcing_period=forcing_period,
+        forcing_period=options.forcing_period,
         resolution=train.resolution,
-        count_bin=count_bin,
+        count_bin=options.count_bin,
+        embedding=options.embedding,
+        theiler=options.theiler,
     )
     print_intervals(console, dataset)
     return dataset

@@ -12,6 +12,7 @@ from spike_signals import channel, pulses
 from typer.testing import CliRunner
 
 from vibroimpact.analysis import spikes_command
+from vibroimpact.analysis.intervals import dimension
 from vibroimpact.analysis.recording import EventTrain, Recording
 from vibroimpact.analysis.recording_files import write_recording
 from vibroimpact.fmus.errors import DatasetError, EstimationError, UsageError
@@ -156,3 +157,14 @@ def test_misuse_is_said_and_leaves_no_file(
 def test_an_unknown_channel_is_answered_with_the_names_there_are(record: Path) -> None:
     with pytest.raises(DatasetError, match="expected one of cell"):
         spikes(record, "--channel", "cel")
+
+
+def test_the_defaults_of_the_dimension_are_those_of_the_report() -> None:
+    assert (spikes_command._EMBEDDING, spikes_command._THEILER) == (dimension.EMBEDDING, dimension.THEILER)
+
+
+def test_embedding_and_theiler_window_reach_the_dimension(record: Path, tmp_path: Path) -> None:
+    spikes(record, "--events", "neuron", "--theiler", "5", "--embedding", "3", "-o", tmp_path / "out.nc")
+    with xr.open_dataset(tmp_path / "out.nc") as found:
+        assert found.attrs["theiler"] == 5
+        assert found.sizes["embedding"] == 3
