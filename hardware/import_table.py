@@ -10,9 +10,9 @@ from rich.markup import escape
 from rich.table import Table
 
 from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording
+from vibroimpact.analysis.unit_symbols import written_unit
 
 _PIPE_WIDTH = 160
-_UNIT_WORDS = {"9.80665 m s-2": "g", "m s-2": "m/s²", "1": "-"}
 
 
 def show_recording(recording: Recording, output: Path, figure: Path | None = None) -> None:
@@ -25,7 +25,7 @@ def show_recording(recording: Recording, output: Path, figure: Path | None = Non
     if recording.events:
         console.print(_event_table(recording))
     for name, scalar in recording.scalars.items():
-        console.print(escape(f"{name} = {scalar.value:.6g} {_UNIT_WORDS.get(scalar.unit, scalar.unit)}"))
+        console.print(escape(f"{name} = {scalar.value:.6g} {written_unit(scalar.unit)}"))
     for line in recording.remarks:
         console.print(escape(f"- {line}"), soft_wrap=True)
     console.print(
@@ -57,7 +57,7 @@ def _channel_row(channel: Channel) -> tuple[str, ...]:
         channel.name,
         str(len(channel.values)),
         rate,
-        _UNIT_WORDS.get(channel.unit, channel.unit),
+        written_unit(channel.unit),
         least,
         most,
         counted(Quality.clipped),

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponential
 from vibroimpact.analysis.decay.samples import FEWEST_SAMPLES, DecaySamples
 from vibroimpact.analysis.decay.windows import FirstGuess, first_guess
+from vibroimpact.analysis.units import unit_label
 from vibroimpact.fmus.errors import EstimationError
 
 Floats = NDArray[np.float64]
@@ -71,7 +72,7 @@ def _hertz(omega: float, error: float) -> str:
 
 
 def _short(unit: str) -> str:
-    return {"1": "", "9.80665 m s-2": " g"}.get(unit, f" {unit}")
+    return "" if unit == "1" else f" {unit_label(unit)}"
 
 
 def backbone(samples: DecaySamples, periods: float | None = None) -> Backbone:

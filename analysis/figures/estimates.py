@@ -9,20 +9,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, canvas, page_style
+from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, canvas, page_style, unit_symbol
+from vibroimpact.analysis.unit_symbols import written_unit
 from vibroimpact.fmus.errors import DatasetError
 
 _PANEL_MM = 32
 _NARROWEST = 1e-4
 """Of the values: differences below are not worth a panel."""
-_SYMBOLS = {
-    "9.80665 m s-2": "g",
-    "1": "-",
-    "m s-2": "m/s²",
-    "m s-1": "m/s",
-    "m N-1": "m/N",
-    "rad s-1": "rad/s",
-}
 
 
 def draw_estimates(dataset: xr.Dataset) -> Figure:
@@ -44,11 +37,6 @@ def draw_estimates(dataset: xr.Dataset) -> Figure:
         return drawers[kind](dataset)
 
 
-def _symbol(variable: xr.DataArray) -> str:
-    unit = str(variable.attrs.get("units", "1"))
-    return _SYMBOLS.get(unit, unit)
-
-
 def _draw_decay(dataset: xr.Dataset) -> Figure:
     """Draw motion, residuals and peaks over time, then frequency and damping over amplitude."""
     panels = [_draw_motion, _draw_residuals]
@@ -66,7 +54,7 @@ def _draw_decay(dataset: xr.Dataset) -> Figure:
         axis.set_xlim(left=0.0)
         axis.tick_params(labelbottom=axis is axes[-1])
     if windows:
-        axes[-1].set_xlabel(f"amplitude ({_symbol(dataset.window_amplitude)})")
+        axes[-1].set_xlabel(f"amplitude ({unit_symbol(dataset.window_amplitude)})")
     return figure
 
 
@@ -74,7 +62,7 @@ def _draw_motion(axis: Axes, dataset: xr.Dataset) -> None:
     axis.plot(dataset.time, dataset.measured, color=LINE, linewidth=0.5, rasterized=True, label="measured")
     best = _best_fit(dataset)
     axis.plot(dataset.time, best, color=MARK, linewidth=0.4, linestyle="--", rasterized=True, label="fitted")
-    axis.set_ylabel(f"{dataset.attrs['channel'].replace('_', ' ')} ({_symbol(dataset.measured)})")
+    axis.set_ylabel(f"{dataset.attrs['channel'].replace('_', ' ')} ({unit_symbol(dataset.measured)})")
     _name_above(axis)
 
 
@@ -90,7 +78,7 @@ def _draw_residuals(axis: Axes, dataset: xr.Dataset) -> None:
         residual = dataset.measured - dataset.law_fit
         axis.plot(dataset.time, residual, color=MARK, linewidth=0.4, rasterized=True, label="best law")
     axis.axhline(0.0, color="k", linewidth=0.3)
-    axis.set_ylabel(f"residual ({_symbol(dataset.measured)})")
+    axis.set_ylabel(f"residual ({unit_symbol(dataset.measured)})")
     _name_above(axis)
 
 
@@ -126,7 +114,7 @@ def _draw_peaks(axis: Axes, dataset: xr.Dataset) -> None:
     level = np.average(np.log(height) - line, weights=height**2)
     axis.plot(dataset.peak_time, np.exp(level + line), color=MARK, linewidth=0.6, label="one decrement")
     axis.set_yscale("log")
-    axis.set_ylabel(f"peaks ({_symbol(dataset.measured)})")
+    axis.set_ylabel(f"peaks ({unit_symbol(dataset.measured)})")
     axis.legend(frameon=False, loc="lower left", borderaxespad=0.1)
 
 
@@ -184,7 +172,7 @@ def _draw_response(dataset: xr.Dataset) -> Figure:
     )
     axes[0].plot(hertz, dataset.fitted_response, color=MARK, label="fitted resonance", zorder=3)
     axes[0].set_yscale("log")
-    axes[0].set_ylabel(f"response ({_symbol(dataset.response)})")
+    axes[0].set_ylabel(f"response ({unit_symbol(dataset.response)})")
     axes[0].legend(frameon=False, loc="best", borderaxespad=0.3)
     if coherent:
         near = (dataset.frequency >= hertz[0]) & (dataset.frequency <= hertz[-1])
@@ -230,7 +218,7 @@ def _draw_intervals(axis: Axes, chosen: xr.Dataset, methods: list[str]) -> None:
     axis.ticklabel_format(axis="x", useOffset=False)
     axis.locator_params(axis="x", nbins=5)
     unit = str(chosen["unit"].values)
-    axis.set_xlabel(f"{str(chosen['quantity'].values).replace('_', ' ')} ({_SYMBOLS.get(unit, unit)})")
+    axis.set_xlabel(f"{str(chosen['quantity'].values).replace('_', ' ')} ({written_unit(unit)})")
 
 
 def _limit(setter: Callable[[float, float], object], low: float, high: float) -> None:

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from vibroimpact.analysis.atomic import write_atomically
 from vibroimpact.analysis.outputs import FIGURE_ENDINGS
+from vibroimpact.analysis.unit_symbols import written_unit
 from vibroimpact.fmus.errors import UsageError
 
 Floats = npt.NDArray[np.float64]
@@ -43,14 +44,6 @@ MARK = "#D55E00"
 STOP = "0.45"
 # Told apart with every kind of colour vision (Okabe and Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-_UNIT_SYMBOLS = {
-    "1": "-",
-    "m s-1": "m/s",
-    "rad s-1": "rad/s",
-    "m s-2": "m/s²",
-    "N m-1": "N/m",
-    "N s m-1": "N s/m",
-}
 
 
 def page_style() -> AbstractContextManager[None]:
@@ -95,8 +88,7 @@ def title(variable: xr.DataArray) -> str:
 
 def unit_symbol(variable: xr.DataArray) -> str:
     """Return the unit of a variable as people write it."""
-    unit = str(variable.attrs.get("units", "1"))
-    return _UNIT_SYMBOLS.get(unit, unit)
+    return written_unit(str(variable.attrs.get("units", "1")))
 
 
 def canvas(height_mm: float, width: float = COLUMN_WIDTH) -> Figure:

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, STOP, Floats, canvas, page_style
 from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording
+from vibroimpact.analysis.unit_symbols import written_unit
 from vibroimpact.fmus.errors import DatasetError
 
 _PANEL_MM = 22
 _TRAIN_MM = 20
 _MOST_PANELS = 12
 _MOST_POINTS = 4000
-_UNIT_WORDS = {"9.80665 m s-2": "g", "m s-2": "m/s²", "m s-1": "m/s", "1": "-", "0.001 V": "mV"}
 _LONGEST_NAME = 34
 _MOST_BANDS = 200
 _LOG_FROM = 30.0
@@ -94,7 +94,7 @@ def _draw_channel(axis: Axes, channel: Channel) -> None:
         )
         entries.append(f"{int(clipped.sum())} clipped")
     axis.set_title(_titled(channel.name, entries), fontsize=7.5, loc="left", pad=2)
-    axis.set_ylabel(f"({_UNIT_WORDS.get(channel.unit, channel.unit)})")
+    axis.set_ylabel(f"({written_unit(channel.unit)})")
 
 
 def _titled(name: str, entries: Sequence[str]) -> str:
