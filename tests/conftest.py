@@ -36,7 +36,20 @@ def _counted(function: Callable[..., Any], count: list[int]) -> Callable[..., An
     return run
 
 
+def _draw_the_same_whatever_is_loaded() -> None:
+    """Keep hypothesis from drawing constants of whichever of our modules happen to be loaded by then.
+
+    What is loaded depends on which tests ran before, in which worker: a run could not be repeated. Hypothesis has no
+    setting for it; where its inside is another, nothing is changed.
+    """
+    from hypothesis.internal.conjecture import providers
+
+    if hasattr(providers, "_get_local_constants") and hasattr(providers, "_local_constants"):
+        providers._get_local_constants = lambda: providers._local_constants
+
+
 def pytest_configure(config: pytest.Config) -> None:
+    _draw_the_same_whatever_is_loaded()
     config.stash.setdefault(COUNTS, {})
 
 
