@@ -58,7 +58,7 @@ def replay(
     One recording, or several with --fit and --score, make a dataset. A folder as output makes a campaign over all
     recordings and the grid that the scene sweeps, on many workers; the same command resumes it.
 
-    Example: vibroimpact replay examples/board.toml a0.nc -o a0_replay.nc --fit body.damping_ratio --score a1.nc
+    Example: vibroimpact replay examples/recordings/board.toml a0.nc -o fit.nc --fit body.damping_ratio --score a1.nc
     """
     from vibroimpact.analysis.outputs import refuse_outputs
     from vibroimpact.fmus.errors import UsageError
@@ -125,8 +125,8 @@ def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:
                 f"{scene.source}: expected a recording to replay, got none. Name one after the scene."
             )
         return scene
-    # JSON's strings are TOML's
-    line = f"recordings = {json.dumps([str(path.absolute()) for path in recordings])}"
+    # JSON's strings are TOML's, but for characters that JSON would write as pairs
+    line = f"recordings = {json.dumps([str(path.absolute()) for path in recordings], ensure_ascii=False)}"
     text, count = _TABLE.subn(lambda match: f"{match[0]}\n{line}", scene.text, count=1)
     if not count:
         raise UsageError(
