@@ -156,7 +156,9 @@ class _Fit:
         comparisons = self.compared(values)
         values, comparisons = self.better_start(values, comparisons)
         self.refuse_alike(self._slopes(values, comparisons))  # before a search that would wander about
-        for alignments in range(1, MOST_ALIGNMENTS + 1):  # noqa: B007 counted for the report
+        alignments = 0
+        while alignments < MOST_ALIGNMENTS:
+            alignments += 1
             solution = self.solve(values, comparisons)
             values = solution.x * self.scale
             renewed = self.compared(values)

@@ -22,6 +22,7 @@ import time
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -126,13 +127,11 @@ def measure(repetitions: int, with_nolds: bool) -> list[Timing]:
                     points,
                     m,
                     repetitions,
-                    lambda v=values, m=m: near_pairs(v, RADII, m),  # type: ignore[misc]
+                    partial(near_pairs, values, RADII, m),
                 )
             )
             if points <= MOST_FOR_TREE:
-                timings.append(
-                    timed("k-d tree of scipy", points, m, 1, lambda v=values, m=m: by_tree(v, m))  # type: ignore[misc]
-                )
+                timings.append(timed("k-d tree of scipy", points, m, 1, partial(by_tree, values, m)))
         if points <= MOST_FOR_TREE:
             assert np.array_equal(by_tree(values, EMBEDDING), near)
         if with_nolds and points <= MOST_FOR_NOLDS:
@@ -142,7 +141,7 @@ def measure(repetitions: int, with_nolds: bool) -> list[Timing]:
                     points,
                     EMBEDDING,
                     1,
-                    lambda v=values: by_nolds(v, EMBEDDING, RADII),  # type: ignore[misc]
+                    partial(by_nolds, values, EMBEDDING, RADII),
                 )
             )
         for timing in timings[-5:]:
