@@ -52,7 +52,8 @@ def _compared(replayer: Replayer, reading: Reading, motion: Motion, place: int) 
         windows=list(replay.windows),
         peak_window=replay.peaks,
         measured_events=impacts,
-        simulated_events=motion.impacts[:, 0] if len(motion.impacts) or impacts is not None else None,
+        # without measured instants every simulated impact would count as one too many
+        simulated_events=None if impacts is None else motion.impacts[:, 0],
         simulated_name=reading.compared.simulated,
     )
 

@@ -400,3 +400,17 @@ def test_a_simulated_run_with_impacts_replayed_through_its_own_force_is_the_same
     assert len(comparison.events.measured) == len(recorded_impacts)
     assert len(comparison.events.extra) == len(comparison.events.missed) == 0
     assert np.abs(comparison.events.delay).max() < 1e-5
+
+
+def test_simulated_impacts_are_not_called_extra_where_none_were_measured(tmp_path: Path) -> None:
+    stopped = BOARD + "[[stop]]\nposition = 1e-6\nlocation = 0.5\nrestitution = 0.5\n"
+    path = written(
+        tmp_path / "own.nc",
+        channel("base", TIME, pulse(TIME), trigger="one"),
+        channel("board", TIME, pulse(TIME), trigger="one"),
+    )
+    with opened_replays(scene(stopped), [path]) as (replayer,):
+        motion = replayer.simulate()
+        (comparison,) = compare_motion(replayer, motion)
+    assert len(motion.impacts) > 0
+    assert comparison.events is None
