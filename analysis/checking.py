@@ -202,7 +202,9 @@ def _event_problems(dataset: xr.Dataset) -> list[str]:
         problems.append("event_index: expected events at the same time numbered from 0, got a lower number.")
     component = dataset.variables["event_component"]
     count = len(component.attrs["flag_meanings"].split())
-    if not np.array_equal(component.attrs.get("flag_values", []), np.arange(1, count + 1)):
+    # NetCDF gives an attribute of one element back as a number.
+    values = np.atleast_1d(component.attrs.get("flag_values", []))
+    if not np.array_equal(values, np.arange(1, count + 1)):
         problems.append(f"event_component: expected flag_values 1 to {count}, one for each of flag_meanings.")
     if ((component.values < 1) | (component.values > count)).any():
         problems.append(f"event_component: expected components numbered 1 to {count}, got one outside.")

@@ -329,7 +329,8 @@ def carried_attributes(state: State) -> dict[str, Any]:
 def carried_state(attrs: Mapping[str, Any]) -> State | None:
     """Return the state that the attributes of a part keep; None where there is none."""
     if CARRIED_STATE in attrs:
-        return tuple(np.asarray(attrs[CARRIED_STATE], dtype=np.float64).tolist())
+        # NetCDF gives an array of one element back as a number.
+        return tuple(np.atleast_1d(np.asarray(attrs[CARRIED_STATE], dtype=np.float64)).tolist())
     displacement, velocity = (attrs.get(name) for name in CARRIED)
     return None if displacement is None or velocity is None else (float(displacement), float(velocity))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import in_this_process
+from command_line import in_this_process, vibroimpact
 from fmu_factory import bouncing_ball
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
@@ -44,6 +44,18 @@ def test_a_ball_without_events_bounces_where_it_must(tmp_path: Path) -> None:
     dataset = read_flat(ran(tmp_path, "bouncing_ball"))
     assert dataset.outcome.values[0] == Outcome.ok
     assert dataset.event_time.values[0] == pytest.approx(math.sqrt(2.0 / 9.81), abs=1e-10)
+
+
+def test_a_campaign_over_a_single_component_finishes(tmp_path: Path) -> None:
+    shutil.copy(bouncing_ball(tmp_path), tmp_path / "BouncingBall.fmu")
+    expected = read_flat(ran(tmp_path, "bouncing_ball"))
+    folder = tmp_path / "campaign"
+    done = vibroimpact("campaign", tmp_path / "bouncing_ball.toml", "-o", folder, "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    dataset = read_flat(folder / "dataset.nc")
+    assert np.array_equal(dataset.event_time.values, expected.event_time.values)
+    assert np.array_equal(dataset.event_component.values, expected.event_component.values)
+    assert dataset.event_component.flag_meanings == "ball"
 
 
 def test_a_law_in_python_is_exported_by_the_command_line_and_answers(tmp_path: Path) -> None:

@@ -371,6 +371,26 @@ def test_parts_of_a_coupled_scene_merge_with_their_connections_once(tmp_path: Pa
     xr.testing.assert_identical(merge_datasets(paths), coupled_dataset(runs))
 
 
+def test_parts_of_a_scene_with_one_component_merge_and_can_be_written(tmp_path: Path) -> None:
+    runs = [coupled_record(float(k), events=1) for k in range(2)]
+    paths = []
+    for k in range(2):
+        place = {"mass": np.array([float(k)])}
+        part = coupled_dataset([runs[k]], run_index=[k], coordinates=place, event_components=["ball"])
+        paths.append(written(part, tmp_path, f"{k}.nc"))
+    again = read_flat(written(merge_datasets(paths), tmp_path))
+    check(again)
+    assert again.event_component.attrs["flag_values"] == 1
+    xr.testing.assert_equal(again, coupled_dataset(runs, event_components=["ball"]))
+
+
+def test_a_flag_value_of_another_component_is_refused() -> None:
+    dataset = coupled_dataset([coupled_record(0.0, events=1)], event_components=["ball"])
+    dataset.event_component.attrs["flag_values"] = 2
+    with pytest.raises(DatasetError, match="expected flag_values 1 to 1"):
+        check(dataset)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
