@@ -1,0 +1,104 @@
+"""Scenes, datasets, recordings and campaign folders of version 0.1 keep working, or one line says what to do.
+
+`tests/version_0_1.zip` was written by version 0.1: `done` is a finished campaign, `half` one that lost a part before it
+was compacted, `recording.nc` a decay at 9 rad/s and .3 1/s, `estimates.nc` what was found in it.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import in_this_process, vibroimpact
+from tolerance import SEQUENCE
+
+from vibroimpact.analysis import open_dataset
+from vibroimpact.analysis.dataset import read_flat
+from vibroimpact.orchestrator.body_driver import BodyDriver
+
+FILES = Path(__file__).parents[1] / "version_0_1.zip"
+
+
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    with zipfile.ZipFile(FILES) as archive:
+        archive.extractall(tmp_path)
+    return tmp_path
+
+
+def test_a_dataset_opens_with_its_coordinates_and_rows(old: Path) -> None:
+    campaign = open_dataset(old / "done")
+    assert campaign.displacement_range.sizes == {"direction": 2, "angular_frequency": 5}
+    np.testing.assert_array_equal(campaign.angular_frequency, [0.7, 0.75, 0.8, 0.85, 0.9])
+    assert np.isfinite(campaign.displacement_range).all()
+    assert campaign.vibroimpact.impacts(direction="up", angular_frequency=0.9).impact_velocity.min() > 0.0
+
+
+@pytest.mark.parametrize("name", ["run.nc", "beam.nc", "done", "recording.nc", "estimates.nc"])
+def test_a_file_of_each_kind_has_its_figure(old: Path, name: str) -> None:
+    done = in_this_process("plot", old / name, "-o", old / "figure.png")
+    assert done.returncode == 0, done.stderr
+    assert (old / "figure.png").stat().st_size > 5_000
+
+
+@pytest.mark.parametrize("name", ["run", "beam"])
+def test_a_scene_gives_the_motion_that_it_gave(old: Path, name: str) -> None:
+    done = in_this_process("run", old / f"{name}.toml", "-o", old / "now.nc")
+    assert done.returncode == 0, done.stderr
+    before, now = read_flat(old / f"{name}.nc"), read_flat(old / "now.nc")
+    assert before.sizes["impact"] > 1
+    for variable in ("impact_time", "impact_velocity", "displacement_max", "displacement_min"):
+        np.testing.assert_allclose(now[variable], before[variable], rtol=SEQUENCE, atol=SEQUENCE)
+
+
+def test_a_finished_campaign_has_nothing_left_to_do(old: Path) -> None:
+    before = (old / "done" / "dataset.nc").read_bytes()
+    done = vibroimpact("campaign", old / "campaign.toml", "-o", old / "done")
+    assert done.returncode == 0, done.stderr
+    assert (old / "done" / "dataset.nc").read_bytes() == before
+
+
+def components_of(campaign: Path) -> dict[str, Any]:
+    """Return what a campaign's folder says of itself."""
+    content: dict[str, Any] = json.loads((campaign / "campaign.json").read_text())
+    return content
+
+
+def test_a_half_done_campaign_of_other_components_is_refused_in_one_line_and_keeps_its_parts(
+    old: Path,
+) -> None:
+    half = old / "half"
+    content = components_of(half) | {"fmu_hashes": {"body": "0" * 64}}
+    (half / "campaign.json").write_text(json.dumps(content))
+    parts = {path: path.read_bytes() for path in (half / "parts").iterdir()}
+    done = vibroimpact("campaign", old / "half.toml", "-o", half)
+    assert done.returncode == 2
+    assert "fmu_hashes.body was" in done.stderr
+    assert "choose another folder" in done.stderr
+    assert {path: path.read_bytes() for path in (half / "parts").iterdir()} == parts
+
+
+def test_a_half_done_campaign_goes_on_from_its_parts(old: Path) -> None:
+    half = old / "half"
+    content = components_of(half) | {"fmu_hashes": {"body": BodyDriver({}, {}).hashes["body"]}}
+    (half / "campaign.json").write_text(json.dumps(content))
+    [part] = (half / "parts").iterdir()
+    kept = read_flat(part).impact_time.values
+    done = vibroimpact("campaign", old / "half.toml", "-o", half, "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    resumed = read_flat(half / "dataset.nc")
+    assert resumed.sizes["run"] == 6
+    np.testing.assert_array_equal(resumed.impact_time[: len(kept)], kept)
+
+
+def test_a_recording_is_estimated_as_it_was(old: Path) -> None:
+    done = in_this_process("estimate", old / "recording.nc", "-o", old / "now.nc")
+    assert done.returncode == 0, done.stderr
+    with xr.open_dataset(old / "now.nc") as now, xr.open_dataset(old / "estimates.nc") as before:
+        assert "angular_frequency" in before.quantity
+        np.testing.assert_allclose(now.estimate, before.estimate, rtol=1e-6, equal_nan=True)
