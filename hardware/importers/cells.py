@@ -205,7 +205,7 @@ def _read_column(cells: Sequence[str], decimal: str) -> Cells:
 def _read_dates(cells: Sequence[str]) -> Cells:
     """Read dates with times of day as seconds after the first one."""
     strange: list[tuple[int, str]] = []
-    stamps = np.full(len(cells), np.datetime64("NaT"), dtype="datetime64[ns]")
+    stamps = np.full(len(cells), np.datetime64("NaT", "ns"))
     for row, cell in enumerate(cells):
         stamp = date_of(cell)
         if stamp is not None:

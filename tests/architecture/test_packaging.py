@@ -48,7 +48,7 @@ def test_the_sdist_has_the_sources_of_all_packages_and_nothing_built(sdist: Path
     for package in PACKAGES:
         assert f"{package}/__init__.py" in names
     assert "fmus/native/oscillator/variables.toml" in names
-    assert "LICENSE" in names
+    assert {"LICENSE", "CHANGELOG.md"} <= set(names)
     left_out = (".editable", ".venv", "fmus/built", ".git/")
     assert [name for name in names if name.startswith(left_out)] == []
 
