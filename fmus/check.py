@@ -10,7 +10,6 @@ from __future__ import annotations
 import difflib
 import json
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
@@ -19,6 +18,7 @@ from vibroimpact.fmus.archive import INTERFACES, UnpackedFmu, binary_path, platf
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.fmpy_door import schema_folder, validate
 from vibroimpact.fmus.platform_names import SUFFIXES
+from vibroimpact.fmus.python_child import python_command
 from vibroimpact.fmus.safe_xml import root_of
 
 #: Longest time that loading and instantiating an FMU may take, s.
@@ -98,7 +98,7 @@ def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
         "interface": _interface(fmu),
         "resources": str(fmu.resources),
     }
-    command = [sys.executable, "-m", "vibroimpact.fmus.load_check", json.dumps(facts)]
+    command = python_command("-m", "vibroimpact.fmus.load_check", json.dumps(facts))
     try:
         result = subprocess.run(command, capture_output=True, text=True, timeout=LOADING_LIMIT)
     except subprocess.TimeoutExpired:

@@ -7,7 +7,6 @@ import os
 import shlex
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
@@ -16,6 +15,7 @@ from types import MappingProxyType
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.platform_names import library_suffix, system
+from vibroimpact.fmus.python_child import python_command
 
 #: Chosen by the user; if it does not work that is an error, not a reason to take another.
 CHOICE = "VIBROIMPACT_CC"
@@ -113,7 +113,7 @@ def _candidates() -> Iterator[tuple[str, ...]]:
         yield tuple(shlex.split(os.environ["CC"]))
     yield from ((path,) for path in map(shutil.which, ON_PATH) if path)
     if importlib.util.find_spec("ziglang"):
-        yield (sys.executable, "-m", "ziglang", "cc")
+        yield tuple(python_command("-m", "ziglang", "cc"))
 
 
 @cache

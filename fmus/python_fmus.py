@@ -11,7 +11,6 @@ import hashlib
 import importlib.util
 import shutil
 import subprocess
-import sys
 import tempfile
 import uuid
 import zipfile
@@ -22,6 +21,7 @@ from xml.etree import ElementTree
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
 from vibroimpact.fmus.fmu_zip import write_fmu
+from vibroimpact.fmus.python_child import python_command
 from vibroimpact.fmus.si_units import SiUnit
 
 SOURCES = Path(__file__).with_name("python")
@@ -137,7 +137,7 @@ def _copy(source: Path, target: Path) -> None:
 
 def _built(parts: PythonFmu) -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as output:
-        command = [sys.executable, "-m", "pythonfmu", "build", "-f", str(parts.script), "-d", output]
+        command = python_command("-m", "pythonfmu", "build", "-f", str(parts.script), "-d", output)
         _run([*command, *(str(extra) for extra in parts.extras)], parts)
         (path,) = Path(output).glob("*.fmu")
         with zipfile.ZipFile(path) as archive:

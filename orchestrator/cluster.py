@@ -38,6 +38,7 @@ from distributed.comm.core import CommClosedError
 from distributed.scheduler import KilledWorker
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
+from vibroimpact.fmus.python_child import safe_module_path
 
 CONNECT_SECONDS = 5.0
 """How long a scheduler may take to answer before it counts as absent."""
@@ -216,7 +217,7 @@ def open_workers(*, workers: int | None = None, scheduler: str | None = None) ->
             with _remote_client(scheduler) as client:
                 yield _ready_pool(client, scheduler)
         else:
-            with _embedded_client(workers or processor_count()) as client:
+            with safe_module_path(), _embedded_client(workers or processor_count()) as client:
                 yield _ready_pool(client, "this machine")
 
 

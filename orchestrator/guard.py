@@ -12,7 +12,6 @@ import os
 import queue
 import signal
 import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -23,6 +22,7 @@ from typing import IO, Any
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
+from vibroimpact.fmus.python_child import python_command
 from vibroimpact.orchestrator.breadcrumbs import Breadcrumbs
 from vibroimpact.orchestrator.empty_record import empty_record
 from vibroimpact.orchestrator.guard_pipe import Failure, Identity, Order, Point, receive, send
@@ -43,7 +43,7 @@ class _Child:
 
     def __init__(self, order: Order) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "vibroimpact.orchestrator.guard_child"],
+            python_command("-m", "vibroimpact.orchestrator.guard_child"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.python_child import python_command
 
 PROBE_SECONDS = 120.0
 
@@ -27,7 +27,7 @@ def check_survives(code: str, path: os.PathLike[str] | str, kind: str) -> None:
     DatasetError
         The child died or did not end.
     """
-    command = [sys.executable, "-c", code, os.fspath(path)]
+    command = python_command("-c", code, os.fspath(path))
     try:
         ended = subprocess.run(command, capture_output=True, timeout=PROBE_SECONDS, check=False).returncode
     except subprocess.TimeoutExpired as problem:

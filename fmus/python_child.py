@@ -1,0 +1,36 @@
+"""Python processes that this package starts: none of them imports files that lie in the current folder.
+
+`python -m` and `python -c` put the current folder first on the module path. A person's `queue.py` beside a scene, or a
+stranger's `scipy.py` beside a recording, would be imported in place of what it is named after.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+SAFE_PATH = "PYTHONSAFEPATH"
+
+
+def python_command(*arguments: str) -> list[str]:
+    """Return the command that runs this Python with arguments, the current folder off its module path."""
+    return [sys.executable, "-P", *arguments]
+
+
+@contextmanager
+def safe_module_path() -> Iterator[None]:
+    """Keep the current folder off the module path of the Python processes that libraries start meanwhile.
+
+    For processes whose command is not ours to choose: those of Dask and multiprocessing.
+    """
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = before
