@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 
-def write_atomically(path: str | os.PathLike[str], content: bytes | memoryview) -> None:
+def write_atomically(path: str | os.PathLike[str], *content: bytes | memoryview) -> None:
     """Write the whole content of a file, or leave what was there before.
 
     The content goes to a temporary name in the same folder (hidden, ending in `.tmp`), is forced to the disk
@@ -17,7 +17,8 @@ def write_atomically(path: str | os.PathLike[str], content: bytes | memoryview) 
     Parameters
     ----------
     path : path
-    content : bytes-like
+    *content : bytes-like
+        Written one after the other.
 
     Raises
     ------
@@ -28,7 +29,8 @@ def write_atomically(path: str | os.PathLike[str], content: bytes | memoryview) 
     temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
     try:
         with open(temporary, "xb") as file:
-            file.write(content)
+            for piece in content:
+                file.write(piece)
             file.flush()
             os.fsync(file.fileno())
         os.replace(temporary, target)

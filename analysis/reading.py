@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
+from vibroimpact.analysis.fingerprints import matches_recorded_hash
 from vibroimpact.analysis.schema import RAGGED, RULES, SCHEMA_VERSION, Direction, Outcome, swept_names
 from vibroimpact.fmus.errors import DatasetError
 
@@ -51,6 +52,7 @@ class Part:
 def _opened(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
     """Open a file with the NetCDF library; whatever is wrong with the file is one DatasetError."""
     try:
+        matches_recorded_hash(path)
         with netCDF4.Dataset(os.fspath(path), "r") as file:
             file.set_auto_mask(False)
             _refuse_foreign(path, file.ncattrs(), file.variables)

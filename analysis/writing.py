@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import struct
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.atomic import write_atomically
 from vibroimpact.analysis.checking import check
+from vibroimpact.analysis.fingerprints import closing_line, content_length
 from vibroimpact.analysis.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,
@@ -39,10 +39,6 @@ from vibroimpact.analysis.schema import (
     unit_in,
 )
 from vibroimpact.fmus.errors import DatasetError
-
-# Where the superblock of an HDF5 file has its version, and in versions 2 and 3 the address of the end.
-_SUPERBLOCK_VERSION = 8
-_END_OF_FILE = 28
 
 _Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]
 
@@ -357,8 +353,8 @@ def _quantity_attributes(name: str, units: UnitSystem, unit_of: Mapping[str, str
 def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compression: int = 0) -> None:
     """Check a dataset and write it as one NetCDF-4 file that is whole or not there at all.
 
-    The file is made in memory first and then written in one go: the HDF5 library would keep a file open,
-    and its space taken, after the disk was full.
+    The SHA-256 of the content follows it, see `fingerprints`. The file is made in memory first and then
+    written in one go: the HDF5 library would keep a file open, and its space taken, after the disk was full.
 
     Parameters
     ----------
@@ -377,7 +373,8 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compress
         If the file cannot be written (no space, no permission), with the reason of the operating system.
     """
     check(dataset)
-    write_atomically(path, _image(dataset, compression))
+    image = _image(dataset, compression)
+    write_atomically(path, image, closing_line(image))
 
 
 def _image(dataset: xr.Dataset, compression: int) -> memoryview:
@@ -394,15 +391,9 @@ def _image(dataset: xr.Dataset, compression: int) -> memoryview:
         labels = " connection" if "interface" in variable.dims else ""
         labels += " compared" if "comparison" in variable.dims else ""
         _store(file, str(name), variable, compression, linked + labels if is_data else None)
-    return _without_padding(memoryview(file.close()))
-
-
-def _without_padding(image: memoryview) -> memoryview:
-    """Cut off what the library rounded the memory up by; a truncated file is then always noticed."""
-    if image[_SUPERBLOCK_VERSION] not in (2, 3):
-        return image
-    (end,) = struct.unpack_from("<Q", image, _END_OF_FILE)
-    return image[:end]
+    image = memoryview(file.close())
+    # The library rounds the memory up: cut off, so that the content ends where the file says.
+    return image[: content_length(image)]
 
 
 def _store(

@@ -1,0 +1,95 @@
+"""The SHA-256 that every dataset file ends with, looked at before any library opens the file.
+
+A dataset is its NetCDF-4 content, then one line of text with the SHA-256 of that content. Both are written by one
+rename, so neither is ever there without the other; a copy keeps them together. HDF5 reads its own content and
+ignores what follows. By hand: `head -c -86 dataset.nc | sha256sum` and `tail -c 86 dataset.nc` agree.
+
+Files of version 0.1 end with their content.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import struct
+from typing import BinaryIO
+
+from vibroimpact.fmus.errors import DatasetError
+
+_BEGIN, _END = b"\nvibroimpact SHA-256 ", b"\n"
+_DIGITS = 2 * hashlib.sha256().digest_size
+LINE_LENGTH = len(_BEGIN) + _DIGITS + len(_END)
+"""Bytes after the content of a file whose SHA-256 is recorded."""
+
+_BLOCK = 1 << 20
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+# Where the superblock of an HDF5 file has its version, and in versions 2 and 3 the address of the end.
+_SUPERBLOCK_VERSION = 8
+_END_OF_FILE = 28
+_HEAD = _END_OF_FILE + 8
+
+
+def closing_line(content: bytes | memoryview) -> bytes:
+    """Return the line that follows the content of a file.
+
+    >>> closing_line(b"")[:30]
+    b'\\nvibroimpact SHA-256 e3b0c4429'
+    """
+    return _BEGIN + hashlib.sha256(content).hexdigest().encode() + _END
+
+
+def content_length(head: bytes | memoryview) -> int | None:
+    """Return where the content of an HDF5 file ends, as its first bytes say; None for another kind of file."""
+    if len(head) < _HEAD or bytes(head[:8]) != _SIGNATURE or head[_SUPERBLOCK_VERSION] not in (2, 3):
+        return None
+    (end,) = struct.unpack_from("<Q", head, _END_OF_FILE)
+    return int(end)
+
+
+def matches_recorded_hash(path: str | os.PathLike[str]) -> bool:
+    """Return whether a file has a recorded SHA-256, which its content then matches.
+
+    Only bytes are read; no library sees the file.
+
+    Parameters
+    ----------
+    path : path
+
+    Returns
+    -------
+    bool
+        False where no hash is recorded: a file of version 0.1 or of another program.
+
+    Raises
+    ------
+    DatasetError
+        When the content is not the one whose hash is recorded.
+    OSError
+        When the file cannot be read.
+    """
+    with open(path, "rb") as file:
+        length = os.fstat(file.fileno()).st_size - LINE_LENGTH
+        if length < 0:
+            return False
+        expected = content_length(file.read(_HEAD))
+        file.seek(length)
+        line = file.read()
+        # Two signs of a hash, the length of the file and the line: damage at one place leaves the other.
+        if expected != length and not line.startswith(_BEGIN):
+            return False
+        file.seek(0)
+        if line != _BEGIN + _hash_of(file, length) + _END:
+            raise DatasetError(
+                f"{os.fspath(path)}: expected the content whose SHA-256 the file ends with, got another: the file is "
+                "damaged. Take a copy of it, or write it again."
+            )
+    return True
+
+
+def _hash_of(file: BinaryIO, length: int) -> bytes:
+    """Return the SHA-256 of so many bytes from here on, in hexadecimal."""
+    digest, left = hashlib.sha256(), length
+    while left and (block := file.read(min(left, _BLOCK))):
+        digest.update(block)
+        left -= len(block)
+    return digest.hexdigest().encode()
