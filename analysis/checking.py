@@ -1,11 +1,17 @@
-"""The check of a dataset against the schema; every writer calls it before it writes."""
+"""The check of a dataset against the schema; every writer calls it before it writes.
+
+Two kinds of problems: the file would be no dataset (a variable is missing, counts do not sum), which is refused;
+and the values of a run cannot be right (a speed of approach below 0), which marks that run and keeps all others.
+"""
 
 from __future__ import annotations
 
-from typing import get_args
+from collections.abc import Iterator
+from typing import Any, get_args
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.schema import (
     CONVENTIONS,
@@ -25,7 +31,9 @@ from vibroimpact.fmus.errors import DatasetError
 
 
 def check(dataset: xr.Dataset) -> None:
-    """Check a one-dimensional dataset against the schema; every writer calls this before it writes.
+    """Check a one-dimensional dataset against the schema.
+
+    A run with the outcome error promises nothing of its values: they are not looked at.
 
     Parameters
     ----------
@@ -37,12 +45,48 @@ def check(dataset: xr.Dataset) -> None:
     DatasetError
         With all problems, one on each line.
     """
-    problems = _structure_problems(dataset)
-    # The contents mean nothing while a variable is missing or has another shape.
+    problems = _problems(dataset)
     if not problems:
-        problems = _content_problems(dataset)
+        index = dataset.variables["run_index"].values
+        problems = [f"run {index[run]}: {problem}" for run, problem in _run_problems(dataset)]
     if problems:
-        raise DatasetError("\n".join(f"dataset: {problem}" for problem in problems))
+        raise _refusal(problems)
+
+
+def marked(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset in which each run whose values fail the check has the outcome error, and says why.
+
+    Nothing that was computed is taken away: the values of a marked run stay as they are.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A dataset along `run`; it is not changed.
+
+    Raises
+    ------
+    DatasetError
+        Names, dimensions, types or counts are wrong, so that no run can be told from another.
+    """
+    problems = _problems(dataset)
+    if problems:
+        raise _refusal(problems)
+    outcome, message = dataset.variables["outcome"].copy(), dataset.variables["message"].copy()
+    bad = list(_run_problems(dataset))
+    for run, problem in bad:
+        outcome.values[run] = Outcome.error
+        message.values[run] = "; ".join(text for text in (message.values[run], f"check: {problem}") if text)
+    return dataset.assign(outcome=outcome, message=message) if bad else dataset
+
+
+def _refusal(problems: list[str]) -> DatasetError:
+    return DatasetError("\n".join(f"dataset: {problem}" for problem in problems))
+
+
+def _problems(dataset: xr.Dataset) -> list[str]:
+    """Return why this is no dataset at all."""
+    # The contents mean nothing while a variable is missing or has another shape.
+    return _structure_problems(dataset) or _content_problems(dataset)
 
 
 def _structure_problems(dataset: xr.Dataset) -> list[str]:
@@ -110,7 +154,7 @@ def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
 
 
 def _content_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with the values of a dataset whose structure is right."""
+    """Return what is wrong with the values that tell runs, rows and components apart."""
     problems = []
     for name, kind in (("outcome", Outcome), ("direction", Direction)):
         values = dataset.variables[name].values
@@ -126,98 +170,91 @@ def _content_problems(dataset: xr.Dataset) -> list[str]:
             problems.append(f"{name}: expected finite values of a swept parameter, got NaN or infinity.")
     for dimension, count_name in RAGGED.items():
         if count_name in dataset.variables:
-            problems += _ragged_problems(dataset, dimension, count_name)
-    return (
-        problems
-        + _impact_problems(dataset)
-        + _stick_problems(dataset)
-        + _event_problems(dataset)
-        + _coupling_problems(dataset)
-    )
+            count = dataset.variables[count_name].values
+            rows = dataset.sizes[dimension]
+            if (count < 0).any() or int(count.sum(dtype=np.int64)) != rows:
+                problems.append(
+                    f"{count_name}: expected counts that sum to the {rows} rows of {dimension}, got {count.sum()}."
+                )
+    return problems + _label_problems(dataset)
 
 
-_CLOCKS = {"impact": "impact_time", "stick": "stick_start", "sample": "time", "event": "event_time"}
-
-
-def _ragged_problems(dataset: xr.Dataset, dimension: str, count_name: str) -> list[str]:
-    """Return what is wrong with the rows of a ragged array: their number and their order in time."""
-    count = dataset.variables[count_name].values
-    rows = dataset.sizes[dimension]
-    if (count < 0).any() or int(count.sum(dtype=np.int64)) != rows:
-        return [
-            f"{count_name}: expected counts that sum to the {rows} rows of {dimension}, got {count.sum()}."
-        ]
-    clock = _CLOCKS[dimension]
-    time = dataset.variables[clock].values
-    if not np.isfinite(time).all():
-        return [f"{clock}: expected finite times, got NaN or infinity."]
-    backwards = np.diff(time) < 0
-    first_rows = np.cumsum(count, dtype=np.int64)[:-1]
-    # The first row of a run may be earlier than the last row of the run before it.
-    backwards[first_rows[(first_rows > 0) & (first_rows < rows)] - 1] = False
-    if backwards.any():
-        row = int(np.argmax(backwards)) + 1
-        return [
-            f"{clock}: expected times that do not decrease in a run, got {time[row - 1]} then {time[row]}."
-        ]
-    return []
-
-
-def _impact_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with recorded impacts."""
-    if "impact" not in dataset.dims:
-        return []
+def _label_problems(dataset: xr.Dataset) -> list[str]:
+    """Return what is wrong with the names of components and connections."""
     problems = []
-    phase = dataset.variables["impact_phase"].values
-    if ((phase < 0) | (phase >= 2 * np.pi)).any():
-        problems.append("impact_phase: expected 0 <= phase < 2 pi rad or NaN, got a phase outside.")
-    if not (dataset.variables["impact_velocity"].values >= 0).all():
-        problems.append("impact_velocity: expected a speed of approach >= 0, got a negative or missing one.")
-    for name in ("impact_restitution", "impact_duration"):
-        if name in dataset.variables and (dataset.variables[name].values < 0).any():
-            problems.append(f"{name}: expected a number >= 0 or NaN, got a negative one.")
-    if (dataset.variables["impact_contact"].values < 1).any():
-        problems.append("impact_contact: expected stops numbered from 1, got a smaller number.")
-    return problems
-
-
-def _stick_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with recorded sticking phases."""
-    if "stick" not in dataset.dims:
-        return []
-    problems = []
-    if (dataset.variables["stick_end"].values < dataset.variables["stick_start"].values).any():
-        problems.append("stick_end: expected an end that is not before its start, got an earlier one.")
-    if (dataset.variables["stick_contact"].values < 1).any():
-        problems.append("stick_contact: expected stops numbered from 1, got a smaller number.")
-    return problems
-
-
-def _event_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with recorded events."""
-    if "event" not in dataset.dims:
-        return []
-    problems = []
-    if (dataset.variables["event_index"].values < 0).any():
-        problems.append("event_index: expected events at the same time numbered from 0, got a lower number.")
-    component = dataset.variables["event_component"]
-    count = len(component.attrs["flag_meanings"].split())
-    # NetCDF gives an attribute of one element back as a number.
-    values = np.atleast_1d(component.attrs.get("flag_values", []))
-    if not np.array_equal(values, np.arange(1, count + 1)):
-        problems.append(f"event_component: expected flag_values 1 to {count}, one for each of flag_meanings.")
-    if ((component.values < 1) | (component.values > count)).any():
-        problems.append(f"event_component: expected components numbered 1 to {count}, got one outside.")
-    return problems
-
-
-def _coupling_problems(dataset: xr.Dataset) -> list[str]:
-    """Return what is wrong with the residuals of a coupled scene."""
-    problems = []
+    if "event" in dataset.dims:
+        component = dataset.variables["event_component"]
+        count = len(component.attrs["flag_meanings"].split())
+        # NetCDF gives an attribute of one element back as a number.
+        values = np.atleast_1d(component.attrs.get("flag_values", []))
+        if not np.array_equal(values, np.arange(1, count + 1)):
+            problems.append(
+                f"event_component: expected flag_values 1 to {count}, one for each of flag_meanings."
+            )
     if "connection" in dataset.variables:
         names = dataset.variables["connection"].values
         if len(set(names)) != names.size:
             problems.append("connection: expected each connection once, got one twice.")
-    if "loop_residual" in dataset.variables and (dataset.variables["loop_residual"].values < 0).any():
-        problems.append("loop_residual: expected a residual >= 0 or NaN, got a negative one.")
     return problems
+
+
+_Flags = NDArray[np.bool_]
+_CLOCKS = {"impact": "impact_time", "stick": "stick_start", "sample": "time", "event": "event_time"}
+
+
+def _run_problems(dataset: xr.Dataset) -> Iterator[tuple[int, str]]:
+    """Yield each run whose values cannot be right, by its place, with the first value that is not."""
+    failed = dataset.variables["outcome"].values == Outcome.error
+    for dimension, count_name in RAGGED.items():
+        if count_name in dataset.variables:
+            count = dataset.variables[count_name].values.astype(np.int64)
+            owner = np.repeat(np.arange(count.size), count)
+            first = np.cumsum(count) - count
+            for name, expected, bad in _row_checks(dataset, dimension, owner):
+                rows = np.flatnonzero(bad & ~failed[owner])
+                _, places = np.unique(owner[rows], return_index=True)
+                values = dataset.variables[name].values
+                for row in rows[places]:
+                    run = int(owner[row])
+                    where = f"of {dimension} {row - first[run] + 1}"
+                    yield run, f"{name}: expected {expected}, got {values[row]} {where}."
+    if "loop_residual" in dataset.variables:
+        residual = dataset.variables["loop_residual"].values
+        for run in np.flatnonzero((residual < 0) & ~failed).tolist():
+            yield run, f"loop_residual: expected a residual >= 0 or NaN, got {residual[run]}."
+
+
+def _row_checks(
+    dataset: xr.Dataset, dimension: str, owner: NDArray[np.int64]
+) -> Iterator[tuple[str, str, _Flags]]:
+    """Yield the variables of a ragged dimension: name, what its values must be, and which rows are not."""
+    clock = _CLOCKS[dimension]
+    time = dataset.variables[clock].values
+    yield clock, "finite times", ~np.isfinite(time)
+    backwards = np.zeros(time.size, dtype=np.bool_)
+    # The first row of a run may be earlier than the last row of the run before it.
+    backwards[1:] = (np.diff(time) < 0) & (np.diff(owner) == 0)
+    yield clock, "times that do not decrease in a run", backwards
+
+    def value(name: str) -> NDArray[Any]:
+        values: NDArray[Any] = dataset.variables[name].values
+        return values
+
+    if dimension == "impact":
+        phase = value("impact_phase")
+        yield "impact_phase", "0 <= phase < 2 pi rad or NaN", (phase < 0) | (phase >= 2 * np.pi)
+        yield "impact_velocity", "a speed of approach >= 0", ~(value("impact_velocity") >= 0)
+        for name in ("impact_restitution", "impact_duration"):
+            if name in dataset.variables:
+                yield name, "a number >= 0 or NaN", value(name) < 0
+    if dimension in ("impact", "stick"):
+        name = f"{dimension}_contact"
+        yield name, "stops numbered from 1", value(name) < 1
+    if dimension == "stick":
+        yield "stick_end", "an end that is not before its start", value("stick_end") < time
+    if dimension == "event":
+        yield "event_index", "events at the same time numbered from 0", value("event_index") < 0
+        component = dataset.variables["event_component"]
+        count = len(component.attrs["flag_meanings"].split())
+        outside = (component.values < 1) | (component.values > count)
+        yield "event_component", f"components numbered 1 to {count}", outside

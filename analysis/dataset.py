@@ -8,7 +8,7 @@ is importable from here.
 from __future__ import annotations
 
 from vibroimpact.analysis.accessor import VibroimpactAccessor
-from vibroimpact.analysis.checking import check
+from vibroimpact.analysis.checking import check, marked
 from vibroimpact.analysis.merging import merge_datasets
 from vibroimpact.analysis.reading import Part, open_dataset, open_measured, read_flat, read_part, unreadable
 from vibroimpact.analysis.schema import (
@@ -49,6 +49,7 @@ __all__ = [
     "check",
     "file_name_of",
     "file_names",
+    "marked",
     "merge_datasets",
     "open_dataset",
     "open_measured",

@@ -11,11 +11,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.reading import read_flat
-from vibroimpact.analysis.schema import RAGGED, flat_order
+from vibroimpact.analysis.schema import IMPACT_COLUMNS, NEEDED_IMPACT_COLUMNS, RAGGED, flat_order
 from vibroimpact.fmus.errors import DatasetError
 
 # Not along run, the same in all parts.
 _SHARED = frozenset({"connection", "compared"})
+# What runs may be without: a part of failed runs knows no loops, one of an older version no durations.
+_MAY_LACK = ("loop_residual", *(name for name in IMPACT_COLUMNS if name not in NEEDED_IMPACT_COLUMNS))
 # Attributes that say what the values are: parts that differ in them cannot be joined.
 _MEANING = ("units", "component_variable", "flag_meanings")
 
@@ -48,6 +50,7 @@ def merge_datasets(paths: Sequence[str | os.PathLike[str]]) -> xr.Dataset:
 
 def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
     """Join parts along run and along every ragged dimension, then put the runs in order."""
+    parts = _completed(parts)
     first = parts[0]
     for name, part in zip(names, parts, strict=True):
         if set(part.variables) != set(first.variables):
@@ -76,6 +79,20 @@ def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
     }
     coords = {str(name): data.pop(str(name)) for name in first.coords}
     return xr.Dataset(data, coords=coords, attrs=first.attrs)
+
+
+def _completed(parts: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Return parts in which NaN stands for what only others of them have, where runs may be without it."""
+    known = {name: part.variables[name] for part in parts for name in _MAY_LACK if name in part.variables}
+    completed = []
+    for part in parts:
+        missing = {
+            name: (variable.dims, np.full(part.sizes[variable.dims[0]], np.nan), variable.attrs)
+            for name, variable in known.items()
+            if name not in part.variables and variable.dims[0] in part.sizes
+        }
+        completed.append(part.assign(missing) if missing else part)
+    return completed
 
 
 def _refuse_other_meaning(name: str, part: xr.Dataset, first_name: str, first: xr.Dataset) -> None:

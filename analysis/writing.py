@@ -13,7 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.atomic import write_atomically
-from vibroimpact.analysis.checking import check
+from vibroimpact.analysis.checking import marked
 from vibroimpact.analysis.fingerprints import closing_line, content_length
 from vibroimpact.analysis.schema import (
     CONVENTIONS,
@@ -93,7 +93,7 @@ def build_dataset(
     -------
     xarray.Dataset
         Dimensions `run`, and `state`, `period`, `impact`, `stick`, `sample`, `event`, `interface` where recorded.
-        Not checked yet: `check`.
+        Not checked yet: `checking.check`.
 
     Raises
     ------
@@ -353,6 +353,8 @@ def _quantity_attributes(name: str, units: UnitSystem, unit_of: Mapping[str, str
 def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compression: int = 0) -> None:
     """Check a dataset and write it as one NetCDF-4 file that is whole or not there at all.
 
+    A run whose values fail the check is marked (`checking.marked`) and written with the others.
+
     The SHA-256 of the content follows it, see `fingerprints`. The file is made in memory first and then
     written in one go: the HDF5 library would keep a file open, and its space taken, after the disk was full.
 
@@ -368,12 +370,11 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compress
     Raises
     ------
     DatasetError
-        If the dataset does not follow the schema.
+        If names, dimensions, types or counts are not those of the schema.
     OSError
         If the file cannot be written (no space, no permission), with the reason of the operating system.
     """
-    check(dataset)
-    image = _image(dataset, compression)
+    image = _image(marked(dataset), compression)
     write_atomically(path, image, closing_line(image))
 
 

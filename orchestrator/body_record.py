@@ -30,6 +30,20 @@ class DeadlineReached(Exception):
     """A run took longer than its deadline; it ends here with what it has."""
 
 
+def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return rows in the order of their first column, a time; rows of equal times keep their order.
+
+    What lasts is recorded when it ends: a contact within which another one begins and ends comes after it.
+
+    Examples
+    --------
+    >>> in_time_order(np.array([[1.2, 2.0], [0.8, 1.0], [1.2, 1.0]])).tolist()
+    [[0.8, 1.0], [1.2, 2.0], [1.2, 1.0]]
+    """
+    time = rows[:, 0]
+    return rows[np.argsort(time, kind="stable")] if (np.diff(time) < 0.0).any() else rows
+
+
 @dataclass(slots=True)
 class Rows:
     """Rows taken from a body's record, in the order they were written; shape (row, 8) each."""
@@ -37,9 +51,9 @@ class Rows:
     blocks: list[NDArray[np.float64]] = field(default_factory=list)
 
     def of_kind(self, kind: float) -> NDArray[np.float64]:
-        """Return the rows of one kind, shape (n, 8)."""
+        """Return the rows of one kind without the column of the kind, shape (n, 7)."""
         rows = np.concatenate(self.blocks) if self.blocks else np.empty((0, ROW_WIDTH))
-        chosen: NDArray[np.float64] = rows[rows[:, 0] == kind]
+        chosen: NDArray[np.float64] = rows[rows[:, 0] == kind, 1:]
         return chosen
 
 
@@ -152,6 +166,18 @@ class RecordedBody(ABC):
             self.rows.blocks.append(self._table[:count].copy())
             self._taken.values[0] = count
             self._taken.set()
+
+    def impacts(self) -> NDArray[np.float64]:
+        """Return the impacts so far by time of touch-down, shape (n, 7): columns `schema.IMPACT_COLUMNS`."""
+        self.take_rows()
+        return in_time_order(self.rows.of_kind(ROW_IMPACT))
+
+    def sticks(self) -> NDArray[np.float64]:
+        """Return the sticks so far by their start, shape (n, 3): start, end (NaN: not ended), contact."""
+        self.take_rows()
+        ended = self.rows.of_kind(ROW_STICK)[:, :3]
+        still = [(start, np.nan, float(contact)) for contact, start in self.sticks_open()]
+        return in_time_order(np.concatenate([ended, np.array(still).reshape(-1, 3)]))
 
     def observed(self) -> tuple[float, float]:
         """Return displacement (m) and velocity (m/s) of the observed point."""

@@ -24,6 +24,7 @@ from vibroimpact.analysis.dataset import (
     Direction,
     Outcome,
     RunRecord,
+    marked,
     write_dataset,
 )
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
@@ -207,8 +208,8 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     records, carried = run_points(opened.scene, opened.runner, points, chunk.start, deadline)
     computed = time.perf_counter()
     done = replace(chunk, stop=chunk.first + len(records))
-    write_part(work, opened.scene, done, points[: len(records)], records, carried)
-    return ChunkResult(done, carried, tally(records), computed - began, time.perf_counter() - computed)
+    outcomes = write_part(work, opened.scene, done, points[: len(records)], records, carried)
+    return ChunkResult(done, carried, outcomes, computed - began, time.perf_counter() - computed)
 
 
 def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
@@ -217,8 +218,8 @@ def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     scene = parse_scene(work.scene_text, work.source)
     points = points_of(expand(scene), chunk)
     records = [empty_record(scene, Outcome.crash, message, 0.0) for _ in points]
-    write_part(work, scene, chunk, points, records, chunk.start)
-    return ChunkResult(chunk, chunk.start, tally(records), 0.0, time.perf_counter() - began)
+    outcomes = write_part(work, scene, chunk, points, records, chunk.start)
+    return ChunkResult(chunk, chunk.start, outcomes, 0.0, time.perf_counter() - began)
 
 
 def _refuse_other_runner(work: Work, runner: Runner) -> None:
@@ -299,17 +300,17 @@ def run_point(scene: Scene, runner: Runner, point: Point, start: State | None) -
         return empty_record(scene, Outcome.error, str(error), time.perf_counter() - began)
 
 
-def tally(records: Sequence[RunRecord]) -> dict[str, int]:
-    """Count the records of each outcome."""
-    names = [record.outcome.name for record in records]
-    return {name: names.count(name) for name in dict.fromkeys(names)}
+def tally(dataset: xr.Dataset) -> dict[str, int]:
+    """Count the runs of each outcome."""
+    values, counts = np.unique(dataset.outcome.values, return_counts=True)
+    return {Outcome(value).name: int(count) for value, count in zip(values, counts, strict=True)}
 
 
 def dataset_of(
     scene: Scene, points: Sequence[BranchPoint], records: Sequence[RunRecord], attrs: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Return the dataset of points and what became of them."""
-    return dataset_of_runs(
+    """Return the dataset of points and what became of them; points with impossible values are marked."""
+    dataset = dataset_of_runs(
         scene,
         [place.point.values for place in points],
         [place.direction for place in points],
@@ -317,6 +318,7 @@ def dataset_of(
         records,
         attrs,
     )
+    return marked(dataset)
 
 
 def carried_attributes(state: State) -> dict[str, Any]:
@@ -342,16 +344,18 @@ def write_part(
     points: Sequence[BranchPoint],
     records: Sequence[RunRecord],
     carried: State | None,
-) -> None:
-    """Write the part of a chunk: it is there as a whole or not at all."""
+) -> dict[str, int]:
+    """Write the part of a chunk, as a whole or not at all; returns how many runs ended in each way."""
     attrs: dict[str, Any] = {"scene_hash": work.scene_hash}
     if carried is not None:
         attrs |= carried_attributes(carried)
     path = Path(work.parts_folder, chunk.part_name)
     try:
-        write_dataset(dataset_of(scene, points, records, attrs), path)
+        dataset = dataset_of(scene, points, records, attrs)
+        write_dataset(dataset, path)
     except OSError as error:
         raise CampaignError(
             f"{path.parent}: the results of {chunk.count} points could not be written: "
             f"{error.strerror or error}. Make room or restore access; then the same command resumes."
         ) from error
+    return tally(dataset)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
-from vibroimpact.orchestrator.body_record import DeadlineReached, ImpactLimitReached
+from vibroimpact.orchestrator.body_record import DeadlineReached, ImpactLimitReached, in_time_order
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.general_scene import GeneralScene
@@ -221,7 +221,7 @@ class GeneralRunner:
             final_velocity=math.nan,
             final_phase=math.nan,
             seconds=seconds,
-            events=np.array(self._events, dtype=np.float64).reshape(-1, 3)
+            events=in_time_order(np.array(self._events, dtype=np.float64).reshape(-1, 3))
             if self._scene.record.impacts
             else None,
             energy_residual=self._energy.residuals() if self._energy.names else None,

@@ -24,9 +24,7 @@ from vibroimpact.orchestrator.body_parameters import (
     state_variables,
 )
 from vibroimpact.orchestrator.body_record import (
-    ROW_IMPACT,
     ROW_PERIOD,
-    ROW_STICK,
     DeadlineReached,
     ImpactLimitReached,
     RecordedBody,
@@ -221,7 +219,7 @@ class _Run:
     def record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
         """Return the record of the run."""
         self.driver.take_rows()
-        wanted, rows = self.scene.record, self.driver.rows
+        wanted = self.scene.record.impacts
         displacement, velocity = self.driver.observed()
         if not math.isfinite(displacement):
             where = f"displacement: expected a finite number, got {displacement}"
@@ -230,8 +228,8 @@ class _Run:
             outcome=outcome,
             message=message,
             periods=self._period_rows(),
-            impacts=rows.of_kind(ROW_IMPACT)[:, 1:8] if wanted.impacts else None,
-            sticks=self._stick_rows() if wanted.impacts else None,
+            impacts=self.driver.impacts() if wanted else None,
+            sticks=self.driver.sticks() if wanted else None,
             samples=self._sample_rows(),
             final_displacement=displacement,
             final_velocity=velocity,
@@ -251,12 +249,7 @@ class _Run:
     def _period_rows(self) -> NDArray[np.float64] | None:
         if self.scene.period is None or not (self.scene.record.extrema or self.scene.record.strobe):
             return None
-        return self.driver.rows.of_kind(ROW_PERIOD)[:, 2:7]
-
-    def _stick_rows(self) -> NDArray[np.float64]:
-        ended = self.driver.rows.of_kind(ROW_STICK)[:, 1:4]
-        open_sticks = [(start, math.nan, float(contact)) for contact, start in self.driver.sticks_open()]
-        return np.concatenate([ended, np.array(open_sticks).reshape(-1, 3)])
+        return self.driver.rows.of_kind(ROW_PERIOD)[:, 1:6]
 
     def _sample_rows(self) -> NDArray[np.float64] | None:
         series = self.scene.record.time_series

@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.body_parameters import (
     integer_parameters,
     state_variables,
 )
-from vibroimpact.orchestrator.body_record import ROW_IMPACT, ROW_STICK, RecordedBody
+from vibroimpact.orchestrator.body_record import RecordedBody
 from vibroimpact.orchestrator.coupled_driver import CoupledDriver
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.runner import driver_of
@@ -189,15 +189,11 @@ class Session:
 
     def impacts(self) -> Floats:
         """Return the impacts so far, shape (impact, 7): columns `analysis.schema.IMPACT_COLUMNS`."""
-        self._driver.take_rows()
-        return self._driver.rows.of_kind(ROW_IMPACT)[:, 1:8]
+        return self._driver.impacts()
 
     def sticks(self) -> Floats:
         """Return the sticks so far, shape (stick, 3): start, end (NaN: not ended), contact."""
-        self._driver.take_rows()
-        ended = self._driver.rows.of_kind(ROW_STICK)[:, 1:4]
-        still = [(start, math.nan, float(contact)) for contact, start in self._driver.sticks_open()]
-        return np.concatenate([ended, np.array(still).reshape(-1, 3)])
+        return self._driver.sticks()
 
     def observed(self) -> tuple[float, float]:
         """Return displacement (m) and velocity (m/s) of the observed point."""

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from vibroimpact.analysis.dataset import RunRecord, write_dataset
+from vibroimpact.analysis.dataset import Outcome, RunRecord, write_dataset
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.chunks import (
     DEFAULT_RUNNER,
@@ -20,6 +20,7 @@ from vibroimpact.orchestrator.chunks import (
     run_points,
     tally,
 )
+from vibroimpact.orchestrator.empty_record import empty_record
 from vibroimpact.orchestrator.progress import Progress, Silence
 from vibroimpact.orchestrator.provenance import provenance
 from vibroimpact.orchestrator.scene import Scene
@@ -60,6 +61,8 @@ def run_scene(
     opened = open_runner(scene, runner)
     try:
         points = _all_points(scene)
+        # A dataset that cannot be made is found out before an hour of work, not after it.
+        dataset_of(scene, points[:1], [empty_record(scene, Outcome.error, "rehearsal", 0.0)], {})
         records = _run_all(scene, opened, points, progress or Silence())
         dataset = dataset_of(scene, points, records, provenance(scene, identify(opened)))
     finally:
@@ -68,7 +71,7 @@ def run_scene(
         write_dataset(dataset, target)
     except OSError as error:
         raise _unwritable(target, error) from error
-    return tally(records)
+    return tally(dataset)
 
 
 def _all_points(scene: Scene) -> list[BranchPoint]:

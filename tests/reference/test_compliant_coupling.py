@@ -187,8 +187,7 @@ def rows_of(driver: BodyDriver | CoupledDriver, floats: dict[str, float], end: f
     driver.begin(floats, None)
     driver.record(impacts=True, extrema=False, periods=False)
     driver.advance(end)
-    driver.take_rows()
-    rows = driver.rows.of_kind(1.0)[:, 1:]
+    rows = driver.impacts()
     driver.close()
     return rows
 

@@ -34,6 +34,7 @@ from vibroimpact.analysis.dataset import (
     check,
     file_name_of,
     file_names,
+    marked,
     merge_datasets,
     read_flat,
     read_part,
@@ -508,6 +509,77 @@ def test_check_refuses_impossible_events_and_residuals(name: str, value: float, 
     dataset[name].values[1] = value
     with pytest.raises(DatasetError, match=message):
         check(dataset)
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "value", "told"),
+    [
+        (
+            "impact_time",
+            2,
+            -1.0,
+            "impact_time: expected times that do not decrease in a run, got -1.0 of impact 2",
+        ),
+        ("impact_time", 2, np.nan, "impact_time: expected finite times, got nan of impact 2"),
+        (
+            "impact_velocity",
+            2,
+            np.nan,
+            "impact_velocity: expected a speed of approach >= 0, got nan of impact 2",
+        ),
+        ("impact_contact", 2, 0, "impact_contact: expected stops numbered from 1, got 0 of impact 2"),
+        ("stick_end", 0, 0.1, "stick_end: expected an end that is not before its start, got 0.1 of stick 1"),
+        ("time", 3, -1.0, "time: expected times that do not decrease in a run, got -1.0 of sample 2"),
+    ],
+)
+def test_a_run_with_an_impossible_value_is_marked_and_everything_is_written(
+    name: str, row: int, value: float, told: str, tmp_path: Path
+) -> None:
+    dataset = up_down()
+    dataset[name].values[row] = value
+    stored = read_flat(written(dataset, tmp_path))
+    assert stored.outcome.values.tolist() == [0, Outcome.error, 0, 0, 0, 0]
+    assert stored.message.values[1] == f"check: {told}."
+    xr.testing.assert_identical(
+        stored.drop_vars(["outcome", "message"]), dataset.drop_vars(["outcome", "message"])
+    )
+    # Joined with others it is as it was: what is marked is not marked again, and is no reason to refuse the whole.
+    again = read_flat(written(merge_datasets([tmp_path / "runs.nc"]), tmp_path, "again.nc"))
+    xr.testing.assert_identical(again, stored)
+    check(stored)
+
+
+def test_what_a_marked_run_said_before_is_kept_and_the_dataset_given_is_not_changed() -> None:
+    dataset = coupled_dataset([coupled_record(1.0, events=2), coupled_record(1.0, events=2)])
+    dataset["loop_residual"].values[1] = -1.0
+    dataset["event_index"].values[2] = -3
+    dataset["message"].values[1] = "slow"
+    found = marked(dataset).message.values
+    assert found[0] == ""
+    assert found[1] == (
+        "slow; check: event_index: expected events at the same time numbered from 0, got -3 of event 1.; "
+        "check: loop_residual: expected a residual >= 0 or NaN, got -1.0."
+    )
+    assert dataset.message.values.tolist() == ["", "slow"]
+    assert dataset.outcome.values.tolist() == [0, 0]
+
+
+def test_parts_of_runs_without_loops_or_durations_merge_with_those_that_have_them(tmp_path: Path) -> None:
+    good = coupled_record(1.0, events=1)
+    lost = coupled_record(2.0)
+    lost.loop_residual = None
+    paths = [
+        written(coupled_dataset([lost]), tmp_path, "a.nc"),
+        written(coupled_dataset([good], run_index=[1]), tmp_path, "b.nc"),
+    ]
+    merged = merge_datasets(paths)
+    assert merged.loop_residual.values.tolist()[1] == 1e-12
+    assert np.isnan(merged.loop_residual.values[0])
+    old = dataset_of([record(1.0, impacts=2)]).drop_vars(["impact_restitution", "impact_duration"])
+    new = dataset_of([record(3.0, impacts=1)], run_index=[1])
+    merged = merge_datasets([written(old, tmp_path, "old.nc"), written(new, tmp_path, "new.nc")])
+    assert merged.impact_restitution.values.tolist()[2] == 0.7
+    assert np.isnan(merged.impact_restitution.values[:2]).all()
 
 
 def test_check_refuses_events_whose_components_have_no_names_and_a_connection_given_twice() -> None:
