@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibroimpact.fmus.core import SIDES, core_library
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import ComponentError, UsageError
 
 Array = NDArray[np.float64]
 
@@ -24,7 +24,8 @@ LAWS = {"none": 0, "restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossl
 #: What a contact does, by the number in `Structure.statuses`.
 STATUSES = ("free", "touching", "held", "yielding", "receding")
 #: How `Structure.advance` may end.
-DONE, RECORD_FULL, IMPACT_LIMIT, REFUSED = 0, 2, 3, 4
+DONE, RECORD_FULL, IMPACT_LIMIT, REFUSED, STANDSTILL = 0, 2, 3, 4, 5
+MESSAGE_LENGTH = 1024
 ROW_WIDTH, ROW_CAPACITY = 8, 512
 ROW_IMPACT, ROW_STICK, ROW_PERIOD = 1.0, 2.0, 3.0
 
@@ -130,6 +131,7 @@ def _library() -> ctypes.CDLL:
     library.vi_door_structure_state.argtypes = [
         *(ctypes.c_void_p, numbers, numbers, ctypes.POINTER(integer), numbers, numbers),
     ]
+    library.vi_door_structure_complaint.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
     library.vi_door_structure_rows.argtypes = [ctypes.c_void_p, numbers, integer]
     return library
 
@@ -275,6 +277,11 @@ class Structure:
             Modal forces now and their slopes, N kg^(-1/2) and N kg^(-1/2) / s.
         most_impacts : float
             End after so many impacts; 0: no limit.
+
+        Raises
+        ------
+        ComponentError
+            Contacts at one instant come to no end: names them and the time.
         """
         force, slope = _vector(held, self.modes), _vector(held_rate, self.modes)
         self._read()
@@ -290,7 +297,14 @@ class Structure:
             taken = self._take_rows()
             left = max(1.0, left - taken) if left else 0
             remaining = end - self.time
+        if result == STANDSTILL:
+            raise ComponentError(self._complaint(), function="advance", time=self.time)
         return int(result)
+
+    def _complaint(self) -> str:
+        message = ctypes.create_string_buffer(MESSAGE_LENGTH)
+        self._library.vi_door_structure_complaint(self._handle, message)
+        return f"Structure: {message.value.decode()}."
 
     def _take_rows(self) -> int:
         rows = np.empty((ROW_CAPACITY, ROW_WIDTH))

@@ -249,3 +249,30 @@ def test_a_compliant_stop_is_not_missed_where_a_rigid_one_on_the_other_side_touc
         assert body.advance(30.0, held=[1.0], most_impacts=100) == DONE
         assert body.statuses == ("yielding", "free")
         assert body.displacement[0] == pytest.approx(math.sqrt(1.0 / 80.0), rel=1e-6)
+
+
+def beam_that_rests_while_another_stop_lets_go(law: str) -> Structure:
+    """Return a pinned beam of 2 modes on a plastic stop above, with a stop of this law below."""
+    points = np.sqrt(2.0) * np.sin(np.pi * np.outer([0.7, 0.55], [1.0, 2.0]))
+    stops = [
+        Stop(points[0], 0.0, restitution=0.0),
+        Stop(points[1], -0.01, law=law, side="lower", stiffness=1e3, damping=0.01),
+    ]
+    return Structure(Modes([1.0, 4.0], 0.02), stops, 0.0, [-0.15, -2.29], energies=True)
+
+
+@pytest.mark.parametrize("law", ["hertz", "hunt_crossley"])
+def test_a_beam_held_by_a_stop_that_lets_go_comes_to_the_end_of_its_run(law: str) -> None:
+    with beam_that_rests_while_another_stop_lets_go(law) as one:
+        start = one.energy
+        assert one.advance(12.0, most_impacts=1000) == DONE
+        assert len(one.impacts) > 10
+        assert np.all(one.sticks[:, 2] > one.sticks[:, 1])
+        balance = one.energy - start + one.damping_loss + one.contact_loss
+        assert abs(balance) <= 1e-10 * start
+        with beam_that_rests_while_another_stop_lets_go(law) as many:
+            for part in range(97):
+                assert many.advance(12.0 * (part + 1) / 97 - many.time, most_impacts=1000) == DONE
+            assert len(many.impacts) == len(one.impacts)
+            assert np.abs(many.displacement - one.displacement).max() <= 1e-10
+            assert np.abs(many.velocity - one.velocity).max() <= 1e-10

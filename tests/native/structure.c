@@ -119,8 +119,43 @@ static void check_state(int run)
     CHECK(isfinite(state.energies.contact_loss) && isfinite(state.energies.damping_loss), "run %d", run);
 }
 
+/* One event more at an instant that has seen many: a mass between two stops is thrown off the second. */
+static void one_event_too_many_is_said(void)
+{
+    uint64_t seed = 1;
+    char message[VI_MESSAGE_LENGTH] = "";
+    do {
+        make(&seed);
+    } while (model.modes != 1 || model.contacts != 2);
+    vi_structure_mode(&model, 0, 0.0, 0.0, 0.0, 0.0);
+    for (int k = 0; k < 2; ++k) {
+        model.shape[k][0] = model.impulse[k][0] = 1.0;
+        contacts[k].law = (vi_contact_law){VI_LAW_RESTITUTION, 0.5, 0.0, 0.0, 0.0, 1.5};
+        contacts[k].side = k == 0 ? VI_SIDE_LOWER : VI_SIDE_UPPER;
+        contacts[k].position = k == 0 ? -1.0 : 0.0;
+    }
+    state.q[0] = state.p[0] = 0.0;
+    vi_structure_prepare(&model);
+    vi_structure_start(&body, (vi_instant){0, 0.0, 0.0});
+    const double pressed[VI_MODES] = {1.0}, pulled[VI_MODES] = {-1.0}, level[VI_MODES] = {0.0};
+    const vi_step_request request = {0.0, 0.1, false, false};
+    vi_structure_hold(&body, pressed, level);
+    CHECK(vi_structure_advance(&body, vi_clock_after(&model.clock, state.now, 0.1), &request) == VI_STEP_DONE, "%s", "pressed");
+    CHECK(state.status[1] == VI_CONTACT_HELD, "status %d", state.status[1]);
+    vi_structure_hold(&body, pulled, level);
+    state.standstill = (vi_standstill){state.now, VI_MOST_EVENTS - 1};
+    state.status[1] = VI_CONTACT_YIELDING; /* thrown off a compliant stop: its contact ends at this instant */
+    contacts[1].law = (vi_contact_law){VI_LAW_KELVIN_VOIGT, 0.0, 0.0, 1.0, 1.0, 1.0};
+    state.p[0] = -1.0;
+    CHECK(vi_structure_advance(&body, vi_clock_after(&model.clock, state.now, 0.1), &request) == VI_STEP_STANDSTILL, "%s", "goes on");
+    vi_structure_complain(&body, message);
+    CHECK(strstr(message, "contact[2]") != NULL && strstr(message, "contact[1]") == NULL, "%s", message);
+    CHECK(strstr(message, "1000 events at ") != NULL, "%s", message);
+}
+
 int main(int count, char **names)
 {
+    one_event_too_many_is_said();
     uint64_t seed = 4;
     int64_t impacts = 0;
     const int only = count > 1 ? atoi(names[1]) : -1; /* a run to look at by itself */
@@ -136,7 +171,8 @@ int main(int count, char **names)
         for (int n = 0; n < 6; ++n) {
             const double size = pow(10.0, uniform(&own, -3.0, 2.0)) / fastest_rate(), before = vi_clock_time(&model.clock, state.now);
             const vi_step_request request = {before, size, false, false};
-            vi_structure_advance(&body, vi_clock_after(&model.clock, state.now, size), &request);
+            const vi_step_result result = vi_structure_advance(&body, vi_clock_after(&model.clock, state.now, size), &request);
+            CHECK(result != VI_STEP_STANDSTILL, "run %d stands still at %.17g", run, before);
             CHECK(vi_clock_time(&model.clock, state.now) >= before, "run %d: back from %.17g", run, before);
             record.taken = record.count;
             vi_record_take(&record);

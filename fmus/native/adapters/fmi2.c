@@ -171,7 +171,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     }
     const vi_step_request request = {currentCommunicationPoint, communicationStepSize, false, false};
     const vi_step_result result = vi_this_component.step(it->self, &request, it->message);
-    if (result == VI_STEP_ERROR) {
+    if (result == VI_STEP_ERROR || result == VI_STEP_STANDSTILL) {
         return status(vi_instance_fail(it, function, "%s", it->message));
     }
     it->outputs_stale = false;

@@ -242,7 +242,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
     *lastSuccessfulTime = currentCommunicationPoint;
     const vi_step_result result = vi_this_component.step(it->self, &request, it->message);
-    if (result == VI_STEP_ERROR) {
+    if (result == VI_STEP_ERROR || result == VI_STEP_STANDSTILL) {
         return status(vi_instance_fail(it, "fmi3DoStep", "%s", it->message));
     }
     it->outputs_stale = false;

@@ -410,7 +410,7 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
         follow_amplitudes(b);
     }
     hold_inputs(b);
-    const vi_step_result result = vi_structure_component_advance(&b->body, target, request);
+    const vi_step_result result = vi_structure_component_advance(&b->body, target, request, message);
     update_outputs(b);
     return result;
 }

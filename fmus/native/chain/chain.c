@@ -225,7 +225,7 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
         return VI_STEP_ERROR;
     }
     hold_inputs(c);
-    const vi_step_result result = vi_structure_component_advance(&c->body, target, request);
+    const vi_step_result result = vi_structure_component_advance(&c->body, target, request, message);
     update_outputs(c);
     return result;
 }

@@ -105,10 +105,11 @@ static double seconds_to_landing(const vi_segment *segment, double stop, const v
     return exact ? s : HUGE_VAL;
 }
 
-/* First contact at or after `u` in the segment: its index, with *u and the approach velocity; -1 when there is none. */
+/* First contact at or after `u` in the segment: its index, with *u and the approach velocity; -1 when there is none up to
+ * *u, the end of the segment or of a long search. */
 static int locate(const vi_body *body, const vi_segment *segment, double *u, vi_motion *m, double *approach)
 {
-    for (;;) {
+    for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
         double step = segment->length - *u;
         int nearest = -1, landing = -1;
         for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
@@ -145,6 +146,7 @@ static int locate(const vi_body *body, const vi_segment *segment, double *u, vi_
             return -1;
         }
     }
+    return -1;
 }
 
 /* Can no stop ever be reached again under the present input? */
@@ -283,7 +285,7 @@ static void fly(vi_body *body, vi_instant target, const vi_step_request *request
         m.a = 0.0; /* exactly: that is what released it */
     }
     const int k = locate(body, &segment, &u, &m, &approach);
-    const bool whole = k < 0 && segment.length >= length;
+    const bool whole = k < 0 && u >= length;
     if (whole && room > 0.0) {
         u = length; /* the room after the end was only searched */
         vi_segment_at(&segment, length, &m);
@@ -377,6 +379,7 @@ static void settle_all(vi_body *body, const vi_step_request *request)
 void vi_body_start(vi_body *body, vi_instant now, double displacement, double velocity)
 {
     body->now = body->held_since = now;
+    body->standstill = (vi_standstill){now, 0};
     body->displacement = displacement;
     body->velocity = velocity;
     body->stuck = body->leaving = body->pending = body->passed = 0;
@@ -429,8 +432,20 @@ vi_step_result vi_body_advance(vi_body *body, vi_instant target, const vi_step_r
         } else {
             fly(body, target, request);
         }
+        if (vi_clock_stands(&body->standstill, body->now)) {
+            return VI_STEP_STANDSTILL;
+        }
     }
     return body->pending ? VI_STEP_CONTACT : VI_STEP_DONE;
+}
+
+void vi_body_complain(const vi_body *body, char message[VI_MESSAGE_LENGTH])
+{
+    int on_stop[VI_BODY_CONTACTS];
+    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
+        on_stop[k] = watched(body, k) && body->displacement == body->contacts[k].position;
+    }
+    vi_complain_of_standstill(message, vi_clock_time(&body->clock, body->now), on_stop, VI_BODY_CONTACTS);
 }
 
 void vi_body_resolve(vi_body *body)

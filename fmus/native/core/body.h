@@ -9,6 +9,7 @@
 #include <stdint.h>
 
 #include "clock.h"
+#include "complaint.h"
 #include "contact.h"
 #include "flow.h"
 #include "record.h"
@@ -24,6 +25,7 @@ typedef struct {
     int64_t impact_limit; /* 0: none */
     /* state */
     vi_instant now;
+    vi_standstill standstill;
     double displacement, velocity;
     double held, held_rate; /* input per unit mass at held_since, and its slope */
     vi_instant held_since;
@@ -46,6 +48,9 @@ void vi_body_hold(vi_body *body, double held, double held_rate);
 
 /* Advance to `target`. See step.h for what may end it earlier. */
 vi_step_result vi_body_advance(vi_body *body, vi_instant target, const vi_step_request *request);
+
+/* Say where it stands after VI_STEP_STANDSTILL. */
+void vi_body_complain(const vi_body *body, char message[VI_MESSAGE_LENGTH]);
 
 /* Resolve the pending contact with its answer. */
 void vi_body_resolve(vi_body *body);

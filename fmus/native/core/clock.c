@@ -102,6 +102,16 @@ double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b)
     return (whole + rests) + (count * clock->period_low + fma(count, clock->period, -whole) + low);
 }
 
+bool vi_clock_stands(vi_standstill *standstill, vi_instant now)
+{
+    const vi_instant *last = &standstill->instant;
+    if (now.periods != last->periods || now.rest != last->rest || now.rest_low != last->rest_low) {
+        *standstill = (vi_standstill){now, 0};
+    }
+    standstill->events += 1;
+    return standstill->events >= VI_MOST_EVENTS;
+}
+
 double vi_clock_to_period_end(const vi_clock *clock, vi_instant instant)
 {
     return (clock->period - instant.rest) + (clock->period_low - instant.rest_low);

@@ -22,6 +22,18 @@ typedef struct {
     double rest_low; /* its rounding: a short flight in a long period is timed as well as one in a short period */
 } vi_instant;
 
+/* How often something has happened at one instant. */
+typedef struct {
+    vi_instant instant;
+    int64_t events;
+} vi_standstill;
+
+/* Events at one instant after which time counts as standing still: eight contacts need some tens at most. */
+enum { VI_MOST_EVENTS = 1000 };
+
+/* Count an event that has led to `now`; true once VI_MOST_EVENTS in a row have left the time where it was. */
+bool vi_clock_stands(vi_standstill *standstill, vi_instant now);
+
 /* A clock for a force of this angular frequency (rad/s, >= 0) and phase (rad) at time 0; `natural` (rad/s) is used
  * when angular_frequency is 0. Returns false when the period is not a finite positive number of seconds. */
 bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, double natural);

@@ -5,6 +5,9 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "clock.h"
+#include "sizes.h"
+
 /* Longest name of a variable with its index. */
 enum { NAME_LENGTH = 64 };
 
@@ -63,4 +66,17 @@ void vi_check_each(char message[VI_MESSAGE_LENGTH], vi_check check, const char *
         (void)snprintf(indexed, sizeof indexed, "%s[%d]", name, i + 1);
         check(message, indexed, values[i]);
     }
+}
+
+void vi_complain_of_standstill(char message[VI_MESSAGE_LENGTH], double time, const int on_stop[], int count)
+{
+    char names[16 * VI_PORTS] = "no contact";
+    size_t used = 0;
+    for (int k = 0; k < count; ++k) {
+        if (on_stop[k]) {
+            used += (size_t)snprintf(names + used, sizeof names - used, "%scontact[%d]", used > 0 ? ", " : "", k + 1);
+        }
+    }
+    vi_complain(message, "%s: expected a motion that goes on, got %d events at %.17g s. Change a gap, a start value or"
+                         " contact_tolerance a little", names, VI_MOST_EVENTS, time);
 }

@@ -18,4 +18,7 @@ typedef void (*vi_check)(char message[VI_MESSAGE_LENGTH], const char *name, doub
 void vi_check_each(char message[VI_MESSAGE_LENGTH], vi_check check, const char *name, const double values[],
                    int count);
 
+/* Time stands still at `time`, s, with these contacts on their stops. */
+void vi_complain_of_standstill(char message[VI_MESSAGE_LENGTH], double time, const int on_stop[], int count);
+
 #endif

@@ -28,7 +28,7 @@ static bool advance(vi_body *body, double duration)
     const vi_step_request request = {0.0, duration, true, false};
     vi_instant target;
     return duration >= 0.0 && vi_clock_instant(&body->clock, duration, 0.0, &target)
-           && vi_body_advance(body, target, &request) != VI_STEP_ERROR;
+           && vi_body_advance(body, target, &request) < VI_STEP_ERROR;
 }
 
 VI_DOOR int vi_door_flow(const vi_door_oscillator *oscillator, double phase, const double state[2], double held,
@@ -86,7 +86,7 @@ VI_DOOR int vi_door_motion(const vi_door_oscillator *oscillator, double phase, c
         const vi_step_request request = {reached, instants[i] - reached, false, false};
         vi_instant target;
         if (!(instants[i] >= reached) || !vi_clock_instant(&body.clock, instants[i], 0.0, &target)
-            || vi_body_advance(&body, target, &request) == VI_STEP_ERROR) {
+            || vi_body_advance(&body, target, &request) >= VI_STEP_ERROR) {
             return -1;
         }
         reached = instants[i];

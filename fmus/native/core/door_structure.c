@@ -115,6 +115,13 @@ VI_DOOR int vi_door_structure_advance(vi_door_structure *structure, double durat
     return (int)vi_structure_advance(&s, target, &request);
 }
 
+VI_DOOR void vi_door_structure_complaint(vi_door_structure *structure, char message[])
+{
+    const vi_structure s = parts(structure);
+    message[0] = '\0';
+    vi_structure_complain(&s, message);
+}
+
 VI_DOOR void vi_door_structure_state(vi_door_structure *structure, double q[], double p[], int status[], double force[],
                                      double facts[6])
 {

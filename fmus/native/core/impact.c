@@ -173,7 +173,7 @@ void vi_body_follow_extrema(vi_body *body, const vi_segment *segment, double end
     vi_record_extend(&body->record, body->displacement);
     const double noise = 4.0 * DBL_EPSILON * (fabs(m.v) + segment->scale * segment->mode->fastest);
     double sign = m.v != 0.0 ? copysign(1.0, m.v) : copysign(1.0, m.a);
-    while (u < end) {
+    for (int evaluation = 0; u < end; ++evaluation) {
         /* the velocity sign * v falls to zero as a clearance does */
         const double speed = fmax(0.0, sign * m.v), closing = -sign * m.a;
         if (closing > 0.0 && speed <= noise) {
@@ -186,7 +186,7 @@ void vi_body_follow_extrema(vi_body *body, const vi_segment *segment, double end
         }
         const vi_approach state = {speed, closing, -sign * m.j, m.snap_bound, 0.0};
         const double step = vi_certified_step(&state, end - u);
-        u = fmin(end, u + fmax(step, 1e-12 * end));
+        u = fmin(end, u + fmax(step, vi_least_step(end, 1e-12, evaluation)));
         vi_segment_at(segment, u, &m);
     }
 }

@@ -20,6 +20,10 @@ typedef struct {
     double bound;        /* >= |fourth derivative| over the horizon, m/s^4 */
 } vi_approach;
 
+/* Evaluations after which a search along one piece of motion ends where it is, that far certified: the rest is a piece
+ * of its own. Some tens are usual. */
+enum { VI_MOST_EVALUATIONS = 10000 };
+
 /* A step s, 0 <= s <= horizon, such that the clearance stays >= 0 over [0, s]. s = horizon: nothing before it. */
 double vi_certified_step(const vi_approach *approach, double horizon);
 
@@ -31,6 +35,13 @@ static inline double vi_parabola_root(double clearance, double velocity, double 
         return square < 0.0 ? HUGE_VAL : 2.0 * clearance / (velocity + sqrt(square));
     }
     return acceleration > 0.0 ? (sqrt(square) - velocity) / acceleration : HUGE_VAL;
+}
+
+/* Least step of a search for extremes over `length`: at first this share of it, doubled time and again so that the search
+ * ends. */
+static inline double vi_least_step(double length, double share, int evaluation)
+{
+    return ldexp(share * length, evaluation / 1024);
 }
 
 /* fmin and fmax without their rules for NaN, which cost a call each. */

@@ -63,7 +63,7 @@ vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double len
     const double bound = vi_polynomial_snap(c, length);
     double u = from;
     int crawl = 0;
-    for (;;) {
+    for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
         double value[4];
         vi_polynomial_at(c, u, value);
         vi_approach p = {vi_max(0.0, value[0]), -value[1], -value[2], -value[3], bound};
@@ -85,4 +85,5 @@ vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double len
         }
         u += step;
     }
+    return (vi_fall){false, u, 0.0};
 }

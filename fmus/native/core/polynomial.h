@@ -18,7 +18,7 @@ double vi_polynomial_size(const double c[VI_ORDER + 1], double length);
 
 typedef struct {
     bool found;
-    double time;  /* s */
+    double time;  /* s; not found: there is none up to here, the length or the end of a long search */
     double speed; /* at which it falls there, per s; 0 when it only touches zero and rises again */
 } vi_fall;
 

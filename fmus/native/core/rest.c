@@ -13,7 +13,7 @@ double vi_body_time_to_release(const vi_body *body, int k, double length, bool *
     const double noise = vi_body_pressure_noise(body, stop);
     double u = 0.0;
     *released = false;
-    while (u < length) {
+    for (int evaluation = 0; u < length && evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
         double pressure, slope;
         const vi_phase phase = vi_phase_of(w * (body->now.rest + u));
         vi_mode_held(&body->mode, stop, phase, held + body->held_rate * u, body->held_rate, &pressure, &slope);
@@ -37,7 +37,7 @@ double vi_body_time_to_release(const vi_body *body, int k, double length, bool *
         }
         u = step < length - u ? u + step : length;
     }
-    return length;
+    return u;
 }
 
 bool vi_body_pressed_for_ever(const vi_body *body, int k)

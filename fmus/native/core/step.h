@@ -9,7 +9,8 @@ typedef enum {
     VI_STEP_CONTACT = 1,      /* stopped at a contact whose law is external; an event must resolve it */
     VI_STEP_RECORD_FULL = 2,  /* stopped early because the record has no more room */
     VI_STEP_IMPACT_LIMIT = 3, /* stopped early after impact_limit impacts in one step */
-    VI_STEP_ERROR = 4         /* misuse; the state is unchanged */
+    VI_STEP_ERROR = 4,        /* misuse; the state is unchanged */
+    VI_STEP_STANDSTILL = 5    /* stopped early: VI_MOST_EVENTS events at one instant; stepping on would not end */
 } vi_step_result;
 
 typedef struct {

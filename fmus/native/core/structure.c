@@ -119,11 +119,13 @@ static void correct_start(const vi_structure *s, int k, vi_approach *p)
     }
 }
 
-/* First contact after the start of the flight: its index, with *u; -1 when there is none. */
+/* First contact after the start of the flight: its index, with *u; -1 when there is none up to *u, the end of the flight
+ * or of a long search. */
 static int locate(const vi_structure *s, const vi_flight *flight, const vi_point points[], double *u)
 {
     vi_part parts[VI_MODES];
-    for (*u = 0.0;;) {
+    *u = 0.0;
+    for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
         double step = flight->length - *u;
         int nearest = -1, landing_on = -1;
         vi_flight_parts(flight, *u, parts);
@@ -160,6 +162,7 @@ static int locate(const vi_structure *s, const vi_flight *flight, const vi_point
         }
         *u += step;
     }
+    return -1;
 }
 
 static void start_points(const vi_structure *s, const vi_flight *flight, vi_point points[])
@@ -241,7 +244,7 @@ static void fly(const vi_structure *s, vi_instant target, const vi_step_request 
     vi_point points[VI_PORTS];
     vi_structure_held_now(s, held);
     vi_flight_start(&flight, s->model, state->q, state->p, vi_structure_phase(s), held, state->held_rate,
-                    vi_min(length + room, bounce), bounce < HUGE_VAL);
+                    vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), bounce < HUGE_VAL);
     start_points(s, &flight, points);
     const bool unreachable = out_of_reach(s, &flight, points);
     if (unreachable && only_end_matters(s, &flight)) {
@@ -250,7 +253,7 @@ static void fly(const vi_structure *s, vi_instant target, const vi_step_request 
     }
     u = flight.length;
     const int k = unreachable ? -1 : locate(s, &flight, points, &u);
-    const bool whole = k < 0 && flight.length >= length;
+    const bool whole = k < 0 && u >= length;
     u = whole ? length : u; /* the room after the end was only searched */
     if (s->record->extrema) {
         vi_extremes_of_flight(s, &flight, u);
@@ -348,6 +351,9 @@ vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, co
             fly(s, target, request);
         }
         vi_structure_settle(s, request);
+        if (vi_clock_stands(&s->state->standstill, s->state->now)) {
+            return VI_STEP_STANDSTILL;
+        }
     }
     return s->state->pending ? VI_STEP_CONTACT : VI_STEP_DONE;
 }

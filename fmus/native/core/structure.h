@@ -14,6 +14,7 @@
 #include <stdint.h>
 
 #include "clock.h"
+#include "complaint.h"
 #include "contact.h"
 #include "flow.h"
 #include "record.h"
@@ -65,6 +66,7 @@ typedef struct {
 
 typedef struct {
     vi_instant now;
+    vi_standstill standstill;
     double q[VI_MODES], p[VI_MODES]; /* modal displacements and velocities */
     vi_instant held_since;
     double held[VI_MODES], held_rate[VI_MODES]; /* modal forces of the inputs at held_since, and their slopes */
@@ -108,6 +110,9 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
 
 /* Advance to `target`. See step.h for what may end it earlier. */
 vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, const vi_step_request *request);
+
+/* Say where it stands after VI_STEP_STANDSTILL. */
+void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH]);
 
 /* Resolve the pending contact with its answer. */
 void vi_structure_resolve(const vi_structure *s);

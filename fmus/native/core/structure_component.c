@@ -339,11 +339,15 @@ bool vi_structure_component_resolve(vi_structure_component *c, char message[VI_M
 }
 
 vi_step_result vi_structure_component_advance(vi_structure_component *c, vi_instant target,
-                                              const vi_step_request *request)
+                                              const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
     const vi_structure parts = vi_structure_component_parts(c);
     c->state.follow_energies = c->record_energies;
-    return vi_structure_advance(&parts, target, request);
+    const vi_step_result result = vi_structure_advance(&parts, target, request);
+    if (result == VI_STEP_STANDSTILL) {
+        vi_structure_complain(&parts, message);
+    }
+    return result;
 }
 
 bool vi_structure_component_needs_events(const vi_structure_component *c)

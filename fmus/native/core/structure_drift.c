@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "complementarity.h"
 #include "majorant.h"
 #include "structure_parts.h"
 
@@ -23,6 +24,8 @@ typedef struct {
     double held[VI_MODES];
     vi_press press[VI_PORTS];
     int thin[VI_PORTS]; /* of a power law: so little penetration that its force acts as an impulse */
+    bool any_thin;
+    double acceleration[VI_MODES]; /* with all forces; only where there is a power law */
     double length;      /* that thin contacts and relaxing surfaces allow, s */
 } situation;
 
@@ -76,10 +79,39 @@ static void give_thin_impulse(const vi_structure *s, int k, double depth, double
     s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
 }
 
+/* What thin contacts, which the series leave out, add to the force of held contact k after u seconds; *size: the sum of
+ * the moduli. */
+static double thin_part(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double u,
+                        double *size)
+{
+    double g[VI_PORTS][VI_PORTS], column[VI_PORTS], share[VI_PORTS], sum = 0.0;
+    int held[VI_PORTS] = {0};
+    *size = 0.0;
+    vi_structure_signed(s, s->model->compliance, g);
+    for (int l = 0; l < s->model->contacts; ++l) {
+        held[l] = s->state->status[l] == VI_CONTACT_HELD;
+    }
+    for (int l = 0; l < s->model->contacts; ++l) {
+        if (now->thin[l]) {
+            const vi_press press = vi_structure_press(s, l);
+            const double rate = drift->penetration[l][1], depth = vi_max(0.0, now->at[l] + rate * u);
+            const double force = press.stiffness * pow(depth, press.exponent) * vi_max(0.0, 1.0 + press.damping * rate);
+            for (int i = 0; i < s->model->contacts; ++i) {
+                column[i] = g[i][l];
+            }
+            vi_solve_active(s->model->contacts, g, column, held, share);
+            sum -= share[k] * force;
+            *size += fabs(share[k] * force);
+        }
+    }
+    return sum;
+}
+
 static void look(const vi_structure *s, situation *now)
 {
-    double acceleration[VI_MODES], force[VI_PORTS];
+    double force[VI_PORTS];
     bool any_power = false;
+    now->any_thin = false;
     now->length = HUGE_VAL;
     vi_structure_held_now(s, now->held);
     for (int k = 0; k < s->model->contacts; ++k) {
@@ -102,18 +134,19 @@ static void look(const vi_structure *s, situation *now)
     if (!any_power) {
         return;
     }
-    vi_structure_accelerate(s, acceleration, force);
+    vi_structure_accelerate(s, now->acceleration, force);
     for (int k = 0; k < s->model->contacts; ++k) {
         if (now->press[k].kind != VI_PRESS_POWER) {
             continue;
         }
         const double rate = vi_structure_approach(s, k), depth = vi_max(0.0, now->at[k]);
-        const double a = vi_structure_at(s->model, s->model->shape[k], acceleration);
+        const double a = vi_structure_at(s->model, s->model->shape[k], now->acceleration);
         const double time = thin_time(s, k, rate, a);
         /* the way in: as far as its series would need steps much shorter than this one */
         const double entered = ENTRY * (rate + 0.5 * vi_max(0.0, vi_structure_direction(s, k) * a) * time) * time;
         if (rate <= 0.0 ? depth <= -rate * time || depth == 0.0 : depth <= entered) {
             now->thin[k] = 1;
+            now->any_thin = true;
             now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
             now->length = vi_min(now->length, time); /* on its way out it may be turned round before it is out */
         } else if (rate < 0.0) {
@@ -129,12 +162,15 @@ typedef struct {
     double time;
     vi_drift_event event;
     int contact;
+    double searched; /* the shortest of the searches for the others, s */
 } event_found;
 
 static void consider(event_found *first, const vi_fall *fall, vi_drift_event event, int contact)
 {
-    if (fall->found && fall->time < first->time) {
-        *first = (event_found){fall->time, event, contact};
+    if (!fall->found) {
+        first->searched = vi_min(first->searched, fall->time);
+    } else if (fall->time < first->time) {
+        *first = (event_found){fall->time, event, contact, first->searched};
     }
 }
 
@@ -173,17 +209,30 @@ static bool stays(const vi_structure *s, const vi_drift *drift, int k, const dou
     return moved <= VI_ROUNDING * terms;
 }
 
-static void arrivals(const vi_structure *s, const vi_drift *drift, int k, double length, event_found *first)
+/* What is known exactly of the motion of contact k, which touches: thin contacts, which its series leaves out, lift it
+ * off, or have just ceased to hold it. */
+static void correct_start(const vi_structure *s, const situation *now, int k, double clearance[VI_ORDER + 1])
+{
+    const int exact = s->state->leaving[k];
+    clearance[0] = 0.0;
+    clearance[1] = exact ? 0.0 : clearance[1];
+    if (exact == 2) {
+        clearance[2] = now->any_thin ? vi_max(0.0, clearance[2]) : 0.0;
+    } else if (now->any_thin) {
+        clearance[2] = -0.5 * vi_structure_direction(s, k)
+                       * vi_structure_at(s->model, s->model->shape[k], now->acceleration);
+    }
+}
+
+static void arrivals(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double length,
+                     event_found *first)
 {
     double clearance[VI_ORDER + 1];
     for (int n = 0; n <= VI_ORDER; ++n) {
         clearance[n] = -drift->penetration[k][n];
     }
     if (s->state->status[k] == VI_CONTACT_TOUCHING) {
-        const int exact = s->state->leaving[k];
-        clearance[0] = 0.0;
-        clearance[1] = exact ? 0.0 : clearance[1];
-        clearance[2] = exact == 2 ? 0.0 : clearance[2];
+        correct_start(s, now, k, clearance);
     }
     if (fabs(clearance[0]) <= VI_ROUNDING * vi_structure_displacement_size(s, k)
         && stays(s, drift, k, clearance, length)) {
@@ -194,12 +243,40 @@ static void arrivals(const vi_structure *s, const vi_drift *drift, int k, double
     consider(first, &fall, VI_DRIFT_ARRIVAL, k);
 }
 
-static void releases(const vi_drift *drift, int k, double length, event_found *first)
+/* Where the force of held contact k, thin contacts' part and all, falls through zero; without that part it does so at
+ * `alone`. */
+static vi_fall release_beside_thin(const vi_structure *s, const vi_drift *drift, const situation *now, int k,
+                                   vi_fall alone, double length, double noise)
 {
-    const double *force = drift->force[k], noise = VI_ROUNDING * drift->force_scale[k];
+    double value[4], size;
+    vi_polynomial_at(drift->force[k], alone.time, value);
+    if (value[0] + thin_part(s, drift, now, k, alone.time, &size) <= noise) {
+        return alone;
+    }
+    vi_polynomial_at(drift->force[k], length, value);
+    if (value[0] + thin_part(s, drift, now, k, length, &size) >= 0.0) {
+        return (vi_fall){false, length, 0.0};
+    }
+    double pressed = alone.time, lifted = length;
+    for (int halving = 0; halving < DBL_MANT_DIG; ++halving) {
+        const double middle = 0.5 * (pressed + lifted);
+        vi_polynomial_at(drift->force[k], middle, value);
+        *(value[0] + thin_part(s, drift, now, k, middle, &size) >= 0.0 ? &pressed : &lifted) = middle;
+    }
+    return (vi_fall){true, lifted, 1.0};
+}
+
+static void releases(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double length,
+                     event_found *first)
+{
+    const double *force = drift->force[k];
+    double size = 0.0;
+    const double thin = now->any_thin ? thin_part(s, drift, now, k, 0.0, &size) : 0.0;
+    const double noise = VI_ROUNDING * (drift->force_scale[k] + size);
     vi_fall fall = {true, 0.0, 1.0};
-    if (force[0] >= -noise) {
-        fall = fall_through(force, length, noise);
+    if (force[0] + thin >= -noise) {
+        fall = force[0] >= -noise ? fall_through(force, length, noise) : fall;
+        fall = now->any_thin && fall.found ? release_beside_thin(s, drift, now, k, fall, length, noise) : fall;
     }
     consider(first, &fall, VI_DRIFT_RELEASE, k);
 }
@@ -290,7 +367,7 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
         if (lags) {
             const double elapsed = vi_clock_elapsed(&s->model->clock, s->state->separated[k], s->state->now);
             const bool relaxed = s->state->surface[k] * exp(-elapsed / tau) <= RELAXED * noise / VI_ROUNDING;
-            fall = (vi_fall){relaxed, 0.0, 1.0};
+            fall = (vi_fall){relaxed, relaxed ? 0.0 : length, 1.0};
             consider(first, &fall, VI_DRIFT_FREE, k);
             return;
         }
@@ -305,20 +382,21 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
 static event_found first_event(const vi_structure *s, const vi_drift *drift, const situation *now, double length,
                                double searched)
 {
-    event_found first = {HUGE_VAL, VI_DRIFT_NO_EVENT, -1};
+    event_found first = {HUGE_VAL, VI_DRIFT_NO_EVENT, -1, length};
     for (int k = 0; k < s->model->contacts; ++k) {
         if (!vi_structure_watched(s, k) && s->state->status[k] < VI_CONTACT_HELD) {
             continue;
         }
         switch (s->state->status[k]) {
         case VI_CONTACT_FREE:
-        case VI_CONTACT_TOUCHING: arrivals(s, drift, k, searched, &first); break;
-        case VI_CONTACT_HELD: releases(drift, k, length, &first); break;
+        case VI_CONTACT_TOUCHING: arrivals(s, drift, now, k, searched, &first); break;
+        case VI_CONTACT_HELD: releases(s, drift, now, k, length, &first); break;
         case VI_CONTACT_YIELDING: separations(s, drift, now, k, length, &first); break;
         default: returns(s, drift, k, length, &first); break;
         }
     }
-    return first;
+    const bool cut = first.searched < length && first.searched < first.time;
+    return cut || first.event == VI_DRIFT_NO_EVENT ? (event_found){first.searched, VI_DRIFT_NO_EVENT, -1, 0.0} : first;
 }
 
 /* ---- one segment ---- */
@@ -372,7 +450,7 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
     const event_found first = first_event(s, &drift, &now, reach, vi_max(reach, drift.length));
     *event = first.event;
     *k = first.contact;
-    const double u = first.event == VI_DRIFT_NO_EVENT ? reach : first.time;
+    const double u = first.time;
     if (first.event == VI_DRIFT_NO_EVENT && at_rest_for_good(s, &drift, &now)) {
         return length;
     }

@@ -108,6 +108,8 @@ bool vi_structure_is_coupled(const vi_structure *s);
 
 /* ---- energies, when they are followed ---- */
 
+/* How long a flight may be for its energies, s: HUGE_VAL when they are not followed. */
+double vi_energies_reach(const vi_structure *s);
 void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const double held[], double u);
 void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], double u);
 double vi_structure_kinetic(const vi_structure *s);

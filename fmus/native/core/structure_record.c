@@ -19,7 +19,7 @@ static const double PIECE = 1.5;
 static double climb(const vi_flight *flight, const vi_point *point, double u, double end, double *top)
 {
     vi_part parts[VI_MODES];
-    for (;;) {
+    for (int evaluation = 0;; ++evaluation) {
         vi_flight_parts(flight, u, parts);
         const vi_approach p = vi_point_approach(point, flight, parts, u);
         *top = p.clearance; /* of a stop above: falls as the point rises */
@@ -29,7 +29,7 @@ static double climb(const vi_flight *flight, const vi_point *point, double u, do
         }
         /* the velocity falls to zero as a clearance does */
         const vi_approach fall = {p.velocity, -p.acceleration, -p.jerk, p.bound, 0.0};
-        u = vi_min(end, u + vi_max(vi_certified_step(&fall, end - u), 1e-12 * end));
+        u = vi_min(end, u + vi_max(vi_certified_step(&fall, end - u), vi_least_step(end, 1e-12, evaluation)));
     }
 }
 
@@ -46,18 +46,19 @@ static void extreme(const vi_structure *s, const vi_flight *flight, double sign,
     best = vi_max(best, sign * here);
     vi_point_start(&point, flight, s->model->observed, sign, best - sign * here);
     const double start = point.offset, least = VI_ROUNDING * point.scale;
-    while (u < end) {
+    for (int evaluation = 0; u < end; ++evaluation) {
+        const double least_step = vi_least_step(end, 1e-9, evaluation);
         vi_flight_parts(flight, u, parts);
         const vi_approach p = vi_point_approach(&point, flight, parts, u);
         if (p.clearance <= least && p.velocity > 0.0) {
             double top;
             u = climb(flight, &point, u, end, &top);
             point.offset += vi_max(0.0, -top); /* the bar is raised to what was reached */
-            u += 1e-9 * end;
+            u += least_step;
             continue;
         }
         point.offset += least;
-        u += vi_max(vi_point_step(&point, flight, parts, u, end - u), 1e-9 * end);
+        u += vi_max(vi_point_step(&point, flight, parts, u, end - u), least_step);
         point.offset -= least;
     }
     vi_flight_parts(flight, end, parts);
@@ -131,6 +132,11 @@ static double node(double start, double piece, int i, double *weight)
     const double middle = start + 0.5 * piece, half = 0.5 * piece;
     *weight = half * WEIGHTS[i % 4];
     return i < 4 ? middle - half * NODES[i] : middle + half * NODES[i % 4];
+}
+
+double vi_energies_reach(const vi_structure *s)
+{
+    return s->state->follow_energies ? VI_MOST_EVALUATIONS / 8 * PIECE / s->model->fastest : HUGE_VAL;
 }
 
 void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const double held[], double u)

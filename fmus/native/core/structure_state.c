@@ -140,6 +140,15 @@ int vi_structure_beyond(const vi_structure *s)
     return 0;
 }
 
+void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH])
+{
+    int on_stop[VI_PORTS];
+    for (int k = 0; k < s->model->contacts; ++k) {
+        on_stop[k] = s->state->status[k] != VI_CONTACT_FREE;
+    }
+    vi_complain_of_standstill(message, vi_clock_time(&s->model->clock, s->state->now), on_stop, s->model->contacts);
+}
+
 /* ---- life ---- */
 
 static void place(const vi_structure *s, int k)

@@ -113,13 +113,22 @@ void oscillator_hold(oscillator *o)
     o->inputs_changed = 0;
 }
 
-vi_step_result oscillator_advance(oscillator *o, vi_instant target, const vi_step_request *request)
+vi_step_result oscillator_advance(oscillator *o, vi_instant target, const vi_step_request *request,
+                                  char message[VI_MESSAGE_LENGTH])
 {
     if (o->yields) {
         const vi_structure s = parts(o);
-        return vi_structure_advance(&s, target, request);
+        const vi_step_result result = vi_structure_advance(&s, target, request);
+        if (result == VI_STEP_STANDSTILL) {
+            vi_structure_complain(&s, message);
+        }
+        return result;
     }
-    return vi_body_advance(&o->body, target, request);
+    const vi_step_result result = vi_body_advance(&o->body, target, request);
+    if (result == VI_STEP_STANDSTILL) {
+        vi_body_complain(&o->body, message);
+    }
+    return result;
 }
 
 void oscillator_resolve(oscillator *o)

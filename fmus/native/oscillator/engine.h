@@ -21,7 +21,9 @@ void oscillator_follow_amplitude(oscillator *o);
 /* Give the inputs to the body from now on. */
 void oscillator_hold(oscillator *o);
 
-vi_step_result oscillator_advance(oscillator *o, vi_instant target, const vi_step_request *request);
+/* Complains of a standstill. */
+vi_step_result oscillator_advance(oscillator *o, vi_instant target, const vi_step_request *request,
+                                  char message[VI_MESSAGE_LENGTH]);
 
 /* Resolve the pending contacts with their answers. */
 void oscillator_resolve(oscillator *o);

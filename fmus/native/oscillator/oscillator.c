@@ -275,7 +275,7 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     }
     oscillator_follow_amplitude(o);
     oscillator_hold(o);
-    const vi_step_result result = oscillator_advance(o, target, request);
+    const vi_step_result result = oscillator_advance(o, target, request, message);
     update_outputs(o);
     return result;
 }
