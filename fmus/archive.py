@@ -7,28 +7,38 @@ outside its folder, fill the disk, or expand entities. Everything here raises `C
 from __future__ import annotations
 
 import hashlib
+import lzma
 import os
 import shutil
 import stat
+import struct
 import tempfile
 import time
 import zipfile
 import zlib
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BufferedReader
 from pathlib import Path, PurePosixPath
 
-import platformdirs
-
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.private_folder import (
+    CACHE_VARIABLE,
+    UnsafeFolderError,
+    private_folder,
+    refuse_links,
+    refuse_unsafe,
+)
 from vibroimpact.fmus.safe_xml import root_of
 
-CACHE_VARIABLE = "VIBROIMPACT_CACHE"
 #: Most bytes that an archive may expand to, and most members: far above any real FMU.
 EXPANSION_LIMIT = 1 << 30
 MEMBER_LIMIT = 10_000
+#: Most folders that a member may lie in, and most characters of its name that messages show.
+DEEPEST = 50
+LONGEST_NAME = 100
 #: Age after which the temporary folder of a process that was killed is swept, s.
 ABANDONED_AFTER = 3600.0
 INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
@@ -39,6 +49,12 @@ PARSED_XML = (
     "terminalsAndIcons/terminalsAndIcons.xml",
 )
 BLOCK = 1 << 20
+#: What the libraries that expand members raise on damaged ones, and on those of kinds they do not know.
+DAMAGE = (
+    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError),
+    *(ValueError, RuntimeError, MemoryError),
+)
+_DAMAGED = "expected an intact FMU, got a damaged one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,12 +88,6 @@ class UnpackedFmu:
         return self.folder / "resources"
 
 
-def cache_folder() -> Path:
-    """Return where FMUs are unpacked: `$VIBROIMPACT_CACHE`, else the user's cache folder of the system."""
-    chosen = os.environ.get(CACHE_VARIABLE)
-    return Path(chosen) if chosen else platformdirs.user_cache_path("vibroimpact")
-
-
 def content_hash(path: Path) -> str:
     """Return the SHA-256 of a file, as hexadecimal text."""
     with _opened(path) as file:
@@ -87,8 +97,9 @@ def content_hash(path: Path) -> str:
 def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
     """Check an FMU and unpack it, unless this machine has unpacked the same contents before.
 
-    Safe with any number of processes at once: each unpacks into a folder of its own, and the first to
-    rename it into place wins.
+    What lies there is compared with the archive byte by byte, once in a process and again where a file changed
+    since: what is loaded is what `sha256` names. Safe with any number of processes at once: each unpacks into a
+    folder of its own, and the first to rename it into place wins.
 
     Parameters
     ----------
@@ -112,8 +123,8 @@ def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
         file.seek(0)
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         members = _checked_members(path, archive, limit)
-        folder = cache_folder() / "fmus" / digest
-        if not _is_complete(folder, members):
+        folder = _cache(path) / digest
+        if not _is_intact(folder, archive, members):
             _unpack_into_place(path, archive, members, folder)
     return _described(path, folder, digest)
 
@@ -145,9 +156,14 @@ def platforms(fmu: UnpackedFmu) -> tuple[str, ...]:
 
 def _opened(path: Path) -> BufferedReader:
     try:
+        # opening a pipe would wait for somebody who writes into it
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise ComponentFileError(f"{path}: expected an FMU file, got a folder or a device.")
         return path.open("rb")
     except OSError as error:
         raise ComponentFileError(f"{path}: expected an FMU file, got: {error.strerror}.") from error
+    except ValueError as error:  # a zero byte
+        raise ComponentFileError(f"{str(path)!r}: expected the path of an FMU file, got: {error}.") from error
 
 
 def _archive(path: Path, file: BufferedReader) -> zipfile.ZipFile:
@@ -161,22 +177,43 @@ def _archive(path: Path, file: BufferedReader) -> zipfile.ZipFile:
 
 def _checked_members(path: Path, archive: zipfile.ZipFile, limit: int) -> list[zipfile.ZipInfo]:
     members = archive.infolist()
-    problems = [f"member {m.orig_filename!r} {problem}" for m in members for problem in _problems(m)]
-    names = {member.filename.rstrip("/") for member in members}
-    if len(names) < len(members):
-        problems.append("two members have the same name")
+    problems = [f"member {_shown(m)} {problem}" for m in members for problem in _problems(m)]
     if len(members) > MEMBER_LIMIT:
         problems.append(f"{len(members)} members, limit {MEMBER_LIMIT}")
     size = sum(member.file_size for member in members)
     if size > limit:
         problems.append(f"{size} bytes when unpacked, limit {limit}")
-    if "modelDescription.xml" not in names:
+    if not any(_place(member) == ("modelDescription.xml",) for member in members if not member.is_dir()):
         problems.append("no modelDescription.xml")
+    # only names that are short and few are worth comparing
+    problems = problems or list(_clashes(members))
     if problems:
         raise ComponentFileError(
             f"{path}: expected a safe FMU, got: {'; '.join(problems[:5])}. It was not unpacked."
         )
     return members
+
+
+def _place(member: zipfile.ZipInfo) -> tuple[str, ...]:
+    """Return where a member lies, one way for `a/b`, `./a/b` and `a//b`; as the file system compares names."""
+    return PurePosixPath(os.path.normcase(member.filename).replace(os.sep, "/")).parts
+
+
+def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[str]:
+    """Yield what members would overwrite: equal places, and files where others need a folder."""
+    places = [_place(member) for member in members]
+    twice = [place for place, count in Counter(places).items() if count > 1]
+    if twice:
+        yield f"two members have the same name, {'/'.join(twice[0])[:LONGEST_NAME]!r}"
+    folders = {place[:end] for place in places for end in range(len(place))}
+    blocking = [m for m, place in zip(members, places, strict=True) if place in folders and not m.is_dir()]
+    if blocking:
+        yield f"member {_shown(blocking[0])} is a file and a folder"
+
+
+def _shown(member: zipfile.ZipInfo) -> str:
+    name = member.orig_filename
+    return repr(name if len(name) <= LONGEST_NAME else name[:LONGEST_NAME] + "...")
 
 
 def _problems(member: zipfile.ZipInfo) -> Iterator[str]:
@@ -188,6 +225,8 @@ def _problems(member: zipfile.ZipInfo) -> Iterator[str]:
         yield "has an absolute path"
     if ".." in PurePosixPath(name).parts:
         yield "leads out of the archive"
+    if len(PurePosixPath(name).parts) > DEEPEST:
+        yield f"lies deeper than {DEEPEST} folders"
     kind = stat.S_IFMT(member.external_attr >> 16)
     if member.create_system == 3 and kind not in {0, stat.S_IFREG, stat.S_IFDIR}:
         yield "is a link or a device, not a file"
@@ -195,19 +234,62 @@ def _problems(member: zipfile.ZipInfo) -> Iterator[str]:
         yield "is encrypted"
 
 
-def _is_complete(folder: Path, members: list[zipfile.ZipInfo]) -> bool:
-    # caches get cleaned by the system, sometimes file by file
+def _cache(path: Path) -> Path:
     try:
-        return all(m.is_dir() or (folder / m.filename).stat().st_size == m.file_size for m in members)
-    except OSError:
+        return private_folder("fmus")
+    except UnsafeFolderError as error:
+        raise ComponentFileError(f"{path}: was not unpacked: {error}") from error
+    except OSError as error:
+        raise ComponentFileError(
+            f"{path}: was not unpacked: {error.filename}: expected a folder that can be written, got: "
+            f"{error.strerror}. Set {CACHE_VARIABLE} to another one."
+        ) from error
+
+
+#: Of the folders that this process has compared with their archives: what each file looked like then.
+_compared: dict[Path, list[tuple[int, ...]]] = {}
+
+
+def _is_intact(folder: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> bool:
+    """Return whether a folder holds what its archive does; files that an FMU made beside them do not count."""
+    try:
+        refuse_links(folder)
+        refuse_unsafe(folder)
+        seen = [_appearance(folder / member.filename, member) for member in members]
+        if _compared.get(folder) != seen:
+            if not all(member.is_dir() or _is_equal(folder, archive, member) for member in members):
+                return False
+            _compared[folder] = seen
+    except UnsafeFolderError as error:
+        raise ComponentFileError(f"{archive.filename}: was not unpacked: {error}") from error
+    except (OSError, *DAMAGE):
+        # caches get cleaned by the system, sometimes file by file; a damaged archive shows when it is unpacked
         return False
+    return True
+
+
+def _appearance(path: Path, member: zipfile.ZipInfo) -> tuple[int, ...]:
+    status = path.lstat()
+    expected = stat.S_IFDIR if member.is_dir() else stat.S_IFREG
+    if stat.S_IFMT(status.st_mode) != expected:
+        raise FileNotFoundError(path)
+    if member.is_dir():
+        return ()
+    return (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+
+
+def _is_equal(folder: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bool:
+    with archive.open(member) as source, (folder / member.filename).open("rb") as copy:
+        while block := source.read(BLOCK):
+            if copy.read(len(block)) != block:
+                return False
+        return not copy.read(1)
 
 
 def _unpack_into_place(
     path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo], folder: Path
 ) -> None:
     try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
         _sweep(folder.parent)
         temporary = Path(tempfile.mkdtemp(prefix=".unpacking-", dir=folder.parent))
     except OSError as error:
@@ -218,9 +300,14 @@ def _unpack_into_place(
     try:
         _extract(path, archive, members, temporary)
         _check_xml(path, temporary)
-        _rename(temporary, folder, members)
+        _rename(temporary, folder, archive, members)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+    if not _is_intact(folder, archive, members):
+        raise ComponentFileError(
+            f"{path}: expected an unpacked copy equal to the archive in {folder}, got another. Something else writes "
+            f"there, or its file system takes different names for one. Set {CACHE_VARIABLE} to another folder."
+        )
 
 
 def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo], folder: Path) -> None:
@@ -234,12 +321,14 @@ def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo
             # reading ends at the size in the directory, whatever the data would expand to
             with archive.open(member) as source, target.open("wb") as file:
                 shutil.copyfileobj(source, file, BLOCK)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
-        raise ComponentFileError(f"{path}: expected an intact FMU, got a damaged one: {error}.") from error
     except OSError as error:
+        if error.errno is None:  # bz2 says so that its data are damaged
+            raise ComponentFileError(f"{path}: {_DAMAGED}: {error}.") from error
         raise ComponentFileError(
             f"{path}: could not be unpacked into {folder.parent}: {error.strerror}."
         ) from error
+    except DAMAGE as error:
+        raise ComponentFileError(f"{path}: {_DAMAGED}: {error}.") from error
 
 
 def _check_xml(path: Path, folder: Path) -> None:
@@ -248,18 +337,18 @@ def _check_xml(path: Path, folder: Path) -> None:
             root_of((folder / name).read_bytes(), f"{path}: {name}")
 
 
-def _rename(temporary: Path, folder: Path, members: list[zipfile.ZipInfo]) -> None:
+def _rename(temporary: Path, folder: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> None:
     try:
         temporary.rename(folder)
     except OSError as error:
-        if _is_complete(folder, members):
+        if _is_intact(folder, archive, members):
             return  # another process was first
-        # a folder with files missing: out of the way, then ours in its place
+        # a copy that is not the archive's: out of the way, then ours in its place
         shutil.rmtree(folder, ignore_errors=True)
         try:
             temporary.rename(folder)
         except OSError:
-            if not _is_complete(folder, members):
+            if not _is_intact(folder, archive, members):
                 raise ComponentFileError(
                     f"{folder}: expected to replace a damaged copy, got: {error.strerror}. Delete it."
                 ) from error

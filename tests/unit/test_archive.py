@@ -1,5 +1,6 @@
 """Bad FMU files: each is one clear message, and nothing is left behind."""
 
+import os
 import stat
 import subprocess
 import sys
@@ -87,6 +88,96 @@ def test_many_processes_may_unpack_the_same_fmu_at_once(tmp_path: Path, cache: P
     assert len(unpacked_folders(cache)) == 1
 
 
+def test_a_library_of_equal_size_in_the_cache_is_not_believed(tmp_path: Path) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    binary_path(fmu).write_bytes(b"evil")
+    assert binary_path(unpack(fmu.source)).read_bytes() == b"code"
+
+
+def test_another_process_does_not_believe_the_cache_either(tmp_path: Path) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    library = binary_path(fmu)
+    before = library.stat()
+    library.write_bytes(b"evil")
+    os.utime(library, ns=(before.st_atime_ns, before.st_mtime_ns))
+    code = (
+        "import sys; from pathlib import Path; from vibroimpact.fmus.archive import binary_path, unpack\n"
+        "assert binary_path(unpack(Path(sys.argv[1]))).read_bytes() == b'code'"
+    )
+    assert subprocess.run([sys.executable, "-c", code, str(fmu.source)]).returncode == 0
+
+
+def test_a_link_in_the_place_of_a_library_is_not_followed(tmp_path: Path) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    (tmp_path / "elsewhere").write_bytes(b"code")
+    library = binary_path(fmu)
+    library.unlink()
+    library.symlink_to(tmp_path / "elsewhere")
+    assert not binary_path(unpack(fmu.source)).is_symlink()
+
+
+def test_what_an_fmu_wrote_beside_its_own_files_stays(tmp_path: Path) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    (fmu.folder / "log.txt").write_text("written while it ran")
+    assert (unpack(fmu.source).folder / "log.txt").exists()
+
+
+def test_the_cache_is_the_users_alone(tmp_path: Path, cache: Path) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    modes = {path.stat().st_mode & 0o777 for path in (cache, cache / "fmus", fmu.folder)}
+    assert modes == {0o700}
+
+
+def test_a_cache_of_version_0_1_is_used_on_and_closed_to_others(tmp_path: Path, cache: Path) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    (cache / "fmus").chmod(0o755)
+    before = binary_path(fmu).stat().st_ino
+    assert binary_path(unpack(fmu.source)).stat().st_ino == before
+    assert (cache / "fmus").stat().st_mode & 0o777 == 0o700
+
+
+@pytest.mark.parametrize("place", ["", "fmus", "entry"])
+def test_a_cache_that_others_may_write_is_refused(tmp_path: Path, cache: Path, place: str) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    folder = fmu.folder if place == "entry" else cache / place
+    folder.chmod(0o777)
+    message = refusal(fmu.source)
+    assert f"{folder}: expected a folder that only you can write, got mode 0777" in message
+    assert "VIBROIMPACT_CACHE" in message
+
+
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give a folder away"
+)
+@pytest.mark.parametrize("place", ["", "fmus", "entry"])
+def test_a_cache_of_another_user_is_refused(tmp_path: Path, cache: Path, place: str) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    folder = fmu.folder if place == "entry" else cache / place
+    os.chown(folder, 65534, 65534)
+    assert f"{folder}: expected a folder of your own, got one of user 65534" in refusal(fmu.source)
+
+
+@pytest.mark.parametrize("place", ["fmus", "entry"])
+def test_a_link_in_the_cache_is_refused(tmp_path: Path, cache: Path, place: str) -> None:
+    fmu = unpack(written(tmp_path / "M.fmu"))
+    folder = fmu.folder if place == "entry" else cache / "fmus"
+    folder.rename(tmp_path / "elsewhere")
+    folder.symlink_to(tmp_path / "elsewhere")
+    assert "got a link" in refusal(fmu.source)
+
+
+def test_the_default_cache_is_closed_to_others_whatever_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("VIBROIMPACT_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    (tmp_path / "vibroimpact" / "fmus").mkdir(parents=True)
+    (tmp_path / "vibroimpact").chmod(0o775)
+    (tmp_path / "vibroimpact" / "fmus").chmod(0o775)
+    assert unpack(written(tmp_path / "M.fmu")).folder.parent == tmp_path / "vibroimpact" / "fmus"
+    assert (tmp_path / "vibroimpact").stat().st_mode & 0o777 == 0o700
+
+
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     assert "No such file" in refusal(tmp_path / "absent.fmu")
 
@@ -143,6 +234,39 @@ def test_a_symbolic_link_is_refused(tmp_path: Path) -> None:
 def test_two_members_with_one_name_are_refused(tmp_path: Path) -> None:
     path = written(tmp_path / "M.fmu", {"modelDescription.xml": DESCRIPTION})
     assert "the same name" in refusal(path)
+
+
+@pytest.mark.parametrize("name", ["resources//x", "./resources/x", "resources/./x"])
+def test_two_spellings_of_one_name_are_refused(tmp_path: Path, name: str) -> None:
+    assert "the same name" in refusal(written(tmp_path / "M.fmu", {"resources/x": b"", name: b"later"}))
+
+
+@pytest.mark.parametrize("names", [("resources/x", "resources/x/y"), ("resources/x/y", "resources/x")])
+def test_a_file_where_others_need_a_folder_is_refused(tmp_path: Path, names: tuple[str, str]) -> None:
+    assert "is a file and a folder" in refusal(written(tmp_path / "M.fmu", dict.fromkeys(names, b"")))
+
+
+def test_a_description_that_is_a_folder_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "M.fmu"
+    with zipfile.ZipFile(path, "w") as file:
+        file.writestr("modelDescription.xml/", b"")
+        file.writestr(BINARY, b"code")
+    assert "no modelDescription.xml" in refusal(path)
+
+
+def test_members_of_great_depth_are_refused_at_once(tmp_path: Path) -> None:
+    deep: Members = {f"{'a/' * 30_000}{number}": b"" for number in range(50)}
+    assert "lies deeper than" in refusal(written(tmp_path / "M.fmu", deep))
+
+
+def test_an_fmu_with_a_member_for_each_folder_is_unpacked(tmp_path: Path) -> None:
+    members: Members = {"binaries/": b"", "resources/": b"", "./resources/x": b"1", BINARY: b"code"}
+    assert (unpack(written(tmp_path / "M.fmu", members)).resources / "x").read_bytes() == b"1"
+
+
+def test_a_pipe_is_no_fmu(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "M.fmu")
+    assert "a device" in refusal(tmp_path / "M.fmu")
 
 
 def test_a_zip_bomb_is_refused_before_it_is_unpacked(tmp_path: Path, cache: Path) -> None:
