@@ -57,6 +57,7 @@ class Parts:
         """
         title = source.path.name if titled else ""
         self.remark(source.remarks, title)
+        self.remark([line for table in source.tables for line in _told_lengths(table)], title)
         axes: dict[Any, tuple[Placement, TimeAxis]] = {}
         columns = [(at, table, column) for at, table in enumerate(source.tables) for column in table.columns]
         if sum(len(column.values) for _, _, column in columns) > MOST_SAMPLES:
@@ -115,6 +116,17 @@ class Parts:
         if as_events and _NUMBERED.fullmatch(label):
             label = "events"
         return channel_name(label, {*self.channels, *self.events, *self.scalars})
+
+
+def _told_lengths(table: Table) -> list[str]:
+    """Say where columns that were written together end at different rows, as those of a file that was cut off do."""
+    lengths = sorted({len(column.values) for column in table.columns})
+    if table.vectors or len(lengths) < 2:
+        return []
+    shortest = next(column for column in table.columns if len(column.values) == lengths[0])
+    return [
+        f"channels of unequal lengths, {lengths[0]} to {lengths[-1]} samples: {shortest.label} ends first"
+    ]
 
 
 def described(name: str, column: Column, settings: ImportSettings, number: int) -> tuple[Column, list[str]]:

@@ -13,6 +13,7 @@ import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.importers.cells import Cells, date_of, is_marker, is_number, read_cells, split_line
+from vibroimpact.hardware.importers.cut_off import without_cut_cells
 from vibroimpact.hardware.importers.labels import is_time_name, seconds_in, split_label
 from vibroimpact.hardware.importers.table import Column, RawFile, Table
 from vibroimpact.hardware.importers.text import columns_of, with_time
@@ -52,6 +53,7 @@ def read_labview(content: str) -> RawFile:
     tables: list[Table] = []
     origin: np.datetime64 | None = None
     for number, segment in enumerate(_segments(lines, after, separator, decimal), 1):
+        rows, cut = without_cut_cells(segment.rows, content, separator, decimal)
         begins = _earliest(segment.header) or _earliest(header)
         origin = begins if origin is None else origin
         late = (
@@ -60,9 +62,9 @@ def read_labview(content: str) -> RawFile:
             else float((begins - origin) / np.timedelta64(1, "ns")) * 1e-9
         )
         title = "" if number == 1 else f"segment {number}"
-        found, told = _tables(segment, header, separator, decimal, late, title)
+        found, told = _tables(replace(segment, rows=rows), header, separator, decimal, late, title)
         tables += found
-        remarks += [f"{title}: {line}" if title else line for line in told]
+        remarks += [f"{title}: {line}" if title else line for line in (*told, *cut)]
     if not tables:
         raise DatasetError(
             "expected rows of numbers after the header, got none. The measurement holds no data."

@@ -18,6 +18,7 @@ from vibroimpact.hardware.importers.cells import (
     read_cells,
     split_line,
 )
+from vibroimpact.hardware.importers.cut_off import without_cut_cells
 from vibroimpact.hardware.importers.labels import is_known_unit, is_time_name, seconds_in, split_label
 from vibroimpact.hardware.importers.table import MOST_COLUMNS, Column, RawFile, Table
 
@@ -79,7 +80,8 @@ def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> Ra
     first = next(place for place, line in enumerate(lines) if _is_plain(line) and dialect.is_row(line))
     body = [(place, line) for place, line in enumerate(lines[first:], first) if _is_plain(line)]
     rows, dropped = _rows(body, dialect)
-    remarks += dropped
+    rows, cut = without_cut_cells(rows, content, dialect.delimiter, dialect.decimal)
+    remarks += dropped + cut
     cells = read_cells(rows, dialect.delimiter, dialect.decimal)
     if len(cells) > MOST_COLUMNS:
         raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got {len(cells)}. Is it turned over?")

@@ -112,7 +112,7 @@ def test_one_number_in_the_first_row_is_a_single_value(tmp_path: Path) -> None:
 def test_markers_of_overrange_and_of_nothing_are_told_apart(tmp_path: Path) -> None:
     marks = ["OVRNG", "Inf", "1e308", "9.9e37", "NaN", "", "n/a", "9.91e37"]
     rows = [f"{k / 10},{marks[k - 3] if 3 <= k < 11 else k * 0.5}" for k in range(20)]
-    channel = import_recording([written(tmp_path, "time,force\n" + "\n".join(rows))]).channels["force"]
+    channel = import_recording([written(tmp_path, "time,force\n" + "\n".join(rows) + "\n")]).channels["force"]
     overrange, missing = int(Quality.overrange), int(Quality.missing)
     assert channel.quality[3:11].tolist() == [overrange] * 4 + [missing] * 4
     assert np.isnan(channel.values[3:11]).all()
