@@ -1,17 +1,26 @@
 # Everything sets itself up: a virtual environment in .venv, the packages, the FMUs.
 .DEFAULT_GOAL := help
-.PHONY: help demo test sanitize bench lint clean
+.PHONY: help demo test soak oldest sanitize bench lint clean
 
+OLDEST := $(or $(PYTHON),python3.11)
+ifneq ($(PYTHON),)
+# `make test PYTHON=python3.13`: each version has an environment of its own
+VENV := .venv-$(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null)
+else
 VENV := .venv
-BIN := $(VENV)/bin
-# override with `make PYTHON=...`; otherwise the first of these that is new enough
-PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
+PYTHON := $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; do \
 	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$p && break; done)
+endif
+BIN := $(VENV)/bin
 NATIVE := $(shell find fmus/native -name '*.c' -o -name '*.h' -o -name '*.toml' -o -name '*.md') \
 	$(wildcard fmus/description/*.py) fmus/build.py fmus/compiler.py
 # tests side by side, four at most, as many start processes of their own; `make test PARALLEL=` runs them one by one
 PARALLEL ?= -n logical --maxprocesses 4 --dist worksteal
 SETUP := pyproject.toml hatch_build.py
+INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# what pyproject.toml names at its lower bounds, what those need in turn at its newest; pip has no such way
+INSTALL_LOWEST = $(INSTALL_UV) && $(BIN)/uv pip install --quiet --python $(BIN)/python --resolution lowest-direct
+INSTALL_UV = $(BIN)/python -m pip install --quiet --disable-pip-version-check 'uv>=0.8'
 
 help: ## show this
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -24,11 +33,18 @@ test: $(VENV)/test.stamp $(VENV)/fmus.stamp sanitize ## run all tests but the be
 	$(BIN)/python -m pytest --doctest-modules --pyargs vibroimpact.fmus vibroimpact.analysis vibroimpact.orchestrator \
 		vibroimpact.hardware
 
+soak: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run thousands of random cases of each kind; goes on where it ended; SEED= MINUTES= KINDS= CASES=
+	PYTHONPATH=tests $(BIN)/python -m soak
+
 sanitize: $(VENV)/test.stamp ## run the C tests under the address and undefined-behaviour sanitizers
 	$(BIN)/python tests/native/run_sanitized.py
 
 bench: $(VENV)/bench.stamp $(VENV)/fmus.stamp ## run the benchmarks; each leaves its figures and a sentence
 	@for script in tests/benchmarks/bench_*.py; do $(BIN)/python "$$script" || exit 1; done
+
+oldest: ## run all tests on Python 3.11 with the lowest versions that pyproject.toml allows
+	@$(OLDEST) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || { echo "make oldest: expected Python 3.11, got $$($(OLDEST) --version 2>&1). Say where it is: make oldest PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@$(MAKE) test VENV=.venv-oldest INSTALL='$$(INSTALL_LOWEST)' PYTHON=$(OLDEST)
 
 lint: $(VENV)/lint.stamp ## check style, types and the directions of imports
 	$(BIN)/ruff check .
@@ -37,7 +53,7 @@ lint: $(VENV)/lint.stamp ## check style, types and the directions of imports
 	$(BIN)/lint-imports
 
 clean: ## remove what make has made
-	rm -rf $(VENV) .editable fmus/built
+	rm -rf .venv .venv-* .editable fmus/built
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "make: needs Python 3.11 or newer, found none on PATH. Install it, or say where it is: make PYTHON=/path/to/python3" >&2; exit 1; }
@@ -46,20 +62,20 @@ $(BIN)/python:
 
 # one environment; each purpose adds what it needs, once
 $(VENV)/demo.stamp: $(SETUP) | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e .
+	$(INSTALL) -e .
 	@touch $@ $(VENV)/fmus.stamp
 
 $(VENV)/test.stamp: $(SETUP) | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	$(INSTALL) -e '.[test]'
 	@touch $@ $(VENV)/demo.stamp $(VENV)/fmus.stamp
 
 # the benchmarks compare with other people's packages too
 $(VENV)/bench.stamp: $(SETUP) | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test,bench]'
+	$(INSTALL) -e '.[test,bench]'
 	@touch $@ $(VENV)/test.stamp $(VENV)/demo.stamp $(VENV)/fmus.stamp
 
 $(VENV)/lint.stamp: $(SETUP) | $(BIN)/python
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[lint]'
+	$(INSTALL) -e '.[lint]'
 	@touch $@ $(VENV)/demo.stamp $(VENV)/fmus.stamp
 
 # the installation builds the FMUs; only an edit of the C makes them again

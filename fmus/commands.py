@@ -59,6 +59,13 @@ def build_components(
 
     Example: vibroimpact fmu build
     """
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise UsageError(
+            f"--output: expected a folder to fill, got {str(output)[:200]!r}: {reason}."
+        ) from problem
     for path in (*update_readmes(), *build(output)):
         typer.echo(str(path))
 

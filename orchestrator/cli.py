@@ -6,6 +6,7 @@ module imports nothing above it, and another package can add commands of its own
 
 from __future__ import annotations
 
+import functools
 import sys
 import traceback
 from collections.abc import Sequence
@@ -44,8 +45,9 @@ def _options(
     """Dynamics of things that vibrate and hit stops."""
 
 
+@functools.cache
 def load_commands() -> None:
-    """Let every installed package add its commands."""
+    """Let every installed package add its commands, once in a process."""
     for entry in sorted(metadata.entry_points(group=COMMAND_GROUP), key=lambda entry: entry.name):
         entry.load()(app)
 

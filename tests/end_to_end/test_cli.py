@@ -231,3 +231,8 @@ def test_a_bad_fmu_file_is_misuse_with_one_message(
     start = in_this_process if command == "run" else vibroimpact
     assert_misuse(start(command, scene, "-o", tmp_path / output), told)
     assert not (tmp_path / "x.nc").exists()
+
+
+def test_a_build_into_a_file_is_misuse(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert_misuse(in_this_process("fmu", "build", "--output", tmp_path / "file"), "expected a folder to fill")

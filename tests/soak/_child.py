@@ -1,0 +1,164 @@
+"""The other end of a child process: hands it one case at a time, and replaces it where it does not come back."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import IO
+
+import psutil
+
+from soak._kinds import Kind
+
+TESTS = Path(__file__).parents[1]
+WALL_PER_PROCESSOR_TIME = 5.0
+"""On a machine that is shared, a case may take so much longer than its processor time."""
+START_SECONDS = 60.0
+"""Processor time for starting Python and importing the package, added to the limit of a child's first case."""
+
+
+class Child:
+    """A process that tries cases, and the case that it is at.
+
+    Attributes
+    ----------
+    at : (Kind, int, int) or None
+        Kind, number and seed of the case that is being tried.
+    """
+
+    def __init__(self, package: str) -> None:
+        self.package = package
+        self.at: tuple[Kind, int, int] | None = None
+        self._start()
+
+    def _start(self) -> None:
+        self._folder = Path(tempfile.mkdtemp(prefix="vibroimpact-soak-"))
+        path = os.pathsep.join(filter(None, [str(TESTS), *(entry for entry in sys.path if entry)]))
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "soak._case", self.package],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            cwd=self._folder,
+            env=os.environ | {"PYTHONPATH": path, "TMPDIR": str(self._folder)},
+            start_new_session=True,
+        )
+        self._facts = psutil.Process(self._process.pid)
+        self._allowance = START_SECONDS
+
+    @property
+    def answers(self) -> IO[str]:
+        """Where an answer comes from; readable too when the process has died."""
+        assert self._process.stdout is not None
+        return self._process.stdout
+
+    def hand(self, kind: Kind, case: int, seed: int) -> None:
+        """Let it try a case."""
+        assert self._process.stdin is not None
+        self.at = (kind, case, seed)
+        self._began, self._used = time.monotonic(), self._processor_time()
+        try:
+            self._process.stdin.write(json.dumps([kind.name, seed]) + "\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            pass  # it has died since; reading its answer says so
+
+    def answer(self) -> tuple[float, str | None]:
+        """Read processor time and problem of the case, or say how the process died."""
+        line = self.answers.readline()
+        if line:
+            self._allowance = 0.0
+            seconds, problem = json.loads(line)
+            return float(seconds), problem
+        seconds = time.monotonic() - self._began
+        status = self._process.wait()
+        said = self._last_words() or "it said nothing"
+        self._replace()
+        return seconds, f"the process died: {_named(status)}; {said}"
+
+    def overdue(self) -> tuple[float, str] | None:
+        """Return time and problem of a case that has had its time; the process is replaced."""
+        if self.at is None:
+            return None
+        limit = self.at[0].seconds + self._allowance
+        wall, used = time.monotonic() - self._began, self._processor_time() - self._used
+        if used <= limit and wall <= WALL_PER_PROCESSOR_TIME * limit:
+            return None
+        where = self._asked_where_it_is()
+        self._replace()
+        return used, f"no answer after {used:.0f} s of processor time ({wall:.0f} s of wall time); {where}"
+
+    def close(self) -> None:
+        """End the process with all that it has started, and remove its folder."""
+        _kill(self._process)
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            if pipe is not None:
+                _close(pipe)
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def _replace(self) -> None:
+        self.close()
+        self._start()
+
+    def _processor_time(self) -> float:
+        try:
+            used = self._facts.cpu_times()
+        except psutil.Error:
+            return 0.0
+        return used.user + used.system + used.children_user + used.children_system
+
+    def _asked_where_it_is(self) -> str:
+        if hasattr(signal, "SIGUSR1"):
+            self._process.send_signal(signal.SIGUSR1)
+            time.sleep(0.5)
+        places = re.findall(r'File "([^"]*)", line (\d+) in (\S+)', self._log())
+        if not places:
+            return "where is not known"
+        return "in " + " < ".join(
+            f"{Path(name).name}:{line} ({function})" for name, line, function in places[:4]
+        )
+
+    def _last_words(self) -> str:
+        fatal = re.search(r"^Fatal Python error: .*$", self._log(), re.MULTILINE)
+        lines = self._log().strip().splitlines()
+        words = fatal.group() if fatal else "".join(lines[-1:])
+        places = re.findall(r'File "([^"]*)", line (\d+) in (\S+)', self._log())[:1]
+        return words + "".join(
+            f" in {Path(name).name}:{line} ({function})" for name, line, function in places
+        )
+
+    def _log(self) -> str:
+        try:
+            return (self._folder / "log").read_text(encoding="utf-8", errors="replace")[:100_000]
+        except OSError:
+            return ""
+
+
+def _named(status: int) -> str:
+    return signal.Signals(-status).name if status < 0 else f"exit code {status}"
+
+
+def _kill(process: subprocess.Popen[str]) -> None:
+    if sys.platform == "win32":
+        process.kill()
+        return
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        return  # all of them have ended
+
+
+def _close(pipe: IO[str]) -> None:
+    try:
+        pipe.close()
+    except BrokenPipeError:
+        return  # what was still to be said has no listener

@@ -1,0 +1,53 @@
+"""What `make` offers is what it says it does."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="there is no make here")
+
+
+def make(*arguments: str) -> subprocess.CompletedProcess[str]:
+    # the make that runs these tests hands down what it was given
+    theirs = ("MAKEFLAGS", "MFLAGS", "MAKEOVERRIDES", "MAKELEVEL", "PYTHON", "VENV", "INSTALL")
+    environment = {name: value for name, value in os.environ.items() if name not in theirs}
+    return subprocess.run(
+        ["make", *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60
+    )
+
+
+def targets() -> set[str]:
+    (line,) = re.findall(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    return set(line.split())
+
+
+def test_help_names_every_target() -> None:
+    listed = {line.split()[0] for line in make("help").stdout.splitlines()}
+    assert listed == targets()
+
+
+def test_the_readme_names_every_target_a_developer_needs() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [name for name in targets() - {"clean"} if f"make {name}" not in readme] == []
+
+
+def test_a_python_that_is_given_has_an_environment_of_its_own() -> None:
+    version = f"{sys.version_info[0]}.{sys.version_info[1]}"
+    given = make("--dry-run", "--always-make", "demo", f"PYTHON={sys.executable}").stdout
+    assert f".venv-{version}/bin/vibroimpact demo" in given
+    assert ".venv/bin/vibroimpact demo" in make("--dry-run", "--always-make", "demo").stdout
+
+
+def test_the_lowest_versions_are_refused_on_another_python() -> None:
+    refused = make("oldest", "PYTHON=false")
+    assert refused.returncode != 0
+    assert "expected Python 3.11" in refused.stderr
