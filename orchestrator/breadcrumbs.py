@@ -24,6 +24,8 @@ from vibroimpact.orchestrator.importer.wiring import CallList
 MOST_COMPONENTS = 32
 MOST_CALLS = 4096
 NAME_LENGTH = 96
+#: What is noted of a component whose FMU is being loaded, in place of a function.
+LOADING = "loading"
 #: FMI's functions by the methods of an instance that call them.
 METHODS = {
     "step": "DoStep",
@@ -77,9 +79,13 @@ class Breadcrumbs:
     # ---- written by the process that runs FMUs ----
 
     def log(self, component: str) -> LogTail:
-        """Return a log tail for a component that both processes see: the same one for each of its instances."""
+        """Return a log tail for a component that both processes see: the same one for each of its instances.
+
+        It is asked for just before the component's FMU is loaded, which is noted.
+        """
         index = self._known.setdefault(component, len(self._known))
         self._notes.components = len(self._known)
+        self._notes.call = self._register(component, LOADING)
         return self._tail(index)
 
     def _tail(self, index: int) -> LogTail:
@@ -139,7 +145,7 @@ class Breadcrumbs:
             if found is not None:
                 instance, function = found
                 number = self._register(instance.name, instance.prefix + function)
-                self._notes.time = instance.step_start if function == "DoStep" else instance.time
+                self._notes.time = _time_of(instance, function)
                 self._notes.call = number
                 return
             frame = frame.f_back
@@ -165,6 +171,13 @@ class Breadcrumbs:
         """Return the last log lines of the component of the last call."""
         index = int(self._notes.call) - 1
         return self._tail(self._notes.owners[index]).take() if index >= 0 else ()
+
+
+def _time_of(instance: Instance, function: str) -> float:
+    """Time of a call, s; NaN for one before which no run has begun."""
+    if function == METHODS["_instantiate"]:
+        return math.nan
+    return instance.step_start if function == METHODS["step"] else instance.time
 
 
 def _call_in(frame: FrameType) -> tuple[Instance, str] | None:

@@ -119,13 +119,24 @@ class GeneralRunner:
         """
         began = time.perf_counter()
         scene = self._scene.with_values(values) if values else self._scene
-        if self._broken and scene.general is not None:
-            self._importer.free()
-            self._build(scene.general)
+        if self._broken:
+            self._rebuild()
         self._broken = True  # until this run ends well: after an error FMI allows little but to free
-        outcome, message = self._run(scene)
+        try:
+            outcome, message = self._run(scene)
+        except ComponentError as error:
+            if not error.function.endswith("Reset"):
+                raise
+            self._rebuild()  # the end of the run before has failed: no fault of this one
+            outcome, message = self._run(scene)
         self._broken = False
         return self._record(outcome, message, time.perf_counter() - began)
+
+    def _rebuild(self) -> None:
+        """Make all components anew."""
+        assert self._scene.general is not None  # the constructor refuses any other
+        self._importer.free()
+        self._build(self._scene.general)
 
     def _run(self, scene: Scene) -> tuple[Outcome, str]:
         general, record, execution = scene.general, scene.record, scene.execution

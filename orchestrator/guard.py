@@ -2,7 +2,11 @@
 
 The child is used again for every point; only after a crash or a missed deadline a new one is made. What the child
 was doing is read from `breadcrumbs`. A hanging call is seen there at no cost. To see a call that crashes, every call
-must be noted before it is made: that is done from the first crash on, and the point of that crash is repeated once.
+must be noted before it is made: that is done from the first crash on.
+
+A point is repeated once, in a new process, where its loss may be no fault of its own: a crash in a process that has
+run other points, or of which nobody knows the call; a hang in a call that puts an end to the point before. If it then
+goes well, the result counts. What an FMU starts ends with the child (`guard_supervisor`).
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import IO, Any
@@ -36,6 +41,19 @@ GRACE = 0.5
 WAITS_ON_PIPES = os.name == "posix"
 #: Starting Python and loading the FMUs, s.
 START_TIME = 60.0
+#: What a child that is to end may take, s: longer than its supervisor takes to end all that an FMU has started.
+END_TIME = 10.0
+#: Calls that end the life of the point before.
+AFTER_A_POINT = ("Reset", "FreeInstance", "Terminate")
+
+
+@dataclass(frozen=True, slots=True)
+class _Loss:
+    """A point that took its process down or did not answer: its outcome, why, and the FMI call that was under way."""
+
+    outcome: Outcome
+    message: str
+    function: str
 
 
 class _Child:
@@ -43,10 +61,11 @@ class _Child:
 
     def __init__(self, order: Order) -> None:
         self._process = subprocess.Popen(
-            python_command("-m", "vibroimpact.orchestrator.guard_child"),
+            python_command("-m", "vibroimpact.orchestrator.guard_supervisor"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
+            start_new_session=True,  # Ctrl-C reaches all processes of a terminal's session: it is the parent's
         )
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._reader: threading.Thread | None = None
@@ -81,11 +100,13 @@ class _Child:
         except queue.Empty:
             raise TimeoutError from None
 
-    def end(self) -> int:
+    def end(self, *, at_once: bool = False) -> int:
         """End the child, by force if it does not by itself; returns its exit code (negative: the signal)."""
         self._close(self._process.stdin)
+        if at_once:
+            self._process.terminate()
         try:
-            code = self._process.wait(0.2)
+            code = self._process.wait(END_TIME)
         except subprocess.TimeoutExpired:
             self._process.kill()
             code = self._process.wait()
@@ -124,6 +145,7 @@ class GuardedRunner:
         self._wanted = execution
         self._folder = tempfile.TemporaryDirectory(prefix="vibroimpact-guard-")
         self._child: _Child | None = None
+        self._points = 0  # that the child has run
         self._noting = False
         try:
             identity = self._start()
@@ -140,17 +162,18 @@ class GuardedRunner:
         path = Path(self._folder.name) / "notes"
         Breadcrumbs.create(path)
         self._notes = Breadcrumbs(path)
+        self._notes.begin()
         self._child = _Child(
             Order(self._scene.text, self._scene.source, self._wanted, str(path), self._noting)
         )
         try:
             answer = self._child.answer(START_TIME)
         except TimeoutError:
-            answer = Failure(self._what_happened(f"no answer within {START_TIME:g} s while loading"))
+            answer = Failure(self._what_happened(f"no answer within {START_TIME:g} s"))
         if isinstance(answer, Identity):
+            self._points = 0
             return answer
-        code = self._child.end()
-        self._child = None
+        code = self._end_child(at_once=answer is not None)
         if isinstance(answer, Failure):
             raise (ComponentFileError if answer.misuse else ComponentError)(answer.message)
         raise ComponentError(self._what_happened(_ending(code)))
@@ -165,53 +188,66 @@ class GuardedRunner:
         """
         began = time.perf_counter()
         point = Point(dict(values), start)
+        used = self._child is not None and self._points > 0
+        found = self._attempt(point)
+        if isinstance(found, _Loss):
+            found = self._second_attempt(point, found, used=used)
+        seconds = time.perf_counter() - began
+        if isinstance(found, _Loss):
+            return empty_record(self._scene, found.outcome, found.message, seconds)
+        return replace(found, seconds=seconds)
+
+    def _attempt(self, point: Point) -> RunRecord | _Loss:
+        """Run a point in the child, or in a new one."""
+        if self._child is None:
+            self._start()
+        assert self._child is not None
+        self._points += 1
+        self._notes.begin()
+        self._child.say(point)
         try:
-            answer = self._answer(point)
+            answer = self._child.answer(self._deadline + GRACE)
         except TimeoutError:
-            return self._lost(Outcome.timeout, self._end_late(), began)
+            return self._lost(Outcome.timeout, f"no answer within {self._deadline:g} s")
         if answer is None:
-            return self._lost(Outcome.crash, self._end_crashed(point), began)
+            return self._lost(Outcome.crash, _ending(self._end_child()))
         if isinstance(answer, Failure):
             raise ComponentError(answer.message)
         record: RunRecord = answer
         return record
 
-    def _answer(self, point: Point) -> Any:
-        """What the child, or a new one, says to a point; None when it is gone; raises TimeoutError."""
-        if self._child is None:
-            self._start()
-        assert self._child is not None
-        self._notes.begin()
-        self._child.say(point)
-        return self._child.answer(self._deadline + GRACE)
-
-    def _lost(self, outcome: Outcome, message: str, began: float) -> RunRecord:
-        return empty_record(self._scene, outcome, message, time.perf_counter() - began)
-
-    def _end_late(self) -> str:
-        """Give up a child that does not answer and say what it was doing."""
-        message = self._what_happened(f"no answer within {self._deadline:g} s")
-        self._end_child()
-        return message
-
-    def _end_crashed(self, point: Point) -> str:
-        """Give up a child that is gone and say what it was doing; where its calls were not noted, find out."""
-        ending = _ending(self._end_child())
-        if self._noting:
-            return self._what_happened(ending)
-        self._noting = True
+    def _second_attempt(self, point: Point, loss: _Loss, *, used: bool) -> RunRecord | _Loss:
+        """Repeat a lost point in a new process where that may help, or tell which call crashes."""
+        if loss.outcome is Outcome.crash:
+            helps = used or not self._noting
+            self._noting = True
+        else:
+            helps = used and loss.function.endswith(AFTER_A_POINT)
+        if not helps:
+            return loss
         try:
-            if self._answer(point) is None:
-                return self._what_happened(_ending(self._end_child()))
-        except TimeoutError:
-            return f"guard: {ending}. Repeated to find where, the point ended otherwise: {self._end_late()}"
+            again = self._attempt(point)
         except ComponentError as error:
-            return f"guard: {ending}. Repeated to find where, the components could not be loaded: {error}"
-        return f"guard: {ending}. Repeated to find where, the point did not do it again."
+            raise ComponentError(f"{error} Before that, in another process: {loss.message}") from error
+        if isinstance(again, _Loss) and again.outcome is not loss.outcome:
+            return replace(again, message=f"{again.message}. In another process before: {loss.message}")
+        if isinstance(again, _Loss):
+            return again
+        remark = f"repeated in a new process, where it went well; in the first: {loss.message}"
+        return replace(again, message="; ".join(filter(None, (again.message, remark))))
 
-    def _end_child(self) -> int:
+    def _lost(self, outcome: Outcome, what: str) -> _Loss:
+        """Give up a child that is gone or does not answer and say what it was doing."""
+        known = self._noting or outcome is Outcome.timeout
+        message = self._what_happened(what) if known else f"guard: {what}"
+        loss = _Loss(outcome, message, self._notes.last_call()[1])
+        if self._child is not None:
+            self._end_child(at_once=True)
+        return loss
+
+    def _end_child(self, *, at_once: bool = False) -> int:
         assert self._child is not None
-        code = self._child.end()
+        code = self._child.end(at_once=at_once)
         self._child = None
         return code
 
@@ -219,10 +255,17 @@ class GuardedRunner:
         instance, function, at = self._notes.last_call()
         if not instance:
             return f"guard: expected an answer of the child process, got {what}."
+        if math.isnan(at):
+            # no run has begun: the file is what a user can do something about
+            function = f"{function} of {self._file_of(instance) or instance}"
         lines = self._notes.last_lines()
         logged = " | ".join(lines[-5:]) if lines else "nothing"
         when = "" if math.isnan(at) else f" at time {at:.17g}"
         return f"{instance}: {function}{when}: {what}; the component logged last: {logged}"
+
+    def _file_of(self, instance: str) -> str:
+        components = self._scene.general.components if self._scene.general is not None else ()
+        return next((str(spec.fmu) for spec in components if spec.name == instance), "")
 
     def close(self) -> None:
         """End the child and remove its notes."""

@@ -1,4 +1,4 @@
-"""The child process of `guard`: runs points that may take it down. Started as `python -m`, speaks over pipes."""
+"""The process that `guard` lets points run in, since they may take it down. `guard_supervisor` forks it."""
 
 from __future__ import annotations
 
@@ -37,11 +37,17 @@ def _look_around(parent: int, notes: Breadcrumbs) -> None:
     threading.Thread(target=look, daemon=True).start()
 
 
-def _private_output() -> BinaryIO:
-    """Keep standard output for the answers; what an FMU prints goes to standard error."""
-    answers = os.fdopen(os.dup(1), "wb")
+def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
+    """Keep standard input and output for orders and answers; what an FMU prints goes to standard error.
+
+    Neither an FMU nor a program that it starts can read an order or hold the answers open.
+    """
+    orders, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
     os.dup2(2, 1)
-    return answers
+    return orders, answers
 
 
 def _answer(runner: Runner, point: Point) -> Any:
@@ -61,7 +67,7 @@ def main() -> None:
     # Ctrl-C reaches all processes of a terminal: a point must not count as crashed for it. The parent ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = os.getppid()
-    answers, orders = _private_output(), sys.stdin.buffer
+    orders, answers = _private_pipes()
     order = receive(orders)
     if not isinstance(order, Order):
         return
@@ -76,7 +82,3 @@ def main() -> None:
     while isinstance(point := receive(orders), Point):
         send(answers, _answer(runner, point))
     runner.close()
-
-
-if __name__ == "__main__":
-    main()

@@ -32,6 +32,20 @@ void say(void *instance, const char *word, int number, double value)
     }
 }
 
+static fmi2Status at(fmi2Component c, occasion where)
+{
+    switch (model_at(&of(c)->m, where, c)) {
+    case STEP_DONE:
+        return fmi2OK;
+    case STEP_FATAL:
+        return fmi2Fatal;
+    case STEP_DISCARDS:
+        return fmi2Discard;
+    default:
+        return fmi2Error;
+    }
+}
+
 static fmi2Status status(bool good)
 {
     return good ? fmi2OK : fmi2Error;
@@ -67,12 +81,17 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
         i->callbacks = *callbacks;
         strncpy(i->name, name, sizeof i->name - 1);
         model_start(&i->m);
+        if (at(i, AT_INSTANTIATE) != fmi2OK) {
+            free(i);
+            return NULL;
+        }
     }
     return i;
 }
 
 void fmi2FreeInstance(fmi2Component c)
 {
+    (void)at(c, AT_FREE);
     free(c);
 }
 
@@ -86,12 +105,15 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerance_defined, f
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    (void)c;
-    return fmi2OK;
+    return at(c, AT_ENTER_INITIALIZATION);
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
+    const fmi2Status refused = at(c, AT_EXIT_INITIALIZATION);
+    if (refused != fmi2OK) {
+        return refused;
+    }
     return status(model_begin(&of(c)->m, c));
 }
 
@@ -103,9 +125,10 @@ fmi2Status fmi2Terminate(fmi2Component c)
 
 fmi2Status fmi2Reset(fmi2Component c)
 {
+    const fmi2Status found = at(c, AT_RESET);
     model_start(&of(c)->m);
     of(c)->terminated = false;
-    return fmi2OK;
+    return found;
 }
 
 /* ---- values ---- */
@@ -117,6 +140,10 @@ static double *place(fmi2Component c, fmi2ValueReference reference)
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2Real values[])
 {
+    const fmi2Status found = at(c, AT_GET);
+    if (found != fmi2OK) {
+        return found;
+    }
     model_calculate(&of(c)->m);
     for (size_t k = 0; k < count; k++) {
         const double *from = place(c, references[k]);
@@ -130,6 +157,10 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], s
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, const fmi2Real values[])
 {
+    const fmi2Status found = at(c, AT_SET);
+    if (found != fmi2OK) {
+        return found;
+    }
     for (size_t k = 0; k < count; k++) {
         double *to = place(c, references[k]);
         if (to == NULL) {
@@ -168,6 +199,10 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference references[]
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 {
+    const fmi2Status found = at(c, AT_SAVE);
+    if (found != fmi2OK) {
+        return found;
+    }
     if (!model_has_state) {
         return fmi2Error;
     }
@@ -183,6 +218,10 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)
 
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state)
 {
+    const fmi2Status found = at(c, AT_RESTORE);
+    if (found != fmi2OK) {
+        return found;
+    }
     if (!model_has_state || state == NULL) {
         return fmi2Error;
     }
@@ -237,7 +276,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     }
     m->time = time;
     const step_answer answer = model_step(m, size, c);
-    of(c)->terminated = answer == STEP_TERMINATES;
+    of(c)->terminated = answer == STEP_TERMINATES || answer == STEP_ENDS_SHORT || answer == STEP_SAYS;
     switch (answer) {
     case STEP_FAILS:
         return fmi2Error;
@@ -247,6 +286,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
         return fmi2Discard;
     case STEP_DISCARDS:
         m->time = time + size / 2;
+        return fmi2Discard;
+    case STEP_ENDS_SHORT:
+    case STEP_SAYS:
+        m->time = m->reached;
         return fmi2Discard;
     case STEP_TERMINATES:
         m->time = time + size;

@@ -35,6 +35,20 @@ void say(void *instance, const char *word, int number, double value)
     }
 }
 
+static fmi3Status at(fmi3Instance c, occasion where)
+{
+    switch (model_at(&of(c)->m, where, c)) {
+    case STEP_DONE:
+        return fmi3OK;
+    case STEP_FATAL:
+        return fmi3Fatal;
+    case STEP_DISCARDS:
+        return fmi3Discard;
+    default:
+        return fmi3Error;
+    }
+}
+
 static fmi3Status status(bool good)
 {
     return good ? fmi3OK : fmi3Error;
@@ -59,7 +73,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
                                          fmi3IntermediateUpdateCallback update)
 {
-    (void)name, (void)resources, (void)visible, (void)logging, (void)early_return, (void)update;
+    (void)name, (void)resources, (void)visible, (void)logging, (void)update;
     (void)intermediate, (void)intermediate_count;
     if (strcmp(token, TOKEN) != 0 || (event_mode_used && !model_has_event_mode)) {
         return NULL;
@@ -70,12 +84,18 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
         i->log = log;
         i->environment = environment;
         model_start(&i->m);
+        i->m.early_allowed = event_mode_used && early_return;
+        if (at(i, AT_INSTANTIATE) != fmi3OK) {
+            free(i);
+            return NULL;
+        }
     }
     return i;
 }
 
 void fmi3FreeInstance(fmi3Instance c)
 {
+    (void)at(c, AT_FREE);
     free(c);
 }
 
@@ -84,12 +104,16 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean tolerance_def
 {
     (void)tolerance_defined, (void)tolerance, (void)stop_defined, (void)stop;
     of(c)->m.time = start;
-    return fmi3OK;
+    return at(c, AT_ENTER_INITIALIZATION);
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance c)
 {
     of(c)->in_event_mode = of(c)->event_mode_used;
+    const fmi3Status refused = at(c, AT_EXIT_INITIALIZATION);
+    if (refused != fmi3OK) {
+        return refused;
+    }
     return status(model_begin(&of(c)->m, c));
 }
 
@@ -101,9 +125,12 @@ fmi3Status fmi3Terminate(fmi3Instance c)
 
 fmi3Status fmi3Reset(fmi3Instance c)
 {
+    const fmi3Status found = at(c, AT_RESET);
+    const bool early_allowed = of(c)->m.early_allowed;
     model_start(&of(c)->m);
+    of(c)->m.early_allowed = early_allowed;
     of(c)->in_event_mode = false;
-    return fmi3OK;
+    return found;
 }
 
 /* ---- values ---- */
@@ -116,6 +143,10 @@ static double *place(fmi3Instance c, fmi3ValueReference reference)
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t count, fmi3Float64 values[],
                           size_t value_count)
 {
+    const fmi3Status found = at(c, AT_GET);
+    if (found != fmi3OK) {
+        return found;
+    }
     model_calculate(&of(c)->m);
     of(c)->m.value[0] = of(c)->m.time;
     for (size_t k = 0; k < count; k++) {
@@ -131,6 +162,10 @@ fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[],
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t count,
                           const fmi3Float64 values[], size_t value_count)
 {
+    const fmi3Status found = at(c, AT_SET);
+    if (found != fmi3OK) {
+        return found;
+    }
     for (size_t k = 0; k < count; k++) {
         double *to = place(c, references[k]);
         if (to == NULL || value_count != count) {
@@ -170,6 +205,10 @@ fmi3Status fmi3SetInt64(fmi3Instance c, const fmi3ValueReference references[], s
 
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
 {
+    const fmi3Status found = at(c, AT_SAVE);
+    if (found != fmi3OK) {
+        return found;
+    }
     if (!model_has_state) {
         return fmi3Error;
     }
@@ -185,6 +224,10 @@ fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)
 
 fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state)
 {
+    const fmi3Status found = at(c, AT_RESTORE);
+    if (found != fmi3OK) {
+        return found;
+    }
     if (!model_has_state || state == NULL) {
         return fmi3Error;
     }
@@ -240,11 +283,12 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
     m->time = time;
     const step_answer answer = model_step(m, size, c);
     const double share = answer == STEP_STALLS ? 0.0 : answer == STEP_DISCARDS ? 0.5 : 1.0;
-    m->time = share < 1.0 ? time + share * size : time + size;
-    *needs_event = answer == STEP_NEEDS_EVENT && of(c)->event_mode_used;
-    *terminates = answer == STEP_TERMINATES;
-    *early = answer == STEP_STALLS;
-    *last_time = m->time;
+    const bool short_of_end = answer == STEP_ENDS_SHORT || answer == STEP_EVENT_EARLY;
+    m->time = short_of_end ? m->reached : share < 1.0 ? time + share * size : time + size;
+    *needs_event = (answer == STEP_NEEDS_EVENT || answer == STEP_EVENT_EARLY) && of(c)->event_mode_used;
+    *terminates = answer == STEP_TERMINATES || answer == STEP_ENDS_SHORT;
+    *early = answer == STEP_STALLS || answer == STEP_EVENT_EARLY || (answer == STEP_SAYS && m->says_early);
+    *last_time = answer == STEP_SAYS ? m->reached : m->time;
     switch (answer) {
     case STEP_FAILS:
         return fmi3Error;
@@ -276,6 +320,10 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Bool
     if (!of(c)->in_event_mode) {
         say(c, "not in event mode", 0, of(c)->m.time);
         return fmi3Error;
+    }
+    const fmi3Status found = at(c, AT_EVENT);
+    if (found != fmi3OK) {
+        return found;
     }
     *again = model_update(&of(c)->m);
     *terminates = false;

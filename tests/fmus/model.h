@@ -8,10 +8,29 @@
 
 enum { MODEL_VALUES = 9 };
 
+/* Where an adapter is, as `fault_place` in the model descriptions of Faulty. */
+typedef enum {
+    AT_STEP,
+    AT_INSTANTIATE,
+    AT_ENTER_INITIALIZATION,
+    AT_EXIT_INITIALIZATION,
+    AT_RESET,
+    AT_FREE,
+    AT_GET,
+    AT_SET,
+    AT_SAVE,
+    AT_RESTORE,
+    AT_EVENT,
+    PLACES
+} occasion;
+
 /* A state: copying it saves it. Integers and enumerations are kept as doubles too. */
 typedef struct {
     double time;                /* s */
     double value[MODEL_VALUES]; /* by value reference; 0 is the time in FMI 3.0 and unused in FMI 2.0 */
+    double reached;             /* what the last step says of its end, where its answer needs that, s */
+    bool says_early;            /* STEP_SAYS: early return */
+    bool early_allowed;         /* the importer handles event mode and early return */
 } model;
 
 typedef enum {
@@ -20,6 +39,9 @@ typedef enum {
     STEP_TERMINATES,  /* done; asks for the end of the simulation (FMI 2.0: discard, and terminated) */
     STEP_STALLS,      /* the time stays where it is (FMI 3.0: early return, FMI 2.0: discard) */
     STEP_DISCARDS,    /* half of the step is done, then discard */
+    STEP_ENDS_SHORT,  /* as STEP_TERMINATES, at `reached` */
+    STEP_EVENT_EARLY, /* FMI 3.0: the step has ended at `reached` and asks for event mode */
+    STEP_SAYS,        /* done; says that it has ended at `reached` (FMI 2.0: with discard, and terminated) */
     STEP_FAILS,
     STEP_FATAL
 } step_answer;
@@ -32,6 +54,8 @@ extern const bool model_has_event_mode; /* FMI 3.0 */
 void model_start(model *m);
 /* False: the parameters are refused. */
 bool model_begin(model *m, void *instance);
+/* At the begin of each call of the importer but doStep; any answer but STEP_DONE is the call's status. */
+step_answer model_at(model *m, occasion where, void *instance);
 /* Outputs from inputs and states; called before every get. */
 void model_calculate(model *m);
 /* Advance by `size` (s, > 0); the adapter moves the time. */
