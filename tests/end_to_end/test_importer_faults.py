@@ -211,8 +211,10 @@ def test_a_child_that_is_killed_between_two_points_costs_no_point(folder: Path) 
     runner = make_runner(parse_scene(scene_text("3.0"), str(folder / "faults.toml")))
     try:
         assert_runs_well(runner.run({"culprit.fault": 0.0}))
-        for child in living_children():
-            child.kill()
+        tree = [p for child in living_children() for p in (child, *child.children(recursive=True))]
+        for process in tree:
+            process.kill()
+        wait_until(lambda: not any(alive(process) for process in tree))
         again = runner.run({"culprit.fault": 0.0})
         assert again.outcome is Outcome.ok
         assert again.message.startswith(
@@ -374,7 +376,7 @@ recorded_time = 10.0
 [execution]
 macro_step = 100.0
 guard = true
-deadline = 0.4
+deadline = 1.0
 """
 
 
