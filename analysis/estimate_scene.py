@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -18,6 +17,7 @@ from vibroimpact.analysis.recording import Channel, Recording
 from vibroimpact.analysis.recording_files import is_recording
 from vibroimpact.analysis.schema import file_name_of
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.safe_toml import parse_toml
 
 #: A table among several: `stop[1]`.
 _NUMBERED = re.compile(r"(\w+)\[(\d+)\]")
@@ -137,8 +137,8 @@ def refuse_far_options(
 def scene_of(attrs: Mapping[str, Any]) -> dict[str, Any]:
     """Return the tables of the scene of a simulated dataset; empty where there is none."""
     try:
-        return tomllib.loads(str(attrs.get("scene", "")))
-    except tomllib.TOMLDecodeError:
+        return parse_toml(str(attrs.get("scene", "")))
+    except ValueError:
         return {}
 
 

@@ -9,7 +9,6 @@ V impact velocity, theta forcing phase at impact.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +18,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.safe_toml import parse_toml
 
 Floats = npt.NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class ImpactOscillator:
         DatasetError
             If the scene is not an oscillator with one impulsive stop in front of it.
         """
-        scene = tomllib.loads(text)
+        scene = parse_toml(text)
         stops = scene.get("stop", [])
         if scene.get("body", {}).get("kind") != "oscillator" or len(stops) != 1 or "forcing" not in scene:
             raise DatasetError(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -18,8 +17,9 @@ from pydantic import (
 )
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.hardware.importers.labels import is_known_unit
-from vibroimpact.orchestrator.scene_errors import Problem, Rule, problems_of, syntax_problem
+from vibroimpact.orchestrator.scene_errors import Rule, lines_of, problems_of, syntax_problem
 
 _LARGEST = 2**16
 
@@ -156,7 +156,7 @@ def checked(values: Mapping[str, Any], source: str) -> ImportSettings:
         return ImportSettings.model_validate(dict(values))
     except ValidationError as error:
         problems = problems_of(error, ImportSettings, ())
-        raise UsageError("\n".join(dict.fromkeys(problem.line(source) for problem in problems))) from None
+        raise UsageError("\n".join(lines_of(problems, source))) from None
 
 
 def settings_beside(path: Path) -> ImportSettings:
@@ -183,10 +183,7 @@ def read_settings(path: Path) -> ImportSettings:
     if len(content) > _LARGEST:
         raise UsageError(f"{path}: expected a settings file of at most {_LARGEST} bytes, got a larger one.")
     try:
-        document = tomllib.loads(text)
+        document = parse_toml(text)
     except ValueError as problem:
         raise UsageError(syntax_problem(problem, text).line(str(path))) from None
-    except RecursionError:
-        line = Problem("", "shallow tables", "nesting too deep to read").line(str(path))
-        raise UsageError(line) from None
     return checked(document, str(path))

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -89,7 +90,9 @@ def _shipped_fmu(table: ComponentTable, path: tuple[str, ...], problems: list[Pr
     where = key_path((*path, "fmu"))
     if table.fmu not in components():
         expected = "a path that ends in .fmu, or the name of a shipped component"
-        problems.append(Problem(where, expected, quoted(table.fmu), nearest(table.fmu, components())))
+        problems.append(
+            Problem(where, expected, quoted(table.fmu), partial(nearest, table.fmu, components()))
+        )
         return None
     fmi = table.fmi or "3.0"
     try:
@@ -165,7 +168,7 @@ def _parameters(
 def _start_problems(name: str, value: object, where: str, facts: ComponentFacts) -> Iterator[Problem]:
     variable = facts.variables.get(name)
     if variable is None:
-        hint = _quotes_hint(name, value) or nearest(name, settable_names(facts))
+        hint = _quotes_hint(name, value) or partial(nearest, name, settable_names(facts))
         yield Problem(where, f"a variable of {facts.file}", quoted(name), hint)
     else:
         yield from start_problems(variable, where)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from vibroimpact.orchestrator.component_facts import NUMERIC_KINDS, ComponentFacts, VariableFacts
@@ -79,13 +80,13 @@ def reference_problem(draft: GeneralDraft, where: str, reference: str) -> Proble
         hint = 'For example "ball.h"; the component ends at the first dot.'
         return Problem(where, "a variable COMPONENT.VARIABLE", quoted(reference), hint)
     if component not in draft.components:
-        hint = nearest(component, draft.components)
-        return Problem(where, "a component of this scene before the first dot", quoted(reference), hint)
+        near = partial(nearest, component, draft.components)
+        return Problem(where, "a component of this scene before the first dot", quoted(reference), near)
     facts = draft.facts(reference)
     if facts is None or variable in facts.variables:
         return None
-    hint = nearest(variable, facts.variables, f"{component}.")
-    return Problem(where, f"a variable of {facts.file} after {component}.", quoted(reference), hint)
+    near = partial(nearest, variable, facts.variables, f"{component}.")
+    return Problem(where, f"a variable of {facts.file} after {component}.", quoted(reference), near)
 
 
 def _connections_join_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import partial
 from typing import Any
 
 from vibroimpact.orchestrator.component_facts import VariableFacts
@@ -85,7 +86,9 @@ def _start_value_problems(key: str, where: str, draft: GeneralDraft) -> Iterator
     facts, variable = draft.facts(key), draft.variable(key)
     if problem:
         component, name = split(key)
-        near = nearest(name, settable_names(facts), f"{component}.") if facts and name else problem.hint
+        near = (
+            partial(nearest, name, settable_names(facts), f"{component}.") if facts and name else problem.hint
+        )
         yield Problem(where, problem.expected, problem.got, near)
     elif variable:
         found = list(start_problems(variable, where))

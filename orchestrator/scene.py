@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_serializer
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.general_scene import GeneralScene
 from vibroimpact.orchestrator.replay_models import RECORDING_KEY, Replay
+from vibroimpact.orchestrator.scene_errors import lines_of
 from vibroimpact.orchestrator.scene_file import parse_toml, read_text
 from vibroimpact.orchestrator.scene_keys import Key, coordinate_name, number_of, numeric_key, replacement
 from vibroimpact.orchestrator.scene_models import Body, Execution, Forcing, Record, Sensor, Stop
@@ -207,7 +208,7 @@ def parse_scene(text: str, source: str) -> Scene:
     """
     tables, problems = read_tables(parse_toml(text, source), Path(source).parent)
     if tables is None:
-        raise SceneError(tuple(dict.fromkeys(problem.line(source) for problem in problems)))
+        raise SceneError(lines_of(problems, source))
     return Scene(
         source=source,
         text=text,

@@ -9,19 +9,23 @@ from __future__ import annotations
 import json
 import math
 import re
-import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from functools import partial
 from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from vibroimpact.fmus.safe_toml import TooDeepError
+
 NUMBER_TAG, ARRAY_TAG = "number alone", "array of numbers"
 """Which form of a field "a number, or an array of them" was read; part of pydantic's location, not of the key."""
 
 LONGEST_QUOTE = 60
+MOST_PROBLEMS = 50
+"""Problems that are told of one file; more of them help nobody, and only their number is said."""
 MOST_WORDS_LISTED = 12
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+\Z")
@@ -40,18 +44,32 @@ _SYNTAX_HINTS = {
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing that is wrong with a scene: where, what is expected, what is there, and what to do."""
+    """One thing that is wrong with a scene: where, what is expected, what is there, and what to do.
+
+    A hint that takes time to find, such as the nearest spelling, may be a function: it is called when it is told.
+    """
 
     key: str
     expected: str
     got: str
-    hint: str = ""
+    hint: str | Callable[[], str] = ""
 
     def line(self, source: str) -> str:
         """Return the problem as the line that a user reads."""
         where = f"{source}: {self.key}: " if self.key else f"{source}: "
-        hint = f" {self.hint}" if self.hint else ""
-        return f"{where}expected {self.expected}, got {self.got}.{hint}"
+        hint = self.hint if isinstance(self.hint, str) else self.hint()
+        return f"{where}expected {self.expected}, got {self.got}.{f' {hint}' if hint else ''}"
+
+
+def lines_of(problems: Sequence[Problem], source: str) -> tuple[str, ...]:
+    """Return the lines that a user reads of all problems of a file, each once; of very many, how many more."""
+    lines: dict[str, None] = {}
+    for place, problem in enumerate(problems):
+        if len(lines) == MOST_PROBLEMS:
+            more = len(problems) - place
+            return (*lines, f"{source}: and {more} more {'problem' if more == 1 else 'problems'}.")
+        lines[problem.line(source)] = None
+    return tuple(lines)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +140,8 @@ def key_path(parts: Iterable[str | int]) -> str:
         if isinstance(part, int):
             path += f"[{part + 1}]"
         else:
-            path += ("." if path else "") + (part if _BARE_KEY.match(part) else quoted(part))
+            plain = _BARE_KEY.match(part) and len(part) <= LONGEST_QUOTE
+            path += ("." if path else "") + (part if plain else quoted(part))
     return path
 
 
@@ -156,7 +175,10 @@ def _nearest_word(word: object, options: Sequence[str]) -> str | None:
 def unknown_key(path: Sequence[str | int], known: Iterable[str]) -> Problem:
     """Return the problem of a key that its table does not have."""
     return Problem(
-        key_path(path), "a known key", f"the unknown key {quoted(path[-1])}", nearest(path[-1], known)
+        key_path(path),
+        "a known key",
+        f"the unknown key {quoted(path[-1])}",
+        partial(nearest, path[-1], list(known)),
     )
 
 
@@ -196,13 +218,15 @@ def _is_an_echo(entry: Any, entries: Sequence[Any], model: type[BaseModel]) -> b
     location = entry["loc"]
     if entry["type"] == "too_short":  # bad items do not count as items
         return bool(entry["input"])
+    if entry["type"] != "missing":
+        return False
     misspelt = (
         other["loc"][-1]
-        for other in entries
+        for other in entries[:MOST_PROBLEMS]
         if other["type"] == "extra_forbidden" and other["loc"][:-1] == location[:-1]
     )
     known = known_keys(_owner(model, location)[0])
-    return entry["type"] == "missing" and any(_nearest_word(word, known) == location[-1] for word in misspelt)
+    return any(_nearest_word(word, known) == location[-1] for word in misspelt)
 
 
 def _problem_of(entry: Any, model: type[BaseModel], table: tuple[str | int, ...]) -> Problem:
@@ -276,7 +300,11 @@ def _header(table: tuple[str | int, ...]) -> str:
 
 def syntax_problem(error: ValueError, text: str) -> Problem:
     """Return the problem of a text that is not TOML, with its place and the line itself."""
-    if not isinstance(error, tomllib.TOMLDecodeError):
+    if isinstance(error, TooDeepError):
+        where = "" if error.line is None else f"line {error.line}"
+        hint = "A scene has tables and short arrays only."
+        return Problem(where, "shallow tables and arrays", "nesting too deep to read", hint)
+    if not _TOML_PLACE.search(str(error)):
         return Problem("", "numbers of a usual length", "one of thousands of digits")
     message = str(error)
     place = _TOML_PLACE.search(message)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import stat
-import tomllib
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from vibroimpact.fmus import safe_toml
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene_errors import Problem, syntax_problem
 
@@ -40,12 +40,9 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         When the text is not TOML, with the line.
     """
     try:
-        return tomllib.loads(text)
+        return safe_toml.parse_toml(text)
     except ValueError as error:
         raise SceneError([syntax_problem(error, text).line(source)]) from None
-    except RecursionError:
-        hint = "A scene has tables and short arrays only."
-        raise _file_error(source, "shallow tables and arrays", "nesting too deep to read", hint) from None
 
 
 def _read_bytes(path: Path, source: str) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import Annotated, Any, get_origin
 
 import numpy as np
@@ -44,8 +45,9 @@ def read_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list
     """
     entries, problems = sweep_entries(document)
     axes: list[SweepAxis] = []
+    known = dict.fromkeys(_sweepable_keys(document))
     for key, entry in entries.items():
-        found = list(_key_problems(key, entry, document))
+        found = list(_key_problems(key, entry, document, known))
         if not found:
             axis, found = read_axis(key, entry)
             found += _value_problems(axis, document) if axis else []
@@ -62,11 +64,13 @@ def sweep_entries(document: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[
     return {}, [Problem("sweep", "a table", quoted(table), f"Write [sweep] and below it KEY = {_FORMS}.")]
 
 
-def _key_problems(text: str, entry: object, document: Mapping[str, Any]) -> Iterator[Problem]:
-    known = _sweepable_keys(document)
+def _key_problems(
+    text: str, entry: object, document: Mapping[str, Any], known: Mapping[str, None]
+) -> Iterator[Problem]:
     if text not in known:
         where, expected = key_path(("sweep", text)), "a numeric key of this scene"
-        yield Problem(where, expected, quoted(text), _key_hint(text, entry, document, known))
+        hint = partial(_key_hint, text, entry, document, list(known))
+        yield Problem(where, expected, quoted(text), hint)
 
 
 def _sweepable_keys(document: Mapping[str, Any]) -> list[str]:

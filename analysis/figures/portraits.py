@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, Floats, canvas, label, title
 from vibroimpact.analysis.schema import swept_names
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.safe_toml import parse_toml
 
 _PANEL_MM = 62
 # Small enough that ten thousand impacts do not run into one blot.
@@ -123,8 +123,8 @@ def _scene(dataset: xr.Dataset) -> dict[str, Any]:
     if swept_names(dataset):
         return {}
     try:
-        return tomllib.loads(str(dataset.attrs.get("scene", "")))
-    except tomllib.TOMLDecodeError:
+        return parse_toml(str(dataset.attrs.get("scene", "")))
+    except ValueError:
         # The text is only provenance here: a portrait without stops and modes is still right.
         return {}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, 
 from vibroimpact.analysis.figures.series import draw_series, sampled_names
 from vibroimpact.analysis.schema import swept_names
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.safe_toml import parse_toml
 
 
 def draw_run(dataset: xr.Dataset, run: int | None = None) -> Figure:
@@ -87,12 +87,12 @@ def _stops(dataset: xr.Dataset) -> list[tuple[float, float]]:
     if any(name.endswith(("position", "side", "location")) for name in swept_names(dataset)):
         return []
     try:
-        scene = tomllib.loads(str(dataset.attrs.get("scene", "")))
+        scene = parse_toml(str(dataset.attrs.get("scene", "")))
         stops = scene.get("stop", [])
         if not _at_observed_point(scene, stops):
             return []
         return [(float(s["position"]), -1.0 if s.get("side") == "lower" else 1.0) for s in stops]
-    except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError):
         # The scene text is only provenance here: a figure without the line of the stop is still right.
         return []
 

@@ -326,6 +326,62 @@ def test_text_that_is_not_toml_is_reported_with_its_line(text: str, problem: str
     assert line.startswith(problem)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "{}a = 1",
+        "[{}a]",
+        "[[{}a]]",
+        "x = {{ {}a = 1 }}",
+        "x = [{{ y = 1, {}a = 1 }}]",
+        "[body]\nb = 1\n{}a = 1",
+    ],
+)
+@pytest.mark.parametrize("part", ["a.", '"a" .', "'a'. "])
+def test_a_key_of_thousands_of_parts_is_refused_with_its_line_before_it_is_parsed(
+    text: str, part: str
+) -> None:
+    # 200,000 of them: the parser would take hours and all memory
+    (problem,) = problems_of(FORCED + text.format(part * 200_000))
+    line = FORCED.count("\n") + text.count("\n") + 1
+    assert problem.startswith(
+        f"line {line}: expected shallow tables and arrays, got nesting too deep to read."
+    )
+
+
+@pytest.mark.parametrize(
+    "text", ["x = " + "{a=" * 50_000, "x = " + "[" * 2000 + "]" * 2000, "x=" + "[{a=" * 9999]
+)
+def test_deep_nesting_is_refused_however_it_is_written(text: str) -> None:
+    assert "expected shallow tables and arrays, got nesting too deep to read" in problems_of(text)[0]
+
+
+def many(pattern: str, count: int) -> str:
+    return "".join(pattern.format(number) for number in range(count))
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        (forced("[forcing]", many("key{} = 1\n", 20_000) + "[forcing]"), 20_000),
+        (FORCED + many("[table{}]\n", 5000), 5000),
+        (swept(*(f'"body.mas{k}" = {{ values = [1] }}' for k in range(3000))), 3000),
+        (FORCED + "[record.time_series]\nrate = 1\nvariables = [" + many('"v{}", ', 5000) + "]", 5000),
+    ],
+)
+def test_of_very_many_problems_some_are_told_and_how_many_more_there_are(text: str, count: int) -> None:
+    problems = problems_of(text)
+    assert len(problems) == 51
+    assert problems[-1] == f"and {count - 50} more problems."
+    assert sum(map(len, problems)) < 20_000
+
+
+def test_a_problem_with_a_key_of_a_million_letters_is_one_short_line() -> None:
+    (problem,) = problems_of(forced("[forcing]", "k" * 10**6 + " = 1\n[forcing]"))
+    assert len(problem) < 500
+    assert "kkk..." in problem
+
+
 def load_problem(path: Path) -> str:
     with pytest.raises(SceneError) as caught:
         load_scene(path)
