@@ -72,6 +72,8 @@ class CampaignReport:
     chunks : list of Chunk
         In the order in which they ended.
     workers : int
+    lost_workers : int
+        How many died before the last point was done.
     compute_seconds : float
         From the first chunk handed out to the last one done; workers were ready before, s.
     compaction_seconds : float
@@ -84,6 +86,7 @@ class CampaignReport:
     outcomes: Counter[str] = field(default_factory=Counter)
     chunks: list[Chunk] = field(default_factory=list)
     workers: int = 0
+    lost_workers: int = 0
     compute_seconds: float = 0.0
     compaction_seconds: float = 0.0
 
@@ -193,7 +196,7 @@ class _Campaign:
 
     def _compute_on(self, parts: Sequence[StoredPart], workers: int | None, scheduler: str | None) -> None:
         try:
-            with open_workers(workers=workers, scheduler=scheduler) as pool:
+            with open_workers(workers=workers, scheduler=scheduler, progress=self._progress) as pool:
                 self._compute_with(pool, parts, shared=scheduler is not None)
         finally:
             # A worker that was stopped may have been writing.
@@ -212,6 +215,7 @@ class _Campaign:
             Computation(pool, replace(self._work, identity=identity), schedule, self._take).run()
         finally:
             self._report.compute_seconds = time.perf_counter() - began
+            self._report.lost_workers = pool.lost_workers
             pool.cancel_all()
 
     def _agree_with_manifest(self, identity: RunnerIdentity) -> None:

@@ -26,8 +26,8 @@ import os
 import queue
 import signal
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Set
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import resource_tracker
 from typing import Any
@@ -39,6 +39,7 @@ from distributed.scheduler import KilledWorker
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.fmus.python_child import safe_module_path
+from vibroimpact.orchestrator.progress import Progress, Silence
 
 CONNECT_SECONDS = 5.0
 """How long a scheduler may take to answer before it counts as absent."""
@@ -48,6 +49,27 @@ WORKERLESS_SECONDS = 30.0
 
 STOP_SECONDS = 3.0
 """How long a worker may take to stop by itself before it is killed, s."""
+
+LOOK_SECONDS = 1.0
+"""How often the pool looks which workers are there, s."""
+
+ASK_SECONDS = 0.05
+"""How often the pool looks for workers and answers while they get ready, s."""
+
+RESULT_SECONDS = 10.0
+"""How long the answer of a finished call may take to arrive; after that its worker counts as gone, s."""
+
+DEAD_SECONDS = 5.0
+"""How long one of our own workers may be dead before another one is started in its place, s."""
+
+MOST_REPLACEMENTS = 50
+"""How often in a campaign workers are started in place of dead ones; then the others go on alone."""
+
+MOST_STARTS = 5
+"""How often the workers of this machine are started before a start that fails is an error."""
+
+MOST_DEATHS = 5
+"""Deaths for each worker, while all get ready, at which the scene counts as what kills them."""
 
 QUIET = {
     "distributed.worker.profile.enabled": False,
@@ -81,46 +103,135 @@ class Finished:
     worker_lost: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class _Cluster:
+    """A client and, where the workers are our own, their number and what replaces those that stay dead."""
+
+    client: Client
+    size: int = 0
+    replace_dead: Callable[[], None] = lambda: None
+
+
 class WorkerPool:
     """Workers of one Dask cluster, one piece of work at a time on each.
 
     Parameters
     ----------
-    client : distributed.Client
-        Connected to the cluster.
+    cluster : _Cluster
+        Connected to the workers.
     where : str
         Where the workers are, for messages.
+    progress : Progress
+        Told of workers that were lost.
     """
 
-    def __init__(self, client: Client, where: str) -> None:
-        self._client = client
+    def __init__(self, cluster: _Cluster, where: str, progress: Progress) -> None:
+        self._cluster = cluster
+        self._client = cluster.client
         self._where = where
+        self._progress = progress
         self._ended: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._futures: dict[int, Future[Any]] = {}
         self._tickets = 0
+        self._present: frozenset[str] = frozenset()
+        self._looked = self._last_present = self._last_complete = time.monotonic()
+        self._replacements = 0
+        self.lost_workers = 0
 
     def worker_addresses(self) -> tuple[str, ...]:
-        """Return the addresses of the workers that are there now."""
-        return tuple(self._client.scheduler_info(n_workers=-1)["workers"])
+        """Return the addresses of the workers that are there now; take note of those that are not any more.
+
+        Raises
+        ------
+        CampaignError
+            When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
+        """
+        try:
+            present = frozenset(self._client.scheduler_info(n_workers=-1)["workers"])
+        except (OSError, TimeoutError):
+            present = frozenset()
+        self._looked = time.monotonic()
+        if lost := len(self._present - present):
+            self.lost_workers += lost
+            self._progress.lost_workers(self.lost_workers)
+        self._present = present
+        self._replace_dead()
+        if present:
+            self._last_present = self._looked
+        elif self._looked - self._last_present > WORKERLESS_SECONDS:
+            raise CampaignError(
+                f"{self._where}: expected at least one worker, got none for {WORKERLESS_SECONDS:.0f} s. "
+                "Start workers; then the same command resumes."
+            )
+        return tuple(sorted(present))
+
+    def _replace_dead(self) -> None:
+        if len(self._present) >= self._cluster.size:
+            self._last_complete = self._looked
+        elif self._looked - self._last_complete > DEAD_SECONDS and self._replacements < MOST_REPLACEMENTS:
+            self._last_complete = self._looked
+            self._replacements += 1
+            self._cluster.replace_dead()
+
+    def wait_for_workers(self) -> None:
+        """Wait until a worker is there."""
+        while not self.worker_addresses():
+            time.sleep(ASK_SECONDS)
 
     def call_everywhere(self, function: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
         """Call a function once on each worker, in the thread that will also do the work.
+
+        A worker that dies meanwhile is not waited for; the one that comes in its place is asked too.
 
         Returns
         -------
         dict of str to object
             What each worker, named by its address, returned.
+
+        Raises
+        ------
+        CampaignError
+            When workers die again and again.
         """
-        calls = {
-            address: self._client.submit(function, *arguments, workers=[address], pure=False)
-            for address in self.worker_addresses()
-        }
-        try:
-            return {address: call.result() for address, call in calls.items()}
-        except KilledWorker as error:
+        calls: dict[str, Future[Any]] = {}
+        answers: dict[str, Any] = {}
+        began, lost_before = time.monotonic(), self.lost_workers
+        while True:
+            present = self.worker_addresses()
+            self._refuse_deadly_start(self.lost_workers - lost_before)
+            gone = [calls.pop(address) for address in calls.keys() - set(present)]
+            self._client.cancel(gone, force=True)
+            for address in set(present) - calls.keys():
+                calls[address] = self._client.submit(function, *arguments, workers=[address], pure=False)
+            answers = {address: answer for address, answer in answers.items() if address in calls}
+            answers |= self._new_answers(calls, calls.keys() - answers.keys())
+            if calls and len(answers) == len(calls) and self._is_complete(began):
+                return answers
+
+    def _new_answers(self, calls: dict[str, Future[Any]], waiting: Set[str]) -> dict[str, Any]:
+        """Return the answers that are there after a while; a call that was lost is taken out of `calls`."""
+        answers = {}
+        time.sleep(ASK_SECONDS)
+        for address in waiting:
+            if not calls[address].done():
+                continue
+            try:
+                answers[address] = calls[address].result(timeout=RESULT_SECONDS)
+            except (TimeoutError, CancelledError, KilledWorker):
+                del calls[address]
+        return answers
+
+    def _is_complete(self, began: float) -> bool:
+        """Return whether all workers are there, or those that are missing have been waited for."""
+        return len(self._present) >= self._cluster.size or time.monotonic() - began > WORKERLESS_SECONDS
+
+    def _refuse_deadly_start(self, deaths: int) -> None:
+        if deaths > MOST_DEATHS * max(self._cluster.size, len(self._present), 1):
             raise CampaignError(
-                f"{self._where}: expected workers that live, got one that died while it got ready: {error}"
-            ) from error
+                f"{self._where}: expected workers that live until the first point, got {deaths} that died while "
+                "they loaded the components. `vibroimpact run` shows whether a component of the scene ends its "
+                "process; a lack of memory does it too."
+            )
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> int:
         """Queue a call on whichever worker is free first; return the ticket of its `Finished`."""
@@ -143,18 +254,22 @@ class WorkerPool:
             When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
         """
         while True:
-            ticket = self._wait_for_ticket()
-            future = self._futures[ticket]
-            if future.status == "lost":
-                # Its worker died with the result in its memory; another one works on it already.
-                self._announce(ticket, future)
+            if time.monotonic() - self._looked > LOOK_SECONDS:
+                self.worker_addresses()
+            try:
+                ticket = self._ended.get(timeout=LOOK_SECONDS)
+            except queue.Empty:
                 continue
-            del self._futures[ticket]
-            return self._finished_work(ticket, future)
+            finished = self._finished_work(ticket, self._futures[ticket])
+            if finished is not None:
+                del self._futures[ticket]
+                return finished
 
-    def _finished_work(self, ticket: int, future: Future[Any]) -> Finished:
+    def _finished_work(self, ticket: int, future: Future[Any]) -> Finished | None:
+        """Return what became of a piece of work; None when it is under way again."""
         try:
-            return Finished(ticket, result=future.result())
+            if future.status != "lost":
+                return Finished(ticket, result=future.result(timeout=RESULT_SECONDS))
         except KilledWorker as error:
             return Finished(ticket, error=error, worker_lost=True)
         except (CancelledError, CommClosedError) as error:
@@ -164,27 +279,11 @@ class WorkerPool:
             ) from error
         except Exception as error:
             # Whatever the work raised; who asked for the work knows what to make of it.
-            return Finished(ticket, error=error)
-
-    def _wait_for_ticket(self) -> int:
-        last_seen = time.monotonic()
-        while True:
-            try:
-                return self._ended.get(timeout=5.0)
-            except queue.Empty:
-                if self._has_workers():
-                    last_seen = time.monotonic()
-                elif time.monotonic() - last_seen > WORKERLESS_SECONDS:
-                    raise CampaignError(
-                        f"{self._where}: expected at least one worker, got none for "
-                        f"{WORKERLESS_SECONDS:.0f} s. Start workers; then the same command resumes."
-                    ) from None
-
-    def _has_workers(self) -> bool:
-        try:
-            return bool(self.worker_addresses())
-        except OSError:
-            return False
+            if future.status == "error" or not isinstance(error, TimeoutError):
+                return Finished(ticket, error=error)
+        # Its worker died with the result in its memory; another one works on it already.
+        self._announce(ticket, future)
+        return None
 
     def cancel_all(self) -> None:
         """Withdraw all work that has not begun."""
@@ -195,7 +294,9 @@ class WorkerPool:
 
 
 @contextmanager
-def open_workers(*, workers: int | None = None, scheduler: str | None = None) -> Iterator[WorkerPool]:
+def open_workers(
+    *, workers: int | None = None, scheduler: str | None = None, progress: Progress | None = None
+) -> Iterator[WorkerPool]:
     """Open workers for one campaign and leave no process behind, whatever ends it.
 
     Parameters
@@ -204,21 +305,27 @@ def open_workers(*, workers: int | None = None, scheduler: str | None = None) ->
         Number of worker processes on this machine; one for each processor by default.
     scheduler : str, optional
         Address of a Dask scheduler (`tcp://host:8786`) to use instead; its workers outlive the campaign.
+    progress : Progress, optional
+        Told of workers that were lost.
 
     Raises
     ------
     UsageError
         When nothing listens at `scheduler`.
+    CampaignError
+        When the workers cannot be started.
     """
     # Its warnings about workers that end are about what is meant here, or said better by an error.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    with dask.config.set(QUIET):
+    with dask.config.set(QUIET), ExitStack() as stack:
         if scheduler is not None:
-            with _remote_client(scheduler) as client:
-                yield _ready_pool(client, scheduler)
+            cluster = stack.enter_context(_remote_cluster(scheduler))
         else:
-            with safe_module_path(), _embedded_client(workers or processor_count()) as client:
-                yield _ready_pool(client, "this machine")
+            stack.enter_context(safe_module_path())
+            cluster = stack.enter_context(_embedded_cluster(workers or processor_count()))
+        pool = WorkerPool(cluster, scheduler or "this machine", progress or Silence())
+        pool.wait_for_workers()
+        yield pool
 
 
 def processor_count() -> int:
@@ -228,21 +335,8 @@ def processor_count() -> int:
     return os.cpu_count() or 1
 
 
-def _ready_pool(client: Client, where: str) -> WorkerPool:
-    pool = WorkerPool(client, where)
-    deadline = time.monotonic() + WORKERLESS_SECONDS
-    while not pool.worker_addresses():
-        if time.monotonic() > deadline:
-            raise CampaignError(
-                f"{where}: expected at least one worker, got none for {WORKERLESS_SECONDS:.0f} s. "
-                "Start workers first."
-            )
-        time.sleep(0.1)
-    return pool
-
-
 @contextmanager
-def _remote_client(address: str) -> Iterator[Client]:
+def _remote_cluster(address: str) -> Iterator[_Cluster]:
     try:
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
@@ -251,29 +345,18 @@ def _remote_client(address: str) -> Iterator[Client]:
             f"{CONNECT_SECONDS:.0f} s. Start one with `dask scheduler`, or leave the option out."
         ) from error
     try:
-        yield client
+        yield _Cluster(client)
     finally:
         with suppress(TimeoutError):
             client.close(timeout=STOP_SECONDS)
 
 
 @contextmanager
-def _embedded_client(workers: int) -> Iterator[Client]:
-    with _deaf_children():
-        cluster = LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            # None would still open the usual port of a Dask dashboard, to the whole network.
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
+def _embedded_cluster(workers: int) -> Iterator[_Cluster]:
+    cluster = _started_workers(workers)
     try:
         with Client(cluster, set_as_default=False) as client:
-            yield client
+            yield _Cluster(client, workers, lambda: _replace_dead_workers(cluster, workers))
     except BaseException:
         # A worker may be deep in a long call; what it computes is not wanted any more.
         _kill_workers(cluster)
@@ -282,6 +365,37 @@ def _embedded_client(workers: int) -> Iterator[Client]:
         # What does not end in time dies with this process.
         with suppress(TimeoutError):
             cluster.close(timeout=STOP_SECONDS)
+
+
+def _started_workers(workers: int) -> LocalCluster:
+    """Start workers on this machine, again where one of them died before it was up."""
+    for _ in range(MOST_STARTS):
+        try:
+            with _interrupts_blocked():
+                return LocalCluster(
+                    n_workers=workers,
+                    threads_per_worker=1,
+                    processes=True,
+                    host="127.0.0.1",
+                    # None would still open the usual port of a Dask dashboard, to the whole network.
+                    dashboard_address="127.0.0.1:0",
+                    scheduler_kwargs={"dashboard": False},
+                    memory_limit=0,
+                    silence_logs=logging.CRITICAL,
+                )
+        except RuntimeError as error:
+            failure = error
+    raise CampaignError(
+        f"this machine: expected {workers} workers that start, got a failure {MOST_STARTS} times: {failure}. "
+        "Is there memory for them? With --workers there are fewer; the same command tries again."
+    ) from failure
+
+
+def _replace_dead_workers(cluster: LocalCluster, workers: int) -> None:
+    """Start as many new workers as are dead for good: those killed while they were started again."""
+    living = sum(nanny.is_alive() for nanny in cluster.workers.values())
+    if living < workers:
+        cluster.scale(len(cluster.worker_spec) + workers - living)
 
 
 def _kill_workers(cluster: LocalCluster) -> None:
@@ -293,7 +407,7 @@ def _kill_workers(cluster: LocalCluster) -> None:
 
 
 @contextmanager
-def _deaf_children() -> Iterator[None]:
+def _interrupts_blocked() -> Iterator[None]:
     """Let the threads and processes that begin here not hear Ctrl-C: it is for this thread alone.
 
     A terminal sends the signal to every process of the command. A blocked signal is inherited by threads and

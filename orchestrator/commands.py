@@ -96,6 +96,11 @@ def tell(report: CampaignReport) -> None:
         f"{_counted(computed, 'point')} computed in {report.compute_seconds:.1f} s by "
         f"{_counted(report.workers, 'worker')}{kept}: {report.dataset}"
     )
+    if report.lost_workers:
+        lost = "was lost; what it" if report.lost_workers == 1 else "were lost; what they"
+        typer.echo(
+            f"{_counted(report.lost_workers, 'worker')} {lost} had not finished was computed again.", err=True
+        )
     _tell_failures(report.outcomes)
     if report.runs <= MOST_RUNS_READ:
         _tell_warnings(report.dataset)

@@ -27,6 +27,9 @@ class Progress(Protocol):
     def advance(self, points: int) -> None:
         """Take note that more points are done."""
 
+    def lost_workers(self, count: int) -> None:
+        """Take note that so many workers have died so far."""
+
     def note(self, text: str) -> None:
         """Say something once."""
 
@@ -40,6 +43,9 @@ class Silence:
     def advance(self, points: int) -> None:
         """Show nothing."""
 
+    def lost_workers(self, count: int) -> None:
+        """Show nothing."""
+
     def note(self, text: str) -> None:
         """Show nothing."""
 
@@ -50,6 +56,7 @@ class Lines:
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._total = self._done = self._resumed = 0
+        self._lost = ""
         self._began = self._last_line = time.monotonic()
 
     def begin(self, total: int, done: int) -> None:
@@ -65,6 +72,10 @@ class Lines:
             self._last_line = now
             self.note(self._line(now - self._began))
 
+    def lost_workers(self, count: int) -> None:
+        """Say it with the next line."""
+        self._lost = lost_text(count)
+
     def note(self, text: str) -> None:
         """Write a line."""
         print(text, file=self._stream, flush=True)
@@ -72,7 +83,7 @@ class Lines:
     def _line(self, seconds: float) -> str:
         rate = (self._done - self._resumed) / max(seconds, 1e-9)
         remaining = clock((self._total - self._done) / rate) if rate > 0 else "?"
-        return f"{self._done} of {self._total} points, {rate:.0f} points/s, {remaining} remaining"
+        return f"{self._done} of {self._total} points, {rate:.0f} points/s, {remaining} remaining{self._lost}"
 
 
 class Bar:
@@ -80,7 +91,7 @@ class Bar:
 
     def __init__(self, bar: RichBar) -> None:
         self._bar = bar
-        self._task = bar.add_task("points", total=None, rate="", remaining="")
+        self._task = bar.add_task("points", total=None, rate="", remaining="", lost="")
         self._total = self._done = self._resumed = 0
         self._began = time.monotonic()
 
@@ -97,9 +108,22 @@ class Bar:
         remaining = clock((self._total - self._done) / rate)
         self._bar.update(self._task, completed=self._done, rate=f"{rate:.0f} points/s", remaining=remaining)
 
+    def lost_workers(self, count: int) -> None:
+        """Say it at the end of the bar."""
+        self._bar.update(self._task, lost=lost_text(count))
+
     def note(self, text: str) -> None:
         """Write a line above the bar."""
         self._bar.console.print(text, highlight=False, markup=False)
+
+
+def lost_text(count: int) -> str:
+    """Return what a line of progress says of lost workers.
+
+    >>> lost_text(0), lost_text(1), lost_text(2)
+    ('', ', 1 worker lost', ', 2 workers lost')
+    """
+    return f", {count} worker{'s' if count > 1 else ''} lost" if count else ""
 
 
 def clock(seconds: float) -> str:
@@ -129,7 +153,7 @@ def shown_progress(stream: TextIO | None = None) -> Iterator[Progress]:
         MofNCompleteColumn(),
         TextColumn("points"),
         TextColumn("{task.fields[rate]}"),
-        TextColumn("{task.fields[remaining]} remaining"),
+        TextColumn("{task.fields[remaining]} remaining{task.fields[lost]}"),
     )
     with RichBar(*columns, console=Console(file=stream), refresh_per_second=REFRESHES_PER_SECOND) as bar:
         yield Bar(bar)

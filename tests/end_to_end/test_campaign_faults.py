@@ -66,6 +66,8 @@ def test_a_campaign_survives_a_worker_that_is_killed(
     code, out, err = campaign.end()
     assert code == 0, err
     assert "Traceback" not in err
+    said = [line for line in err.splitlines() if "points/s" not in line]
+    assert said == ["1 worker was lost; what it had not finished was computed again."]
     assert f"{POINTS} points computed" in out
     assert_same_rows(tmp_path / "campaign" / "dataset.nc", expected)
     campaign.assert_nothing_lives()
