@@ -13,6 +13,7 @@ from vibroimpact.analysis.outputs import writing
 from vibroimpact.analysis.recording_files import is_recording, open_recording
 from vibroimpact.analysis.results import results_kind
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.terminal import say
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -68,7 +69,7 @@ def plot(
         raise unreadable(file, problem) from problem
     with writing(output):
         figures.save(figure, output)
-    typer.echo(f"Figure written to {output}.")
+    say(f"Figure written to {output}.")
 
 
 def _drawn(results: xr.Dataset, kind: str, file: Path) -> Figure:

@@ -9,10 +9,10 @@ import typer
 
 from vibroimpact.analysis.outputs import refuse_outputs, writing
 from vibroimpact.fmus.errors import EstimationError, UsageError
+from vibroimpact.fmus.terminal import Terminal
 
 if TYPE_CHECKING:
     import xarray as xr
-    from rich.console import Console
 
     from vibroimpact.analysis.decay.free_decay import FreeDecay
     from vibroimpact.analysis.estimate_scene import ImpactOptions
@@ -91,8 +91,6 @@ def estimate(
 
     Example: vibroimpact estimate pendulum.nc --from 40 --to 80 -o estimates.nc --figure estimates.png
     """
-    from rich.console import Console
-
     from vibroimpact.analysis.estimate_scene import ImpactOptions, chosen_kind, refuse_far_options
 
     if kind not in KINDS:
@@ -128,7 +126,7 @@ def estimate(
         {"--law": law != "all", "--cubic": cubic, "--periods": periods is not None},
     )
     # Piped, a table is as wide as it needs to be.
-    console = Console(soft_wrap=False, width=None if Console().is_terminal else 160)
+    console = Terminal(soft_wrap=False, width=None if Terminal().is_terminal else 160)
     try:
         if kind == "decay":
             found = _decay(console, data, channel, run, start, stop_time, law, cubic, periods)
@@ -144,7 +142,7 @@ def estimate(
 
 
 def _decay(
-    console: Console,
+    console: Terminal,
     data: Path,
     channel: str | None,
     run: int | None,
@@ -169,7 +167,7 @@ def _decay(
 
 
 def _impacts(
-    console: Console,
+    console: Terminal,
     data: Path,
     channel: str | None,
     run: int | None,
@@ -190,7 +188,7 @@ def _impacts(
 
 
 def _response(
-    console: Console,
+    console: Terminal,
     data: Path,
     channel: str | None,
     run: int | None,
@@ -228,7 +226,7 @@ def _response(
     )
 
 
-def _swept(console: Console, data: Path, band: tuple[float, float] | None) -> xr.Dataset:
+def _swept(console: Terminal, data: Path, band: tuple[float, float] | None) -> xr.Dataset:
     from vibroimpact.analysis.decay.resonance import fit_resonance
     from vibroimpact.analysis.decay.response_estimates import ResponseEstimates
     from vibroimpact.analysis.decay.swept_response import swept_response
@@ -249,7 +247,7 @@ def _swept(console: Console, data: Path, band: tuple[float, float] | None) -> xr
     return dataset.assign_attrs(source_file=data.name)
 
 
-def _shown_response(console: Console, found: Any) -> xr.Dataset:
+def _shown_response(console: Terminal, found: Any) -> xr.Dataset:
     from vibroimpact.analysis.decay.tables import print_estimates, print_remarks
 
     print_estimates(console, found.title, found.estimates())
@@ -274,7 +272,7 @@ def _sourced(dataset: xr.Dataset, data: Path, recording: Recording) -> xr.Datase
     return dataset.assign_attrs(source_file=data.name, **known)
 
 
-def _written(console: Console, dataset: xr.Dataset, output: Path | None, figure: Path | None) -> None:
+def _written(console: Terminal, dataset: xr.Dataset, output: Path | None, figure: Path | None) -> None:
     """Write what was asked for, and say so."""
     from vibroimpact.analysis.results import write_results
 
@@ -290,4 +288,4 @@ def _written(console: Console, dataset: xr.Dataset, output: Path | None, figure:
                 from vibroimpact.analysis.figures.estimates import draw_estimates
 
                 save(draw_estimates(dataset), path)
-        console.print(f"{what} written to {path}.", highlight=False, markup=False)
+        console.print(f"{what} written to {path}.")

@@ -10,6 +10,7 @@ import typer
 
 from vibroimpact.fmus.commands import commands
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.terminal import say
 
 if TYPE_CHECKING:
     from vibroimpact.analysis.recording import Channel, Recording
@@ -48,8 +49,8 @@ def replay(
     chosen = _chosen(source, channel or ())
     build_replay({item.name: replay_signal(item, si=si) for item in chosen}, output)
     for item in chosen:
-        typer.echo(_described(item, si))
-    typer.echo(str(output))
+        say(_described(item, si))
+    say(str(output))
 
 
 def _chosen(source: Recording, names: Sequence[str]) -> list[Channel]:

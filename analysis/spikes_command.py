@@ -10,10 +10,10 @@ import typer
 
 from vibroimpact.analysis.outputs import refuse_outputs, writing
 from vibroimpact.fmus.errors import EstimationError, UsageError
+from vibroimpact.fmus.terminal import Terminal
 
 if TYPE_CHECKING:
     import xarray as xr
-    from rich.console import Console
 
     from vibroimpact.analysis.recording import EventTrain, Floats, Recording
     from vibroimpact.analysis.spikes import Mechanics, SpikeReport, SpikeSettings
@@ -97,8 +97,6 @@ def spikes(
 
     Example: vibroimpact spikes smd05.nc --channel base -o spikes.nc --figure spikes.png
     """
-    from rich.console import Console
-
     from vibroimpact.analysis.recording_files import open_signals
     from vibroimpact.analysis.recording_rules import masked_spans
     from vibroimpact.analysis.results import write_results
@@ -123,9 +121,9 @@ def spikes(
     intervals = _IntervalOptions(forcing_period, count_bin, seams, embedding, theiler)
     mechanics = Mechanics(mass, restitution, sensitivity, _numbers(known_impulses), waveform=waveform)
     recording = open_signals(data, run)
-    console = Console()
+    console = Terminal()
     for remark in recording.remarks:
-        console.print(remark, style="yellow", markup=False, highlight=False)
+        console.print(remark, style="yellow")
     report = None
     try:
         if events is not None or not recording.channels:
@@ -139,11 +137,11 @@ def spikes(
     if output is not None:
         with writing(output):
             write_results(dataset, output, kind="spikes")
-        console.print(f"Dataset written to {output}.", highlight=False)
+        console.print(f"Dataset written to {output}.")
     if figure is not None:
         with writing(figure):
             _draw(report, dataset, figure)
-        console.print(f"Figure written to {figure}.", highlight=False)
+        console.print(f"Figure written to {figure}.")
 
 
 def _number(text: str, option: str) -> float:
@@ -163,7 +161,7 @@ def _numbers(text: str | None) -> Floats | None:
 
 
 def _spikes(
-    console: Console,
+    console: Terminal,
     recording: Recording,
     channel: str | None,
     settings: SpikeSettings,
@@ -192,7 +190,7 @@ def _spikes(
 
 
 def _trains(
-    console: Console,
+    console: Terminal,
     train: EventTrain,
     options: _IntervalOptions,
     masked: tuple[tuple[float, float], ...] = (),

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from vibroimpact.fmus import component_name, components, fmu_path
@@ -17,6 +16,7 @@ from vibroimpact.fmus.check import check_fmu
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.export import export_fmu
 from vibroimpact.fmus.python_fmus import build_user_contact_law
+from vibroimpact.fmus.terminal import Terminal, say
 
 VERSIONS = ("3.0", "2.0")
 USER_CONTACT_LAW = "user-contact-law"
@@ -40,7 +40,7 @@ def list_components() -> None:
             count = len(component.variables_of(int(version[0])))
             table.add_row(component.name, version, str(count), *_binaries(component.name, version))
     # paths are for copying: never cut them
-    Console(soft_wrap=True).print(table)
+    Terminal(soft_wrap=True).print(table)
 
 
 def _binaries(name: str, version: str) -> tuple[str, str]:
@@ -67,7 +67,7 @@ def build_components(
             f"--output: expected a folder to fill, got {str(output)[:200]!r}: {reason}."
         ) from problem
     for path in (*update_readmes(), *build(output)):
-        typer.echo(str(path))
+        say(str(path))
 
 
 @commands.command("check")
@@ -82,7 +82,7 @@ def check_files(
     problems = [f"{path}: {problem}" for path in paths for problem in check_fmu(path)]
     if problems:
         raise ComponentFileError("\n".join(problems))
-    typer.echo(f"{len(paths)} FMU{'s' if len(paths) != 1 else ''} checked: no problems.")
+    say(f"{len(paths)} FMU{'s' if len(paths) != 1 else ''} checked: no problems.")
 
 
 def _export_user_law(law: Path | None, output: Path | None, counts: Mapping[str, int | None]) -> Path:
@@ -113,9 +113,9 @@ def export_component(
     """
     counts = {"contacts": contacts, "modes": modes, "masses": masses, "sensors": sensors}
     if component == USER_CONTACT_LAW:
-        typer.echo(str(_export_user_law(law, output, counts)))
+        say(str(_export_user_law(law, output, counts)))
         return
     if law is not None:
         raise UsageError(f"--law: expected the component {USER_CONTACT_LAW} with it, got {component}.")
     path = output or Path(f"{component_name(component)}.fmu")
-    typer.echo(str(export_fmu(component, path, **counts, fmi=fmi)))
+    say(str(export_fmu(component, path, **counts, fmi=fmi)))

@@ -5,19 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording
 from vibroimpact.analysis.unit_symbols import written_unit
+from vibroimpact.fmus.terminal import Terminal
 
 _PIPE_WIDTH = 160
 
 
 def show_recording(recording: Recording, output: Path, figure: Path | None = None) -> None:
     """Print a table of the channels and events of a recording, then its remarks, a line each."""
-    console = Console(highlight=False)
+    console = Terminal()
     if not console.is_terminal:  # a pipe has no width to keep to
         console.width = _PIPE_WIDTH
     if recording.channels:
@@ -25,21 +24,21 @@ def show_recording(recording: Recording, output: Path, figure: Path | None = Non
     if recording.events:
         console.print(_event_table(recording))
     for name, scalar in recording.scalars.items():
-        console.print(escape(f"{name} = {scalar.value:.6g} {written_unit(scalar.unit)}"))
+        console.print(f"{name} = {scalar.value:.6g} {written_unit(scalar.unit)}")
     for line in recording.remarks:
-        console.print(escape(f"- {line}"), soft_wrap=True)
+        console.print(f"- {line}", soft_wrap=True)
     console.print(
-        escape(f"Recording written to {output}." + (f" Figure: {figure}." if figure else "")), soft_wrap=True
+        f"Recording written to {output}." + (f" Figure: {figure}." if figure else ""), soft_wrap=True
     )
 
 
 def _channel_table(recording: Recording) -> Table:
-    table = Table(title=escape(recording.title))
+    table = Table(title=recording.title)
     table.add_column("channel", overflow="fold")
     for heading in ("samples", "rate (Hz)", "unit", "min", "max", "clipped", "missing", "overrange"):
         table.add_column(heading, justify="right", overflow="fold")
     for channel in recording.channels.values():
-        table.add_row(*map(escape, _channel_row(channel)))
+        table.add_row(*_channel_row(channel))
     return table
 
 
@@ -67,12 +66,12 @@ def _channel_row(channel: Channel) -> tuple[str, ...]:
 
 
 def _event_table(recording: Recording) -> Table:
-    table = Table(title="" if recording.channels else escape(recording.title))
+    table = Table(title="" if recording.channels else recording.title)
     table.add_column("event train", overflow="fold")
     for heading in ("events", "first (s)", "last (s)", "window (s)", "grid (s)", "per second"):
         table.add_column(heading, justify="right", overflow="fold")
     for train in recording.events.values():
-        table.add_row(*map(escape, _event_row(train)))
+        table.add_row(*_event_row(train))
     return table
 
 

@@ -16,6 +16,7 @@ from typing import Annotated
 import typer
 
 from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.fmus.terminal import say
 
 COMMAND_GROUP = "vibroimpact.commands"
 DEBUG = "--debug"
@@ -31,7 +32,7 @@ app = typer.Typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"vibroimpact {metadata.version('vibroimpact')}")
+        say(f"vibroimpact {metadata.version('vibroimpact')}")
         raise typer.Exit
 
 
@@ -72,8 +73,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _report(text: str, exit_code: int, debug: bool) -> int:
     if debug:
-        traceback.print_exc()
-    print(text, file=sys.stderr)
+        say(traceback.format_exc(), err=True)
+    say(text, err=True)
     return exit_code
 
 

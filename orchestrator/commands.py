@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.replay_commands import register as register_replay
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def run(
     with shown_progress() as progress:
         outcomes = run_scene(loaded, output, progress=progress)
     runs = sum(outcomes.values())
-    typer.echo(f"{_counted(runs, 'run')} in {time.perf_counter() - began:.1f} s: {output}")
+    say(f"{_counted(runs, 'run')} in {time.perf_counter() - began:.1f} s: {output}")
     _tell_failures(outcomes)
     _tell_warnings(output)
 
@@ -80,7 +81,7 @@ def campaign(
         with shown_progress() as progress:
             report = run_campaign(loaded, output, workers=workers, scheduler=scheduler, progress=progress)
     except CampaignInterrupted as interrupted:
-        typer.echo(str(interrupted), err=True)
+        say(str(interrupted), err=True)
         raise typer.Exit(130) from None
     tell(report)
 
@@ -88,17 +89,17 @@ def campaign(
 def tell(report: CampaignReport) -> None:
     """Say what a campaign did."""
     if report.resumed == report.runs and not report.chunks and not report.compaction_seconds:
-        typer.echo(f"Nothing to do: all {report.runs} points are in {report.dataset} already.")
+        say(f"Nothing to do: all {report.runs} points are in {report.dataset} already.")
         return
     computed = report.runs - report.resumed
     kept = f", {report.resumed} were there" if report.resumed else ""
-    typer.echo(
+    say(
         f"{_counted(computed, 'point')} computed in {report.compute_seconds:.1f} s by "
         f"{_counted(report.workers, 'worker')}{kept}: {report.dataset}"
     )
     if report.lost_workers:
         lost = "was lost; what it" if report.lost_workers == 1 else "were lost; what they"
-        typer.echo(
+        say(
             f"{_counted(report.lost_workers, 'worker')} {lost} had not finished was computed again.", err=True
         )
     _tell_failures(report.outcomes)
@@ -110,7 +111,7 @@ def _tell_failures(outcomes: Mapping[str, int]) -> None:
     failed = {name: count for name, count in outcomes.items() if name in ("error", "crash", "timeout")}
     for name, count in failed.items():
         told = f"{_counted(count, 'point')} ended with the outcome {name}; see their messages in the dataset."
-        typer.echo(told, err=True)
+        say(told, err=True)
 
 
 def _tell_warnings(dataset: Path) -> None:
@@ -121,9 +122,9 @@ def _tell_warnings(dataset: Path) -> None:
         fine = opened.outcome.isin([0, 1]).values  # ok, stuck
         messages = sorted({str(text) for text in opened.message.values[fine] if text})
     for message in messages[:MOST_WARNINGS]:
-        typer.echo(f"warning: {message}", err=True)
+        say(f"warning: {message}", err=True)
     if len(messages) > MOST_WARNINGS:
-        typer.echo(f"{len(messages) - MOST_WARNINGS} more warnings are in the dataset.", err=True)
+        say(f"{len(messages) - MOST_WARNINGS} more warnings are in the dataset.", err=True)
 
 
 def _counted(count: int, what: str) -> str:
@@ -143,5 +144,5 @@ def demo(
     try:
         run_demo(output)
     except CampaignInterrupted as interrupted:
-        typer.echo(str(interrupted), err=True)
+        say(str(interrupted), err=True)
         raise typer.Exit(130) from None

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.readings import Reading, bifurcation_readings
 from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
 from vibroimpact.orchestrator.progress import shown_progress
 from vibroimpact.orchestrator.scene import Scene, load_scene
@@ -39,7 +39,7 @@ def run_demo(output: Path) -> None:
     CampaignError
         When a reading is not within `STEPS_ALLOWED` of its exact value.
     """
-    console = Console(highlight=False, soft_wrap=True)
+    console = Terminal(soft_wrap=True)
     began = time.perf_counter()
     with resources.as_file(resources.files("vibroimpact.orchestrator") / SCENE) as path:
         scene = load_scene(path)

@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Protocol, TextIO
 
+from vibroimpact.fmus.terminal import Terminal, printable
+
 if TYPE_CHECKING:
     from rich.progress import Progress as RichBar
 
@@ -78,7 +80,7 @@ class Lines:
 
     def note(self, text: str) -> None:
         """Write a line."""
-        print(text, file=self._stream, flush=True)
+        print(printable(text), file=self._stream, flush=True)
 
     def _line(self, seconds: float) -> str:
         rate = (self._done - self._resumed) / max(seconds, 1e-9)
@@ -114,7 +116,7 @@ class Bar:
 
     def note(self, text: str) -> None:
         """Write a line above the bar."""
-        self._bar.console.print(text, highlight=False, markup=False)
+        self._bar.console.print(text)
 
 
 def lost_text(count: int) -> str:
@@ -144,7 +146,6 @@ def shown_progress(stream: TextIO | None = None) -> Iterator[Progress]:
     if not stream.isatty():
         yield Lines(stream)
         return
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn
     from rich.progress import Progress as RichBar
 
@@ -155,5 +156,5 @@ def shown_progress(stream: TextIO | None = None) -> Iterator[Progress]:
         TextColumn("{task.fields[rate]}"),
         TextColumn("{task.fields[remaining]} remaining{task.fields[lost]}"),
     )
-    with RichBar(*columns, console=Console(file=stream), refresh_per_second=REFRESHES_PER_SECOND) as bar:
+    with RichBar(*columns, console=Terminal(file=stream), refresh_per_second=REFRESHES_PER_SECOND) as bar:
         yield Bar(bar)

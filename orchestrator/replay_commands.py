@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from rich.console import Console
+from vibroimpact.fmus.terminal import Terminal, say
 
+if TYPE_CHECKING:
     from vibroimpact.analysis.replay.trust import Verdict
     from vibroimpact.orchestrator.replay import Replayer
     from vibroimpact.orchestrator.replay_fit import ReplayFit
@@ -150,7 +150,7 @@ def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | 
         with shown_progress() as progress:
             report = run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)
     except CampaignInterrupted as interrupted:
-        typer.echo(str(interrupted), err=True)
+        say(str(interrupted), err=True)
         raise typer.Exit(130) from None
     tell(report)
 
@@ -164,8 +164,6 @@ def _to_dataset(
     figure: Path | None,
     execution: str,
 ) -> None:
-    from rich.console import Console
-
     from vibroimpact.fmus.errors import UsageError
     from vibroimpact.orchestrator.replay_output import replay_dataset
 
@@ -175,13 +173,13 @@ def _to_dataset(
         raise UsageError(
             "--score: expected --fit beside it: a recording is scored with numbers fitted on others."
         )
-    console = Console()
+    console = Terminal()
     with ExitStack() as stack:
         fitted, verdict, replays = _replays(stack, scene, paths, scored, fit, execution)
         _print(console, replays, fitted, verdict)
         dataset = replay_dataset(replays, fitted, verdict)
         _write(dataset, output, figure)
-    console.print(f"{output} in {time.perf_counter() - began:.1f} s", highlight=False, soft_wrap=True)
+    console.print(f"{output} in {time.perf_counter() - began:.1f} s", soft_wrap=True)
 
 
 def _paths(scene: Scene) -> list[Path]:
@@ -224,11 +222,9 @@ def _replays(
 
 def _fitted(replayers: Sequence[Replayer], keys: Sequence[str]) -> ReplayFit:
     """Fit with a line that says how far it is."""
-    from rich.console import Console
-
     from vibroimpact.orchestrator.replay_fit import fit_replay
 
-    console = Console(stderr=True)
+    console = Terminal(stderr=True)
     with console.status("fitting") as status:
         return fit_replay(
             replayers,
@@ -240,16 +236,16 @@ def _fitted(replayers: Sequence[Replayer], keys: Sequence[str]) -> ReplayFit:
 
 
 def _print(
-    console: Console, replays: Sequence[Replayed], fit: ReplayFit | None, verdict: Verdict | None
+    console: Terminal, replays: Sequence[Replayed], fit: ReplayFit | None, verdict: Verdict | None
 ) -> None:
     from rich.table import Table
 
     from vibroimpact.analysis.replay.table import print_comparison
 
     for replay in replays:
-        console.print(f"[bold]{replay.name}[/bold] ({replay.use})", highlight=False)
+        console.print(f"{replay.name} ({replay.use})", style="bold")
         for line in (*replay.replayer.remarks, *replay.motion.warnings):
-            console.print(f"  {line}", highlight=False, soft_wrap=True)
+            console.print(f"  {line}", soft_wrap=True)
         if replay.comparisons:
             print_comparison(console, replay.comparisons)
     if fit is not None:
@@ -258,11 +254,11 @@ def _print(
             table.add_row(key, f"{value:.6g}", f"{error:.2g}", f"{start:.6g}")
         console.print(table)
         for line in fit.remarks:
-            console.print(f"  {line}", highlight=False, soft_wrap=True)
+            console.print(f"  {line}", soft_wrap=True)
     if verdict is not None:
-        console.print(verdict.words, highlight=False, soft_wrap=True)
+        console.print(verdict.words, soft_wrap=True)
         for reason in verdict.reasons[1:]:
-            console.print(f"  also: {reason}", highlight=False, soft_wrap=True)
+            console.print(f"  also: {reason}", soft_wrap=True)
 
 
 def _write(dataset: object, output: Path, figure: Path | None) -> None:

@@ -13,10 +13,10 @@ from vibroimpact.analysis.decay.laws import spoken
 from vibroimpact.analysis.estimate_table import estimate_table
 
 if TYPE_CHECKING:
-    from rich.console import Console
     from rich.table import Table
 
     from vibroimpact.analysis.decay.free_decay import FreeDecay
+    from vibroimpact.fmus.terminal import Terminal
 
 _ROUNDING = 1e-9
 """Relative errors below this are not of the data, but of the arithmetic."""
@@ -75,7 +75,7 @@ def _table(title: str, columns: Mapping[str, str]) -> Table:
 
 
 def print_estimates(
-    console: Console,
+    console: Terminal,
     title: str,
     estimates: Mapping[str, Mapping[str, Estimate]],
     names: Mapping[str, str] = METHOD_WORDS,
@@ -101,13 +101,13 @@ def print_estimates(
     console.print(table)
 
 
-def print_remarks(console: Console, remarks: tuple[str, ...]) -> None:
+def print_remarks(console: Terminal, remarks: tuple[str, ...]) -> None:
     """Print remarks, one line each."""
     for remark in remarks:
-        console.print(f"- {remark}", highlight=False, markup=False, soft_wrap=True)
+        console.print(f"- {remark}", soft_wrap=True)
 
 
-def print_decay(console: Console, decay: FreeDecay) -> None:
+def print_decay(console: Terminal, decay: FreeDecay) -> None:
     """Print the estimates of a free decay, its damping laws, its backbone, and the remarks."""
     unit = "" if decay.samples.unit == "1" else f" ({decay.samples.unit})"
     title = (
@@ -122,7 +122,7 @@ def print_decay(console: Console, decay: FreeDecay) -> None:
     print_remarks(console, decay.words())
 
 
-def _print_laws(console: Console, decay: FreeDecay) -> None:
+def _print_laws(console: Terminal, decay: FreeDecay) -> None:
     assert decay.choice is not None
     choice = decay.choice
     table = _table(
@@ -152,7 +152,7 @@ def _print_laws(console: Console, decay: FreeDecay) -> None:
     console.print(table)
 
 
-def _print_backbone(console: Console, decay: FreeDecay) -> None:
+def _print_backbone(console: Terminal, decay: FreeDecay) -> None:
     assert decay.backbone is not None
     found = decay.backbone
     table = _table(

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import math
 
-from rich.console import Console
 from rich.table import Table
 
 from vibroimpact.analysis.estimation.estimates import METHODS, QUANTITIES, Estimate, ImpactEstimates
+from vibroimpact.fmus.terminal import Terminal
 
 
-def print_impacts(console: Console, estimates: ImpactEstimates) -> None:
+def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
     """Print all methods side by side, how far errors move the estimates, refusals and remarks."""
     console.print(_estimates(estimates))
     if estimates.conditioning:
         console.print(_conditioning(estimates))
     for name, value in estimates.facts.items():
         shown = value if isinstance(value, str) else f"{value:.6g}"
-        console.print(f"{name.replace('_', ' ')}: {shown}", highlight=False)
+        console.print(f"{name.replace('_', ' ')}: {shown}")
     for refusal in estimates.refusals:
-        console.print(f"refused: {refusal.reason}", highlight=False, markup=False)
+        console.print(f"refused: {refusal.reason}")
     for remark in estimates.remarks:
-        console.print(f"note: {remark}", highlight=False, markup=False)
+        console.print(f"note: {remark}")
 
 
 def _estimates(estimates: ImpactEstimates) -> Table:

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
-from rich.console import Console
 from rich.table import Table
 
+from vibroimpact.fmus.terminal import Terminal
 
-def print_intervals(console: Console, report: xr.Dataset) -> None:
+
+def print_intervals(console: Terminal, report: xr.Dataset) -> None:
     """Print the report of `interval_report`: numbers with their doubt, verdicts with their reasons."""
     table = Table(title="Intervals", title_justify="left")
     for heading in ("quantity", "value", "how"):
@@ -18,9 +19,9 @@ def print_intervals(console: Console, report: xr.Dataset) -> None:
     for row in (*_rows(report), *_lattice_rows(report)):
         table.add_row(*row)
     console.print(table)
-    console.print(f"Motion: {report.attrs['cycle']}.", soft_wrap=True, markup=False, highlight=False)
-    console.print(f"Lattice: {report.attrs['lattice']}.", soft_wrap=True, markup=False, highlight=False)
-    console.print(f"Gaps: {report.attrs['gaps']}.", soft_wrap=True, markup=False, highlight=False)
+    console.print(f"Motion: {report.attrs['cycle']}.", soft_wrap=True)
+    console.print(f"Lattice: {report.attrs['lattice']}.", soft_wrap=True)
+    console.print(f"Gaps: {report.attrs['gaps']}.", soft_wrap=True)
     _print_gaps(console, report)
     _print_dimension(console, report)
 
@@ -89,7 +90,7 @@ def _lattice_rows(report: xr.Dataset) -> Iterator[tuple[str, str, str]]:
         yield f"delay points, {cell}", f"{float(share):.4f}", how
 
 
-def _print_gaps(console: Console, report: xr.Dataset) -> None:
+def _print_gaps(console: Terminal, report: xr.Dataset) -> None:
     if not report.sizes["gap"]:
         return
     table = Table(title="Gaps", title_justify="left")
@@ -100,14 +101,14 @@ def _print_gaps(console: Console, report: xr.Dataset) -> None:
         table.add_row(f"{start:.4f}", f"{length:.4f}", str(missing))
     console.print(table)
     if report.sizes["gap"] > _MOST_GAPS:
-        console.print(f"and {report.sizes['gap'] - _MOST_GAPS} more", highlight=False)
+        console.print(f"and {report.sizes['gap'] - _MOST_GAPS} more")
 
 
-def _print_dimension(console: Console, report: xr.Dataset) -> None:
+def _print_dimension(console: Terminal, report: xr.Dataset) -> None:
     scales = ("raw", "log")
     low, high = report.attrs["slope_window"]
     if any(np.isfinite(report[f"slope_{scale}"].values).any() for scale in scales):
-        console.print(f"Slope of the correlation sum, C from {low:g} to {high:g}", highlight=False)
+        console.print(f"Slope of the correlation sum, C from {low:g} to {high:g}")
         table = Table()
         for heading in ("m", "raw", "shuffled", "log", "shuffled"):
             table.add_column(heading, justify="right")
@@ -117,12 +118,12 @@ def _print_dimension(console: Console, report: xr.Dataset) -> None:
         console.print(table)
     for scale, kind in zip(scales, ("raw intervals", "log intervals"), strict=True):
         words = report.attrs[f"dimension_{scale}"]
-        console.print(f"Dimension of {kind}: {words}.", soft_wrap=True, markup=False, highlight=False)
+        console.print(f"Dimension of {kind}: {words}.", soft_wrap=True)
     warnings = dict.fromkeys(
         line for scale in scales for line in report.attrs[f"dimension_{scale}_warnings"].splitlines()
     )
     for line in warnings:
-        console.print(f"Note: {line}.", soft_wrap=True, markup=False, highlight=False)
+        console.print(f"Note: {line}.", soft_wrap=True)
 
 
 def _slope_cells(report: xr.Dataset, scale: str, m: int) -> tuple[str, str]:

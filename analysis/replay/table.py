@@ -6,23 +6,23 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.replay_dataset import comparison_names
 from vibroimpact.analysis.replay.spectra import DominantFrequency
 from vibroimpact.analysis.units import measured_unit
+from vibroimpact.fmus.terminal import Terminal
 
 _MOST_WINDOWS = 12
 
 
-def print_comparison(console: Console, comparisons: Sequence[Comparison]) -> None:
+def print_comparison(console: Terminal, comparisons: Sequence[Comparison]) -> None:
     """Print the scores of comparisons, a column for each, and what a reader must know.
 
     Parameters
     ----------
-    console : rich.console.Console
+    console : Terminal
     comparisons : sequence of Comparison
     """
     names = comparison_names(comparisons)
@@ -38,7 +38,7 @@ def print_comparison(console: Console, comparisons: Sequence[Comparison]) -> Non
     console.print(table)
     for name, comparison in zip(names, comparisons, strict=True):
         for remark in comparison.remarks:
-            console.print(f"{name}: {remark}", highlight=False, markup=False)
+            console.print(f"{name}: {remark}")
 
 
 def _percent(value: float) -> str:

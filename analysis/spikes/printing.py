@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from rich.console import Console
 from rich.table import Table
 
 from vibroimpact.analysis.spikes.contact import SHORT_CONTACT
 from vibroimpact.analysis.spikes.report import SpikeReport
+from vibroimpact.fmus.terminal import Terminal
 
 #: A longer list of spikes is cut; all of them are in the dataset.
 _MOST_ROWS = 12
 
 
-def print_spikes(console: Console, report: SpikeReport) -> None:
+def print_spikes(console: Terminal, report: SpikeReport) -> None:
     """Print how spikes were found, each spike, and what they say of the contact.
 
     Parameters
     ----------
-    console : rich.console.Console
+    console : Terminal
     report : SpikeReport
     """
     data = report.dataset
     count = int(data.sizes["spike"])
     console.print(f"{data.attrs['channel']}: {count or 'no'} {'spike' if count == 1 else 'spikes'}.")
     for line in _words(report):
-        console.print(line, style="yellow", markup=False, highlight=False)
+        console.print(line, style="yellow")
     console.print(_settings(report))
     if count:
         console.print(_spikes(data))
@@ -135,7 +135,7 @@ def _waveforms(data: xr.Dataset) -> Table:
     return table
 
 
-def _print_contact(console: Console, data: xr.Dataset) -> None:
+def _print_contact(console: Terminal, data: xr.Dataset) -> None:
     if "sensitivity" in data:
         value, error = float(data["sensitivity"]), float(data["sensitivity_error"])
         console.print(f"Sensitivity of the load cell {value:.5g} ± {error:.2g} V/N, from the impulses given.")

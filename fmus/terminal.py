@@ -1,0 +1,51 @@
+"""What is written to the terminal: no character of a file may move its cursor, colour it or turn its text around.
+
+Names in files, scenes and the log lines of FMUs are strangers' text. Every message goes through `printable`: by `say`,
+or by a `Terminal`, which also takes square brackets as what they are.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from typing import Any
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+_KEPT = "\n\t"
+# Control, format (such as U+202E, which turns what follows around), surrogate, line and paragraph separator.
+_ESCAPED = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+
+
+def printable(text: str) -> str:
+    r"""Return a text in which characters that are no letters, but orders, are shown as their escapes.
+
+    >>> print(printable("a\x1b[31mred\u202eder, 5 \N{MICRO SIGN}s\r"))
+    a\x1b[31mred\u202eder, 5 µs\r
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        character.encode("unicode_escape").decode("ascii")
+        if unicodedata.category(character) in _ESCAPED and character not in _KEPT
+        else character
+        for character in text
+    )
+
+
+def say(text: object, *, err: bool = False) -> None:
+    """Write a line to standard output, or to standard error."""
+    typer.echo(printable(str(text)), err=err)
+
+
+class Terminal(Console):
+    """A console of rich whose texts are printable and hold no markup; styles are given apart from them."""
+
+    def __init__(self, **options: Any) -> None:
+        plain = {"markup": False, "highlight": False, "emoji": False}
+        super().__init__(**{**plain, **options})
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        """Return a text as it is shown; everything that is printed as a string passes here."""
+        return super().render_str(printable(text), **options)
