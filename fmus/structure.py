@@ -24,7 +24,8 @@ LAWS = {"none": 0, "restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossl
 #: What a contact does, by the number in `Structure.statuses`.
 STATUSES = ("free", "touching", "held", "yielding", "receding")
 #: How `Structure.advance` may end.
-DONE, RECORD_FULL, IMPACT_LIMIT, REFUSED, STANDSTILL = 0, 2, 3, 4, 5
+DONE, RECORD_FULL, IMPACT_LIMIT, REFUSED, UNFINISHED = 0, 2, 3, 4, 8
+GIVEN_UP = (5, 6, 7)
 MESSAGE_LENGTH = 1024
 ROW_WIDTH, ROW_CAPACITY = 8, 512
 ROW_IMPACT, ROW_STICK, ROW_PERIOD = 1.0, 2.0, 3.0
@@ -131,7 +132,7 @@ def _library() -> ctypes.CDLL:
     library.vi_door_structure_state.argtypes = [
         *(ctypes.c_void_p, numbers, numbers, ctypes.POINTER(integer), numbers, numbers),
     ]
-    library.vi_door_structure_complaint.argtypes = [ctypes.c_void_p, ctypes.c_char_p]
+    library.vi_door_structure_complaint.argtypes = [ctypes.c_void_p, integer, ctypes.c_char_p]
     library.vi_door_structure_rows.argtypes = [ctypes.c_void_p, numbers, integer]
     return library
 
@@ -276,42 +277,40 @@ class Structure:
         held, held_rate : array_like, shape (modes,)
             Modal forces now and their slopes, N kg^(-1/2) and N kg^(-1/2) / s.
         most_impacts : float
-            End after so many impacts; 0: no limit.
+            End after so many events of contacts: impacts, touch-downs, rests; 0: no limit.
 
         Raises
         ------
         ComponentError
-            Contacts at one instant come to no end: names them and the time.
+            The motion does not go on, or goes beyond the largest numbers: names the time.
         """
         force, slope = _vector(held, self.modes), _vector(held_rate, self.modes)
         self._read()
         end = self.time + duration
-        result = RECORD_FULL
-        remaining, left = duration, most_impacts
-        while result == RECORD_FULL:
-            elapsed = duration - remaining
+        result, remaining = UNFINISHED, duration
+        while result in (RECORD_FULL, UNFINISHED):
             result = self._library.vi_door_structure_advance(
-                self._handle, remaining, _pointer(force + slope * elapsed), _pointer(slope), left
+                self._handle, remaining, _pointer(force), _pointer(slope), most_impacts
             )
             self._read()
-            taken = self._take_rows()
-            left = max(1.0, left - taken) if left else 0
+            self._take_rows()
             remaining = end - self.time
-        if result == STANDSTILL:
-            raise ComponentError(self._complaint(), function="advance", time=self.time)
+            if remaining <= 0.0 and result in (RECORD_FULL, UNFINISHED):
+                result = DONE
+        if result in GIVEN_UP:
+            raise ComponentError(self._complaint(result), function="advance", time=self.time)
         return int(result)
 
-    def _complaint(self) -> str:
+    def _complaint(self, result: int) -> str:
         message = ctypes.create_string_buffer(MESSAGE_LENGTH)
-        self._library.vi_door_structure_complaint(self._handle, message)
+        self._library.vi_door_structure_complaint(self._handle, result, message)
         return f"Structure: {message.value.decode()}."
 
-    def _take_rows(self) -> int:
+    def _take_rows(self) -> None:
         rows = np.empty((ROW_CAPACITY, ROW_WIDTH))
         count = self._library.vi_door_structure_rows(self._handle, _pointer(rows), ROW_CAPACITY)
         if count:
             self._rows.blocks.append(rows[:count].copy())
-        return int((rows[:count, 0] == ROW_IMPACT).sum())
 
     @property
     def impacts(self) -> Array:

@@ -23,7 +23,7 @@ OBSERVED = ("displacement", "velocity")
 
 
 class ImpactLimitReached(Exception):
-    """A run met more impacts than `impact_limit`; it ends here with what it has."""
+    """A run met `impact_limit` impacts, touch-downs and rests; it ends here with what it has."""
 
 
 class DeadlineReached(Exception):
@@ -133,8 +133,8 @@ class RecordedBody(ABC):
         """Start a run at time 0 with these real parameters; it may take `deadline` seconds of wall time."""
 
     @abstractmethod
-    def advance(self, end: float, slice_length: float = np.inf) -> None:
-        """Advance to time `end`, s, in slices of at most `slice_length`, between which the deadline is looked at.
+    def advance(self, end: float) -> None:
+        """Advance to time `end`, s, looking at the clock and for signals on the way.
 
         Raises
         ------

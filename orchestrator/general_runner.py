@@ -89,6 +89,7 @@ class GeneralRunner:
         )
         self._names = tuple(self._importer.components)
         self._importer.on_event = self._note_event
+        self._importer.on_pause = self._refuse_late
         self._importer.watchers.append(StepWatcher(self._look_at_clock, lambda time, end: None))
         self._energy = InterfaceEnergy(self._importer, general.connections)
         self._sampler = self._make_sampler(general)
@@ -215,7 +216,11 @@ class GeneralRunner:
 
     def _look_at_clock(self, step_start: float) -> None:
         self._steps += 1
-        if self._steps % STEPS_PER_LOOK == 0 and time.perf_counter() > self._deadline:
+        if self._steps % STEPS_PER_LOOK == 0:
+            self._refuse_late()
+
+    def _refuse_late(self) -> None:
+        if time.perf_counter() > self._deadline:
             raise DeadlineReached
 
     def _record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:

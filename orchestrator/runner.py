@@ -35,8 +35,6 @@ from vibroimpact.orchestrator.scene_models import OscillatorBody
 from vibroimpact.orchestrator.time_series import TimeSeriesPlan
 
 TWO_PI = 2.0 * math.pi
-#: A run with a deadline looks at the clock at least every so many forcing periods.
-PERIODS_PER_SLICE = 64.0
 
 
 class PointRunner:
@@ -133,7 +131,6 @@ class _Run:
         self.parameters = float_parameters(scene, start)
         self.samples: list[tuple[float, ...]] = []
         self.begin_time, self.end_time = self._window()
-        self.slice_length = self._slice_length()
 
     def _window(self) -> tuple[float, float]:
         """Start and end of the recording, s; those of a forced scene are at forcing phase 0."""
@@ -145,22 +142,17 @@ class _Run:
         first = record.transient_periods + (1 if phase > 0.0 else 0)
         return first * period - lag, (first + record.recorded_periods) * period - lag
 
-    def _slice_length(self) -> float:
-        if self.scene.execution.deadline is None or self.scene.period is None:
-            return math.inf
-        return PERIODS_PER_SLICE * self.scene.period
-
     def run(self) -> tuple[Outcome, str]:
         """Run to the end; returns how that went."""
         execution, driver = self.scene.execution, self.driver
         driver.begin(self.parameters, execution.deadline)
         try:
-            driver.advance(self.begin_time, self.slice_length)
+            driver.advance(self.begin_time)
             self._begin_recording()
             self._advance_sampling()
-            driver.advance(self.end_time, self.slice_length)
+            driver.advance(self.end_time)
         except ImpactLimitReached:
-            limit = f"{execution.impact_limit} impacts in one step"
+            limit = f"{execution.impact_limit} impacts, touch-downs and rests"
             return Outcome.impact_limit, f"impact_limit: {limit} at time {driver.time:.17g}"
         except DeadlineReached:
             return Outcome.timeout, f"deadline: {execution.deadline} s passed at time {driver.time:.17g}"
@@ -179,7 +171,7 @@ class _Run:
             return
         count = math.floor((self.end_time - self.begin_time) * series.rate * (1.0 + 1e-12)) + 1
         for i in range(count):
-            self.driver.advance(min(self.begin_time + i / series.rate, self.end_time), self.slice_length)
+            self.driver.advance(min(self.begin_time + i / series.rate, self.end_time))
             row = self.plan.row(self.driver.sampled(), self.scene.forcing, self._angle())
             self.samples.append((self.driver.time, *row))
 

@@ -73,7 +73,7 @@ class Importer:
     steps, repeated_steps : int
         Communication steps made, and how many of them were repeated.
     on_event, on_pause : callable or None
-        Called at each event with it; called when the first component ended a step early without an event.
+        Called at each event with it; called when a component ended a step early without an event.
     """
 
     def __init__(
@@ -251,7 +251,7 @@ class Importer:
             point = start + (index + 1) * macro_step
         self.time, self._grid_index, self._next_point = time, index, point
         self.steps += index - first
-        self._at_event, self._paused, self._standstill = [], False, 0
+        self._at_event, self._standstill = [], 0
 
     def _step(self, time: float, target: float, made: int | None = None) -> None:
         """Make a step; `made` is the status of the first component's step where it is made already."""
@@ -292,7 +292,7 @@ class Importer:
                 self._note_events(self.on_event)
             if self._event_mode.resolve(end):
                 self.wants_to_end = True
-        elif self._paused and self.on_pause is not None:
+        elif end < target and self.on_pause is not None:
             self.on_pause()
 
     def _prepare(self, time: float) -> None:
@@ -359,7 +359,7 @@ class Importer:
         """
         if self._at_event:
             self._at_event = []
-        self.wants_to_end = self._paused = False  # what a step that was taken back said does not count
+        self.wants_to_end = False  # what a step that was taken back said does not count
         first = True
         for component, inputs, step in self._paths:
             if inputs is not None:
@@ -380,7 +380,6 @@ class Importer:
                     self._stopper = component
                     return reached
                 target = reached
-                self._paused = not self._at_event
             first = False
         self._reached = self._at_event[0].instance.time if self._at_event else target
         return None

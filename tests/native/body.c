@@ -20,7 +20,6 @@ static void make(vi_body *body, uint64_t *seed)
     memset(body, 0, sizeof *body);
     const double amplitude = choice(seed, 4) == 0 ? 0.0 : uniform(seed, -2.0, 2.0), frequency = ANY(FREQUENCIES);
     body->mass = choice(seed, 5) == 0 ? 0.1 : 1.0;
-    body->impact_limit = 3000;
     vi_mode_start(&body->mode, body->mass, ANY(DAMPINGS), ANY(STIFFNESSES), amplitude, frequency);
     CHECK(vi_clock_start(&body->clock, frequency, uniform(seed, -7.0, 7.0), body->mode.natural), "%s", "clock");
     const double position = choice(seed, 4) == 0 ? 0.0 : uniform(seed, -1.0, 1.0), gap = ANY(GAPS);
@@ -77,6 +76,7 @@ static void check_mirrored(const vi_body *body, const vi_body *image, int run)
 static void step(vi_body *body, double size, bool early)
 {
     const vi_step_request request = {0.0, size, false, early};
+    body->impact_limit = body->budget.events + 3000;
     body->record.taken = body->record.count;
     vi_record_take(&body->record);
     vi_body_advance(body, vi_clock_after(&body->clock, body->now, size), &request);

@@ -171,13 +171,17 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     }
     const vi_step_request request = {currentCommunicationPoint, communicationStepSize, false, false};
     const vi_step_result result = vi_this_component.step(it->self, &request, it->message);
-    if (result == VI_STEP_ERROR || result == VI_STEP_STANDSTILL) {
+    if (vi_step_failed(result)) {
         return status(vi_instance_fail(it, function, "%s", it->message));
     }
     it->outputs_stale = false;
     if (result == VI_STEP_IMPACT_LIMIT) {
-        return status(vi_instance_fail(it, function, "impact_limit reached at %.17g s; expected fewer impacts in one step",
+        return status(vi_instance_fail(it, function, "impact_limit reached at %.17g s; expected fewer impacts",
                                        vi_this_component.time(it->self)));
+    }
+    if (result == VI_STEP_UNFINISHED) {
+        return status(vi_instance_fail(it, function, "expected a step whose end can be computed in a minute or so, got as"
+                                       " far as %.17g s. Ask for shorter steps", vi_this_component.time(it->self)));
     }
     return fmi2OK;
 }

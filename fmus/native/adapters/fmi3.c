@@ -242,7 +242,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
     *lastSuccessfulTime = currentCommunicationPoint;
     const vi_step_result result = vi_this_component.step(it->self, &request, it->message);
-    if (result == VI_STEP_ERROR || result == VI_STEP_STANDSTILL) {
+    if (vi_step_failed(result)) {
         return status(vi_instance_fail(it, "fmi3DoStep", "%s", it->message));
     }
     it->outputs_stale = false;
@@ -251,6 +251,11 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     *lastSuccessfulTime = result == VI_STEP_DONE || reached > end ? end : reached;
     if (result == VI_STEP_IMPACT_LIMIT) {
         log_message(it, fmi3Discard, "logStatusWarning", "fmi3DoStep: impact_limit reached");
+        return fmi3Discard;
+    }
+    if (result == VI_STEP_UNFINISHED && !it->early_return_allowed) {
+        log_message(it, fmi3Discard, "logStatusWarning",
+                    "fmi3DoStep: expected a step whose end can be computed in a minute or so. Ask for shorter steps");
         return fmi3Discard;
     }
     *eventHandlingNeeded = result == VI_STEP_CONTACT;

@@ -406,10 +406,12 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
         || !vi_structure_component_resolve(&b->body, message)) {
         return VI_STEP_ERROR;
     }
-    if (b->depends_on_amplitude) {
-        follow_amplitudes(b);
+    if (!vi_structure_component_continues(&b->body)) {
+        if (b->depends_on_amplitude) {
+            follow_amplitudes(b);
+        }
+        hold_inputs(b);
     }
-    hold_inputs(b);
     const vi_step_result result = vi_structure_component_advance(&b->body, target, request, message);
     update_outputs(b);
     return result;

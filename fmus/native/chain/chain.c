@@ -224,7 +224,9 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
         || !vi_structure_component_resolve(&c->body, message)) {
         return VI_STEP_ERROR;
     }
-    hold_inputs(c);
+    if (!vi_structure_component_continues(&c->body)) {
+        hold_inputs(c);
+    }
     const vi_step_result result = vi_structure_component_advance(&c->body, target, request, message);
     update_outputs(c);
     return result;

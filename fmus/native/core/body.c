@@ -42,6 +42,7 @@ void vi_body_hold(vi_body *body, double held, double held_rate)
     body->held = held;
     body->held_rate = held_rate;
     body->held_since = body->now;
+    body->budget.unfinished = 0;
 }
 
 static bool watched(const vi_body *body, int k)
@@ -107,11 +108,12 @@ static double seconds_to_landing(const vi_segment *segment, double stop, const v
 
 /* First contact at or after `u` in the segment: its index, with *u and the approach velocity; -1 when there is none up to
  * *u, the end of the segment or of a long search. */
-static int locate(const vi_body *body, const vi_segment *segment, double *u, vi_motion *m, double *approach)
+static int locate(vi_body *body, const vi_segment *segment, double *u, vi_motion *m, double *approach)
 {
     for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
         double step = segment->length - *u;
         int nearest = -1, landing = -1;
+        vi_budget_spend(&body->budget, 1);
         for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
             if (!watched(body, k)) {
                 continue;
@@ -263,8 +265,9 @@ static void fly_free(vi_body *body, const vi_segment *segment, vi_instant target
     move(body, 0.0, x, v, ENDS_AT_TARGET, target);
 }
 
-/* Fly to the next contact, the end of the segment, or the target, whichever comes first. */
-static void fly(vi_body *body, vi_instant target, const vi_step_request *request)
+/* Fly to the next contact, the end of the segment, or the target, whichever comes first; false where the motion goes
+ * beyond the largest numbers. */
+static bool fly(vi_body *body, vi_instant target, const vi_step_request *request)
 {
     segment_end end;
     const double length = segment_length(body, target, &end);
@@ -276,13 +279,16 @@ static void fly(vi_body *body, vi_instant target, const vi_step_request *request
                      vi_min(length + room, bounce), bounce < HUGE_VAL);
     if (free_for_ever(body, &segment)) {
         fly_free(body, &segment, target);
-        return;
+        return isfinite(body->displacement) && isfinite(body->velocity);
     }
     vi_motion m;
     vi_segment_first(&segment, body->displacement, body->velocity, &m);
     double u = 0.0, approach = 0.0;
     if (body->leaving) {
         m.a = 0.0; /* exactly: that is what released it */
+    }
+    if (!isfinite(m.snap_bound) || !isfinite(segment.scale) || !isfinite(m.j)) {
+        return false;
     }
     const int k = locate(body, &segment, &u, &m, &approach);
     const bool whole = k < 0 && u >= length;
@@ -301,6 +307,7 @@ static void fly(vi_body *body, vi_instant target, const vi_step_request *request
         move(body, u, body->contacts[k].position, direction(body, k) * approach, landing(end, u, length, room), target);
         meet(body, k, approach, vi_clock_elapsed(&body->clock, body->now, target), request);
     }
+    return isfinite(body->displacement) && isfinite(body->velocity);
 }
 
 /* ---- rest on a stop ---- */
@@ -380,6 +387,7 @@ void vi_body_start(vi_body *body, vi_instant now, double displacement, double ve
 {
     body->now = body->held_since = now;
     body->standstill = (vi_standstill){now, 0};
+    vi_budget_start(&body->budget, now);
     body->displacement = displacement;
     body->velocity = velocity;
     body->stuck = body->leaving = body->pending = body->passed = 0;
@@ -400,43 +408,45 @@ static void open_first_period(vi_body *body)
     }
 }
 
-static int64_t impacts_so_far(const vi_body *body)
-{
-    int64_t sum = 0;
-    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        sum += body->contacts[k].count + body->contacts[k].graze_count;
-    }
-    return sum;
-}
-
-vi_step_result vi_body_advance(vi_body *body, vi_instant target, const vi_step_request *request)
+static void begin_step(vi_body *body, const vi_step_request *request)
 {
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
         body->contacts[k].event_time = NAN;
     }
     vi_record_begin_step(&body->record, body->displacement);
-    settle_all(body, request);
+    if (!body->budget.unfinished) {
+        settle_all(body, request);
+    }
     open_first_period(body);
+}
+
+/* One flight or rest; VI_STEP_DONE when the step goes on. */
+static vi_step_result move_on(vi_body *body, vi_instant target, const vi_step_request *request)
+{
+    const vi_step_result looked = vi_budget_look(&body->budget, &body->clock, body->now, body->impact_limit, request);
+    if (looked != VI_STEP_DONE) {
+        return looked;
+    }
+    vi_budget_spend(&body->budget, 1);
+    if (body->stuck) {
+        stay(body, target);
+    } else if (!fly(body, target, request)) {
+        return VI_STEP_NOT_FINITE;
+    }
+    return vi_clock_stands(&body->standstill, body->now) ? VI_STEP_STANDSTILL : VI_STEP_DONE;
+}
+
+vi_step_result vi_body_advance(vi_body *body, vi_instant target, const vi_step_request *request)
+{
+    begin_step(body, request);
     /* a record that is full already was not emptied by the importer: ending the step again would end it for ever */
     const bool ends_when_full = request->early_return && !vi_record_full(&body->record);
-    const int64_t most = body->impact_limit > 0 ? impacts_so_far(body) + body->impact_limit : INT64_MAX;
-    while (!body->pending && vi_clock_elapsed(&body->clock, body->now, target) > 0.0) {
-        if (ends_when_full && vi_record_full(&body->record)) {
-            return VI_STEP_RECORD_FULL;
-        }
-        if (impacts_so_far(body) >= most) {
-            return VI_STEP_IMPACT_LIMIT;
-        }
-        if (body->stuck) {
-            stay(body, target);
-        } else {
-            fly(body, target, request);
-        }
-        if (vi_clock_stands(&body->standstill, body->now)) {
-            return VI_STEP_STANDSTILL;
-        }
+    vi_step_result result = VI_STEP_DONE;
+    while (result == VI_STEP_DONE && !body->pending && vi_clock_elapsed(&body->clock, body->now, target) > 0.0) {
+        result = ends_when_full && vi_record_full(&body->record) ? VI_STEP_RECORD_FULL
+                                                                 : move_on(body, target, request);
     }
-    return body->pending ? VI_STEP_CONTACT : VI_STEP_DONE;
+    return vi_budget_end(&body->budget, result == VI_STEP_DONE && body->pending ? VI_STEP_CONTACT : result);
 }
 
 void vi_body_complain(const vi_body *body, char message[VI_MESSAGE_LENGTH])

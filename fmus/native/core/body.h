@@ -8,6 +8,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "budget.h"
 #include "clock.h"
 #include "complaint.h"
 #include "contact.h"
@@ -22,10 +23,11 @@ typedef struct {
     vi_mode mode;
     vi_clock clock;
     double mass;
-    int64_t impact_limit; /* 0: none */
+    int64_t impact_limit; /* most events of contacts since the start; 0: no limit */
     /* state */
     vi_instant now;
     vi_standstill standstill;
+    vi_budget budget;
     double displacement, velocity;
     double held, held_rate; /* input per unit mass at held_since, and its slope */
     vi_instant held_since;

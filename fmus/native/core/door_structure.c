@@ -110,16 +110,22 @@ VI_DOOR int vi_door_structure_advance(vi_door_structure *structure, double durat
     if (!(duration > 0.0) || !vi_clock_instant(clock, high, low, &target)) {
         return VI_STEP_ERROR;
     }
-    structure->model.impact_limit = (int64_t)most_impacts;
-    vi_structure_hold(&s, held, held_rate);
+    const vi_budget *budget = &structure->state.budget;
+    if (!budget->unfinished) {
+        structure->model.impact_limit = most_impacts > 0.0 ? budget->events + (int64_t)most_impacts : 0;
+        vi_structure_hold(&s, held, held_rate);
+    }
     return (int)vi_structure_advance(&s, target, &request);
 }
 
-VI_DOOR void vi_door_structure_complaint(vi_door_structure *structure, char message[])
+VI_DOOR void vi_door_structure_complaint(vi_door_structure *structure, int result, char message[])
 {
     const vi_structure s = parts(structure);
     message[0] = '\0';
-    vi_structure_complain(&s, message);
+    if (result == VI_STEP_STANDSTILL) {
+        vi_structure_complain(&s, message);
+    }
+    vi_complain_of_end(message, (vi_step_result)result, vi_clock_time(&structure->model.clock, structure->state.now));
 }
 
 VI_DOOR void vi_door_structure_state(vi_door_structure *structure, double q[], double p[], int status[], double force[],

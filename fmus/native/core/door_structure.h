@@ -31,8 +31,8 @@ VI_DOOR void vi_door_structure_record(vi_door_structure *structure, const double
 VI_DOOR int vi_door_structure_advance(vi_door_structure *structure, double duration, const double held[],
                                       const double held_rate[], double most_impacts);
 
-/* Why the last advance ended with VI_STEP_STANDSTILL; message has room for VI_MESSAGE_LENGTH. */
-VI_DOOR void vi_door_structure_complaint(vi_door_structure *structure, char message[]);
+/* Why the last advance was given up with this result; message has room for VI_MESSAGE_LENGTH. */
+VI_DOOR void vi_door_structure_complaint(vi_door_structure *structure, int result, char message[]);
 
 /* Modal displacements and velocities, contact statuses and forces; facts: time, forcing work, damping loss, contact
  * loss, displacement_max, displacement_min. */

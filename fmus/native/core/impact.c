@@ -71,6 +71,7 @@ static chatter_tail sum_tail(const vi_body *body, double pressure, double slope,
 void vi_body_stick(vi_body *body, int k, double delay, double tail_impulse)
 {
     vi_contact *contact = &body->contacts[k];
+    body->budget.events += 1;
     body->stuck = k + 1;
     body->velocity = 0.0;
     body->tail_impulse = tail_impulse;
@@ -150,6 +151,7 @@ void vi_body_impact(vi_body *body, int k, double approach, double restitution)
                      is_tiny(body, contact->position, sign * acceleration, rebound)};
     /* below this speed a touch cannot be told from a miss: it stands for less penetration than can be resolved */
     const bool graze = approach * approach <= 2.0 * fabs(acceleration) * t.resolution;
+    body->budget.events += 1;
     body->displacement = contact->position;
     body->velocity = -sign * rebound;
     if (graze) {
@@ -188,5 +190,6 @@ void vi_body_follow_extrema(vi_body *body, const vi_segment *segment, double end
         const double step = vi_certified_step(&state, end - u);
         u = fmin(end, u + fmax(step, vi_least_step(end, 1e-12, evaluation)));
         vi_segment_at(segment, u, &m);
+        vi_budget_spend(&body->budget, 1);
     }
 }

@@ -8,10 +8,19 @@ typedef enum {
     VI_STEP_DONE = 0,         /* the end of the step is reached */
     VI_STEP_CONTACT = 1,      /* stopped at a contact whose law is external; an event must resolve it */
     VI_STEP_RECORD_FULL = 2,  /* stopped early because the record has no more room */
-    VI_STEP_IMPACT_LIMIT = 3, /* stopped early after impact_limit impacts in one step */
+    VI_STEP_IMPACT_LIMIT = 3, /* stopped early: impact_limit events of contacts since the start */
     VI_STEP_ERROR = 4,        /* misuse; the state is unchanged */
-    VI_STEP_STANDSTILL = 5    /* stopped early: VI_MOST_EVENTS events at one instant; stepping on would not end */
+    VI_STEP_STANDSTILL = 5,   /* stopped early: VI_MOST_EVENTS events at one instant; stepping on would not end */
+    VI_STEP_CRAWL = 6,        /* the same: long work has not advanced time by more than its rounding */
+    VI_STEP_NOT_FINITE = 7,   /* stopped early: the motion goes beyond the largest numbers */
+    VI_STEP_UNFINISHED = 8    /* stopped early after as much work as a step may be; the next one goes on */
 } vi_step_result;
+
+/* Has the component nothing more to give? Its message says why. */
+static inline bool vi_step_failed(vi_step_result result)
+{
+    return result >= VI_STEP_ERROR && result <= VI_STEP_NOT_FINITE;
+}
 
 typedef struct {
     double time;            /* communication point, s */

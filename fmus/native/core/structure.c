@@ -119,15 +119,20 @@ static void correct_start(const vi_structure *s, int k, vi_approach *p)
     }
 }
 
+/* In place of a contact: the motion goes beyond the largest numbers. */
+enum { BEYOND_NUMBERS = -2 };
+
 /* First contact after the start of the flight: its index, with *u; -1 when there is none up to *u, the end of the flight
  * or of a long search. */
 static int locate(const vi_structure *s, const vi_flight *flight, const vi_point points[], double *u)
 {
     vi_part parts[VI_MODES];
+    vi_budget *budget = &s->state->budget;
     *u = 0.0;
     for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
         double step = flight->length - *u;
         int nearest = -1, landing_on = -1;
+        vi_budget_spend(budget, s->model->modes);
         vi_flight_parts(flight, *u, parts);
         for (int k = 0; k < s->model->contacts; ++k) {
             if (!vi_structure_watched(s, k)) {
@@ -137,6 +142,9 @@ static int locate(const vi_structure *s, const vi_flight *flight, const vi_point
             const bool starts = *u == 0.0 && s->state->status[k] == VI_CONTACT_TOUCHING;
             if (starts) {
                 correct_start(s, k, &p);
+            }
+            if (!isfinite(p.bound) || !isfinite(p.jerk)) {
+                return BEYOND_NUMBERS;
             }
             p.clearance = vi_max(0.0, p.clearance);
             if (p.velocity > 0.0 && p.clearance <= VI_ROUNDING * points[k].scale) {
@@ -232,8 +240,9 @@ static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant 
     move(s, u, ENDS_AT_TARGET, target);
 }
 
-/* Fly to the next contact, the end of the segment, or the target, whichever comes first. */
-static void fly(const vi_structure *s, vi_instant target, const vi_step_request *request)
+/* Fly to the next contact, the end of the segment, or the target, whichever comes first; false where the motion goes
+ * beyond the largest numbers. */
+static bool fly(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
     segment_end end;
     const double length = segment_length(s, target, &end), bounce = low_bounce(s);
@@ -249,10 +258,13 @@ static void fly(const vi_structure *s, vi_instant target, const vi_step_request 
     const bool unreachable = out_of_reach(s, &flight, points);
     if (unreachable && only_end_matters(s, &flight)) {
         fly_free(s, &flight, target);
-        return;
+        return true;
     }
     u = flight.length;
     const int k = unreachable ? -1 : locate(s, &flight, points, &u);
+    if (k == BEYOND_NUMBERS) {
+        return false;
+    }
     const bool whole = k < 0 && u >= length;
     u = whole ? length : u; /* the room after the end was only searched */
     if (s->record->extrema) {
@@ -264,11 +276,12 @@ static void fly(const vi_structure *s, vi_instant target, const vi_step_request 
     vi_flight_end(&flight, u, flight.angle + flight.angular_frequency * u, state->q, state->p);
     if (k < 0) {
         move(s, u, whole ? end : ENDS_ANYWHERE, target);
-        return;
+        return true;
     }
     move(s, u, landing(end, u, length, room), target);
     const double remaining = vi_clock_elapsed(&s->model->clock, state->now, target);
     vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
+    return true;
 }
 
 /* ---- coupled motion ---- */
@@ -311,13 +324,14 @@ bool vi_structure_is_coupled(const vi_structure *s)
 
 /* ---- a step ---- */
 
-static int64_t impacts_so_far(const vi_structure *s)
+/* Is the motion still one of finite numbers? */
+static bool is_finite(const vi_structure *s)
 {
-    int64_t sum = 0;
-    for (int k = 0; k < s->model->contacts; ++k) {
-        sum += s->contacts[k].count + s->contacts[k].graze_count;
+    double sum = 0.0;
+    for (int j = 0; j < s->model->modes; ++j) {
+        sum += fabs(s->state->q[j]) + fabs(s->state->p[j]);
     }
-    return sum;
+    return sum <= DBL_MAX;
 }
 
 static void begin_step(const vi_structure *s, const vi_step_request *request)
@@ -326,10 +340,32 @@ static void begin_step(const vi_structure *s, const vi_step_request *request)
     for (int k = 0; k < s->model->contacts; ++k) {
         s->contacts[k].event_time = NAN;
     }
-    vi_structure_settle(s, request);
+    if (!s->state->budget.unfinished) {
+        vi_structure_settle(s, request);
+    }
     if (s->record->periods && !s->record->period_open && s->state->now.rest == 0.0) {
         record_period(s);
     }
+}
+
+/* One flight or drift and what follows at its end; VI_STEP_DONE when the step goes on. */
+static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi_step_request *request)
+{
+    vi_structure_state *state = s->state;
+    const vi_step_result looked = vi_budget_look(&state->budget, &s->model->clock, state->now, s->model->impact_limit,
+                                                 request);
+    if (looked != VI_STEP_DONE) {
+        return looked;
+    }
+    const bool coupled = vi_structure_is_coupled(s);
+    if (coupled) {
+        drift(s, target, request);
+    }
+    if ((!coupled && !fly(s, target, request)) || !is_finite(s)) {
+        return VI_STEP_NOT_FINITE;
+    }
+    vi_structure_settle(s, request);
+    return vi_clock_stands(&state->standstill, state->now) ? VI_STEP_STANDSTILL : VI_STEP_DONE;
 }
 
 vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, const vi_step_request *request)
@@ -337,25 +373,12 @@ vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, co
     begin_step(s, request);
     /* a record that is full already was not emptied by the importer: ending the step again would end it for ever */
     const bool ends_when_full = request->early_return && !vi_record_full(s->record);
-    const int64_t limit = s->model->impact_limit, most = limit > 0 ? impacts_so_far(s) + limit : INT64_MAX;
-    while (!s->state->pending && vi_clock_elapsed(&s->model->clock, s->state->now, target) > 0.0) {
-        if (ends_when_full && vi_record_full(s->record)) {
-            return VI_STEP_RECORD_FULL;
-        }
-        if (impacts_so_far(s) >= most) {
-            return VI_STEP_IMPACT_LIMIT;
-        }
-        if (vi_structure_is_coupled(s)) {
-            drift(s, target, request);
-        } else {
-            fly(s, target, request);
-        }
-        vi_structure_settle(s, request);
-        if (vi_clock_stands(&s->state->standstill, s->state->now)) {
-            return VI_STEP_STANDSTILL;
-        }
+    vi_step_result result = VI_STEP_DONE;
+    while (result == VI_STEP_DONE && !s->state->pending
+           && vi_clock_elapsed(&s->model->clock, s->state->now, target) > 0.0) {
+        result = ends_when_full && vi_record_full(s->record) ? VI_STEP_RECORD_FULL : move_on(s, target, request);
     }
-    return s->state->pending ? VI_STEP_CONTACT : VI_STEP_DONE;
+    return vi_budget_end(&s->state->budget, result == VI_STEP_DONE && s->state->pending ? VI_STEP_CONTACT : result);
 }
 
 void vi_structure_outputs(const vi_structure *s, double acceleration[VI_MODES])

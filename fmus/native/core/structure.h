@@ -13,6 +13,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "budget.h"
 #include "clock.h"
 #include "complaint.h"
 #include "contact.h"
@@ -26,7 +27,7 @@ typedef struct {
     /* set by the component */
     int32_t modes;         /* in use, 1 to VI_MODES */
     int32_t contacts;      /* ports in use, 0 to VI_PORTS */
-    int64_t impact_limit;  /* most impacts in one step; 0: none */
+    int64_t impact_limit;  /* most events of contacts since the start; 0: no limit */
     double tolerance;      /* relative error of a nonlinear contact (hertz, hunt_crossley) */
     vi_clock clock;
     vi_mode mode[VI_MODES]; /* by vi_structure_mode, in ascending order of natural frequency */
@@ -67,6 +68,7 @@ typedef struct {
 typedef struct {
     vi_instant now;
     vi_standstill standstill;
+    vi_budget budget;
     double q[VI_MODES], p[VI_MODES]; /* modal displacements and velocities */
     vi_instant held_since;
     double held[VI_MODES], held_rate[VI_MODES]; /* modal forces of the inputs at held_since, and their slopes */

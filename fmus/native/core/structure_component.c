@@ -221,14 +221,21 @@ void vi_structure_component_hold(vi_structure_component *c, const double held[VI
     c->inputs_changed = 0;
 }
 
+bool vi_structure_component_continues(const vi_structure_component *c)
+{
+    return c->state.budget.unfinished && !c->inputs_changed;
+}
+
 void vi_structure_component_was_set(vi_structure_component *c, uint32_t reference, uint32_t restitution,
                                     uint32_t stride, uint32_t taken)
 {
-    c->inputs_changed = 1;
     const uint32_t from_first = reference - restitution; /* wraps to a large number below the first */
     if (reference == taken) {
         vi_record_take(&c->record);
-    } else if (from_first % stride == 0 && from_first / stride < VI_PORTS) {
+        return;
+    }
+    c->inputs_changed = 1;
+    if (from_first % stride == 0 && from_first / stride < VI_PORTS) {
         c->contacts[from_first / stride].answered = 1;
     }
 }
@@ -347,6 +354,7 @@ vi_step_result vi_structure_component_advance(vi_structure_component *c, vi_inst
     if (result == VI_STEP_STANDSTILL) {
         vi_structure_complain(&parts, message);
     }
+    vi_complain_of_end(message, result, vi_structure_component_time(c));
     return result;
 }
 

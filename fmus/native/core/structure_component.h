@@ -73,9 +73,13 @@ bool vi_structure_component_step_is_good(const vi_structure_component *c, const 
 /* Resolve what is pending; false when the answer is missing or bad. */
 bool vi_structure_component_resolve(vi_structure_component *c, char message[VI_MESSAGE_LENGTH]);
 
-/* Complains of a standstill. */
+/* Complains where the step is given up. */
 vi_step_result vi_structure_component_advance(vi_structure_component *c, vi_instant target,
                                               const vi_step_request *request, char message[VI_MESSAGE_LENGTH]);
+
+/* Is the next step the rest of one that ended early for no reason of the motion, under the same inputs? Their slopes, and
+ * what is found at the start of a step, then hold on. */
+bool vi_structure_component_continues(const vi_structure_component *c);
 
 /* A variable was set; `restitution` is the reference of contact[1].applied_restitution, `stride` the distance to that
  * of the next contact, `taken` the reference of record.taken. */

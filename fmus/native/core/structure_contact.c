@@ -17,6 +17,7 @@ void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_i
 {
     vi_structure_state *state = s->state;
     vi_contact *contact = &s->contacts[k];
+    state->budget.events += 1;
     state->status[k] = VI_CONTACT_HELD;
     state->leaving[k] = 0;
     state->tail_impulse[k] = tail_impulse;
@@ -45,6 +46,7 @@ void vi_structure_touch_down(const vi_structure *s, int k)
     vi_contact *contact = &s->contacts[k];
     const vi_clock *clock = &s->model->clock;
     const double approach = vi_max(0.0, vi_structure_approach(s, k));
+    s->state->budget.events += 1;
     s->state->status[k] = VI_CONTACT_YIELDING;
     s->state->leaving[k] = 0;
     s->state->touch_down[k] = (vi_touch_down){vi_clock_time(clock, s->state->now), vi_clock_phase(clock, s->state->now),

@@ -51,6 +51,7 @@ static double thin_time(const vi_structure *s, int k, double rate, double accele
         const double turned = pull * t + speed * (fastest * t) * (fastest * t); /* by everything else */
         const double error = most * n * (turned + most);
         if (most <= tolerance * total || error <= tolerance * speed * speed) {
+            vi_budget_spend(&s->state->budget, halving);
             return t;
         }
     }
@@ -165,6 +166,7 @@ typedef struct {
     double searched; /* the shortest of the searches for the others, s */
 } event_found;
 
+/* A search has found this, or nothing up to fall->time. */
 static void consider(event_found *first, const vi_fall *fall, vi_drift_event event, int contact)
 {
     if (!fall->found) {
@@ -396,6 +398,7 @@ static event_found first_event(const vi_structure *s, const vi_drift *drift, con
         }
     }
     const bool cut = first.searched < length && first.searched < first.time;
+    vi_budget_spend(&s->state->budget, first.searched < length ? VI_MOST_EVALUATIONS : 0);
     return cut || first.event == VI_DRIFT_NO_EVENT ? (event_found){first.searched, VI_DRIFT_NO_EVENT, -1, 0.0} : first;
 }
 
@@ -435,6 +438,13 @@ static bool at_rest_for_good(const vi_structure *s, const vi_drift *drift, const
     return true;
 }
 
+/* What a drift costs, in evaluations of a mode. */
+static int64_t drift_evaluations(const vi_structure_model *model)
+{
+    const int64_t modes = model->modes;
+    return VI_ORDER * modes + (model->coupled ? modes * modes / 2 : 0);
+}
+
 double vi_structure_drift(const vi_structure *s, double length, double room, vi_drift_event *event, int *k)
 {
     vi_structure_state *state = s->state;
@@ -442,6 +452,7 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
     situation now;
     vi_drift drift;
     look(s, &now);
+    vi_budget_spend(&state->budget, drift_evaluations(s->model));
     const vi_drift_start start = {state->q,   state->p, phase.cosine, phase.sine, now.held, state->held_rate,
                                   now.at, now.sign, now.press};
     vi_drift_begin(&drift, s->model, &start, vi_min(length + room, now.length));

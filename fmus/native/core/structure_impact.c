@@ -174,6 +174,7 @@ static void after_impact(const vi_structure *s, int k, double approach, double i
     const double resolved = resolution(s, k, a, approach);
     /* below this speed a touch cannot be told from a miss: it stands for less penetration than can be resolved */
     const bool graze = approach * approach <= 2.0 * fabs(a) * resolved;
+    state->budget.events += 1;
     if (graze) {
         s->contacts[k].graze_count += 1;
     } else {

@@ -13,6 +13,9 @@ static const double WEIGHTS[4] = {0.36268378337836198297, 0.31370664587788728734
 /* Length of a piece of quadrature times the fastest rate: eight points then integrate to the last digits. */
 static const double PIECE = 1.5;
 
+/* Evaluations that a climb is counted as. */
+enum { CLIMB = 8 };
+
 /* ---- extremes ---- */
 
 /* Climb from u to the next turning point of the observed displacement times sign; returns its time. */
@@ -48,11 +51,13 @@ static void extreme(const vi_structure *s, const vi_flight *flight, double sign,
     const double start = point.offset, least = VI_ROUNDING * point.scale;
     for (int evaluation = 0; u < end; ++evaluation) {
         const double least_step = vi_least_step(end, 1e-9, evaluation);
+        vi_budget_spend(&s->state->budget, s->model->modes);
         vi_flight_parts(flight, u, parts);
         const vi_approach p = vi_point_approach(&point, flight, parts, u);
         if (p.clearance <= least && p.velocity > 0.0) {
             double top;
             u = climb(flight, &point, u, end, &top);
+            vi_budget_spend(&s->state->budget, CLIMB * s->model->modes);
             point.offset += vi_max(0.0, -top); /* the bar is raised to what was reached */
             u += least_step;
             continue;
@@ -143,6 +148,7 @@ void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const
 {
     const double count = ceil(vi_max(1.0, u * s->model->fastest / PIECE)), piece = u / count;
     double q[VI_MODES], p[VI_MODES], weight;
+    vi_budget_spend(&s->state->budget, (int64_t)(8.0 * count) * s->model->modes);
     for (double n = 0.0; n < count; n += 1.0) {
         for (int i = 0; i < 8; ++i) {
             const double t = node(n * piece, piece, i, &weight), angle = flight->angle + flight->angular_frequency * t;

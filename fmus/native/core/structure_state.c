@@ -175,6 +175,7 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     memcpy(fresh.held_rate, state->held_rate, sizeof fresh.held_rate);
     fresh.follow_energies = state->follow_energies;
     fresh.now = fresh.held_since = now;
+    vi_budget_start(&fresh.budget, now);
     *state = fresh;
     for (int k = 0; k < s->model->contacts; ++k) {
         vi_contact_clear(&s->contacts[k]);
@@ -189,6 +190,7 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
     memcpy(state->held, held, (size_t)s->model->modes * sizeof held[0]);
     memcpy(state->held_rate, held_rate, (size_t)s->model->modes * sizeof held_rate[0]);
     state->held_since = state->now;
+    state->budget.unfinished = 0;
     for (int k = 0; k < s->model->contacts; ++k) {
         const vi_contact *contact = &s->contacts[k];
         if (contact->law.law == VI_LAW_EXTERNAL_FORCE) {

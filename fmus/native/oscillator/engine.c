@@ -113,6 +113,11 @@ void oscillator_hold(oscillator *o)
     o->inputs_changed = 0;
 }
 
+bool oscillator_continues(const oscillator *o)
+{
+    return !o->inputs_changed && (o->yields ? o->state.budget.unfinished : o->body.budget.unfinished);
+}
+
 vi_step_result oscillator_advance(oscillator *o, vi_instant target, const vi_step_request *request,
                                   char message[VI_MESSAGE_LENGTH])
 {
@@ -122,12 +127,14 @@ vi_step_result oscillator_advance(oscillator *o, vi_instant target, const vi_ste
         if (result == VI_STEP_STANDSTILL) {
             vi_structure_complain(&s, message);
         }
+        vi_complain_of_end(message, result, vi_clock_time(&o->body.clock, o->state.now));
         return result;
     }
     const vi_step_result result = vi_body_advance(&o->body, target, request);
     if (result == VI_STEP_STANDSTILL) {
         vi_body_complain(&o->body, message);
     }
+    vi_complain_of_end(message, result, vi_clock_time(&o->body.clock, o->body.now));
     return result;
 }
 

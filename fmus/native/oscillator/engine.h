@@ -21,7 +21,11 @@ void oscillator_follow_amplitude(oscillator *o);
 /* Give the inputs to the body from now on. */
 void oscillator_hold(oscillator *o);
 
-/* Complains of a standstill. */
+/* Is the next step the rest of one that ended early for no reason of the motion, under the same inputs? Their slopes, and
+ * what is found at the start of a step, then hold on. */
+bool oscillator_continues(const oscillator *o);
+
+/* Complains where the step is given up. */
 vi_step_result oscillator_advance(oscillator *o, vi_instant target, const vi_step_request *request,
                                   char message[VI_MESSAGE_LENGTH]);
 

@@ -161,13 +161,15 @@ static bool parameters_are_good(const oscillator *o, char *message)
 static void was_set(void *self, uint32_t value_reference)
 {
     oscillator *o = self;
+    if (value_reference == OSCILLATOR_RECORD_TAKEN) {
+        vi_record_take(&o->body.record);
+        return;
+    }
     o->inputs_changed = 1;
     if (value_reference == OSCILLATOR_CONTACT_APPLIED_RESTITUTION_1) {
         o->body.contacts[0].answered = 1;
     } else if (value_reference == OSCILLATOR_CONTACT_APPLIED_RESTITUTION_2) {
         o->body.contacts[1].answered = 1;
-    } else if (value_reference == OSCILLATOR_RECORD_TAKEN) {
-        vi_record_take(&o->body.record);
     }
 }
 
@@ -273,8 +275,10 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
     if (!step_is_good(o, request, &target, message) || !resolve(o, message)) {
         return VI_STEP_ERROR;
     }
-    oscillator_follow_amplitude(o);
-    oscillator_hold(o);
+    if (!oscillator_continues(o)) {
+        oscillator_follow_amplitude(o);
+        oscillator_hold(o);
+    }
     const vi_step_result result = oscillator_advance(o, target, request, message);
     update_outputs(o);
     return result;

@@ -1,0 +1,191 @@
+"""Scenes whose single steps are long, endless or beyond the numbers: the deadline is kept, signals are heard."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import ENVIRONMENT, in_this_process
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.runner import PointRunner
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+DEADLINE = 0.3
+
+STIFF_DASHPOT = ("thesis/figure_6_5d", {"dampings": "[1e5, 0.1]"})
+STIFF_AND_PLASTIC = (
+    "thesis/figure_6_5d",
+    {"dampings": "[1e5, 0.1]", "restitution": "1e-3", "angular_frequency": "0.5"},
+)
+LIGHT_BEAM = ("thesis/figure_7_10", {"mass_per_length": "1e-15"})
+NEAR_STOP = ("thesis/figure_6_6b", {"position": "1e-300"})
+LONG_STEPS = {
+    "stiff dashpot": STIFF_DASHPOT,
+    "stiff dashpot, nearly plastic": STIFF_AND_PLASTIC,
+    "light beam": LIGHT_BEAM,
+    "stop next to the start": NEAR_STOP,
+}
+BEYOND_NUMBERS = {
+    "large force": ("chatter", {"amplitude": "1e300"}),
+    "least mass": ("thesis/figure_2_11", {"mass": "5e-324"}),
+}
+
+
+def changed(name: str, values: dict[str, str], execution: str) -> Scene:
+    """Return an example scene with other values, run as `execution` says."""
+    text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
+    for key, value in values.items():
+        text, count = re.subn(rf"^{key} = .*$", f"{key} = {value}", text, count=1, flags=re.M)
+        assert count == 1, key
+    return parse_scene(f"{text}\n[execution]\n{execution}\n", f"{name}.toml")
+
+
+def ran(scene: Scene, how: str = "auto") -> RunRecord:
+    """Run the one point of a scene."""
+    runner = PointRunner(scene, execution=how)
+    try:
+        return runner.run({})
+    finally:
+        runner.close()
+
+
+@pytest.mark.parametrize("case", LONG_STEPS)
+def test_the_deadline_is_kept_within_one_step(case: str) -> None:
+    record = ran(changed(*LONG_STEPS[case], f"deadline = {DEADLINE}"))
+    assert record.outcome == Outcome.timeout
+    assert f"deadline: {DEADLINE} s passed at time" in record.message
+
+
+@pytest.mark.parametrize("case", ["stiff dashpot", "stop next to the start"])
+def test_the_deadline_is_kept_within_one_step_of_a_coupled_run(case: str) -> None:
+    record = ran(changed(*LONG_STEPS[case], f'how = "coupled"\ndeadline = {DEADLINE}'), "coupled")
+    assert record.outcome == Outcome.timeout
+
+
+@pytest.mark.parametrize("case", BEYOND_NUMBERS)
+def test_a_motion_beyond_the_largest_numbers_is_one_error_that_names_the_time(case: str) -> None:
+    with pytest.raises(ComponentError, match=r"expected finite numbers, got .* after time \d.* s"):
+        ran(changed(*BEYOND_NUMBERS[case], "deadline = 60"))
+
+
+def test_a_deadline_does_not_change_the_results() -> None:
+    plain, limited = (
+        ran(changed("thesis/figure_6_5d", {"transient_periods": "2000"}, execution))
+        for execution in ("", "deadline = 100")
+    )
+    assert plain.impacts is not None
+    assert limited.impacts is not None
+    assert plain.impacts.tobytes() == limited.impacts.tobytes()
+    assert (plain.final_displacement, plain.final_velocity) == (
+        limited.final_displacement,
+        limited.final_velocity,
+    )
+
+
+RATTLE = """
+[scene]
+units = "nondimensional"
+[body]
+mass = 1.0
+stiffness = 1.0
+damping = 0.1
+[forcing]
+amplitude = 0.5
+angular_frequency = 0.8
+[[stop]]
+position = 0.1
+restitution = {restitution}
+[record]
+transient_periods = 100000
+recorded_periods = 2
+impacts = {impacts}
+[execution]
+impact_limit = 5000
+"""
+
+
+@pytest.mark.parametrize("restitution", [0.7, 0.0])
+def test_the_impact_limit_does_not_depend_on_what_is_recorded(restitution: float) -> None:
+    messages = set()
+    for impacts in ("true", "false"):
+        record = ran(parse_scene(RATTLE.format(restitution=restitution, impacts=impacts), "rattle.toml"))
+        assert record.outcome == Outcome.impact_limit
+        messages.add(record.message)
+    assert len(messages) == 1
+    assert "impact_limit: 5000 impacts, touch-downs and rests" in messages.pop()
+
+
+def test_the_impact_limit_holds_for_the_point_and_not_for_each_sample() -> None:
+    text = RATTLE.format(restitution=0.7, impacts="true").replace("transient_periods = 100000", "")
+    text = text.replace("recorded_periods = 2", "recorded_periods = 10000\ntime_series = { rate = 1.0 }")
+    record = ran(parse_scene(text, "rattle.toml"))
+    assert record.outcome == Outcome.impact_limit
+    assert record.impacts is not None
+    assert 0 < len(record.impacts) <= 5000
+
+
+class Heard(Exception):
+    """Raised where a signal is."""
+
+
+@pytest.fixture
+def alarm() -> Iterator[None]:
+    """A signal after a moment, as Ctrl-C is one."""
+
+    def hear(number: int, frame: object) -> None:
+        raise Heard
+
+    before = signal.signal(signal.SIGALRM, hear)
+    signal.setitimer(signal.ITIMER_REAL, DEADLINE)
+    yield
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.mark.usefixtures("alarm")
+@pytest.mark.parametrize("how", ["fused", "coupled"])
+@pytest.mark.parametrize("case", ["stiff dashpot, nearly plastic", "light beam"])
+def test_a_signal_is_heard_within_one_step(case: str, how: str) -> None:
+    with pytest.raises(Heard):
+        ran(changed(*LONG_STEPS[case], ""), how)
+
+
+INTERRUPTED = """
+import os, signal, threading
+from vibroimpact.orchestrator.cli import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+main()
+"""
+
+
+def test_ctrl_c_within_one_step_leaves_no_file(tmp_path: Path) -> None:
+    scene = tmp_path / "light.toml"
+    text = (EXAMPLES / "thesis" / "figure_7_10.toml").read_text(encoding="utf-8")
+    scene.write_text(re.sub(r"^mass_per_length = .*$", "mass_per_length = 1e-15", text, flags=re.M))
+    target = tmp_path / "light.nc"
+    command = [sys.executable, "-c", INTERRUPTED, "run", str(scene), "-o", str(target)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ | ENVIRONMENT)
+    assert ended.returncode == 130, ended.stderr
+    assert os.listdir(tmp_path) == ["light.toml"]
+
+
+def test_every_point_of_a_campaign_whose_steps_are_long_gets_its_outcome(tmp_path: Path) -> None:
+    name, values = STIFF_AND_PLASTIC
+    text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
+    for key, value in values.items():
+        text = re.sub(rf"^{key} = .*$", f"{key} = {value}", text, count=1, flags=re.M)
+    sweep = f'[sweep]\n"forcing.amplitude[1]" = {{ values = [0.5, 0.6, 0.7] }}\n[execution]\ndeadline = {DEADLINE}\n'
+    (tmp_path / "scene.toml").write_text(f"{text}\n{sweep}")
+    done = in_this_process("campaign", tmp_path / "scene.toml", "-o", tmp_path / "out", "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    outcomes = read_flat(tmp_path / "out" / "dataset.nc")["outcome"].values
+    np.testing.assert_array_equal(outcomes, [Outcome.timeout] * 3)
