@@ -36,6 +36,7 @@ import dask
 from distributed import CancelledError, Client, Future, LocalCluster
 from distributed.comm.core import CommClosedError
 from distributed.scheduler import KilledWorker
+from distributed.security import Security
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.fmus.python_child import safe_module_path
@@ -61,6 +62,9 @@ RESULT_SECONDS = 10.0
 
 DEAD_SECONDS = 5.0
 """How long one of our own workers may be dead before another one is started in its place, s."""
+
+TLS_HINT = "Dask's configuration names them: docs/clusters.md shows how."
+"""Where certificates come from, for messages."""
 
 MOST_REPLACEMENTS = 50
 """How often in a campaign workers are started in place of dead ones; then the others go on alone."""
@@ -337,12 +341,21 @@ def processor_count() -> int:
 
 @contextmanager
 def _remote_cluster(address: str) -> Iterator[_Cluster]:
+    expected = f"--scheduler {address}: expected a Dask scheduler that listens there"
     try:
-        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+        security = Security()
+        certified = security.get_connection_args("client")["ssl_context"] is not None
+    except OSError as error:
+        raise UsageError(f"{expected}, and certificates that can be read, got {error}. {TLS_HINT}") from error
+    if address.startswith("tls:") and not certified:
+        raise UsageError(f"{expected}, and certificates for TLS, got none. {TLS_HINT}")
+    try:
+        client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False, security=security)
     except (OSError, ValueError) as error:
         raise UsageError(
-            f"--scheduler {address}: expected a Dask scheduler that listens there, got no answer within "
-            f"{CONNECT_SECONDS:.0f} s. Start one with `dask scheduler`, or leave the option out."
+            f"{expected}, got no answer within {CONNECT_SECONDS:.0f} s. "
+            "Start one with `dask scheduler`, or leave the option out."
+            + (" Are the certificates those of the scheduler?" if certified else "")
         ) from error
     try:
         yield _Cluster(client)
@@ -380,6 +393,8 @@ def _started_workers(workers: int) -> LocalCluster:
                     # None would still open the usual port of a Dask dashboard, to the whole network.
                     dashboard_address="127.0.0.1:0",
                     scheduler_kwargs={"dashboard": False},
+                    protocol="tls://",
+                    security=_own_certificates(),
                     memory_limit=0,
                     silence_logs=logging.CRITICAL,
                 )
@@ -389,6 +404,18 @@ def _started_workers(workers: int) -> LocalCluster:
         f"this machine: expected {workers} workers that start, got a failure {MOST_STARTS} times: {failure}. "
         "Is there memory for them? With --workers there are fewer; the same command tries again."
     ) from failure
+
+
+def _own_certificates() -> Security:
+    """Return a key made for this cluster: Dask runs what it is sent, so other users must not reach it."""
+    try:
+        certificates: Security = Security.temporary()
+    except ImportError as error:
+        raise UsageError(
+            "this machine: expected the package cryptography, which keeps other users of this machine away from the "
+            "workers, got none. Install it: `pip install cryptography`."
+        ) from error
+    return certificates
 
 
 def _replace_dead_workers(cluster: LocalCluster, workers: int) -> None:

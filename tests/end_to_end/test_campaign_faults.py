@@ -10,10 +10,12 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 from campaign_scenes import amplitude_text, assert_same_rows, frequency_text
+from distributed.security import Security
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
 
@@ -294,14 +296,14 @@ def free_port() -> int:
         return int(listener.getsockname()[1])
 
 
-@pytest.fixture
-def dask_cluster() -> Iterator[str]:
-    """Start a scheduler and two workers as another command would, and return the address."""
-    address = f"tcp://127.0.0.1:{free_port()}"
+@contextmanager
+def started_cluster(address: str, *options: str) -> Iterator[None]:
+    """Start a scheduler and two workers as another command would."""
     path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
     environment = os.environ | {"PYTHONPATH": path}
-    commands = [["scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard"]]
-    commands += [["worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]] * 2
+    place = ["--host", "127.0.0.1", "--port", address.rpartition(":")[2]]
+    commands = [["scheduler", *place, "--no-dashboard", *options]]
+    commands += [["worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", *options]] * 2
     processes = [
         subprocess.Popen(
             [sys.executable, "-m", "dask", *command],
@@ -311,10 +313,20 @@ def dask_cluster() -> Iterator[str]:
         )
         for command in commands
     ]
-    yield address
-    for process in processes:
-        process.kill()
-        process.wait()
+    try:
+        yield
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def dask_cluster() -> Iterator[str]:
+    """Start a cluster that anyone may use, and return the address."""
+    address = f"tcp://127.0.0.1:{free_port()}"
+    with started_cluster(address):
+        yield address
 
 
 def test_a_campaign_on_a_dask_cluster_gives_the_same_rows_and_leaves_the_workers(
@@ -327,6 +339,35 @@ def test_a_campaign_on_a_dask_cluster_gives_the_same_rows_and_leaves_the_workers
         assert "2 workers" in out
         assert_same_rows(tmp_path / name / "dataset.nc", expected)
         assert not [*(tmp_path / name).glob(".question*"), *(tmp_path / name).glob(".answer*")]
+
+
+def test_a_scheduler_with_tls_is_reached_with_certificates_and_not_without(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(frequency_text(20, milliseconds=0.1))
+    security = Security.temporary()
+    files = {
+        "ca-file": security.tls_ca_file,
+        "cert": security.tls_client_cert,
+        "key": security.tls_client_key,
+    }
+    for name, text in files.items():
+        (tmp_path / f"{name}.pem").write_text(text)
+    options = [word for name in files for word in (f"--tls-{name}", str(tmp_path / f"{name}.pem"))]
+    variables = {"ca-file": "CA_FILE", "cert": "CLIENT__CERT", "key": "CLIENT__KEY"}
+    environment = {
+        f"DASK_DISTRIBUTED__COMM__TLS__{variables[name]}": str(tmp_path / f"{name}.pem") for name in files
+    }
+    address = f"tls://127.0.0.1:{free_port()}"
+    with started_cluster(address, "--protocol", "tls", *options):
+        campaign = CampaignProcess(scene, tmp_path / "with", "--scheduler", address, **environment)
+        code, _, err = campaign.end()
+        assert code == 0, err
+        for given in (address, address.replace("tls", "tcp")):
+            code, _, err = run_campaign_process(scene, tmp_path / "without", "--scheduler", given)
+            assert code == 2
+            assert_one_clear_message(err)
+            assert f"--scheduler {given}: expected a Dask scheduler that listens there" in err
+    assert read_flat(tmp_path / "with" / "dataset.nc").sizes["run"] == 20
 
 
 @pytest.fixture

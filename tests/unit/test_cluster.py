@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import asyncio
+import ssl
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from busy_runner import die_while
+from distributed.comm import connect
+from distributed.security import Security
 
-from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator import cluster
 from vibroimpact.orchestrator.cluster import MOST_DEATHS, MOST_STARTS, open_workers
 
@@ -41,6 +46,48 @@ def test_a_call_that_kills_every_worker_is_one_clear_error(
         open_workers(workers=1) as pool,
     ):
         pool.call_everywhere(die_while, str(tmp_path))
+
+
+def _strangers() -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield how somebody without the key may try to connect."""
+    yield "tcp", {}
+    yield "tls", Security.temporary().get_connection_args("client")
+    trusting = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE
+    yield "tls", {"ssl_context": trusting}
+
+
+def _answers(address: str, options: dict[str, Any]) -> bool:
+    """Return whether the Dask server at an address takes an order."""
+
+    async def ask() -> bool:
+        comm = await connect(address, timeout=2.0, **options)
+        await comm.write({"op": "identity", "reply": True})
+        answer = await comm.read()
+        await comm.close()
+        return "id" in answer
+
+    try:
+        return asyncio.run(ask())
+    except OSError:
+        return False
+
+
+def test_nobody_without_the_key_of_a_campaign_reaches_its_processes() -> None:
+    with open_workers(workers=1) as pool:
+        client = pool._client
+        (worker,) = client.scheduler_info()["workers"].values()
+        own = client.security.get_connection_args("client")
+        for address in (client.scheduler.address, *pool.worker_addresses(), worker["nanny"]):
+            assert _answers(address, own)
+            for protocol, options in _strangers():
+                assert not _answers(f"{protocol}://{address.partition('://')[2]}", options)
+
+
+def test_a_machine_without_cryptography_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cryptography", None)
+    with pytest.raises(UsageError, match="pip install cryptography"), open_workers(workers=1):
+        pass
 
 
 class _Stillborn:
