@@ -19,7 +19,7 @@ PARALLEL ?= -n logical --maxprocesses 4 --dist worksteal
 SETUP := pyproject.toml hatch_build.py
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 # what pyproject.toml names at its lower bounds, what those need in turn at its newest; pip has no such way
-INSTALL_LOWEST = $(INSTALL_UV) && $(BIN)/uv pip install --quiet --python $(BIN)/python --resolution lowest-direct
+INSTALL_LOWEST = $(INSTALL_UV) && $(BIN)/uv pip install --quiet --python $(BIN)/python --resolution lowest-direct --reinstall
 INSTALL_UV = $(BIN)/python -m pip install --quiet --disable-pip-version-check 'uv>=0.8'
 
 help: ## show this

@@ -53,7 +53,15 @@ FILES: dict[str, bytes] = {
     "-o": b"",
 }
 FOLDERS = ("folder", "folder.nc", "folder.toml", "folder.png")
-MISSING = ("missing.toml", "missing.nc", "no/such/folder/x.nc", "no/such.png", "", "\udcff.toml")
+MISSING = (
+    "missing.toml",
+    "missing.nc",
+    "no/such/folder/x.nc",
+    "no/such.png",
+    "",
+    "\udcff.toml",
+    "\x1b[31mred.nc",
+)
 MISSING_ENDLESS = ("x" * 300 + ".nc", "scene.toml/x.nc", "/", ".", "..", "~")
 OUTPUTS = ("out.nc", "out.png", "out.svg", "out.fmu", "out", "out.xyz", "folder/out.nc", "folder/out.png")
 NUMBERS = (
@@ -113,7 +121,24 @@ WORDS = (
         "5%",
         "-5%",
     ),
-    *("", " ", "\n", "ä", "x" * 5000, "1,2", "1,,2", "tcp://127.0.0.1:1", "tcp://", "[a", "{", "%s", "$HOME"),
+    *(
+        "",
+        " ",
+        "\n",
+        "ä",
+        "\u202e",
+        "\x07",
+        "[red]x[/",
+        "x" * 5000,
+        "1,2",
+        "1,,2",
+        "tcp://127.0.0.1:1",
+        "tcp://",
+        "[a",
+        "{",
+        "%s",
+        "$HOME",
+    ),
 )
 # Each would do minutes of work where it is used well; another kind or test does that.
 ONLY_MISUSED = {("campaign",), ("demo",), ("fmu", "build")}
