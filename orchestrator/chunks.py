@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import importlib
 import math
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,6 +30,7 @@ from vibroimpact.fmus.errors import CampaignError, VibroimpactError
 from vibroimpact.orchestrator.empty_record import empty_record
 from vibroimpact.orchestrator.run_dataset import dataset_of_runs
 from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scratch import ScratchFolder
 from vibroimpact.orchestrator.sweep import Branch, Point, expand
 
 DEFAULT_RUNNER = "vibroimpact.orchestrator.runners:make_runner"
@@ -187,8 +187,8 @@ def get_ready(work: Work) -> RunnerIdentity:
     # The first dataset of a process takes long, because libraries load what they need when they need it.
     first_point = points_of(opened.branches[:1], Chunk(0, 0, 1))
     record = empty_record(opened.scene, Outcome.error, "rehearsal", 0.0)
-    with tempfile.TemporaryDirectory() as folder:
-        write_dataset(dataset_of(opened.scene, first_point, [record], {}), Path(folder, "rehearsal.nc"))
+    with ScratchFolder("rehearsal") as folder:
+        write_dataset(dataset_of(opened.scene, first_point, [record], {}), Path(folder.name, "rehearsal.nc"))
     return identify(opened.runner)
 
 

@@ -41,6 +41,7 @@ from distributed.security import Security
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.fmus.python_child import safe_module_path
 from vibroimpact.orchestrator.progress import Progress, Silence
+from vibroimpact.orchestrator.scratch import ScratchFolder
 
 CONNECT_SECONDS = 5.0
 """How long a scheduler may take to answer before it counts as absent."""
@@ -326,6 +327,8 @@ def open_workers(
             cluster = stack.enter_context(_remote_cluster(scheduler))
         else:
             stack.enter_context(safe_module_path())
+            scratch = stack.enter_context(ScratchFolder("workers"))
+            stack.enter_context(dask.config.set({"temporary-directory": scratch.name}))
             cluster = stack.enter_context(_embedded_cluster(workers or processor_count()))
         pool = WorkerPool(cluster, scheduler or "this machine", progress or Silence())
         pool.wait_for_workers()
@@ -375,9 +378,9 @@ def _embedded_cluster(workers: int) -> Iterator[_Cluster]:
         _kill_workers(cluster)
         raise
     finally:
-        # What does not end in time dies with this process.
         with suppress(TimeoutError):
             cluster.close(timeout=STOP_SECONDS)
+        _kill_workers(cluster)
 
 
 def _started_workers(workers: int) -> LocalCluster:

@@ -13,13 +13,15 @@ from vibroimpact.fmus.errors import UsageError
 if sys.platform == "win32":
     import msvcrt
 
-    def _try_lock(handle: int) -> None:
+    def try_lock(handle: int) -> None:
+        """Lock an open file for this process; raises OSError where another process holds it."""
         msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
 
 else:
     import fcntl
 
-    def _try_lock(handle: int) -> None:
+    def try_lock(handle: int) -> None:
+        """Lock an open file for this process; raises OSError where another process holds it."""
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
@@ -38,7 +40,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
         raise not_writable(folder, error) from error
     try:
         try:
-            _try_lock(handle)
+            try_lock(handle)
         except OSError as error:
             raise UsageError(
                 f"{folder}: expected a folder of its own, got one in which another campaign is running. "

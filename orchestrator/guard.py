@@ -16,7 +16,6 @@ import os
 import queue
 import signal
 import subprocess
-import tempfile
 import threading
 import time
 from collections.abc import Mapping
@@ -32,6 +31,7 @@ from vibroimpact.orchestrator.breadcrumbs import Breadcrumbs
 from vibroimpact.orchestrator.empty_record import empty_record
 from vibroimpact.orchestrator.guard_pipe import Failure, Identity, Order, Point, receive, send
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scratch import ScratchFolder
 
 #: Wall time that a guarded point may take where the scene names no deadline, s.
 DEFAULT_DEADLINE = 300.0
@@ -143,7 +143,7 @@ class GuardedRunner:
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         self._scene = scene
         self._wanted = execution
-        self._folder = tempfile.TemporaryDirectory(prefix="vibroimpact-guard-")
+        self._folder = ScratchFolder("guard")
         self._child: _Child | None = None
         self._points = 0  # that the child has run
         self._noting = False

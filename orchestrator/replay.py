@@ -6,7 +6,6 @@ body and its stops. `auto` takes the first.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -30,6 +29,7 @@ from vibroimpact.orchestrator.replay_covariance import drawn_noise, quiet_noise
 from vibroimpact.orchestrator.replay_models import Compared, Replay
 from vibroimpact.orchestrator.replay_rules import plain_variable
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scratch import ScratchFolder
 from vibroimpact.orchestrator.session import Session
 
 Floats = NDArray[np.float64]
@@ -123,7 +123,7 @@ class Replayer:
         self.drive = self._drive()
         self.time, self._values = self._instants()
         self.execution = "fused" if execution == "auto" else execution
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._folder: ScratchFolder | None = None
         self._session = self._open()
 
     def _drive(self) -> DriveSignal | None:
@@ -151,7 +151,7 @@ class Replayer:
         names = [reading.variable for reading in self.readings] or ["displacement"]
         if self.execution != "coupled" or self.drive is None:
             return Session(self.scene, names, execution=self.execution)
-        self._folder = tempfile.TemporaryDirectory()
+        self._folder = ScratchFolder("replay")
         others, connections = self._component(Path(self._folder.name, "replay.fmu"))
         return Session(self.scene, names, execution="coupled", others=others, connections=connections)
 

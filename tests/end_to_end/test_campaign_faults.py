@@ -62,7 +62,9 @@ def test_a_campaign_survives_a_worker_that_is_killed(
     uninterrupted: tuple[Path, Path], tmp_path: Path
 ) -> None:
     scene, expected = uninterrupted
-    campaign = CampaignProcess(scene, tmp_path / "campaign", *TWO)
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    campaign = CampaignProcess(scene, tmp_path / "campaign", *TWO, TMPDIR=str(scratch))
     campaign.wait_for_parts(3)
     campaign.workers()[0].send_signal(signal.SIGKILL)
     code, out, err = campaign.end()
@@ -73,6 +75,7 @@ def test_a_campaign_survives_a_worker_that_is_killed(
     assert f"{POINTS} points computed" in out
     assert_same_rows(tmp_path / "campaign" / "dataset.nc", expected)
     campaign.assert_nothing_lives()
+    assert not list(scratch.rglob("*"))
 
 
 @pytest.mark.parametrize("everyone", [True, False], ids=["from a terminal", "to the command alone"])
