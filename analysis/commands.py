@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from vibroimpact.analysis import estimate_command, replay_fmu_command, spikes_command
-from vibroimpact.analysis.dataset import open_dataset, open_measured, unreadable
+from vibroimpact.analysis.dataset import open_dataset, open_measured
+from vibroimpact.analysis.fingerprints import matches_recorded_hash
+from vibroimpact.analysis.opening import DAMAGE, unreadable
 from vibroimpact.analysis.outputs import writing
 from vibroimpact.analysis.recording_files import is_recording, open_recording
 from vibroimpact.analysis.results import results_kind
@@ -54,6 +56,8 @@ def plot(
 
     if kind not in _KINDS:
         raise UsageError(f"--kind: expected one of {', '.join(_KINDS)}, got {kind!r}.")
+    # as `open_dataset` takes the folder of a campaign
+    file = file / "dataset.nc" if file.is_dir() else file
     found = results_kind(file)
     try:
         if kind == "auto" and run is None and is_recording(file):
@@ -64,9 +68,12 @@ def plot(
         else:
             with open_measured(file) if kind == "convergence" else open_dataset(file) as dataset:
                 figure = figures.draw(dataset, cast(Any, kind), run)
-    except (OSError, RuntimeError) as problem:
-        # Values are read when first used, so a damaged file may show only here.
-        raise unreadable(file, problem) from problem
+    except DAMAGE as problem:
+        # Values are read when first used, so that damage may show only here. What bears the hash of its writer holds
+        # what was written: there the fault is not the file's.
+        if isinstance(problem, OSError | RuntimeError) or not matches_recorded_hash(file):
+            raise unreadable(file, problem) from problem
+        raise
     with writing(output):
         figures.save(figure, output)
     say(f"Figure written to {output}.")

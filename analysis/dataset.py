@@ -10,7 +10,8 @@ from __future__ import annotations
 from vibroimpact.analysis.accessor import VibroimpactAccessor
 from vibroimpact.analysis.checking import check, marked
 from vibroimpact.analysis.merging import merge_datasets
-from vibroimpact.analysis.reading import Part, open_dataset, open_measured, read_flat, read_part, unreadable
+from vibroimpact.analysis.opening import unreadable
+from vibroimpact.analysis.reading import Part, open_dataset, open_measured, read_flat, read_part
 from vibroimpact.analysis.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,

@@ -38,6 +38,15 @@ def closing_line(content: bytes | memoryview) -> bytes:
     return _BEGIN + hashlib.sha256(content).hexdigest().encode() + _END
 
 
+def sealed(image: bytes | memoryview) -> tuple[memoryview, bytes]:
+    """Return what a file is written of: the bytes of a NetCDF-4 file made in memory, and the line that follows.
+
+    The library rounds the memory up; that is cut off, so that the content ends where the file itself says.
+    """
+    content = memoryview(image)[: content_length(image)]
+    return content, closing_line(content)
+
+
 def content_length(head: bytes | memoryview) -> int | None:
     """Return where the content of an HDF5 file ends, as its first bytes say; None for another kind of file."""
     if len(head) < _HEAD or bytes(head[:8]) != _SIGNATURE or head[_SUPERBLOCK_VERSION] not in (2, 3):

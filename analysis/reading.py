@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from vibroimpact.analysis.fingerprints import matches_recorded_hash
+from vibroimpact.analysis.checking import structure_problems
+from vibroimpact.analysis.opening import one_error, opened_netcdf
+from vibroimpact.analysis.probing import check_sound, refuse_changed
 from vibroimpact.analysis.schema import RAGGED, RULES, SCHEMA_VERSION, Direction, Outcome, swept_names
 from vibroimpact.fmus.errors import DatasetError
 
@@ -50,25 +52,10 @@ class Part:
 
 @contextmanager
 def _opened(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
-    """Open a file with the NetCDF library; whatever is wrong with the file is one DatasetError."""
-    try:
-        matches_recorded_hash(path)
-        with netCDF4.Dataset(os.fspath(path), "r") as file:
-            file.set_auto_mask(False)
-            _refuse_foreign(path, file.ncattrs(), file.variables)
-            yield file
-    except (OSError, RuntimeError) as problem:
-        raise unreadable(path, problem) from problem
-
-
-def unreadable(path: str | os.PathLike[str], problem: Exception) -> DatasetError:
-    """Return the error for a file that is missing or damaged."""
-    if isinstance(problem, FileNotFoundError):
-        return DatasetError(f"{os.fspath(path)}: expected a dataset file, got no such file.")
-    return DatasetError(
-        f"{os.fspath(path)}: expected a readable NetCDF dataset, got {problem}. "
-        "The file is damaged or of another kind; write it again."
-    )
+    """Open a file that vibroimpact wrote; whatever is wrong with it is one DatasetError."""
+    with opened_netcdf(path) as file:
+        _refuse_foreign(path, file.ncattrs(), file.variables)
+        yield file
 
 
 def _refuse_foreign(path: str | os.PathLike[str], attributes: Any, variables: Any) -> None:
@@ -121,7 +108,7 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
             {name for v in file.variables.values() for name in getattr(v, "coordinates", "").split()}
         )
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
-    return xr.Dataset(data, coords={name: data.pop(name) for name in linked}, attrs=attrs)
+        return xr.Dataset(data, coords={name: data.pop(name) for name in linked}, attrs=attrs)
 
 
 def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:
@@ -165,10 +152,9 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     file = Path(path) / "dataset.nc" if Path(path).is_dir() else Path(path)
     flat = _open_flat(file)
     try:
-        opened = _on_grid(flat)
-    except (OSError, RuntimeError) as problem:
-        flat.close()
-        raise unreadable(file, problem) from problem
+        with one_error(file):
+            _refuse_misfits(file, flat)
+            opened = _on_grid(flat)
     except DatasetError:
         flat.close()
         raise
@@ -185,23 +171,44 @@ def open_measured(path: str | os.PathLike[str]) -> xr.Dataset:
     DatasetError
         If the file is missing or damaged.
     """
-    try:
-        return xr.open_dataset(path, engine="netcdf4", decode_times=False)
-    except (OSError, RuntimeError, ValueError) as problem:
-        raise unreadable(path, problem) from problem
+    with one_error(path):
+        return _open_checked(path)
 
 
 def _open_flat(file: Path) -> xr.Dataset:
     """Open a file lazily in its one-dimensional form."""
     with _opened(file) as stored:
-        schema = stored.getncattr("dataset_schema")
+        schema = str(stored.getncattr("dataset_schema"))[:60]
     if schema != SCHEMA_VERSION:
         raise DatasetError(
             f"{file}: expected dataset schema {SCHEMA_VERSION}, got {schema}. "
             "Open it with the version of vibroimpact that wrote it."
         )
-    # Plain numbers: seconds are not dates, flags are not floats, NaN is already NaN.
-    return xr.open_dataset(file, engine="netcdf4", decode_times=False, mask_and_scale=False)
+    with one_error(file):
+        return _open_checked(file)
+
+
+def _open_checked(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Open a file lazily, once it is known to be sound: seconds are not dates, and numbers are as they are stored."""
+    state = check_sound(path)
+    # Flags are not floats, and what is missing is NaN already.
+    dataset = xr.open_dataset(
+        os.path.abspath(path), engine="netcdf4", decode_times=False, mask_and_scale=False
+    )
+    try:
+        refuse_changed(path, state)
+    except BaseException:
+        dataset.close()
+        raise
+    return dataset
+
+
+def _refuse_misfits(file: Path, flat: xr.Dataset) -> None:
+    """Refuse variables of other types and dimensions than the schema says: everything else relies on them."""
+    problems = structure_problems(flat)
+    if problems:
+        more = f" And {len(problems) - 1} more problems." if len(problems) > 1 else ""
+        raise DatasetError(f"{file}: {problems[0]}{more} The file is damaged; write it again.")
 
 
 class _RunArray(BackendArray):

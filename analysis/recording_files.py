@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.atomic import write_atomically
-from vibroimpact.analysis.reading import read_flat, unreadable
+from vibroimpact.analysis.fingerprints import sealed
+from vibroimpact.analysis.opening import opened_netcdf
+from vibroimpact.analysis.reading import read_flat
 from vibroimpact.analysis.recording import (
     RECORDING_SCHEMA,
     Channel,
@@ -27,8 +29,6 @@ from vibroimpact.analysis.schema import CONVENTIONS, RAGGED
 from vibroimpact.analysis.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
 
-# What damaged bytes lead the libraries below to; a text that is not UTF-8 is a ValueError.
-_DAMAGE = (OSError, RuntimeError, ValueError, AttributeError, LookupError, TypeError, MemoryError)
 MOST_VALUES = 10**8
 """Values of a recording that are read: some bytes of a damaged file can promise any number."""
 # What the file itself needs of an attribute, and no channel carries.
@@ -76,7 +76,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str]) -> None:
         variable = file.createVariable(name, "f8", ())
         variable.setncatts({"units": scalar.unit, "long_name": scalar.label or name})
         variable[...] = scalar.value
-    write_atomically(path, bytes(file.close()))
+    write_atomically(path, *sealed(file.close()))
 
 
 def _store_channels(file: netCDF4.Dataset, recording: Recording) -> None:
@@ -150,25 +150,21 @@ def open_recording(path: str | os.PathLike[str]) -> Recording:
     DatasetError
         The file is missing, damaged, or no recording.
     """
-    try:
-        with netCDF4.Dataset(os.fspath(path), "r") as file:
-            file.set_auto_mask(False)
-            if "recording_schema" not in file.ncattrs():
-                raise DatasetError(
-                    f"{os.fspath(path)}: expected a recording, got other NetCDF contents. "
-                    "Make one with `vibroimpact import`."
-                )
-            return _read(file, path)
-    except _DAMAGE as problem:
-        raise unreadable(path, problem) from problem
+    with opened_netcdf(path) as file:
+        if "recording_schema" not in file.ncattrs():
+            raise DatasetError(
+                f"{os.fspath(path)}: expected a recording, got other NetCDF contents. "
+                "Make one with `vibroimpact import`."
+            )
+        return _read(file, path)
 
 
 def is_recording(path: str | os.PathLike[str]) -> bool:
     """Tell whether a file is a recording; a file that cannot be read is none."""
     try:
-        with netCDF4.Dataset(os.fspath(path), "r") as file:
+        with opened_netcdf(path) as file:
             return "recording_schema" in file.ncattrs()
-    except _DAMAGE:
+    except DatasetError:
         return False
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 from typing import Any
 
-import netCDF4
 import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.atomic import write_atomically
+from vibroimpact.analysis.fingerprints import sealed
+from vibroimpact.analysis.opening import opened_netcdf
 from vibroimpact.analysis.schema import CONVENTIONS
 from vibroimpact.fmus.errors import DatasetError
 
@@ -19,9 +20,9 @@ RESULTS_SCHEMA = "1"
 def results_kind(path: str | os.PathLike[str]) -> str | None:
     """Return what kind of analysis wrote a file; None for any other file, also one that cannot be read."""
     try:
-        with netCDF4.Dataset(os.fspath(path), "r") as file:
+        with opened_netcdf(path) as file:
             return str(file.getncattr("results_kind")) if "results_kind" in file.ncattrs() else None
-    except (OSError, RuntimeError):
+    except DatasetError:
         return None
 
 
@@ -59,4 +60,4 @@ def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: st
         for name, variable in dataset.variables.items()
         if variable.dtype.kind == "f"
     }
-    write_atomically(path, bytes(described.to_netcdf(engine="netcdf4", encoding=encoding)))
+    write_atomically(path, *sealed(bytes(described.to_netcdf(engine="netcdf4", encoding=encoding))))

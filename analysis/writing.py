@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.atomic import write_atomically
 from vibroimpact.analysis.checking import marked
-from vibroimpact.analysis.fingerprints import closing_line, content_length
+from vibroimpact.analysis.fingerprints import sealed
 from vibroimpact.analysis.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,
@@ -374,8 +374,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compress
     OSError
         If the file cannot be written (no space, no permission), with the reason of the operating system.
     """
-    image = _image(marked(dataset), compression)
-    write_atomically(path, image, closing_line(image))
+    write_atomically(path, *sealed(_image(marked(dataset), compression)))
 
 
 def _image(dataset: xr.Dataset, compression: int) -> memoryview:
@@ -392,9 +391,7 @@ def _image(dataset: xr.Dataset, compression: int) -> memoryview:
         labels = " connection" if "interface" in variable.dims else ""
         labels += " compared" if "comparison" in variable.dims else ""
         _store(file, str(name), variable, compression, linked + labels if is_data else None)
-    image = memoryview(file.close())
-    # The library rounds the memory up: cut off, so that the content ends where the file says.
-    return image[: content_length(image)]
+    return memoryview(file.close())
 
 
 def _store(

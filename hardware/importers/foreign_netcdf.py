@@ -1,23 +1,25 @@
 """NetCDF files of other programs: variables on one dimension, with their coordinate of time where there is one.
 
 Files of the classic format are read with scipy, in Python alone, since the C library can crash on damaged ones; files
-of version 4 (HDF5) are opened by a child process first, for the same reason.
+of version 4 (HDF5) are read by another process first, for the same reason.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from vibroimpact.analysis.probing import NETCDF
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.importers.cells import sorted_out
 from vibroimpact.hardware.importers.labels import is_time_name, seconds_in
-from vibroimpact.hardware.importers.probe import check_survives
+from vibroimpact.hardware.importers.probe import check_reads
 from vibroimpact.hardware.importers.table import (
     MOST_COLUMNS,
     MOST_SAMPLES,
@@ -28,14 +30,6 @@ from vibroimpact.hardware.importers.table import (
 )
 
 _SINCE = re.compile(r"(?P<unit>\w+)\s+since\s+(?P<date>.+)")
-_PROBE = f"""
-import sys, netCDF4
-with netCDF4.Dataset(sys.argv[1]) as file:
-    for variable in file.variables.values():
-        variable.ncattrs()
-        if variable.size <= {MOST_SAMPLES}:
-            variable[...]
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +41,7 @@ class _Variable:
     values: Floats | None
     unit: str
     label: str
+    remark: str
 
 
 def check_netcdf4(path: os.PathLike[str] | str) -> None:
@@ -55,9 +50,9 @@ def check_netcdf4(path: os.PathLike[str] | str) -> None:
     Raises
     ------
     DatasetError
-        It does. What else is wrong with the file is left to the reader.
+        It does, or says that the file is damaged.
     """
-    check_survives(_PROBE, path, "NetCDF")
+    check_reads(path, NETCDF)
 
 
 def read_foreign_netcdf(path: os.PathLike[str] | str) -> RawFile:
@@ -101,8 +96,11 @@ def _hdf5(path: os.PathLike[str] | str) -> Iterable[_Variable]:
         _check_sizes([int(variable.size) for variable in file.variables.values()])
         for name, variable in file.variables.items():
             numeric = getattr(variable.dtype, "kind", "O") in "fiu" and len(variable.dimensions) == 1
-            values = np.ma.filled(np.ma.asarray(variable[...], dtype=np.float64), np.nan) if numeric else None
-            yield _variable(name, variable, values)
+            # the library warns of a scale or a fill value that means nothing, and goes on without it
+            with warnings.catch_warnings(record=True) as said:
+                warnings.simplefilter("always")
+                values = np.ma.asarray(variable[...], dtype=np.float64).filled(np.nan) if numeric else None
+            yield _variable(name, variable, values, "; ".join({str(warning.message) for warning in said}))
 
 
 def _check_sizes(sizes: list[int]) -> None:
@@ -110,9 +108,10 @@ def _check_sizes(sizes: list[int]) -> None:
         raise DatasetError(f"expected at most {MOST_SAMPLES} numbers in {MOST_COLUMNS} variables, got more.")
 
 
-def _variable(name: str, variable: Any, values: Floats | None) -> _Variable:
+def _variable(name: str, variable: Any, values: Floats | None, remark: str = "") -> _Variable:
     dimension = variable.dimensions[0] if len(variable.dimensions) == 1 else ""
-    return _Variable(name, dimension, values, _text(variable, "units"), _text(variable, "long_name") or name)
+    label = _text(variable, "long_name") or name
+    return _Variable(name, dimension, values, _text(variable, "units"), label, remark)
 
 
 def _text(variable: Any, key: str) -> str:
@@ -125,6 +124,8 @@ def _sorted_out(variables: list[_Variable]) -> RawFile:
     remarks: list[str] = []
     by_dimension: dict[str, list[_Variable]] = {}
     for variable in variables:
+        if variable.remark:
+            remarks.append(f"{variable.name}: {variable.remark[:200]}")
         if variable.values is None:
             remarks.append(f"{variable.name}: is left out; numeric variables of one dimension are read")
         elif len(variable.values):

@@ -1,6 +1,6 @@
 """MATLAB files up to version 7 (`save -v7`), read with scipy: vectors of numbers.
 
-scipy's reader is compiled and can crash on damaged bytes, so that a child process reads the file first.
+scipy's reader is compiled and can crash on damaged bytes, so that another process reads the file first.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from vibroimpact.analysis.probing import Reading
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.importers.cells import sorted_out
 from vibroimpact.hardware.importers.labels import is_time_name
-from vibroimpact.hardware.importers.probe import check_survives
+from vibroimpact.hardware.importers.probe import UnreadableError, check_reads
 from vibroimpact.hardware.importers.table import MOST_COLUMNS, MOST_SAMPLES, Column, RawFile, Table
 
 _RATES = frozenset(
@@ -31,14 +32,7 @@ _CLASSES = frozenset(
 )
 
 
-# the sizes are checked by the reader proper; here a file that promises too much only ends sooner
-_PROBE = f"""
-import sys
-from scipy.io import loadmat, whosmat
-listed = whosmat(sys.argv[1])
-numeric = [name for name, shape, kind in listed if kind in {sorted(_CLASSES)!r}]
-loadmat(sys.argv[1], variable_names=numeric)
-"""
+_READING = Reading("MATLAB", tuple(sorted(_CLASSES)))
 
 
 def read_mat(path: os.PathLike[str] | str) -> RawFile:
@@ -53,18 +47,20 @@ def read_mat(path: os.PathLike[str] | str) -> RawFile:
     """
     from scipy.io import loadmat, whosmat
 
-    check_survives(_PROBE, path, "MATLAB")
     try:
+        check_reads(path, _READING)
         listed = whosmat(path)
         _check_sizes(listed)
         numeric = [name for name, _, kind in listed if kind in _CLASSES]
         contents = loadmat(path, variable_names=numeric, squeeze_me=False)
-    except DatasetError:
-        raise
-    except NotImplementedError as problem:
+    except UnreadableError as problem:
+        if problem.raised != "NotImplementedError":
+            raise
         raise DatasetError(
             "expected a MATLAB file up to version 7, got version 7.3. Save it with `save(..., '-v7')`."
         ) from problem
+    except DatasetError:
+        raise
     # damaged bytes lead scipy to errors of every kind, MemoryError too
     except Exception as problem:
         raise DatasetError(

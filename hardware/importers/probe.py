@@ -1,38 +1,39 @@
-"""Open a file in a child process first, where the library that reads it can crash on damaged bytes."""
+"""Refuse a file on which the compiled library that reads it crashes, or which it never ends to read."""
 
 from __future__ import annotations
 
 import os
-import subprocess
 
+from vibroimpact.analysis.probing import Reading, UnsoundFileError, check_sound
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.python_child import python_command
-
-PROBE_SECONDS = 120.0
 
 
-def check_survives(code: str, path: os.PathLike[str] | str, kind: str) -> None:
-    """Refuse a file whose reading kills a Python process, or does not end.
+class UnreadableError(DatasetError):
+    """A file does not read; `raised` is the name of the exception of the library, if that is how it ended."""
+
+    def __init__(self, message: str, raised: str) -> None:
+        super().__init__(message)
+        self.raised = raised
+
+
+def check_reads(path: os.PathLike[str] | str, reading: Reading) -> None:
+    """Refuse a file that does not read; see `analysis.probing`.
 
     Parameters
     ----------
-    code : str
-        Python that reads the file `sys.argv[1]`. Errors that it raises are left to the reader proper.
     path : path
-    kind : str
-        Format, for the message.
+    reading : Reading
+        What is about to be done with it.
 
     Raises
     ------
-    DatasetError
-        The child died or did not end.
+    UnreadableError
+        Without the name of the file, which the importer puts before it.
     """
-    command = python_command("-c", code, os.fspath(path))
     try:
-        ended = subprocess.run(command, capture_output=True, timeout=PROBE_SECONDS, check=False).returncode
-    except subprocess.TimeoutExpired as problem:
-        raise DatasetError(
-            f"expected a {kind} file that opens within {PROBE_SECONDS:.0f} s, got another."
-        ) from problem
-    if ended not in (0, 1):  # 1 is an exception, a signal or a fault is another number
-        raise DatasetError(f"expected a whole {kind} file, got one that crashes the library which reads it.")
+        check_sound(path, reading)
+    except UnsoundFileError as problem:
+        message = f"expected a whole {reading.library} file, got {problem}."
+        raise UnreadableError(message, problem.raised) from problem
+    except DatasetError as problem:
+        raise UnreadableError(str(problem).removeprefix(f"{os.path.abspath(path)}: "), "") from problem

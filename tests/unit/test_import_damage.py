@@ -18,7 +18,6 @@ from scipy.io import savemat
 from vibroimpact.analysis.recording import Recording, SingleValue
 from vibroimpact.analysis.recording_files import write_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.hardware.importers.probe import check_survives
 from vibroimpact.hardware.importing import import_recording
 
 SIGNAL = np.round(np.sin(np.arange(120) / 7.0), 4)
@@ -191,9 +190,6 @@ def test_a_file_that_kills_its_reader_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "record.nc"
     path.write_bytes(b"\x89HDF\r\n\x1a\n" + b"\x00" * 200)
     with pytest.raises(
-        DatasetError, match=r"record\.nc: expected a whole NetCDF file, got one that cannot be read"
+        DatasetError, match=r"record\.nc: expected a whole NetCDF file, got OSError: .*HDF error"
     ):
         import_recording([path])
-    with pytest.raises(DatasetError, match="crashes the library"):
-        check_survives("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", path, "NetCDF")
-    check_survives("raise ValueError", path, "NetCDF")
