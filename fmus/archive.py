@@ -370,6 +370,10 @@ def _described(path: Path, folder: Path, digest: str) -> UnpackedFmu:
     token = root.get("guid") if version == "2.0" else root.get("instantiationToken")
     identifiers = tuple(e.get("modelIdentifier", "") for tag in INTERFACES for e in root.findall(tag))
     known = version == "2.0" or version.startswith("3.0")
+    if version.startswith("1."):
+        raise ComponentFileError(
+            f"{path}: expected FMI 2.0 or 3.0, got FMI {version}. Export it in one of these versions."
+        )
     if not (known and token and identifiers and all(identifiers)):
         raise ComponentFileError(
             f"{path}: modelDescription.xml: expected FMI 2.0 or 3.0 with a token and a model identifier, "

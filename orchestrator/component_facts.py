@@ -75,12 +75,22 @@ class VariableFacts:
 
 @dataclass(frozen=True, slots=True)
 class ComponentFacts:
-    """An FMU: its file, its variables by name, whether it steps itself, whether its state can be kept."""
+    """An FMU: its file, its variables by name, whether it steps itself, whether its state can be kept.
+
+    Attributes
+    ----------
+    scheduled : bool
+        It can be run by scheduled execution.
+    event_mode : bool
+        It handles events in event mode when it steps itself.
+    """
 
     file: str
     variables: Mapping[str, VariableFacts]
     co_simulation: bool
     restorable: bool
+    scheduled: bool
+    event_mode: bool
 
 
 def component_facts(path: Path) -> ComponentFacts:
@@ -101,7 +111,12 @@ def _facts(sha256: str, path: Path) -> ComponentFacts:
     variables = {variable.name: _variable(variable, units) for variable in description.modelVariables}
     stepped = description.coSimulation
     return ComponentFacts(
-        path.name, variables, stepped is not None, stepped is not None and stepped.canGetAndSetFMUstate
+        path.name,
+        variables,
+        co_simulation=stepped is not None,
+        restorable=stepped is not None and stepped.canGetAndSetFMUstate,
+        scheduled=description.scheduledExecution is not None,
+        event_mode=stepped is not None and bool(getattr(stepped, "hasEventMode", False)),
     )
 
 

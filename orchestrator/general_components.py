@@ -143,8 +143,9 @@ def _facts(fmu: Path, where: str, problems: list[Problem]) -> ComponentFacts | N
         problems.append(Problem(where, "an intact FMU", f"an error: {message}"))
         return None
     if not facts.co_simulation:
-        hint = "Export it for co-simulation: model exchange is not available in this version."
-        problems.append(Problem(where, "an FMU for co-simulation", f"{facts.file} without it", hint))
+        other = "scheduled execution" if facts.scheduled else "model exchange"
+        hint = f"Export it for co-simulation: {other} is not available in this version."
+        problems.append(Problem(where, "an FMU for co-simulation", f"{facts.file} for {other} only", hint))
     return facts
 
 

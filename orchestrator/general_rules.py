@@ -20,6 +20,8 @@ from vibroimpact.orchestrator.scene_models import MOST_SAMPLES_PER_RUN, Executio
 from vibroimpact.orchestrator.unit_check import Unit, agree, gain_unit_between, parse_unit, product_agrees
 
 MOST_STEPS_PER_RUN = 10**10
+#: Inputs of a body's contact port by which another component answers its contact.
+ANSWERS = ("applied_restitution", "applied_force")
 SOURCES = ("output", "local", "parameter", "calculatedParameter")
 
 
@@ -199,6 +201,25 @@ def _events_watch_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
             hint = "A crossing is found by going back to the state before the step."
             got = f"{facts.file}, which does not have canGetAndSetFMUState"
             yield Problem(where, "an FMU whose state can be kept and restored", got, hint)
+        force = _contact_answer(draft, split(event.watch)[0])
+        if facts.event_mode and force is not None:
+            hint = (
+                "A watched component runs without event mode and early return, which a contact with another "
+                "component needs. Watch a component that takes no part in a contact."
+            )
+            yield Problem(where, "a component without a contact", f"one that {force} answers", hint)
+
+
+def _contact_answer(draft: GeneralDraft, component: str) -> str | None:
+    """Return the output that answers a contact of this component; None where none does."""
+    for connection in draft.connections:
+        if connection is None or split(connection.target)[0] != component:
+            continue
+        port, _, answer = split(connection.target)[1].rpartition(".")
+        facts = draft.facts(connection.target)
+        if answer in ANSWERS and facts is not None and f"{port}.law" in facts.variables:
+            return connection.source
+    return None
 
 
 def _records_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:

@@ -179,6 +179,10 @@ class GeneralRunner:
         ]
         if self._importer.wants_to_end:
             remarks.append(f"a component asked for the end at time {self._importer.time:.17g}")
+            if self._importer.overrun > self._importer.time:
+                remarks.append(
+                    f"others, which could not be taken back, had been stepped to {self._importer.overrun:.17g}"
+                )
         return remarks
 
     def _set_gains(self, general: GeneralScene) -> None:

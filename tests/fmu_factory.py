@@ -19,7 +19,7 @@ from vibroimpact.fmus.platform_names import binary_folder, library_suffix
 
 SOURCES = Path(__file__).with_name("fmus")
 #: The C file of each model; those with a description of a version can be made in that version.
-MODELS = {"BouncingBall": "ball.c", "Faulty": "faulty.c", "Gain": "gain.c"}
+MODELS = {"BouncingBall": "ball.c", "Faulty": "faulty.c", "Gain": "gain.c", "SteppedBall": "stepped_ball.c"}
 MADE = tuple((name, fmi) for name in MODELS for fmi in ("2.0", "3.0") if (name, fmi) != ("Gain", "3.0"))
 
 
@@ -29,6 +29,14 @@ def bouncing_ball(folder: Path, fmi: str = "2.0") -> Path:
     Outputs `h` (m), `v` (m/s), `bounces`; parameters `g`, `e`, and `landing`: what a bounce does to `h`.
     """
     return _write("BouncingBall", fmi, folder)
+
+
+def stepped_ball(folder: Path, fmi: str = "3.0") -> Path:
+    """Write a ball that bounces inside steps, as that of FMI's Reference-FMUs; in FMI 3.0 with event mode.
+
+    Outputs `h` (m), `v` (m/s), `bounces`; parameters `g`, `e`.
+    """
+    return _write("SteppedBall", fmi, folder)
 
 
 def faulty(folder: Path, fmi: str = "3.0") -> Path:

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from ctypes import c_double, c_void_p
 from functools import partial
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,10 @@ from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 STATUS_WORDS = ("ok", "warning", "discard", "error", "fatal", "pending")
+
+#: Largest error of the time at which an FMU says that a step has ended: relative to 1 + |time|, and to the step.
+TIME_ROUNDING = 1e-9
+STEP_ROUNDING = 1e-6
 
 #: Wraps a function of an FMU, given its name: for a guard that notes which call is under way.
 Wrapper = Callable[[str, Function], Function]
@@ -43,6 +47,8 @@ class Instance(ABC):
     ----------
     time : float
         The time reached by the last `step`, s.
+    internal_step : float
+        Step of the FMU's own solver that its description declares, s; 0: none. Its steps end at multiples of that.
     is_fatal : bool
         A call returned fatal: no function of the FMU may be called any more.
     needs_event_mode, returned_early, wants_to_end : bool
@@ -63,6 +69,7 @@ class Instance(ABC):
         self.time = 0.0
         self.needs_event_mode = self.returned_early = self.wants_to_end = self.is_flagged = False
         self.is_fatal = False
+        self.internal_step = 0.0
         self._library = Library(fmu)
         self._wrap = wrap
         self._pointer = c_void_p()
@@ -84,7 +91,7 @@ class Instance(ABC):
             word = STATUS_WORDS[status] if 0 <= status < len(STATUS_WORDS) else f"status {status}"
             self._fail(function, f"returned {word} at time {self.time:.17g}")
 
-    def _fail(self, function: str, what: str) -> None:
+    def _fail(self, function: str, what: str) -> NoReturn:
         lines = self.log.take()
         reason = lines[-1] if lines else "the component logged nothing"
         raise ComponentError(
@@ -170,6 +177,24 @@ class Instance(ABC):
     @abstractmethod
     def step(self, time: float, size: float) -> int:
         """Advance from `time` by `size`, s; returns OK, WARNING or DISCARD and sets `self.time`."""
+
+    def _refuse_end(self, rule: str, reached: float) -> NoReturn:
+        """Raise the error of a step that says it has ended where none can."""
+        self.time = self._step_time.value
+        self._fail(
+            "DoStep",
+            f"said that a step of {self._step_size.value:.12g} s has ended at time {reached:.12g} "
+            f"(lastSuccessfulTime), expected {rule}, at time {self.time:.17g}",
+        )
+
+    def _ends_inside(self, reached: float, end: float) -> bool:
+        """Can a step to `end` have ended at this time, with or without an early return?"""
+        room = self._room(end)
+        return self._step_time.value - room <= reached <= end + room  # false for NaN too
+
+    def _room(self, end: float) -> float:
+        rounding = TIME_ROUNDING * (1.0 + abs(end)) + STEP_ROUNDING * self._step_size.value
+        return self.internal_step * (1.0 + STEP_ROUNDING) + rounding
 
     @property
     def step_start(self) -> float:

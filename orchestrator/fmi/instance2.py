@@ -83,21 +83,32 @@ class Instance2(Instance):
         if status > WARNING:
             if status != DISCARD:
                 self.check(status, "DoStep")
-            if not self._ended_at(time + size):
+            if not self._wants_to_end():
                 return status
             self.wants_to_end = self.is_flagged = True
-            status = OK
+            self.time = self._end_told(time + size)
+            return OK
         self.time = time + size
         return status
 
-    def _ended_at(self, end: float) -> bool:
-        """Did a discarded step go all its way, and does the FMU ask for the end of the simulation?"""
-        terminated, reached = c_int(0), c_double(-math.inf)
-        asked = self._function("GetBooleanStatus")(self._pointer, c_int(TERMINATED), ctypes.byref(terminated))
-        told = self._function("GetRealStatus")(
-            self._pointer, c_int(LAST_SUCCESSFUL_TIME), ctypes.byref(reached)
+    def _wants_to_end(self) -> bool:
+        """Does the FMU ask for the end of the simulation by a step that it has discarded?"""
+        terminated = c_int(0)
+        status = self._function("GetBooleanStatus")(
+            self._pointer, c_int(TERMINATED), ctypes.byref(terminated)
         )
-        return asked == OK and told == OK and bool(terminated.value) and reached.value >= end
+        return status == OK and bool(terminated.value)
+
+    def _end_told(self, end: float) -> float:
+        """Return how far a discarded step to `end` has gone, s."""
+        reached = c_double(math.nan)
+        kind = c_int(LAST_SUCCESSFUL_TIME)
+        self.check(
+            self._function("GetRealStatus")(self._pointer, kind, ctypes.byref(reached)), "GetRealStatus"
+        )
+        if not self._ends_inside(reached.value, end):
+            self._refuse_end("a time of the step", reached.value)
+        return min(reached.value, end)
 
     # ---- states ----
 

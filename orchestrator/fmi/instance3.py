@@ -24,6 +24,8 @@ class Instance3(Instance):
 
     Attributes
     ----------
+    may_return_early : bool
+        The FMU was told that it may end a step early.
     enter_event_call, enter_step_call, update_call : callable
         The bare calls, which return FMI's status: for paths that check it themselves.
     decisions : c_uint16
@@ -48,14 +50,15 @@ class Instance3(Instance):
     ) -> None:
         super().__init__(fmu, name, log=log, wrap=wrap)
         self.event_mode = event_mode
-        self._instantiate(early_return or event_mode)
+        self.may_return_early = early_return or event_mode
+        self._instantiate()
         self._bind_life()
         self._bind_events()
         self._bind_states()
 
-    def _instantiate(self, early_return: bool) -> None:
+    def _instantiate(self) -> None:
         instantiate = self._function("InstantiateCoSimulation", c_void_p)
-        flags = (c_bool(False), c_bool(False), c_bool(self.event_mode), c_bool(early_return))
+        flags = (c_bool(False), c_bool(False), c_bool(self.event_mode), c_bool(self.may_return_early))
         texts = (c_char_p(t.encode()) for t in (self.name, self.fmu.token, f"{self.fmu.resources}/"))
         no_variables = (c_void_p(), c_size_t(0))
         pointer = instantiate(
@@ -104,12 +107,31 @@ class Instance3(Instance):
         status = self._do_step()
         if status and status != DISCARD:
             self.check(status, "DoStep")
-        self.time = self._last_time.value
+        reached = self.time = self._last_time.value
         if self._flags.value:
             self._take_flags()
         elif self.is_flagged:
             self.returned_early = self.needs_event_mode = self.wants_to_end = self.is_flagged = False
+        if reached != time + size and status != DISCARD:
+            self._check_end(reached, time + size)
         return status
+
+    def _check_end(self, reached: float, end: float) -> None:
+        """Refuse a step that has not ended where it was to, unless it has returned early or asks for the end.
+
+        A solver of fixed steps may be a part of one behind its communication point, which the step has reached.
+        """
+        if not self._ends_inside(reached, end):
+            self._refuse_end("a time of the step", reached)
+        stops_short = self.returned_early or self.wants_to_end
+        if reached > end or not stops_short:
+            self.time = end
+        if reached >= end - self._room(end):
+            return
+        if self.returned_early and not self.may_return_early:
+            self._refuse_end("the end of the step, since early return was not allowed", reached)
+        if not stops_short:
+            self._refuse_end("the end of the step, since it has not returned early", reached)
 
     def _take_flags(self) -> None:
         self.returned_early = self._early.value

@@ -48,6 +48,8 @@ class Component:
         Where its log lines go.
     wrap : callable or None
         Wraps each function of the FMU.
+    events : bool
+        Let it handle events in event mode and return early, if it can.
 
     Attributes
     ----------
@@ -60,27 +62,32 @@ class Component:
     """
 
     def __init__(
-        self, spec: ComponentSpec, *, log: LogTail | None = None, wrap: Wrapper | None = None
+        self,
+        spec: ComponentSpec,
+        *,
+        log: LogTail | None = None,
+        wrap: Wrapper | None = None,
+        events: bool = True,
     ) -> None:
         self.spec = spec
         self.name = spec.name
         description = description_of(spec.fmu)
         interface = description.coSimulation
         if interface is None:
-            raise ComponentFileError(
-                f"{spec.fmu}: expected an FMU with co-simulation, got model exchange only."
-            )
+            other = "scheduled execution" if description.scheduledExecution is not None else "model exchange"
+            raise ComponentFileError(f"{spec.fmu}: expected an FMU with co-simulation, got {other} only.")
         self.variables: dict[str, ModelVariable] = {v.name: v for v in description.modelVariables}
         self.depends = _dependencies(description)
         self.has_states = bool(interface.canGetAndSetFMUstate)
         version = 3 if description.fmiVersion.startswith("3") else 2
-        self.event_mode = version == 3 and bool(interface.hasEventMode)
+        self.event_mode = events and version == 3 and bool(interface.hasEventMode)
         fmu = unpack(spec.fmu)
         self.instance: Instance2 | Instance3 = (
             Instance3(fmu, spec.name, event_mode=self.event_mode, log=log, wrap=wrap)
             if version == 3
             else Instance2(fmu, spec.name, log=log, wrap=wrap)
         )
+        self.instance.internal_step = float(getattr(interface, "fixedInternalStepSize", None) or 0.0)
         self.sha256 = fmu.sha256
         self.at_start, self.at_end = c_void_p(), c_void_p()
         self._start_groups: dict[str, VariableGroup] = {}

@@ -117,6 +117,15 @@ def standstill_error(instance: Instance, steps: int, time: float) -> ComponentEr
     )
 
 
+def macro_step_error(macro_step: float, room: float, time: float) -> ComponentError:
+    """Return the error of a macro step that is lost in the rounding of the time."""
+    return ComponentError(
+        f"macro_step: expected more than {room:.3g} s, so that time {time:.17g} advances, got {macro_step:.3g} s.",
+        function="doStep",
+        time=time,
+    )
+
+
 def _takes_events(component: Component) -> bool:
     """Does an event reach this component's inputs? Others have been given theirs before their step."""
     return component.event_mode or component.event_times is not None

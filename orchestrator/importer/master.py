@@ -8,7 +8,6 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.beginning import settle_connections
@@ -18,13 +17,18 @@ from vibroimpact.orchestrator.importer.contact_bond import (
     MOST_REPETITIONS,
     ContactBonds,
 )
-from vibroimpact.orchestrator.importer.events import Event, EventMode, StepWatcher, standstill_error
-from vibroimpact.orchestrator.importer.order import stepping_order
+from vibroimpact.orchestrator.importer.events import (
+    Event,
+    EventMode,
+    StepWatcher,
+    macro_step_error,
+    standstill_error,
+)
+from vibroimpact.orchestrator.importer.order import fresh_inputs, stepping_order
 from vibroimpact.orchestrator.importer.revision import Watch
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec, Exchange
 from vibroimpact.orchestrator.importer.wiring import (
     LoopSolver,
-    Transfer,
     equal_values,
     moves_of,
     order_of,
@@ -50,7 +54,7 @@ class Importer:
     connections : sequence of ConnectionSpec
         Outputs to inputs.
     events : sequence of EventSpec
-        Watched variables of components without events of their own.
+        Watched variables; their components run without event mode and early return.
     exchange : str
         `jacobi`: all inputs are those of the start of a step. `gauss_seidel`: each component gets the newest
         outputs of those stepped before it. `iterated`: steps are repeated until the inputs at their end agree.
@@ -70,6 +74,8 @@ class Importer:
         By name.
     contacts : ContactBonds
         The contacts with stops that yield.
+    overrun : float
+        Where components were stepped to that could not be taken back when another asked for the end, s; or -inf.
     steps, repeated_steps : int
         Communication steps made, and how many of them were repeated.
     on_event, on_pause : callable or None
@@ -89,9 +95,13 @@ class Importer:
         wrap: Callable[[str], Wrapper] | None = None,
     ) -> None:
         self.components: dict[str, Component] = {}
+        watched = {event.component for event in events}
         for spec in components:
             self.components[spec.name] = Component(
-                spec, log=log(spec.name) if log else None, wrap=wrap(spec.name) if wrap else None
+                spec,
+                log=log(spec.name) if log else None,
+                wrap=wrap(spec.name) if wrap else None,
+                events=spec.name not in watched,
             )
         self.macro_step = macro_step
         self.exchange = exchange
@@ -114,7 +124,7 @@ class Importer:
 
     def _plan(self) -> None:
         """Decide once what a step must do."""
-        sources = [c for c in self._order if self._is_source(c)]
+        sources = [c for c in self._order if c.event_mode or self._is_looked_at(c)]
         alone = len(sources) == 1 and sources[0] is self._order[0] and sources[0].event_mode
         self._iterates = self.exchange == "iterated"
         self._saves = self._iterates or not (alone or not sources)
@@ -123,7 +133,7 @@ class Importer:
         self._alone = self._order[0] if simple and self._bare_step(self._order[0]) else None
         self._saved = [c for c in self._order if c.has_states]
         self._incoming = {c.name: [t for t in self.transfers if t.target is c] for c in self._order}
-        self._fresh = {c.name: self._fresh_inputs(c) for c in self._order}
+        self._fresh = fresh_inputs(self._order, self._incoming, jacobi=self.exchange == "jacobi")
         self.plan_moves()
 
     def plan_moves(self) -> None:
@@ -139,9 +149,6 @@ class Importer:
         self._stateless_paths = [path for path in paths if not path[0].has_states and repeats]
         self._event_mode = EventMode(self._order, self.transfers, behind)
 
-    def _is_source(self, component: Component) -> bool:
-        return component.event_mode or self._is_looked_at(component)
-
     def _is_looked_at(self, component: Component) -> bool:
         """Are its events found from its outputs?"""
         return component.event_times is not None or any(w.component is component for w in self.watches)
@@ -149,18 +156,6 @@ class Importer:
     def _bare_step(self, component: Component) -> Callable[[float, float], int] | None:
         """The step of a component that says all about it, if there is one."""
         return None if self._is_looked_at(component) else component.instance.step
-
-    def _fresh_inputs(self, component: Component) -> list[Transfer]:
-        """Transfers made just before a component's own step, from those stepped before it.
-
-        With exchange "jacobi" only a component that answers at once needs them: one without event mode whose outputs
-        all depend on its inputs directly, such as a stop.
-        """
-        place = {c.name: i for i, c in enumerate(self._order)}
-        earlier = [t for t in self._incoming[component.name] if place[t.source.name] < place[component.name]]
-        depends = component.depends.values()
-        answers = not component.event_mode and (not component.has_states or (bool(depends) and all(depends)))
-        return earlier if self.exchange != "jacobi" or answers else []
 
     # ---- beginning ----
 
@@ -178,6 +173,7 @@ class Importer:
         self._grid_index = 0
         self._next_point = start_time + self.macro_step
         self.steps = self.repeated_steps = 0
+        self.overrun = -math.inf
         self._event_index, self._event_time = 0, -math.inf
         self._standstill = 0
         self._at_event: list[Component] = []
@@ -220,19 +216,11 @@ class Importer:
 
     def _pass_point(self, room: float) -> None:
         """Find the next communication point, a multiple of the macro step."""
-        self._refuse_below(room)
+        if self.macro_step <= room:
+            raise macro_step_error(self.macro_step, room, self.time)
         while self._next_point - self.time <= room:
             self._grid_index += 1
             self._next_point = self._grid_start + (self._grid_index + 1) * self.macro_step
-
-    def _refuse_below(self, room: float) -> None:
-        if self.macro_step <= room:
-            raise ComponentError(
-                f"macro_step: expected more than {room:.3g} s, so that time {self.time:.17g} advances, "
-                f"got {self.macro_step:.3g} s.",
-                function="doStep",
-                time=self.time,
-            )
 
     def _glide(self, component: Component, time: float, end: float) -> None:
         """Whole macro steps of a single component, for as long as it has nothing to say."""
@@ -323,7 +311,7 @@ class Importer:
 
     def _agree(self, time: float, end: float | None) -> None:
         """Repeat a step until all components have reached one instant; `end` is where the first event was met."""
-        while end is not None or (end := self._iterate_all(time)) is not None:
+        while end is not None or (end := self._iterate(time)) is not None:
             # somebody met an event earlier than the others went: all go back and step to it
             self.repeated_steps += 1
             if end <= time:
@@ -331,12 +319,6 @@ class Importer:
                 return
             self._restore_start()
             end = self._step_all(time, end)
-
-    def _iterate_all(self, time: float) -> float | None:
-        """Repeat a step that all agreed on (exchange "iterated"); returns the time of an event that came earlier."""
-        if not self._iterates:
-            return None
-        return self._iterate(time, self._reached)
 
     def _settle_contacts(self, time: float) -> None:
         """Repeat a step until the stops that yield agree with what their bodies made of their forces."""
@@ -376,13 +358,22 @@ class Importer:
             else:
                 reached = self._step_one(component, time, target)
             if reached < target:
-                if not (first and component.event_mode and reached > time):
+                if not (first and reached > time and (component.event_mode or self.wants_to_end)):
+                    saved = self._saves or self.keeps_start or self.contacts.active
+                    if component.instance.wants_to_end and not (saved and component.has_states):
+                        self._end_run(time, reached, target)
+                        return None
                     self._stopper = component
                     return reached
                 target = reached
             first = False
         self._reached = self._at_event[0].instance.time if self._at_event else target
         return None
+
+    def _end_run(self, time: float, reached: float, target: float) -> None:
+        """End the step, and the run, where a component asks for it; the others have gone on."""
+        self._reached = max(time, reached)
+        self.overrun = target if len(self._order) > 1 else -math.inf
 
     def _stay(self, time: float) -> None:
         """End the step where it began: no step has size 0, so all but the component at its event go back."""
@@ -402,7 +393,7 @@ class Importer:
             component.instance.check(DISCARD, "DoStep")
         reached = self._after_step(component, time, target)
         if component.event_times is not None:
-            reached = self._reported(component, time, target)
+            reached = min(reached, self._reported(component, time, target))
         for watch in self.watches:
             if watch.component is component:
                 reached = min(reached, self._watched(watch, time, target))
@@ -413,6 +404,8 @@ class Importer:
         instance = component.instance
         if instance.wants_to_end:
             self.wants_to_end = True
+            if instance.time < target - SAME_INSTANT * (1.0 + abs(target)) - instance.internal_step:
+                return instance.time
         if not component.event_mode:
             return target
         if instance.needs_event_mode:
@@ -456,11 +449,14 @@ class Importer:
 
     # ---- repeated steps ----
 
-    def _iterate(self, time: float, target: float) -> float | None:
-        """Repeat the step until the inputs over it are those that its end gives.
+    def _iterate(self, time: float) -> float | None:
+        """Repeat a step (exchange "iterated") until the inputs over it are those that its end gives.
 
-        Returns the time of an event that these inputs make earlier than `target`; None without one.
+        Returns the time of an event that these inputs make earlier than its end; None without one.
         """
+        if not self._iterates:
+            return None
+        target = self._reached
         previous: list[NDArray[Any]] | None = None
         for _ in range(STEP_ITERATIONS):
             values = [transfer.take() for transfer in self.transfers]
@@ -490,7 +486,9 @@ class Importer:
         for component, inputs, _ in self._stateless_paths:
             if inputs is not None:
                 inputs()
-            self._step_one(component, time, end)
+            reached = self._step_one(component, time, end)
+            if reached < end and self.wants_to_end:
+                self._end_run(time, reached, end)
 
     def free(self) -> None:
         """Free all components."""

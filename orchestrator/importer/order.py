@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
+from vibroimpact.orchestrator.importer.wiring import Transfer
 
 
 def stepping_order(
@@ -38,6 +39,25 @@ def stepping_order(
         waiting.remove(chosen)
         order.append(chosen)
     return order
+
+
+def fresh_inputs(
+    order: Sequence[Component], incoming: Mapping[str, Sequence[Transfer]], *, jacobi: bool
+) -> dict[str, list[Transfer]]:
+    """Return the transfers made just before each component's own step, from those stepped before it.
+
+    With exchange "jacobi" only a component that answers at once needs them: one without event mode whose outputs
+    all depend on its inputs directly, such as a stop.
+    """
+    place = {c.name: i for i, c in enumerate(order)}
+
+    def fresh(component: Component) -> list[Transfer]:
+        earlier = [t for t in incoming[component.name] if place[t.source.name] < place[component.name]]
+        depends = component.depends.values()
+        answers = not component.event_mode and (not component.has_states or (bool(depends) and all(depends)))
+        return earlier if not jacobi or answers else []
+
+    return {c.name: fresh(c) for c in order}
 
 
 def _feeding(

@@ -275,8 +275,9 @@ step_answer model_step(model *m, double size, void *instance)
     const double end = m->time + size;
     const bool due = end >= m->value[FAULT_TIME] && is_due(m, AT_STEP);
     if (due && (int)m->value[FAULT] == FAULT_END_SHORT) {
-        m->reached = m->time + 0.5 * size;
-        m->value[Y] += 0.5 * size * m->value[U];
+        const double half = m->time + 0.5 * size;
+        m->reached = m->value[FAULT_TIME] > m->time ? m->value[FAULT_TIME] : half;
+        m->value[Y] += (m->reached - m->time) * m->value[U];
         return STEP_ENDS_SHORT;
     }
     const step_answer answer = due ? misbehave(m, end, instance) : STEP_DONE;

@@ -288,7 +288,7 @@ fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 size, fmi3Bo
     *needs_event = (answer == STEP_NEEDS_EVENT || answer == STEP_EVENT_EARLY) && of(c)->event_mode_used;
     *terminates = answer == STEP_TERMINATES || answer == STEP_ENDS_SHORT;
     *early = answer == STEP_STALLS || answer == STEP_EVENT_EARLY || (answer == STEP_SAYS && m->says_early);
-    *last_time = answer == STEP_SAYS ? m->reached : m->time;
+    *last_time = answer == STEP_SAYS || answer == STEP_SOLVER_BEHIND ? m->reached : m->time;
     switch (answer) {
     case STEP_FAILS:
         return fmi3Error;

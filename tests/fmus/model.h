@@ -42,6 +42,7 @@ typedef enum {
     STEP_ENDS_SHORT,  /* as STEP_TERMINATES, at `reached` */
     STEP_EVENT_EARLY, /* FMI 3.0: the step has ended at `reached` and asks for event mode */
     STEP_SAYS,        /* done; says that it has ended at `reached` (FMI 2.0: with discard, and terminated) */
+    STEP_SOLVER_BEHIND, /* done; the solver is at `reached`, which is what FMI 3.0 is told */
     STEP_FAILS,
     STEP_FATAL
 } step_answer;

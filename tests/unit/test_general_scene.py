@@ -588,7 +588,7 @@ def test_every_fmu_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
         f"There is no folder {tmp_path}/no.",
         "component.c2.fmu: expected an intact FMU, got an error: ",
         f"component.c3.fmu: expected an FMU file, got the folder {tmp_path}/folder.fmu.",
-        "component.c4.fmu: expected an FMU for co-simulation, got exchange.fmu without it. ",
+        "component.c4.fmu: expected an FMU for co-simulation, got exchange.fmu for model exchange only. ",
         "component.c5.fmu: expected an intact FMU, got an error: ",
         "component.c6.fmu: expected a path that ends in .fmu, or the name of a shipped component, "
         'got "Oscilator". Did you mean Oscillator?',
