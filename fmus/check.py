@@ -97,6 +97,7 @@ def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
         "token": fmu.token,
         "interface": _interface(fmu),
         "resources": str(fmu.resources),
+        "any_token": _takes_any_token(fmu),
     }
     command = python_command("-m", "vibroimpact.fmus.load_check", json.dumps(facts))
     try:
@@ -112,6 +113,12 @@ def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
         )
     # the FMU may print too: the answer is the last line
     return tuple(json.loads(result.stdout.splitlines()[-1]))
+
+
+def _takes_any_token(fmu: UnpackedFmu) -> bool:
+    """Is the binary one of PythonFMU, the same for all its FMUs, which looks at no token?"""
+    content = (fmu.folder / "modelDescription.xml").read_bytes()
+    return root_of(content, str(fmu.source)).get("generationTool", "").startswith("PythonFMU")
 
 
 def _interface(fmu: UnpackedFmu) -> str:

@@ -6,6 +6,7 @@ import ctypes
 import math
 from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
+from pathlib import Path
 
 from vibroimpact.fmus.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, WARNING, Instance, Wrapper
@@ -27,21 +28,40 @@ class _Callbacks(ctypes.Structure):
     ]
 
 
+#: Instances that were freed and are used again, by the folder of their FMU and their name.
+_kept: dict[tuple[Path, str], list[tuple[int, _Callbacks]]] = {}
+
+
 class Instance2(Instance):
-    """An instance of an FMI 2.0 FMU: no event mode, so steps end where they are asked to."""
+    """An instance of an FMI 2.0 FMU: no event mode, so steps end where they are asked to.
+
+    Parameters
+    ----------
+    reuse : bool
+        Keep the FMU's instance when this one is freed, and reset it for the next one of this name: for FMUs of which
+        each instantiation costs memory that nothing gives back.
+    """
 
     fmi_version = "2.0"
     prefix = "fmi2"
     event_mode = False
 
     def __init__(
-        self, fmu: UnpackedFmu, name: str, *, log: LogTail | None = None, wrap: Wrapper | None = None
+        self,
+        fmu: UnpackedFmu,
+        name: str,
+        *,
+        log: LogTail | None = None,
+        wrap: Wrapper | None = None,
+        reuse: bool = False,
     ) -> None:
         super().__init__(fmu, name, log=log, wrap=wrap)
+        self._reuse = reuse
         self._callbacks = _Callbacks(
             callback("fmi2"), callback("allocate"), callback("free"), None, self.log.environment
         )
-        self._instantiate()
+        if not self._take_kept():
+            self._instantiate()
         self._bind_life()
         self._do_step: Callable[[], int] = self._bound("DoStep", self._step_time, self._step_size, c_int(0))
         self._get_state = self._function("GetFMUstate")
@@ -62,6 +82,25 @@ class Instance2(Instance):
         if not pointer:
             self._fail("Instantiate", f"made no instance of {self.fmu.source}")
         self._pointer.value = pointer
+
+    def _take_kept(self) -> bool:
+        """Use a kept instance, if there is one that can be reset."""
+        kept = _kept.get((self.fmu.folder, self.name), []) if self._reuse else []
+        while kept:
+            self._pointer.value, self._callbacks = kept.pop()
+            self._callbacks.environment = self.log.environment
+            if self._function("Reset")(self._pointer) <= WARNING:
+                return True
+        self._pointer.value = None
+        return False
+
+    def free(self) -> None:
+        """Give the instance's memory back, or keep it for the next one of this name."""
+        if self._reuse and self._pointer and not self.is_fatal:
+            place = (self.fmu.folder, self.name)
+            _kept.setdefault(place, []).append((self._pointer.value or 0, self._callbacks))
+            self._pointer.value = None
+        super().free()
 
     def _type_name(self, kind: str) -> str:
         return FMI2_NAMES[kind]

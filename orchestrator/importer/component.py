@@ -85,7 +85,7 @@ class Component:
         self.instance: Instance2 | Instance3 = (
             Instance3(fmu, spec.name, event_mode=self.event_mode, log=log, wrap=wrap)
             if version == 3
-            else Instance2(fmu, spec.name, log=log, wrap=wrap)
+            else Instance2(fmu, spec.name, log=log, wrap=wrap, reuse=_loses_memory(description))
         )
         self.instance.internal_step = float(getattr(interface, "fixedInternalStepSize", None) or 0.0)
         self.sha256 = fmu.sha256
@@ -174,6 +174,11 @@ class Component:
             if slot and not self.instance.is_fatal:
                 self.instance.free_state(slot)
         self.instance.free()
+
+
+def _loses_memory(description: ModelDescription) -> bool:
+    """Does an FMU lose memory with each instance? The binary of PythonFMU 0.7 does: 18 kB and an entry of sys.path."""
+    return str(description.generationTool or "").startswith("PythonFMU")
 
 
 def _item_value(component: str, variable: ModelVariable, name: str) -> int:

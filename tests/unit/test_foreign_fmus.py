@@ -169,7 +169,7 @@ def test_a_step_that_lies_about_its_end_is_an_error_that_names_what_was_said(
         else:
             with pytest.raises(
                 ComponentError,
-                match="culprit: fmi3DoStep returned error at time 0.3.*: wrong communication point",
+                match=r"culprit: fmi3DoStep returned error at time 0\.3.*: wrong communication point",
             ):
                 run(text, folder)
         return

@@ -699,7 +699,7 @@ def test_the_bouncing_ball_example_takes_a_ball_that_the_user_fetches(tmp_path: 
         load_scene(scene)
     write_fmu(tmp_path / "BouncingBall.fmu")
     loaded = load_scene(scene)
-    assert general_of(loaded).events == (EventSpec("ball", "h", "falling", 0.0),)
+    assert general_of(loaded).events == (EventSpec("ball", "v", "rising", 0.0),)
     assert [axis.key for axis in loaded.sweep] == ["ball.e"]
 
 

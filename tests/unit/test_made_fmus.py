@@ -20,6 +20,7 @@ WRITERS = {
     "BouncingBall": fmu_factory.bouncing_ball,
     "Faulty": fmu_factory.faulty,
     "Gain": lambda folder, _: fmu_factory.gain(folder),
+    "SteppedBall": fmu_factory.stepped_ball,
 }
 GRAVITY, RESTITUTION, HEIGHT = 9.81, 0.7, 1.0
 H, V, BOUNCES, LANDING = 1, 2, 6, 5

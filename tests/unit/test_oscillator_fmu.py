@@ -441,3 +441,21 @@ def test_the_outputs_follow_an_input_set_between_steps() -> None:
         o.set("base_acceleration", 1.0)
         # absolute: the relative one is 2 - .5 - 1
         assert abs(o.get("acceleration") - 1.5) <= ROUNDING
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_step_past_the_stop_time_is_an_error_and_one_up_to_it_is_none(version: str) -> None:
+    with OscillatorFmu({"displacement_start": 1.0}, version=version, initialize=False) as fmu:
+        if version == "3.0":
+            fmu.fmu.enterInitializationMode(startTime=0.0, stopTime=1.0)
+        else:
+            fmu.fmu.setupExperiment(startTime=0.0, stopTime=1.0)
+            fmu.fmu.enterInitializationMode()
+        fmu.fmu.exitInitializationMode()
+        fmu.step(0.9)
+        with pytest.raises(Exception, match=r"(?i)dostep"):
+            fmu.step(0.2)
+        assert "expected a step that ends by the stop time 1 s, got one from 0.9" in fmu.messages[-1]
+        for _ in range(10):
+            fmu.step(0.01)  # their sum is above .1, by rounding
+        assert fmu.time >= 1.0

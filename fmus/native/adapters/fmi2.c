@@ -6,6 +6,7 @@
  */
 #include "fmi2Functions.h"
 
+#include <math.h>
 #include <limits.h>
 #include <string.h>
 
@@ -106,13 +107,12 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
 {
     UNUSED(toleranceDefined);
     UNUSED(tolerance);
-    UNUSED(stopTimeDefined);
-    UNUSED(stopTime);
     vi_instance *it = c;
     if (it == NULL || !vi_instance_expect(it, "fmi2SetupExperiment", VI_MODE_INSTANTIATED)) {
         return fmi2Error;
     }
     it->start_time = startTime;
+    it->stop_time = stopTimeDefined ? stopTime : HUGE_VAL;
     return fmi2OK;
 }
 
@@ -166,7 +166,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     static const char function[] = "fmi2DoStep";
     UNUSED(noSetFMUStatePriorToCurrentPoint);
     vi_instance *it = c;
-    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_STEP)) {
+    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_STEP)
+        || !vi_instance_expect_end(it, function, currentCommunicationPoint, communicationStepSize)) {
         return fmi2Error;
     }
     const vi_step_request request = {currentCommunicationPoint, communicationStepSize, false, false};

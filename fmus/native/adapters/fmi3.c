@@ -5,6 +5,7 @@
  */
 #include "fmi3Functions.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -145,14 +146,13 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 {
     UNUSED(toleranceDefined);
     UNUSED(tolerance);
-    UNUSED(stopTimeDefined);
-    UNUSED(stopTime);
     vi_instance *it = instance;
     if (it == NULL || !vi_instance_expect(it, "fmi3EnterInitializationMode", VI_MODE_INSTANTIATED)) {
         return fmi3Error;
     }
     it->mode = VI_MODE_INITIALIZATION;
     it->start_time = startTime;
+    it->stop_time = stopTimeDefined ? stopTime : HUGE_VAL;
     it->outputs_stale = true;
     return fmi3OK;
 }
@@ -234,7 +234,8 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     UNUSED(noSetFMUStatePriorToCurrentPoint);
     vi_instance *it = instance;
     if (it == NULL || eventHandlingNeeded == NULL || terminateSimulation == NULL || earlyReturn == NULL
-        || lastSuccessfulTime == NULL || !vi_instance_expect(it, "fmi3DoStep", VI_MODE_STEP)) {
+        || lastSuccessfulTime == NULL || !vi_instance_expect(it, "fmi3DoStep", VI_MODE_STEP)
+        || !vi_instance_expect_end(it, "fmi3DoStep", currentCommunicationPoint, communicationStepSize)) {
         return fmi3Error;
     }
     const vi_step_request request = {currentCommunicationPoint, communicationStepSize, it->event_mode_used,

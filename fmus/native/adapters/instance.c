@@ -1,11 +1,15 @@
 #include "instance.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 static const vi_component *const component = &vi_this_component;
+
+/* Largest amount by which a step may pass the stop time: the rounding of an importer's sums, relative to 1 + |time|. */
+#define STOP_ROUNDING 1e-9
 
 /* ---- life ---- */
 
@@ -47,6 +51,7 @@ void vi_instance_reset(vi_instance *instance)
     instance->mode = VI_MODE_INSTANTIATED;
     instance->outputs_stale = false;
     instance->start_time = 0.0;
+    instance->stop_time = HUGE_VAL;
 }
 
 void vi_instance_size(vi_instance *instance, const vi_sizes *sizes)
@@ -105,6 +110,16 @@ bool vi_instance_expect(vi_instance *instance, const char *function, int modes)
         return true;
     }
     return vi_instance_fail(instance, function, "not allowed now: the instance is %s", mode_name(instance->mode));
+}
+
+bool vi_instance_expect_end(vi_instance *instance, const char *function, double time, double size)
+{
+    const double stop = instance->stop_time;
+    if (!(time + size > stop + STOP_ROUNDING * (1.0 + fabs(stop)))) {
+        return true;
+    }
+    return vi_instance_fail(instance, function, "expected a step that ends by the stop time %.17g s, got one from %.17g s "
+                            "by %.17g s", stop, time, size);
 }
 
 bool vi_instance_initialize(vi_instance *instance, const char *function)

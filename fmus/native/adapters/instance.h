@@ -31,7 +31,7 @@ struct vi_instance {
     vi_mode_of_use mode;
     bool outputs_stale;    /* an input was set since the outputs were computed */
     bool event_mode_used, early_return_allowed, logging;
-    double start_time;
+    double start_time, stop_time; /* stop_time: infinite where the importer defines none */
     char *name;
     char message[VI_MESSAGE_LENGTH];
     /* version-specific logger: level 0 event, 1 warning, 3 error */
@@ -51,6 +51,9 @@ void vi_instance_size(vi_instance *instance, const vi_sizes *sizes);
 
 /* Log an error `function: text` and return false. */
 bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...);
+
+/* Does a step from `time` by `size` end by the stop time, to rounding? If not, log it. */
+bool vi_instance_expect_end(vi_instance *instance, const char *function, double time, double size);
 
 /* Is the instance in one of these modes? If not, log it. */
 bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
