@@ -23,10 +23,11 @@ LINE_LENGTH = len(_BEGIN) + _DIGITS + len(_END)
 
 _BLOCK = 1 << 20
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
-# Where the superblock of an HDF5 file has its version, and in versions 2 and 3 the address of the end.
+# Where the superblock of an HDF5 file has its version, and in each version the address of the end. HDF5 2 writes
+# version 2, HDF5 1.14 version 0.
 _SUPERBLOCK_VERSION = 8
-_END_OF_FILE = 28
-_HEAD = _END_OF_FILE + 8
+_END_OF_FILE = {0: 40, 1: 44, 2: 28, 3: 28}
+_HEAD = max(_END_OF_FILE.values()) + 8
 
 
 def closing_line(content: bytes | memoryview) -> bytes:
@@ -49,9 +50,9 @@ def sealed(image: bytes | memoryview) -> tuple[memoryview, bytes]:
 
 def content_length(head: bytes | memoryview) -> int | None:
     """Return where the content of an HDF5 file ends, as its first bytes say; None for another kind of file."""
-    if len(head) < _HEAD or bytes(head[:8]) != _SIGNATURE or head[_SUPERBLOCK_VERSION] not in (2, 3):
+    if len(head) < _HEAD or bytes(head[:8]) != _SIGNATURE or head[_SUPERBLOCK_VERSION] not in _END_OF_FILE:
         return None
-    (end,) = struct.unpack_from("<Q", head, _END_OF_FILE)
+    (end,) = struct.unpack_from("<Q", head, _END_OF_FILE[head[_SUPERBLOCK_VERSION]])
     return int(end)
 
 

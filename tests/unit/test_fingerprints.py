@@ -12,7 +12,7 @@ import pytest
 from dataset_examples import record
 
 from vibroimpact.analysis.dataset import Direction, build_dataset, open_dataset, read_flat, write_dataset
-from vibroimpact.analysis.fingerprints import LINE_LENGTH, matches_recorded_hash
+from vibroimpact.analysis.fingerprints import LINE_LENGTH, closing_line, matches_recorded_hash
 from vibroimpact.fmus.errors import DatasetError
 
 
@@ -80,3 +80,20 @@ def test_other_files_have_no_hash(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "other"
     path.write_bytes(content)
     assert not matches_recorded_hash(path)
+
+
+@pytest.mark.parametrize(("version", "place"), [(0, 40), (1, 44), (2, 28), (3, 28)])
+def test_a_file_that_lost_its_end_is_noticed_in_every_version_of_hdf5(
+    version: int, place: int, tmp_path: Path
+) -> None:
+    # the superblock of HDF5 1.14 is of version 0, that of HDF5 2 of version 2
+    head = bytearray(b"\x89HDF\r\n\x1a\n" + bytes([version]) + bytes(91))
+    head[place : place + 8] = (5000).to_bytes(8, "little")
+    content = bytes(head) + bytes(4900)
+    path = tmp_path / "runs.nc"
+    path.write_bytes(content + closing_line(content))
+    assert matches_recorded_hash(path)
+    # the line is damaged where it begins, but the content still says how long it is
+    path.write_bytes(content + b"X" + closing_line(content)[1:])
+    with pytest.raises(DatasetError, match="SHA-256"):
+        matches_recorded_hash(path)
