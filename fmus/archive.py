@@ -23,6 +23,7 @@ from io import BufferedReader
 from pathlib import Path, PurePosixPath
 
 from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.file_state import FileState, file_state, is_settled
 from vibroimpact.fmus.platform_names import binary_folder, library_suffix
 from vibroimpact.fmus.private_folder import (
     CACHE_VARIABLE,
@@ -39,6 +40,8 @@ MEMBER_LIMIT = 10_000
 #: Most folders that a member may lie in, and most characters of its name that messages show.
 DEEPEST = 50
 LONGEST_NAME = 100
+#: Most bytes of a model identifier: with an ending it is the name of a file.
+LONGEST_IDENTIFIER = 240
 #: Age after which the temporary folder of a process that was killed is swept, s.
 ABANDONED_AFTER = 3600.0
 INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
@@ -183,7 +186,7 @@ def _checked_members(path: Path, archive: zipfile.ZipFile, limit: int) -> list[z
     size = sum(member.file_size for member in members)
     if size > limit:
         problems.append(f"{size} bytes when unpacked, limit {limit}")
-    if not any(_place(member) == ("modelDescription.xml",) for member in members if not member.is_dir()):
+    if not any(_place(member) == ("modelDescription.xml",) for member in members if not _is_folder(member)):
         problems.append("no modelDescription.xml")
     # only names that are short and few are worth comparing
     problems = problems or list(_clashes(members))
@@ -192,6 +195,10 @@ def _checked_members(path: Path, archive: zipfile.ZipFile, limit: int) -> list[z
             f"{path}: expected a safe FMU, got: {'; '.join(problems[:5])}. It was not unpacked."
         )
     return members
+
+
+def _is_folder(member: zipfile.ZipInfo) -> bool:
+    return member.filename.endswith("/")
 
 
 def _place(member: zipfile.ZipInfo) -> tuple[str, ...]:
@@ -204,21 +211,28 @@ def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[str]:
     places = [_place(member) for member in members]
     twice = [place for place, count in Counter(places).items() if count > 1]
     if twice:
-        yield f"two members have the same name, {'/'.join(twice[0])[:LONGEST_NAME]!r}"
+        yield f"two members have the same name, {_cut('/'.join(twice[0]))}"
     folders = {place[:end] for place in places for end in range(len(place))}
-    blocking = [m for m, place in zip(members, places, strict=True) if place in folders and not m.is_dir()]
+    blocking = [m for m, place in zip(members, places, strict=True) if place in folders and not _is_folder(m)]
     if blocking:
         yield f"member {_shown(blocking[0])} is a file and a folder"
 
 
 def _shown(member: zipfile.ZipInfo) -> str:
-    name = member.orig_filename
-    return repr(name if len(name) <= LONGEST_NAME else name[:LONGEST_NAME] + "...")
+    return _cut(member.orig_filename)
+
+
+def _cut(text: object) -> str:
+    """Return what stands in a file as messages show it."""
+    shown = repr(text)
+    return shown if len(shown) <= LONGEST_NAME else shown[:LONGEST_NAME] + "..."
 
 
 def _problems(member: zipfile.ZipInfo) -> Iterator[str]:
     # orig_filename: zipfile replaces backslashes on Windows and cuts names at a zero byte
     name = member.orig_filename
+    if not name:
+        yield "has no name"
     if "\\" in name or "\0" in name:
         yield "has a backslash or a zero byte in its name"
     if name.startswith("/") or ":" in name.split("/")[0]:
@@ -247,7 +261,7 @@ def _cache(path: Path) -> Path:
 
 
 #: Of the folders that this process has compared with their archives: what each file looked like then.
-_compared: dict[Path, list[tuple[int, ...]]] = {}
+_compared: dict[Path, list[FileState]] = {}
 
 
 def _is_intact(folder: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo]) -> bool:
@@ -257,9 +271,10 @@ def _is_intact(folder: Path, archive: zipfile.ZipFile, members: list[zipfile.Zip
         refuse_unsafe(folder)
         seen = [_appearance(folder / member.filename, member) for member in members]
         if _compared.get(folder) != seen:
-            if not all(member.is_dir() or _is_equal(folder, archive, member) for member in members):
+            if not all(_is_folder(member) or _is_equal(folder, archive, member) for member in members):
                 return False
-            _compared[folder] = seen
+            if all(is_settled(state) for state in seen if state):
+                _compared[folder] = seen
     except UnsafeFolderError as error:
         raise ComponentFileError(f"{archive.filename}: was not unpacked: {error}") from error
     except (OSError, *DAMAGE):
@@ -268,14 +283,12 @@ def _is_intact(folder: Path, archive: zipfile.ZipFile, members: list[zipfile.Zip
     return True
 
 
-def _appearance(path: Path, member: zipfile.ZipInfo) -> tuple[int, ...]:
+def _appearance(path: Path, member: zipfile.ZipInfo) -> FileState:
     status = path.lstat()
-    expected = stat.S_IFDIR if member.is_dir() else stat.S_IFREG
+    expected = stat.S_IFDIR if _is_folder(member) else stat.S_IFREG
     if stat.S_IFMT(status.st_mode) != expected:
         raise FileNotFoundError(path)
-    if member.is_dir():
-        return ()
-    return (status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
+    return () if _is_folder(member) else file_state(status)
 
 
 def _is_equal(folder: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bool:
@@ -314,7 +327,7 @@ def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo
     try:
         for member in members:
             target = folder / member.filename
-            if member.is_dir():
+            if _is_folder(member):
                 target.mkdir(parents=True, exist_ok=True)
                 continue
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -377,10 +390,13 @@ def _described(path: Path, folder: Path, digest: str) -> UnpackedFmu:
     if not (known and token and identifiers and all(identifiers)):
         raise ComponentFileError(
             f"{path}: modelDescription.xml: expected FMI 2.0 or 3.0 with a token and a model identifier, "
-            f"got version {version!r}, token {token!r}, identifiers {identifiers!r}."
+            f"got version {_cut(version)}, token {_cut(token)}, identifiers {_cut(identifiers)}."
         )
-    if any(PurePosixPath(name).name != name for name in identifiers):
+    if any(
+        PurePosixPath(name).name != name or len(name.encode()) > LONGEST_IDENTIFIER for name in identifiers
+    ):
         raise ComponentFileError(
-            f"{path}: modelDescription.xml: modelIdentifier: expected a plain name, got {identifiers!r}."
+            f"{path}: modelDescription.xml: modelIdentifier: expected a plain name of at most {LONGEST_IDENTIFIER} "
+            f"bytes, got {_cut(identifiers)}."
         )
     return UnpackedFmu(path, folder, digest, version, token, identifiers)

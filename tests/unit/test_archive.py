@@ -264,6 +264,21 @@ def test_an_fmu_with_a_member_for_each_folder_is_unpacked(tmp_path: Path) -> Non
     assert (unpack(written(tmp_path / "M.fmu", members)).resources / "x").read_bytes() == b"1"
 
 
+def test_a_member_without_a_name_is_refused(tmp_path: Path) -> None:
+    nameless = zipfile.ZipInfo("x")
+    nameless.filename = ""
+    assert "has no name" in refusal(written(tmp_path / "M.fmu", {nameless: b""}))
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [('modelIdentifier="M"', f'modelIdentifier="{"x" * 400}"'), ("3.0", "9" * 5000)]
+)
+def test_texts_of_great_length_are_refused_in_short(tmp_path: Path, old: str, new: str) -> None:
+    message = refusal(written(tmp_path / "M.fmu", description=DESCRIPTION.replace(old, new)))
+    assert "modelDescription.xml" in message
+    assert len(message) < 1000
+
+
 def test_a_pipe_is_no_fmu(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "M.fmu")
     assert "a device" in refusal(tmp_path / "M.fmu")
