@@ -108,7 +108,9 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
             {name for v in file.variables.values() for name in getattr(v, "coordinates", "").split()}
         )
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
-        return xr.Dataset(data, coords={name: data.pop(name) for name in linked}, attrs=attrs)
+        flat = xr.Dataset(data, coords={name: data.pop(name) for name in linked}, attrs=attrs)
+        _refuse_misfits(path, flat)
+        return flat
 
 
 def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:
@@ -203,12 +205,12 @@ def _open_checked(path: str | os.PathLike[str]) -> xr.Dataset:
     return dataset
 
 
-def _refuse_misfits(file: Path, flat: xr.Dataset) -> None:
+def _refuse_misfits(file: str | os.PathLike[str], flat: xr.Dataset) -> None:
     """Refuse variables of other types and dimensions than the schema says: everything else relies on them."""
     problems = structure_problems(flat)
     if problems:
         more = f" And {len(problems) - 1} more problems." if len(problems) > 1 else ""
-        raise DatasetError(f"{file}: {problems[0]}{more} The file is damaged; write it again.")
+        raise DatasetError(f"{os.fspath(file)}: {problems[0]}{more} The file is damaged; write it again.")
 
 
 class _RunArray(BackendArray):

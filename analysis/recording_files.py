@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.atomic import write_atomically
 from vibroimpact.analysis.fingerprints import sealed
-from vibroimpact.analysis.opening import opened_netcdf
+from vibroimpact.analysis.opening import one_error, opened_netcdf
 from vibroimpact.analysis.reading import read_flat
 from vibroimpact.analysis.recording import (
     RECORDING_SCHEMA,
@@ -306,17 +306,18 @@ def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Record
     except DatasetError as problem:
         hint = " `vibroimpact import` makes a recording of the file of an instrument."
         raise DatasetError(f"{problem}{hint if os.path.isfile(path) else ''}") from problem
-    indices = flat.run_index.values.tolist()
-    if run is None and len(indices) > 1:
-        raise DatasetError(
-            f"{os.fspath(path)}: expected one run to be named, got {len(indices)} (run_index {indices[0]} to "
-            f"{indices[-1]}). Choose one with --run."
-        )
-    if run is not None and run not in indices:
-        raise DatasetError(
-            f"{os.fspath(path)}: run: expected a run_index from {min(indices)} to {max(indices)}, got {run}."
-        )
-    return _run_signals(flat, 0 if run is None else indices.index(run), os.fspath(path))
+    with one_error(path):
+        indices = flat.run_index.values.tolist()
+        if run is None and len(indices) > 1:
+            raise DatasetError(
+                f"{os.fspath(path)}: expected one run to be named, got {len(indices)} (run_index {indices[0]} to "
+                f"{indices[-1]}). Choose one with --run."
+            )
+        if run is not None and run not in indices:
+            raise DatasetError(
+                f"{os.fspath(path)}: run: expected a run_index from {min(indices)} to {max(indices)}, got {run}."
+            )
+        return _run_signals(flat, 0 if run is None else indices.index(run), os.fspath(path))
 
 
 def _run_signals(flat: Any, row: int, title: str) -> Recording:
