@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from soak.bodies import check
 from tolerance import ROUNDING, SEQUENCE
 
 from vibroimpact.fmus.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
@@ -276,3 +277,26 @@ def test_a_beam_held_by_a_stop_that_lets_go_comes_to_the_end_of_its_run(law: str
             assert len(many.impacts) == len(one.impacts)
             assert np.abs(many.displacement - one.displacement).max() <= 1e-10
             assert np.abs(many.velocity - one.velocity).max() <= 1e-10
+
+
+def test_a_load_presses_a_compliant_stop_beside_a_rigid_one_without_a_touch_of_rounding_size() -> None:
+    stops = [
+        Stop([1.0], 0.0, restitution=0.0),
+        Stop([1.0], 0.0, law="hunt_crossley", stiffness=1e4),
+        Stop([1.0], -0.1, law="kelvin_voigt", side="lower", stiffness=100.0),
+    ]
+    with Structure(Modes([1.5], 0.0, [3.0], 2.5), stops, 0.0, [0.8], energies=True) as body:
+        start = body.energy
+        assert body.advance(30.0, most_impacts=1000) == DONE
+        assert np.all(body.impacts[:, 3] > 1e-9)
+        balance = body.energy - start - body.forcing_work + body.damping_loss + body.contact_loss
+        assert abs(balance) <= 1e-9
+
+
+#: Adversarial bodies (tests/soak) that once stood still, or were put on a stop that they were not at.
+DEGENERATE = (1032, 1111, 1113, 1118, 1194, 1195, 1235, 3007, 3019, 10123, 10350)
+
+
+@pytest.mark.parametrize("seed", DEGENERATE)
+def test_a_body_whose_stops_leave_it_no_room_or_no_choice_goes_on(seed: int) -> None:
+    assert check(seed) is None

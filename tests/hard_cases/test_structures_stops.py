@@ -216,3 +216,13 @@ def test_a_beam_with_four_stops_and_uneven_damping_loses_what_its_balance_says()
             for stop, sign in zip(stops[:2], (1.0, -1.0), strict=True):
                 assert sign * (np.asarray(stop.shape) @ body.displacement - stop.position) <= 1e-12 * size
         assert len(body.impacts) > 100
+
+
+def test_two_masses_let_go_at_one_instant_write_one_stick_each() -> None:
+    # both forces fall through 0 where the cosine does; rounding tells the instants apart
+    stops = [Stop([1.0, 0.0], 0.1, restitution=0.0), Stop([0.0, 1.0], 0.4, restitution=0.0)]
+    coupling = [[0.5, 0.0], [0.0, 0.0]]
+    with Structure(Modes([0.0, 0.0], 0.0, [3.0, 1.0], 0.3, coupling=coupling), stops) as body:
+        assert body.advance(2.0 * np.pi / 0.3) == DONE
+        assert sorted(body.sticks[:, 3]) == [1.0, 2.0]
+        assert np.all(body.sticks[:, 2] > body.sticks[:, 1] + 1.0)

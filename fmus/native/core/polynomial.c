@@ -46,16 +46,14 @@ double vi_polynomial_size(const double c[VI_ORDER + 1], double length)
 static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p, double length, double noise)
 {
     const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
-    if (square < 0.0) {
-        return (vi_fall){true, vi_min(length, u - p->velocity / p->acceleration), 0.0};
-    }
+    const double step = square < 0.0 ? -p->velocity / p->acceleration : 2.0 * p->clearance / (p->velocity + sqrt(square));
     double value[4];
-    const double root = vi_min(length, u + 2.0 * p->clearance / (p->velocity + sqrt(square)));
+    const double root = vi_min(length, u + step);
     vi_polynomial_at(c, root, value);
-    if (!(value[0] >= -2.0 * noise)) { /* the velocity is no more than rounding, as the value is */
+    if (!(fabs(value[0]) <= 2.0 * noise)) { /* the velocity is no more than rounding, as the value is */
         return (vi_fall){true, u, p->velocity};
     }
-    return (vi_fall){true, root, vi_max(0.0, -value[1])};
+    return (vi_fall){true, root, square < 0.0 ? 0.0 : vi_max(0.0, -value[1])};
 }
 
 vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double length, double noise)

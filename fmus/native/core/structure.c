@@ -6,6 +6,9 @@
 #include "majorant.h"
 #include "structure_parts.h"
 
+/* A contact just released stays on its stop for this times (1 / fastest rate + |time|): others that are released with it
+ * are so at its instant but for the rounding of their forces. */
+static const double ONE_RELEASE = 16.0 * DBL_EPSILON;
 /* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
 static const double LANDING = 1e-13;
 /* A contact that leaves its stop, and within a radian of the fastest mode goes no further than this times its other
@@ -54,7 +57,12 @@ static void move(const vi_structure *s, double u, segment_end end, vi_instant ta
 {
     vi_structure_state *state = s->state;
     const vi_instant after = end == ENDS_AT_TARGET ? target : vi_clock_after(&s->model->clock, state->now, u);
+    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 0.0;
+    const double one = ONE_RELEASE * (radian + fabs(vi_clock_time(&s->model->clock, state->now)));
     for (int k = 0; k < s->model->contacts && u > 0.0; ++k) {
+        if (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k] && u <= one) {
+            continue;
+        }
         if (state->status[k] == VI_CONTACT_TOUCHING) {
             state->status[k] = VI_CONTACT_FREE;
         }

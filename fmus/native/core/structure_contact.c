@@ -33,7 +33,9 @@ void vi_structure_release(const vi_structure *s, int k, int leaving)
     vi_contact *contact = &s->contacts[k];
     contact->stick_end = vi_clock_time(&s->model->clock, s->state->now);
     contact->stick_start = fmin(contact->stick_start, contact->stick_end); /* lifted before the chatter had ended */
-    vi_record_stick(s->record, contact->stick_start, contact->stick_end, k + 1, s->state->tail_impulse[k]);
+    if (contact->stick_end > contact->stick_start || s->state->tail_impulse[k] > 0.0) {
+        vi_record_stick(s->record, contact->stick_start, contact->stick_end, k + 1, s->state->tail_impulse[k]);
+    }
     contact->stuck = 0;
     s->state->status[k] = VI_CONTACT_TOUCHING;
     s->state->leaving[k] = leaving;
@@ -45,10 +47,15 @@ void vi_structure_touch_down(const vi_structure *s, int k)
 {
     vi_contact *contact = &s->contacts[k];
     const vi_clock *clock = &s->model->clock;
-    const double approach = vi_max(0.0, vi_structure_approach(s, k));
+    const double v = vi_structure_approach(s, k), size = vi_structure_displacement_size(s, k);
+    const double approach = v > VI_ROUNDING * vi_structure_velocity_size(s, k) ? v : 0.0;
     s->state->budget.events += 1;
     s->state->status[k] = VI_CONTACT_YIELDING;
     s->state->leaving[k] = 0;
+    /* a contact that begins now begins at depth 0: a graze is over before its depth would outgrow rounding */
+    if (fabs(vi_structure_clearance(s, k)) <= SAME_INSTANT * DBL_EPSILON * size) {
+        s->state->leaving[k] = approach > 0.0 ? 1 : 2;
+    }
     s->state->touch_down[k] = (vi_touch_down){vi_clock_time(clock, s->state->now), vi_clock_phase(clock, s->state->now),
                                               approach, 0.0};
     contact->count += 1;
@@ -67,9 +74,31 @@ static double pressing_now(const vi_structure *s, int k)
     return damping * rate + (law->law == VI_LAW_KELVIN_VOIGT ? law->stiffness * depth : 1.0);
 }
 
+/* A contact that ends at the instant at which it began without speed has only touched: it stays as it is until something moves. */
+static bool only_touched(const vi_structure *s, int k)
+{
+    if (s->state->leaving[k] != 2) {
+        return false;
+    }
+    s->contacts[k].count -= 1;
+    s->state->status[k] = VI_CONTACT_TOUCHING;
+    return true;
+}
+
+/* Is what ends now a touch of rounding size, with neither speed nor impulse? It is no impact. */
+static bool is_rounding(const vi_structure *s, int k)
+{
+    const vi_touch_down *touch = &s->state->touch_down[k];
+    const double noise = VI_ROUNDING * vi_structure_velocity_size(s, k);
+    return touch->velocity == 0.0 && touch->impulse * s->model->mobility[k][k] <= noise;
+}
+
 void vi_structure_separate(const vi_structure *s, int k, bool receding)
 {
     vi_structure_state *state = s->state;
+    if (only_touched(s, k)) {
+        return;
+    }
     const vi_touch_down *touch = &state->touch_down[k];
     const double now = vi_clock_time(&s->model->clock, state->now), rebound = -vi_structure_approach(s, k);
     const double restitution = touch->velocity > 0.0 ? vi_max(0.0, rebound) / touch->velocity : 0.0;
@@ -77,9 +106,13 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
     const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
     /* the last push of a thin contact has thrown it out a little before this instant */
     const double late = penetration < 0.0 && rebound > 0.0 ? -penetration / rebound : 0.0;
-    s->contacts[k].impulse = touch->impulse;
-    vi_record_contact(s->record, touch->time, touch->phase, touch->velocity, touch->impulse, k + 1, restitution,
-                      vi_max(0.0, now - touch->time - late));
+    if (is_rounding(s, k)) {
+        s->contacts[k].count -= 1;
+    } else {
+        s->contacts[k].impulse = touch->impulse;
+        vi_record_contact(s->record, touch->time, touch->phase, touch->velocity, touch->impulse, k + 1, restitution,
+                          vi_max(0.0, now - touch->time - late));
+    }
     const double surface = vi_max(0.0, penetration), tau = s->contacts[k].relaxation_time;
     state->surface[k] = rebound * tau > surface ? surface : 0.0; /* a surface that is faster follows without force */
     state->separated[k] = state->now;
@@ -89,7 +122,8 @@ void vi_structure_separate(const vi_structure *s, int k, bool receding)
     if (receding && (linear ? penetration > WITH_IT * noise : pressing_now(s, k) <= GONE && penetration > noise)) {
         state->status[k] = VI_CONTACT_RECEDING;
     } else {
-        state->status[k] = VI_CONTACT_TOUCHING;
+        /* an impact elsewhere may have put it off its stop, and be on its way back */
+        state->status[k] = -penetration > SAME_INSTANT / 4.0 * noise ? VI_CONTACT_FREE : VI_CONTACT_TOUCHING;
         state->leaving[k] = 0;
     }
 }

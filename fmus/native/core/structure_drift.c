@@ -13,9 +13,6 @@ static const double RELAXED = 1e-16;
 /* A power law is entered as a thin contact from this much of the depth of that thin contact. */
 static const double ENTRY = 1e-3;
 
-/* Roundings of a displacement up to which a contact is on its stop. */
-static const double SAME_INSTANT = 16.0;
-
 /* A receding contact that is pressed by more than so many roundings was thrown back. */
 static const double THROWN = 1e4;
 
@@ -117,12 +114,6 @@ static void look(const vi_structure *s, situation *now)
     vi_structure_held_now(s, now->held);
     for (int k = 0; k < s->model->contacts; ++k) {
         now->at[k] = -vi_structure_clearance(s, k);
-        /* a contact that begins now begins at depth 0: a graze is over before its depth would outgrow rounding */
-        if (s->state->status[k] == VI_CONTACT_YIELDING
-            && s->state->touch_down[k].time == vi_clock_time(&s->model->clock, s->state->now)
-            && fabs(now->at[k]) <= SAME_INSTANT * DBL_EPSILON * vi_structure_displacement_size(s, k)) {
-            now->at[k] = 0.0;
-        }
         now->sign[k] = vi_structure_direction(s, k);
         now->press[k] = vi_structure_press(s, k);
         now->thin[k] = 0;
@@ -296,23 +287,29 @@ double vi_structure_pressing_noise(const vi_structure *s, int k)
 /* What has the sign of a yielding contact's force, and falls through zero with it: the force itself or, of a power law,
  * 1 + damping d'. The series of its force does not reach as far as that of the motion: near touch-down it moves nothing
  * yet, but has its singularity there. */
-static void pressing(const vi_drift *drift, const situation *now, int k, double sense[VI_ORDER + 1])
+static void pressing(const situation *now, int k, const double depth[VI_ORDER + 1], double sense[VI_ORDER + 1])
 {
-    const double *depth = drift->penetration[k];
+    const vi_press *press = &now->press[k];
     for (int n = 0; n <= VI_ORDER; ++n) {
         const double rate = n < VI_ORDER ? (double)(n + 1) * depth[n + 1] : 0.0;
-        sense[n] = now->press[k].kind == VI_PRESS_POWER ? (n == 0 ? 1.0 : 0.0) + now->press[k].damping * rate
-                                                        : drift->force[k][n];
+        const bool power = press->kind == VI_PRESS_POWER;
+        const double level = n > 0 ? 0.0 : power ? 1.0 : press->constant;
+        sense[n] = level + (power ? 0.0 : press->stiffness * depth[n]) + press->damping * rate;
     }
 }
 
 static void separations(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double length,
                         event_found *first)
 {
-    const double *depth = drift->penetration[k];
+    double depth[VI_ORDER + 1];
+    memcpy(depth, drift->penetration[k], sizeof depth);
+    if (s->state->leaving[k] == 2) { /* what begins to press without speed does not move out by rounding */
+        depth[1] = vi_max(0.0, depth[1]);
+        depth[2] = vi_max(0.0, depth[2]);
+    }
     if (!now->thin[k]) {
         double force[VI_ORDER + 1];
-        pressing(drift, now, k, force);
+        pressing(now, k, depth, force);
         const double rounding = VI_ROUNDING * vi_polynomial_size(force, length);
         vi_fall fall = {true, 0.0, 1.0};
         /* else an impact elsewhere, or the start, has thrown the point off its stop */

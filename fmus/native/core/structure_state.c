@@ -96,7 +96,8 @@ double vi_structure_approach(const vi_structure *s, int k)
 double vi_structure_clearance(const vi_structure *s, int k)
 {
     const int32_t status = s->state->status[k];
-    if (status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD) {
+    const bool begins = status == VI_CONTACT_YIELDING && s->state->leaving[k];
+    if (status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD || begins) {
         return 0.0;
     }
     const double displacement = vi_structure_at(s->model, s->model->shape[k], s->state->q);

@@ -1,0 +1,196 @@
+"""Adversarial random bodies: always two kinds of stop on one, in the places where decisions are hardest.
+
+Oscillators, chains and beams with coincident and opposed stops, no room between them, symmetric points, starts on a
+stop or in it, no springs, restitution 0 and 1, stiffnesses over twelve decades. `check` runs one and says what is wrong
+with it.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from random_structures import ALL_LAWS, COMPLIANT, MOST_IMPACTS, POWER, Array, Run, Scene, apart, follow
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.fmus.modes import beam_modes, chain_modes
+from vibroimpact.fmus.structure import IMPACT_LIMIT, Modes, Stop, Structure
+
+#: Processor time that a run may take, s.
+LONGEST = 2.0
+#: A run is followed for at most so many radians of its stiffest stop: resting on it takes their time.
+MOST_RADIANS = 1e4
+CASES = 20_000
+DURATION = 10.0
+STEPS = 97
+#: Energy that may be missing, of all that was turned over; with power laws, followed to a tolerance of 1e-10 each.
+TURNOVER, TURNOVER_POWER = 1e-11, 1e-7
+#: Beyond a rigid stop, of the displacements that add up there.
+PENETRATION = 1e-12
+
+
+@dataclass(frozen=True)
+class Body:
+    """The modes of a body and the shapes of its points that may be hit, shape (points, modes)."""
+
+    natural: Array
+    damping_ratio: Array
+    points: Array
+    coupling: Array | None
+
+
+def _pick(random: np.random.Generator, *values: float) -> float:
+    return float(random.choice(values))
+
+
+def _oscillator(random: np.random.Generator) -> Body:
+    natural = np.array([_pick(random, 0.0, 1.0, 1.0, 7.0)])
+    ratio = np.array([_pick(random, 0.0, 0.02, 1.0, 3.0) if natural[0] > 0.0 else 0.0])
+    return Body(natural, ratio, np.array([[_pick(random, 0.5, 1.0, 2.0)]]), None)
+
+
+def _chain(random: np.random.Generator) -> Body:
+    n = int(random.integers(2, 4))
+    masses, springs = random.choice([0.5, 1.0, 2.0], n), random.choice([0.0, 1.0, 5.0], n)
+    found = chain_modes(masses, springs, random.choice([0.0, 0.1, 2.0], n))
+    return Body(found.natural, found.damping_ratio, found.shapes, None if found.classical else found.damping)
+
+
+def _beam(random: np.random.Generator) -> Body:
+    count = int(random.integers(1, 5))
+    boundary = str(random.choice(["pinned_pinned", "clamped_free", "clamped_clamped", "clamped_pinned"]))
+    found = beam_modes(boundary, count)  # type: ignore[arg-type]  # a literal that numpy has drawn
+    natural = (np.asarray(found.eigenvalues) / found.eigenvalues[0]) ** 2
+    places = np.round(random.uniform(0.1, 0.9, 4), 2)
+    places = np.concatenate([places, 1.0 - places, [0.5]])  # symmetric pairs, and a node of every other mode
+    return Body(natural, np.full(count, _pick(random, 0.0, 0.02, 0.3)), found.shapes(places), None)
+
+
+def _law(random: np.random.Generator, law: str) -> dict[str, float | str]:
+    if law == "restitution":
+        return {"law": law, "restitution": _pick(random, 0.0, 0.0, 0.3, 0.5, 0.9, 1.0)}
+    chosen: dict[str, float | str] = {"law": law, "stiffness": float(10.0 ** random.integers(-2, 11))}
+    if law != "hertz":
+        chosen["damping"] = _pick(random, 0.0, 0.01, 0.1, 3.0)
+    if law == "hunt_crossley":
+        chosen["exponent"] = _pick(random, 1.0, 1.5, 2.5)
+    return chosen
+
+
+def _stops(random: np.random.Generator, body: Body, q: Array) -> tuple[Stop, ...]:
+    laws = ["restitution", str(random.choice(COMPLIANT))]
+    laws += [str(law) for law in random.choice(ALL_LAWS, int(random.integers(0, 4)))]
+    gaps = (0.0, 0.0, 0.0, 1e-15, 1e-9, 0.01, 0.1)
+    stops: list[Stop] = []
+    for law in laws:
+        shape, side = (
+            body.points[int(random.integers(len(body.points)))],
+            str(random.choice(["upper", "lower"])),
+        )
+        if stops and random.random() < 0.3:  # at the point of another
+            shape = np.asarray(stops[-1].shape)
+        gap = _pick(random, *gaps)
+        if law in COMPLIANT and random.random() < 0.1:
+            gap = -0.01  # pressed in at the start
+        position = float(shape @ q) + gap * (1.0 if side == "upper" else -1.0)
+        stops.append(Stop(shape, position, side=side, **_law(random, law)))  # type: ignore[arg-type]
+    order = random.permutation(len(stops))
+    return tuple(stops[k] for k in order)
+
+
+def fastest(modes: Modes, stops: tuple[Stop, ...]) -> float:
+    """Return the rate that the body reaches with its stiffest stop pressed by a unit, rad/s."""
+    rates = [float(np.max(modes.natural)), modes.angular_frequency]
+    for stop in stops:
+        mobility = float(np.square(np.asarray(stop.shape)).sum())
+        rates.append(np.sqrt(stop.stiffness * mobility))
+        if stop.law == "kelvin_voigt":
+            rates.append(stop.damping * mobility)
+    return max(1.0, *rates)
+
+
+def case(seed: int) -> Scene:
+    """Return the scene of this number."""
+    random = np.random.default_rng(seed)
+    body = (_oscillator, _chain, _beam)[int(random.integers(3))](random)
+    n = len(body.natural)
+    frequency = _pick(random, 0.0, 0.3, 1.0, 2.5)
+    force = body.points.T @ random.choice([0.0, 0.0, 1.0, -0.5, 3.0], len(body.points))
+    q = np.zeros(n) if random.random() < 0.7 else np.round(0.1 * random.normal(size=n), 2)
+    p = np.round(random.normal(size=n), 1) * _pick(random, 0.0, 1.0, 1.0)
+    if random.random() < 0.2 and n > 1:
+        p[1::2] = 0.0  # beams: symmetric motion
+    modes = Modes(body.natural, body.damping_ratio, force, frequency, 0.0, body.coupling)
+    stops = _stops(random, body, q)
+    return Scene(modes, stops, q, p, min(DURATION, MOST_RADIANS / fastest(modes, stops)))
+
+
+def _energy_problem(scene: Scene) -> str | None:
+    """Follow it in steps with its energies; return what is missing, penetrates or pulls."""
+    power = any(stop.law in POWER for stop in scene.stops)
+    with scene.body(energies=True) as body:
+        start = turnover = body.energy
+        work = loss = contact = 0.0
+        for step in range(STEPS):
+            ended = body.advance(scene.duration * (step + 1) / STEPS - body.time, most_impacts=MOST_IMPACTS)
+            turnover += (
+                abs(body.forcing_work - work)
+                + abs(body.contact_loss - contact)
+                + abs(body.damping_loss - loss)
+            )
+            work, loss, contact = body.forcing_work, body.damping_loss, body.contact_loss
+            balance = body.energy - start - (work - loss - contact)
+            allowed = (TURNOVER_POWER if power else TURNOVER) * (turnover + body.energy) + 1e-15 * max(
+                1.0, scene.speed
+            ) ** 2
+            if not abs(balance) <= allowed:
+                return f"energy off by {balance:.3g} of {turnover:.3g} at {body.time:.6g} s"
+            found = _state_problem(scene, body)
+            if found or ended == IMPACT_LIMIT:
+                return found
+    return None
+
+
+def _state_problem(scene: Scene, body: Structure) -> str | None:
+    if not np.all(body.forces >= 0.0):
+        return f"a stop pulls: {body.forces} at {body.time:.6g} s"
+    for k, stop in enumerate(scene.stops):
+        sign = 1.0 if stop.side == "upper" else -1.0
+        terms = np.asarray(stop.shape) * body.displacement
+        beyond = sign * (terms.sum() - stop.position)
+        size = abs(stop.position) + np.abs(terms).sum() + 1e-3 * scene.speed
+        if stop.law == "restitution" and beyond > PENETRATION * size:
+            return f"{beyond:.3g} beyond stop {k + 1} at {body.time:.6g} s"
+    if np.any(body.sticks[:, 2] < body.sticks[:, 1]):
+        return "a stick ends before it begins"
+    return None
+
+
+def _timed(scene: Scene, steps: int) -> tuple[Run, float]:
+    begun = time.process_time()
+    run = follow(scene, [scene.duration], stepped=[scene.duration * (i + 1) / steps for i in range(steps)])
+    return run, time.process_time() - begun
+
+
+def check(seed: int) -> str | None:
+    """Run the scene of this number in one step and in 97; return what is wrong, None where nothing is."""
+    try:
+        return _problem(case(seed))
+    except ComponentError as error:
+        return str(error)
+
+
+def _problem(scene: Scene) -> str | None:
+    one, seconds = _timed(scene, 1)
+    if seconds > LONGEST:
+        return f"took {seconds:.1f} s"
+    many, seconds = _timed(scene, STEPS)
+    if seconds > LONGEST:
+        return f"took {seconds:.1f} s in {STEPS} steps"
+    # stops at one place let rounding decide which is hit: a run that was decided otherwise is another run
+    if IMPACT_LIMIT not in (one.ended, many.ended) and one.counts == many.counts:
+        for _, difference, allowed in apart(scene, one, many, [scene.duration]):
+            if not difference <= allowed:
+                return f"one step or {STEPS}: apart by {difference:.3g}, allowed {allowed:.3g}"
+    return _energy_problem(scene)
