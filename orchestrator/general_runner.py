@@ -177,6 +177,11 @@ class GeneralRunner:
             for watch in self._importer.watches
             if watch.accumulated
         ]
+        remarks += [
+            f"{name} changed the rounding of numbers in its process; it was set back after each of its steps"
+            for name, component in self._importer.components.items()
+            if component.instance.changed_rounding
+        ]
         if self._importer.wants_to_end:
             remarks.append(f"a component asked for the end at time {self._importer.time:.17g}")
             if self._importer.overrun > self._importer.time:

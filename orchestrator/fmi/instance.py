@@ -16,6 +16,7 @@ from vibroimpact.fmus.archive import UnpackedFmu
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.library import Function, Library
 from vibroimpact.orchestrator.fmi.log import LogTail
+from vibroimpact.orchestrator.fmi.rounding import is_usual, set_usual
 from vibroimpact.orchestrator.fmi.variables import DTYPES, VariableGroup
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
@@ -49,6 +50,8 @@ class Instance(ABC):
         The time reached by the last `step`, s.
     internal_step : float
         Step of the FMU's own solver that its description declares, s; 0: none. Its steps end at multiples of that.
+    changed_rounding : bool
+        It has changed the rounding mode of the process, or the treatment of subnormal numbers; it was set back.
     is_fatal : bool
         A call returned fatal: no function of the FMU may be called any more.
     needs_event_mode, returned_early, wants_to_end : bool
@@ -70,6 +73,7 @@ class Instance(ABC):
         self.needs_event_mode = self.returned_early = self.wants_to_end = self.is_flagged = False
         self.is_fatal = False
         self.internal_step = 0.0
+        self.changed_rounding = False
         self._library = Library(fmu)
         self._wrap = wrap
         self._pointer = c_void_p()
@@ -148,7 +152,15 @@ class Instance(ABC):
 
     def exit_initialization(self) -> None:
         """Leave initialization mode; the FMU checks its parameters here."""
-        self.check(self._exit_initialization(), "ExitInitializationMode")
+        status = self._exit_initialization()
+        self._keep_rounding()
+        self.check(status, "ExitInitializationMode")
+
+    def _keep_rounding(self) -> None:
+        """Undo a change of the rounding mode, which would change the values of other components."""
+        if not is_usual():
+            set_usual()
+            self.changed_rounding = True
 
     def reset(self) -> None:
         """Go back to the state after instantiation: the instance is ready for another run."""

@@ -11,6 +11,7 @@ from pathlib import Path
 from vibroimpact.fmus.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, WARNING, Instance, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
+from vibroimpact.orchestrator.fmi.rounding import HALF, ONE, SMALL, TINY
 from vibroimpact.orchestrator.fmi.variables import FMI2_NAMES
 
 CO_SIMULATION = 1
@@ -62,6 +63,7 @@ class Instance2(Instance):
         )
         if not self._take_kept():
             self._instantiate()
+        self._keep_rounding()
         self._bind_life()
         self._do_step: Callable[[], int] = self._bound("DoStep", self._step_time, self._step_size, c_int(0))
         self._get_state = self._function("GetFMUstate")
@@ -118,6 +120,8 @@ class Instance2(Instance):
         self._step_time.value = time
         self._step_size.value = size
         status = self._do_step()
+        if ONE + TINY != ONE - TINY or SMALL * HALF == 0.0:
+            self._keep_rounding()
         self.wants_to_end = self.is_flagged = False
         if status > WARNING:
             if status != DISCARD:

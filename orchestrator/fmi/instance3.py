@@ -10,6 +10,7 @@ from functools import partial
 from vibroimpact.fmus.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.instance import DISCARD, Instance, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
+from vibroimpact.orchestrator.fmi.rounding import HALF, ONE, SMALL, TINY
 
 
 class Instance3(Instance):
@@ -52,6 +53,7 @@ class Instance3(Instance):
         self.event_mode = event_mode
         self.may_return_early = early_return or event_mode
         self._instantiate()
+        self._keep_rounding()
         self._bind_life()
         self._bind_events()
         self._bind_states()
@@ -105,6 +107,8 @@ class Instance3(Instance):
         self._step_time.value = time
         self._step_size.value = size
         status = self._do_step()
+        if ONE + TINY != ONE - TINY or SMALL * HALF == 0.0:
+            self._keep_rounding()
         if status and status != DISCARD:
             self.check(status, "DoStep")
         reached = self.time = self._last_time.value

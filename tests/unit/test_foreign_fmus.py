@@ -11,6 +11,7 @@ import pytest
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.archive import unpack
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, SceneError
+from vibroimpact.orchestrator.fmi import rounding
 from vibroimpact.orchestrator.general_runner import GeneralRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
@@ -206,6 +207,36 @@ def test_two_components_end_together_where_the_second_asks_for_the_end(folder: P
     np.testing.assert_allclose(found.samples[:, 2], found.samples[:, 0], rtol=0, atol=1e-12)
     found = run(text.replace('variables = ["culprit.y", "before.y"]\nrate = 100', ""), folder)
     assert "others, which could not be taken back, had been stepped to 0.4" in found.message
+
+
+# ---- the rounding mode ----
+
+
+@pytest.mark.parametrize("place", ["step", "exit_initialization", "instantiate"])
+@pytest.mark.parametrize("fault", ["round_upward", "flush_to_zero"])
+def test_a_component_that_changes_the_rounding_is_named_and_changes_no_other_component(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, fault: str, place: str
+) -> None:
+    def one(told: str, where: str) -> RunRecord:
+        text = LIES.format(
+            major="3", fault=told, early=0, record='variables = ["after.displacement"]\nrate = 100'
+        )
+        text = text.replace("says_early = 0", f'fault_place = "{where}"')
+        after = '[component.after]\nfmu = "Oscillator"\nparameters = { displacement_start = 1.0 }\n[record]'
+        return run(text.replace("[record]", after), folder)
+
+    usual = one("none", "step")
+    if place == "instantiate":
+        monkeypatch.setenv(
+            "VIBROIMPACT_FAULTY_INSTANTIATE", {"round_upward": "23", "flush_to_zero": "24"}[fault]
+        )
+    found = one(fault, "step" if place == "instantiate" else place)
+    monkeypatch.undo()
+    assert rounding.is_usual()
+    assert usual.samples is not None
+    assert found.samples is not None
+    np.testing.assert_array_equal(found.samples, usual.samples)  # bit for bit
+    assert "culprit changed the rounding of numbers in its process" in found.message
 
 
 # ---- what this importer does not import ----
