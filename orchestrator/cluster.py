@@ -4,19 +4,7 @@ No other module imports dask or distributed. A campaign sees a `WorkerPool`: sub
 know when a worker was lost. Where the workers live (embedded in this machine or behind a scheduler's
 address) makes no difference to it.
 
-Where two workers on two processors lose time to two bare processes, measured on chunks of 0.6 s of work:
-
-- Timers. With Dask's defaults an idle worker spends 20 ms of each second in its event loop and the process
-  with scheduler and nannies 27 ms; under load this is 6 % and 3 % of the machine. Half of it is the
-  statistical profiler (100 samples/s, each needs the interpreter lock of the working thread), most of the rest
-  the `tick` that watches the event loop (50/s), then the system and memory monitors. With `QUIET` it is 3 ms
-  and 8 ms.
-- The first dataset a process builds loads libraries for 0.4 s. `chunks.get_ready` does that, and loads the
-  components, before the first chunk.
-- The end: chunks of one size leave a worker idle for half a chunk. `schedule` makes them shorter.
-- Waiting: a worker with an empty queue waits some 5 ms for the next chunk, so there are always more queued.
-
-What stays is about 10 ms of processor time for each chunk and each part, and these timers: 2 to 4 %.
+docs/clusters.md says where the time goes that two workers lose to two bare processes, and what `QUIET` is for.
 """
 
 from __future__ import annotations
@@ -27,10 +15,11 @@ import queue
 import signal
 import time
 from collections.abc import Callable, Iterator, Set
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
-from typing import Any
+from functools import partial
+from types import TracebackType
+from typing import Any, Self
 
 import dask
 from distributed import CancelledError, Client, Future, LocalCluster
@@ -40,6 +29,8 @@ from distributed.security import Security
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.fmus.python_child import safe_module_path
+from vibroimpact.orchestrator.dask_settings import QUIET
+from vibroimpact.orchestrator.lone_process import interrupts_blocked
 from vibroimpact.orchestrator.progress import Progress, Silence
 from vibroimpact.orchestrator.scratch import ScratchFolder
 
@@ -64,8 +55,14 @@ RESULT_SECONDS = 10.0
 DEAD_SECONDS = 5.0
 """How long one of our own workers may be dead before another one is started in its place, s."""
 
-TLS_HINT = "Dask's configuration names them: docs/clusters.md shows how."
-"""Where certificates come from, for messages."""
+STALL_SECONDS = 10.0
+"""How long nothing may end before the pool asks whether anything is being computed, s."""
+
+IDLE_LOOKS = 3
+"""How often in a row the answer must be no, before the connections count as stalled."""
+
+MOST_RESTARTS = 3
+"""Stalls in a row, without a piece of work that ended, that end the campaign."""
 
 MOST_REPLACEMENTS = 50
 """How often in a campaign workers are started in place of dead ones; then the others go on alone."""
@@ -75,27 +72,6 @@ MOST_STARTS = 5
 
 MOST_DEATHS = 5
 """Deaths for each worker, while all get ready, at which the scene counts as what kills them."""
-
-QUIET = {
-    "distributed.worker.profile.enabled": False,
-    "distributed.worker.memory.target": False,
-    "distributed.worker.memory.spill": False,
-    "distributed.worker.memory.pause": False,
-    "distributed.worker.memory.terminate": False,
-    "distributed.admin.system-monitor.interval": "10s",
-    "distributed.admin.system-monitor.gil.enabled": False,
-    "distributed.admin.tick.interval": "1s",
-    "distributed.admin.tick.limit": "1h",
-    "distributed.scheduler.active-memory-manager.start": False,
-    "distributed.scheduler.work-stealing-interval": "100ms",
-    "distributed.client.scheduler-info-interval": "10s",
-    "distributed.scheduler.http.routes": [],
-    "distributed.worker.http.routes": [],
-    # A chunk whose worker died twice is handed back, so that the campaign can find the point that kills.
-    "distributed.scheduler.allowed-failures": 1,
-    "logging": {"distributed": "critical"},
-}
-"""Settings of Dask: what it does beside the work is switched off or slowed down, see above."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,26 +98,49 @@ class WorkerPool:
 
     Parameters
     ----------
-    cluster : _Cluster
-        Connected to the workers.
+    connect : callable
+        Opens a connection to the workers.
     where : str
         Where the workers are, for messages.
     progress : Progress
         Told of workers that were lost.
+
+    Attributes
+    ----------
+    lost_workers : int
+        How many died so far.
+    is_local : bool
+        Whether the workers are processes of this command.
     """
 
-    def __init__(self, cluster: _Cluster, where: str, progress: Progress) -> None:
-        self._cluster = cluster
-        self._client = cluster.client
+    def __init__(
+        self, connect: Callable[[], AbstractContextManager[_Cluster]], where: str, progress: Progress
+    ) -> None:
+        self._connect = connect
         self._where = where
         self._progress = progress
-        self._ended: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._calls: dict[int, tuple[Any, ...]] = {}
         self._futures: dict[int, Future[Any]] = {}
-        self._tickets = 0
-        self._present: frozenset[str] = frozenset()
-        self._looked = self._last_present = self._last_complete = time.monotonic()
-        self._replacements = 0
+        self._tickets = self._replacements = self._restarts = 0
         self.lost_workers = 0
+        self.is_local = False
+        self._connection = ExitStack()
+        self._open()
+
+    def _open(self) -> None:
+        self._cluster = self._connection.enter_context(self._connect())
+        self._client, self.is_local = self._cluster.client, self._cluster.size > 0
+        self._ended: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._present: frozenset[str] = frozenset()
+        self._looked = self._last_present = self._last_complete = self._last_moved = time.monotonic()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._connection.__exit__(kind, error, trace)
 
     def worker_addresses(self) -> tuple[str, ...]:
         """Return the addresses of the workers that are there now; take note of those that are not any more.
@@ -212,6 +211,9 @@ class WorkerPool:
             answers |= self._new_answers(calls, calls.keys() - answers.keys())
             if calls and len(answers) == len(calls) and self._is_complete(began):
                 return answers
+            if len(answers) < len(calls) and self._is_stalled():
+                self._restart()
+                calls, answers = {}, {}
 
     def _new_answers(self, calls: dict[str, Future[Any]], waiting: Set[str]) -> dict[str, Any]:
         """Return the answers that are there after a while; a call that was lost is taken out of `calls`."""
@@ -241,14 +243,17 @@ class WorkerPool:
     def submit(self, function: Callable[..., Any], *arguments: Any) -> int:
         """Queue a call on whichever worker is free first; return the ticket of its `Finished`."""
         self._tickets += 1
-        ticket = self._tickets
-        future = self._client.submit(function, *arguments, pure=False)
-        self._futures[ticket] = future
-        self._announce(ticket, future)
-        return ticket
+        self._calls[self._tickets] = (function, *arguments)
+        self._send(self._tickets)
+        return self._tickets
 
-    def _announce(self, ticket: int, future: Future[Any]) -> None:
-        future.add_done_callback(lambda _future: self._ended.put(ticket))
+    def _send(self, ticket: int) -> None:
+        self._futures[ticket] = self._client.submit(*self._calls[ticket], pure=False)
+        self._announce(ticket)
+
+    def _announce(self, ticket: int) -> None:
+        ended = self._ended
+        self._futures[ticket].add_done_callback(lambda _future: ended.put(ticket))
 
     def next_finished(self) -> Finished:
         """Wait for the next piece of work to end.
@@ -264,10 +269,14 @@ class WorkerPool:
             try:
                 ticket = self._ended.get(timeout=LOOK_SECONDS)
             except queue.Empty:
+                if self._is_stalled():
+                    self._restart()
                 continue
+            self._last_moved = time.monotonic()
             finished = self._finished_work(ticket, self._futures[ticket])
             if finished is not None:
-                del self._futures[ticket]
+                del self._futures[ticket], self._calls[ticket]
+                self._restarts = 0
                 return finished
 
     def _finished_work(self, ticket: int, future: Future[Any]) -> Finished | None:
@@ -287,13 +296,58 @@ class WorkerPool:
             if future.status == "error" or not isinstance(error, TimeoutError):
                 return Finished(ticket, error=error)
         # Its worker died with the result in its memory; another one works on it already.
-        self._announce(ticket, future)
+        self._announce(ticket)
         return None
+
+    def _is_stalled(self) -> bool:
+        """Return whether no worker computes although work is out: messages about it were not sent.
+
+        Dask sends a message when the wall clock has passed a deadline; where the clock was set back, that is
+        never.
+        """
+        if time.monotonic() - self._last_moved < STALL_SECONDS or not self._present:
+            return False
+        for _ in range(IDLE_LOOKS):
+            if not self._is_idle():
+                self._last_moved = time.monotonic()
+                return False
+            time.sleep(LOOK_SECONDS)
+        return self._ended.empty()
+
+    def _is_idle(self) -> bool:
+        """Return whether all workers answer, and none computes; asked on a way of its own."""
+        scheduler = self._client.scheduler
+        if scheduler is None:
+            return False
+        try:
+            return not self._client.sync(scheduler.call_stack, keys=None, callback_timeout=RESULT_SECONDS)
+        except (OSError, TimeoutError):
+            return False
+
+    def _restart(self) -> None:
+        """Connect anew and send all work again; a chunk that is computed twice gives the same part."""
+        stalled = CampaignError(
+            f"{self._where}: expected workers that compute, got workers that wait while work is there. "
+            "Was a clock set back? The same command resumes."
+        )
+        if self._restarts == MOST_RESTARTS:
+            raise stalled
+        self._restarts += 1
+        self._progress.note(
+            f"{self._where}: nothing moves although work is there, as after a clock that was set back; "
+            "connecting to the workers anew."
+        )
+        self._connection.__exit__(CampaignError, stalled, None)
+        self._open()
+        self.wait_for_workers()
+        for ticket in self._calls:
+            self._send(ticket)
 
     def cancel_all(self) -> None:
         """Withdraw all work that has not begun."""
         futures = list(self._futures.values())
         self._futures.clear()
+        self._calls.clear()
         if futures:
             self._client.cancel(futures, force=True)
 
@@ -323,14 +377,14 @@ def open_workers(
     # Its warnings about workers that end are about what is meant here, or said better by an error.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with dask.config.set(QUIET), ExitStack() as stack:
-        if scheduler is not None:
-            cluster = stack.enter_context(_remote_cluster(scheduler))
-        else:
+        if scheduler is None:
             stack.enter_context(safe_module_path())
             scratch = stack.enter_context(ScratchFolder("workers"))
             stack.enter_context(dask.config.set({"temporary-directory": scratch.name}))
-            cluster = stack.enter_context(_embedded_cluster(workers or processor_count()))
-        pool = WorkerPool(cluster, scheduler or "this machine", progress or Silence())
+            connect = partial(_embedded_cluster, workers or processor_count())
+        else:
+            connect = partial(_remote_cluster, scheduler)
+        pool = stack.enter_context(WorkerPool(connect, scheduler or "this machine", progress or Silence()))
         pool.wait_for_workers()
         yield pool
 
@@ -349,9 +403,11 @@ def _remote_cluster(address: str) -> Iterator[_Cluster]:
         security = Security()
         certified = security.get_connection_args("client")["ssl_context"] is not None
     except OSError as error:
-        raise UsageError(f"{expected}, and certificates that can be read, got {error}. {TLS_HINT}") from error
+        raise UsageError(
+            f"{expected}, and certificates that can be read, got {error}. See docs/clusters.md."
+        ) from error
     if address.startswith("tls:") and not certified:
-        raise UsageError(f"{expected}, and certificates for TLS, got none. {TLS_HINT}")
+        raise UsageError(f"{expected}, and certificates for TLS, got none. See docs/clusters.md.")
     try:
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False, security=security)
     except (OSError, ValueError) as error:
@@ -387,7 +443,7 @@ def _started_workers(workers: int) -> LocalCluster:
     """Start workers on this machine, again where one of them died before it was up."""
     for _ in range(MOST_STARTS):
         try:
-            with _interrupts_blocked():
+            with interrupts_blocked():
                 return LocalCluster(
                     n_workers=workers,
                     threads_per_worker=1,
@@ -434,22 +490,3 @@ def _kill_workers(cluster: LocalCluster) -> None:
         if nanny.pid is not None:
             with suppress(ProcessLookupError):
                 os.kill(nanny.pid, signal.SIGKILL)
-
-
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    """Let the threads and processes that begin here not hear Ctrl-C: it is for this thread alone.
-
-    A terminal sends the signal to every process of the command. A blocked signal is inherited by threads and
-    by the processes they start, also by those that replace a dead worker later. Here it only waits.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    # Started here, since its start would open the ears of the thread that needs it first.
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

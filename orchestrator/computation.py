@@ -2,7 +2,8 @@
 
 A chunk whose worker died twice is cut into smaller ones. A single run that was lost is tried once more with
 nothing else on the way, so that the point that kills its process is told from those that only waited beside
-it; then its row says that it crashed.
+it. Workers may also be taken away faster than a point lasts: before its row says that it crashed, a point is
+run in a process of its own, which is no worker.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Callable
 
 from vibroimpact.orchestrator.chunks import Chunk, ChunkResult, Work, run_chunk, write_crashed
 from vibroimpact.orchestrator.cluster import WorkerPool
+from vibroimpact.orchestrator.lone_process import ProcessDied, call_alone
 from vibroimpact.orchestrator.schedule import ChunkSchedule
 
 CRASH_MESSAGE = "this point kills the process that runs it"
@@ -77,8 +79,21 @@ class Computation:
 
     def _lost(self, asked: Chunk) -> None:
         if asked is self._alone:
-            self._ended(asked, write_crashed(self._work, asked, CRASH_MESSAGE))
+            self._ended(asked, self._tried_alone(asked))
         elif asked.count == 1:
             self._suspects.append(asked)
         else:
             self._schedule.lost(asked)
+
+    def _tried_alone(self, chunk: Chunk) -> ChunkResult:
+        """Run a point whose workers died in a process of its own; where that dies too, its row says so."""
+        if not self._pool.is_local:
+            # This machine may be of another kind than those of the workers.
+            return write_crashed(
+                self._work, chunk, f"{CRASH_MESSAGE}, or its workers were taken away each time"
+            )
+        try:
+            result: ChunkResult = call_alone(run_chunk, self._work, chunk)
+        except ProcessDied as died:
+            return write_crashed(self._work, chunk, f"{CRASH_MESSAGE}: run alone, {died}")
+        return result

@@ -88,6 +88,25 @@ class DeadlyRunner(BusyRunner):
         return super().run(values, start)
 
 
+class HuntedRunner(BusyRunner):
+    """Is taken away at every point whose forcing amplitude is negative, as long as it runs in a worker."""
+
+    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+        """Run one point, or die."""
+        if self.scene.with_values(values).value("forcing.amplitude") < 0 and _is_worker():
+            os.kill(os.getpid(), signal.SIGKILL)
+        return super().run(values, start)
+
+
+def _is_worker() -> bool:
+    from distributed import get_worker
+
+    try:
+        return get_worker() is not None
+    except ValueError:
+        return False
+
+
 class OtherMachineRunner(BusyRunner):
     """The same on another kind of processor."""
 
@@ -122,3 +141,8 @@ def die_while(folder: str) -> int:
         wish.unlink()
         os.kill(os.getpid(), signal.SIGKILL)
     return os.getpid()
+
+
+def same(value: int) -> int:
+    """Return a number."""
+    return value

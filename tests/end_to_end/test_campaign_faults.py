@@ -243,8 +243,18 @@ def test_a_point_that_kills_its_process_is_a_row_that_says_so(tmp_path: Path) ->
     assert code == 0, err
     rows = read_flat(tmp_path / "campaign" / "dataset.nc")
     assert (rows["outcome"].values == (rows["amplitude"].values < 0) * Outcome.crash).all()
-    assert "kills the process" in rows["message"].values[0]
+    assert "kills the process that runs it: run alone, it was ended by SIGKILL" in rows["message"].values[0]
     assert rows.sizes["run"] == 60
+
+
+def test_an_innocent_point_is_computed_however_often_its_worker_is_taken_away(tmp_path: Path) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(amplitude_text(60, start=-0.005))
+    code, _, err = run_campaign_process(scene, tmp_path / "campaign", *TWO, runner="HuntedRunner")
+    assert code == 0, err
+    rows = read_flat(tmp_path / "campaign" / "dataset.nc")
+    assert (rows["amplitude"].values < 0).any()
+    assert (rows["outcome"].values == Outcome.ok).all()
 
 
 def test_two_campaigns_do_not_share_a_folder(tmp_path: Path) -> None:

@@ -5,18 +5,20 @@ from __future__ import annotations
 import asyncio
 import ssl
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from busy_runner import die_while
+from busy_runner import die_while, same
 from distributed.comm import connect
 from distributed.security import Security
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator import cluster
 from vibroimpact.orchestrator.cluster import MOST_DEATHS, MOST_STARTS, open_workers
+from vibroimpact.orchestrator.progress import Silence
 
 kills_itself = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
 
@@ -46,6 +48,43 @@ def test_a_call_that_kills_every_worker_is_one_clear_error(
         open_workers(workers=1) as pool,
     ):
         pool.call_everywhere(die_while, str(tmp_path))
+
+
+def test_work_whose_message_waits_for_a_clock_that_was_set_back_is_sent_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(cluster, "STALL_SECONDS", 1.0)
+    said = Said()
+    with open_workers(workers=1, progress=said) as pool:
+        pool.submit(same, 1)
+        assert pool.next_finished().result == 1
+        # What Dask's sender is left with when the clock goes back 20 minutes just after a message.
+        pool._client.scheduler_comm.next_deadline = time.time() + 1200.0
+        ticket = pool.submit(same, 2)
+        finished = pool.next_finished()
+        assert (finished.ticket, finished.result) == (ticket, 2)
+    assert len(said.notes) == 1
+    assert "clock that was set back" in said.notes[0]
+
+
+def test_a_long_point_is_no_stall(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "STALL_SECONDS", 0.1)
+    monkeypatch.setattr(cluster, "LOOK_SECONDS", 0.1)
+    said = Said()
+    with open_workers(workers=1, progress=said) as pool:
+        pool.submit(time.sleep, 2.0)
+        assert pool.next_finished().error is None
+    assert not said.notes
+
+
+class Said(Silence):
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
 
 
 def _strangers() -> Iterator[tuple[str, dict[str, Any]]]:

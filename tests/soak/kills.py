@@ -1,0 +1,170 @@
+"""Processes of a campaign that are killed at random times, the command among them, change no bit of its dataset."""
+
+from __future__ import annotations
+
+import os
+import random
+import subprocess
+import sys
+import time
+from functools import lru_cache
+from pathlib import Path
+
+import psutil
+from campaign_scenes import TIMING, frequency_text
+
+from vibroimpact.analysis.dataset import read_flat
+
+CASES = 60
+SAMPLE = 1
+SECONDS = 400.0
+WAIT_SECONDS = 150.0
+"""Wall time of one command; on an idle machine it takes four."""
+MOST_COMMANDS = 6
+"""Of one case: all but the last may be killed."""
+POINTS = {"independent": 120, "up-down": 60}
+MILLISECONDS = 8.0
+STAMPS = ("history", "date_created", "creation_date")
+
+TESTS = Path(__file__).resolve().parents[1]
+COMMAND = TESTS / "end_to_end" / "busy_command.py"
+
+
+def check(seed: int) -> str | None:
+    """Kill at random, resume until it is done, and compare with a campaign that nothing disturbed."""
+    chance = random.Random(seed)
+    path = chance.choice(sorted(POINTS))
+    expected = _undisturbed(path)
+    scratch = Path("scratch")
+    scratch.mkdir()
+    Path("scene.toml").write_text(frequency_text(POINTS[path], path, MILLISECONDS))
+    for number in range(MOST_COMMANDS):
+        last = number == MOST_COMMANDS - 1
+        code, err = _command("scene.toml", "campaign", scratch, None if last else chance)
+        if code is None:
+            return f"the command had not ended after {WAIT_SECONDS:.0f} s: {err}"
+        if code == 0:
+            break
+        if code > 0 or last:
+            return f"exit code {code}: {err}"
+    left = [entry.name for entry in scratch.iterdir()]
+    if left:
+        return f"left behind in the folder for temporary files: {left}"
+    return _difference(expected, _content(Path("campaign", "dataset.nc")))
+
+
+Content = tuple[dict[str, tuple[str, bytes]], dict[str, str]]
+
+
+@lru_cache(maxsize=2)
+def _undisturbed(path: str) -> Content:
+    """Return what a campaign that nobody disturbs gives, made once in each process."""
+    folder = Path(f"undisturbed-{path}")
+    folder.mkdir()
+    scene = folder / "scene.toml"
+    scene.write_text(frequency_text(POINTS[path], path, MILLISECONDS))
+    code, err = _command(str(scene), str(folder / "campaign"), folder, None)
+    if code != 0:
+        raise RuntimeError(f"the undisturbed campaign ended with {code}: {err}")
+    return _content(folder / "campaign" / "dataset.nc")
+
+
+def _content(dataset: Path) -> Content:
+    """Return the bits of each variable, and the attributes, without what tells one computation from another."""
+    flat = read_flat(dataset)
+    bits = {
+        str(name): (
+            str({key: str(value) for key, value in variable.attrs.items()}),
+            repr(variable.values.tolist()).encode()
+            if variable.dtype == object
+            else variable.values.tobytes(),
+        )
+        for name, variable in flat.variables.items()
+        if name not in TIMING
+    }
+    return bits, {key: str(value) for key, value in flat.attrs.items() if key not in STAMPS}
+
+
+def _difference(expected: Content, got: Content) -> str | None:
+    for kind, one, other in zip(("variable", "attribute"), expected, got, strict=True):
+        for name in sorted(one.keys() | other.keys()):
+            if one.get(name) != other.get(name):
+                return f"the {kind} {name} differs from that of an undisturbed campaign"
+    return None
+
+
+def _command(scene: str, folder: str, scratch: Path, chance: random.Random | None) -> tuple[int | None, str]:
+    """Run a campaign and kill processes of it by chance; return its exit code (None: it hung) and what it said."""
+    arguments = ["BusyRunner", "campaign", scene, "-o", folder, "--workers", "2"]
+    with subprocess.Popen(
+        [sys.executable, str(COMMAND), *arguments],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env=os.environ | {"TMPDIR": str(scratch.absolute())},
+    ) as process:
+        try:
+            if chance is not None:
+                _kill_some(process, chance)
+            _, err = process.communicate(timeout=WAIT_SECONDS)
+            outlived = _still_there(process.pid)
+            return (
+                (1, f"processes outlived it: {outlived}") if outlived else (process.returncode, err[-1000:])
+            )
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return None, process.communicate()[1][-1000:]
+        finally:
+            for left in _session(process.pid):
+                _kill(left)
+
+
+def _kill_some(process: subprocess.Popen[str], chance: random.Random) -> None:
+    """Kill one to four times: workers, and in one case of six the command itself."""
+    for _ in range(chance.randint(1, 4)):
+        pause = chance.expovariate(1.0)
+        try:
+            process.wait(min(pause, 5.0))
+            return
+        except subprocess.TimeoutExpired:
+            pass
+        victims = _workers(process.pid)
+        if chance.random() < 1 / 6:
+            process.kill()
+        elif victims:
+            _kill(chance.choice(victims))
+
+
+def _workers(command: int) -> list[int]:
+    try:
+        children = psutil.Process(command).children()
+        return sorted(child.pid for child in children if "spawn_main" in " ".join(child.cmdline()))
+    except psutil.Error:
+        return []
+
+
+def _kill(process: int) -> None:
+    try:
+        psutil.Process(process).kill()
+    except psutil.Error:
+        return  # it ended by itself
+
+
+def _still_there(session: int) -> list[int]:
+    """Return the processes of a session that do not end by themselves within seconds."""
+    deadline = time.monotonic() + 20.0
+    while (left := _session(session)) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    return left
+
+
+def _session(session: int) -> list[int]:
+    found = []
+    for process in psutil.pids():
+        try:
+            if os.getsid(process) == session and psutil.Process(process).status() != psutil.STATUS_ZOMBIE:
+                found.append(process)
+        except (ProcessLookupError, psutil.Error):
+            continue
+    return found
