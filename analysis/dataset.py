@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from vibroimpact.analysis.accessor import VibroimpactAccessor
 from vibroimpact.analysis.checking import check, marked
-from vibroimpact.analysis.merging import merge_datasets
+from vibroimpact.analysis.merging import merge_datasets, refuse_unlike, take_runs
 from vibroimpact.analysis.opening import unreadable
 from vibroimpact.analysis.reading import Part, open_dataset, open_measured, read_flat, read_part
 from vibroimpact.analysis.schema import (
@@ -56,7 +56,9 @@ __all__ = [
     "open_measured",
     "read_flat",
     "read_part",
+    "refuse_unlike",
     "swept_names",
+    "take_runs",
     "unreadable",
     "write_dataset",
 ]

@@ -56,6 +56,18 @@ def content_length(head: bytes | memoryview) -> int | None:
     return int(end)
 
 
+def has_recorded_hash(path: str | os.PathLike[str]) -> bool:
+    """Return whether a file ends with a hash, right or wrong: `matches_recorded_hash` tells.
+
+    Raises
+    ------
+    OSError
+        When the file cannot be read.
+    """
+    with open(path, "rb") as file:
+        return _recorded(file) is not None
+
+
 def matches_recorded_hash(path: str | os.PathLike[str]) -> bool:
     """Return whether a file has a recorded SHA-256, which its content then matches.
 
@@ -78,15 +90,10 @@ def matches_recorded_hash(path: str | os.PathLike[str]) -> bool:
         When the file cannot be read.
     """
     with open(path, "rb") as file:
-        length = os.fstat(file.fileno()).st_size - LINE_LENGTH
-        if length < 0:
+        recorded = _recorded(file)
+        if recorded is None:
             return False
-        expected = content_length(file.read(_HEAD))
-        file.seek(length)
-        line = file.read()
-        # Two signs of a hash, the length of the file and the line: damage at one place leaves the other.
-        if expected != length and not line.startswith(_BEGIN):
-            return False
+        length, line = recorded
         file.seek(0)
         if line != _BEGIN + _hash_of(file, length) + _END:
             raise DatasetError(
@@ -94,6 +101,18 @@ def matches_recorded_hash(path: str | os.PathLike[str]) -> bool:
                 "damaged. Take a copy of it, or write it again."
             )
     return True
+
+
+def _recorded(file: BinaryIO) -> tuple[int, bytes] | None:
+    """Return the length of the content and the line after it; None where no hash is recorded."""
+    length = os.fstat(file.fileno()).st_size - LINE_LENGTH
+    if length < 0:
+        return None
+    expected = content_length(file.read(_HEAD))
+    file.seek(length)
+    line = file.read()
+    # Two signs of a hash, the length of the file and the line: damage at one place leaves the other.
+    return (length, line) if expected == length or line.startswith(_BEGIN) else None
 
 
 def _hash_of(file: BinaryIO, length: int) -> bytes:

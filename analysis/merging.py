@@ -16,6 +16,7 @@ from vibroimpact.fmus.errors import DatasetError
 
 # Not along run, the same in all parts.
 _SHARED = frozenset({"connection", "compared"})
+_SHARED_SIZES = ("state", "interface", "comparison")
 # What runs may be without: a part of failed runs knows no loops, one of an older version no durations.
 _MAY_LACK = ("loop_residual", *(name for name in IMPACT_COLUMNS if name not in NEEDED_IMPACT_COLUMNS))
 # Attributes that say what the values are: parts that differ in them cannot be joined.
@@ -53,12 +54,7 @@ def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
     parts = _completed(parts)
     first = parts[0]
     for name, part in zip(names, parts, strict=True):
-        if set(part.variables) != set(first.variables):
-            different = sorted(map(str, set(part.variables) ^ set(first.variables)))
-            raise DatasetError(
-                f"{name}: expected the variables of {names[0]}, got a difference in {', '.join(different)}."
-            )
-        _refuse_other_meaning(name, part, names[0], first)
+        refuse_unlike(name, part, names[0], first)
     periods = max(part.sizes.get("period", 0) for part in parts)
     columns = {
         str(name): _stacked([part.variables[name].values for part in parts], variable.dims, periods)
@@ -72,6 +68,25 @@ def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
         )
     if (np.diff(index) < 0).any():
         columns = _ordered(columns, first, np.argsort(index))
+    return _with_columns(first, columns)
+
+
+def take_runs(dataset: xr.Dataset, rows: NDArray[np.intp]) -> xr.Dataset:
+    """Return some runs of a one-dimensional dataset with their ragged rows, in this order.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One-dimensional, as `reading.read_flat` returns it.
+    rows : ndarray of int, shape (run,)
+        Places of the runs.
+    """
+    columns = {str(name): v.values for name, v in dataset.variables.items() if name not in _SHARED}
+    return _with_columns(dataset, _ordered(columns, dataset, rows))
+
+
+def _with_columns(first: xr.Dataset, columns: dict[str, NDArray[Any]]) -> xr.Dataset:
+    """Return a dataset like another one with other values along run."""
     columns |= {name: first.variables[name].values for name in _SHARED if name in first.variables}
     data = {
         str(name): (variable.dims, columns[str(name)], variable.attrs)
@@ -95,10 +110,38 @@ def _completed(parts: Sequence[xr.Dataset]) -> list[xr.Dataset]:
     return completed
 
 
+def refuse_unlike(name: str, part: xr.Dataset, first_name: str, first: xr.Dataset) -> None:
+    """Refuse a part that cannot be joined with another one.
+
+    Parameters
+    ----------
+    name, first_name : str
+        Where the two come from, for the message.
+    part, first : xarray.Dataset
+        One-dimensional.
+
+    Raises
+    ------
+    DatasetError
+        When they differ in their variables, or in what these mean.
+    """
+    different = (set(part.variables) ^ set(first.variables)) - set(_MAY_LACK)
+    if different:
+        raise DatasetError(
+            f"{name}: expected the variables of {first_name}, "
+            f"got a difference in {', '.join(sorted(map(str, different)))}."
+        )
+    for dimension in _SHARED_SIZES:
+        wanted, got = first.sizes.get(dimension), part.sizes.get(dimension)
+        if wanted != got:
+            raise DatasetError(f"{name}: {dimension}: expected the size {wanted} of {first_name}, got {got}.")
+    _refuse_other_meaning(name, part, first_name, first)
+
+
 def _refuse_other_meaning(name: str, part: xr.Dataset, first_name: str, first: xr.Dataset) -> None:
     """Refuse a part whose equal names or numbers mean something else than those of the first part."""
     for variable, meaning in first.variables.items():
-        for key in _MEANING:
+        for key in _MEANING if variable in part.variables else ():
             wanted, got = meaning.attrs.get(key), part.variables[variable].attrs.get(key)
             if wanted != got:
                 raise DatasetError(

@@ -24,6 +24,7 @@ from vibroimpact.analysis.dataset import (
     Outcome,
     RunRecord,
     marked,
+    read_part,
     write_dataset,
 )
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
@@ -94,6 +95,8 @@ class Work:
         Written into each part, so that a stray part of another campaign is noticed.
     identity : RunnerIdentity or None
         What the runner must be; None while the campaign still asks.
+    kept : str
+        File with the runs of an earlier sweep that are left out of all chunks; it may be absent.
     """
 
     scene_text: str
@@ -102,6 +105,7 @@ class Work:
     runner: str = DEFAULT_RUNNER
     scene_hash: str = ""
     identity: RunnerIdentity | None = None
+    kept: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,11 +207,14 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     opened = _opened(work.scene_text, work.source, work.runner)
     _refuse_other_runner(work, opened.runner)
     began = time.perf_counter()
-    points = points_of(opened.branches, chunk)
+    points = _points_left(work, opened.branches, chunk)
+    if not points:
+        return ChunkResult(chunk, chunk.start, {}, 0.0, 0.0)
     deadline = began + chunk.most_seconds
     records, carried = run_points(opened.scene, opened.runner, points, chunk.start, deadline)
     computed = time.perf_counter()
-    done = replace(chunk, stop=chunk.first + len(records))
+    left = points[len(records) :]
+    done = replace(chunk, stop=left[0].point.index if left else chunk.stop)
     outcomes = write_part(work, opened.scene, done, points[: len(records)], records, carried)
     return ChunkResult(done, carried, outcomes, computed - began, time.perf_counter() - computed)
 
@@ -216,7 +223,7 @@ def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     """Write the part of points that kill the process that runs them; nothing of the points is run."""
     began = time.perf_counter()
     scene = parse_scene(work.scene_text, work.source)
-    points = points_of(expand(scene), chunk)
+    points = _points_left(work, expand(scene), chunk)
     records = [empty_record(scene, Outcome.crash, message, 0.0) for _ in points]
     outcomes = write_part(work, scene, chunk, points, records, chunk.start)
     return ChunkResult(chunk, chunk.start, outcomes, 0.0, time.perf_counter() - began)
@@ -250,6 +257,17 @@ def points_of(branches: Sequence[Branch], chunk: Chunk) -> list[BranchPoint]:
         inside = branch.points[max(chunk.first - first, 0) : chunk.stop - first]
         points += [BranchPoint(point, direction, point.index == first) for point in inside]
     return points
+
+
+def _points_left(work: Work, branches: Sequence[Branch], chunk: Chunk) -> list[BranchPoint]:
+    """Return the points of a chunk that are not kept from an earlier sweep."""
+    kept = _kept_runs(work.kept)
+    return [place for place in points_of(branches, chunk) if place.point.index not in kept]
+
+
+@lru_cache(maxsize=1)
+def _kept_runs(path: str) -> frozenset[int]:
+    return frozenset(read_part(path).run_index.tolist()) if path and Path(path).exists() else frozenset()
 
 
 def run_points(

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from vibroimpact.analysis.atomic import write_atomically
 from vibroimpact.fmus.errors import UsageError
@@ -19,7 +19,11 @@ from vibroimpact.orchestrator.chunks import RunnerIdentity
 from vibroimpact.orchestrator.provenance import git_commit, versions
 from vibroimpact.orchestrator.scene import Scene
 
-FORMAT = 1
+FORMAT = 2
+_FORMATS = (1, FORMAT)
+"""Format 1, of version 0.1, has no hash of itself, and its title counts in `scene_hash`."""
+NO_EFFECT = ("title",)
+"""Keys that no result depends on: a campaign goes on when they change."""
 _LONGEST = 60  # characters of a value in a message
 _MOST_DIFFERENCES = 5
 
@@ -33,14 +37,20 @@ class Manifest:
     scene : dict
         Every number and word of the scene by its key; comments and layout of the file do not count.
     scene_hash : str
-        SHA-256 of `scene`.
-    content : dict
-        The whole file.
+        SHA-256 of what counts of `scene`; every part of the campaign says it.
+    scene_text : str
+        The TOML text.
+    runs : int
+        Runs of the campaign.
+    identity : RunnerIdentity
+        What ran.
     """
 
     scene: Mapping[str, Any]
     scene_hash: str
-    content: Mapping[str, Any]
+    scene_text: str
+    runs: int
+    identity: RunnerIdentity
 
 
 def flat_scene(scene: Scene) -> dict[str, Any]:
@@ -56,7 +66,8 @@ def flat_scene(scene: Scene) -> dict[str, Any]:
     document = scene.model_dump(mode="json", by_alias=True, exclude={"source", "text"})
     document["stop"] = document.pop("stops")
     document["sweep"] = {
-        axis["key"]: {"values": axis["values"], "path": axis["path"]} for axis in document["sweep"]
+        axis["key"]: {"values": axis["values"], "path": axis["path"], "place": place}
+        for place, axis in enumerate(document["sweep"], start=1)
     }
     return dict(sorted(_flat("", document)))
 
@@ -73,8 +84,13 @@ def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def scene_hash(scene: Scene) -> str:
-    """Return the SHA-256 of a scene: the same for two files that differ in comments and layout only."""
-    return hashlib.sha256(json.dumps(flat_scene(scene)).encode()).hexdigest()
+    """Return the SHA-256 of a scene: the same for two files that differ in comments, layout and title only."""
+    counting = {key: value for key, value in flat_scene(scene).items() if key not in NO_EFFECT}
+    return _hash_of(counting)
+
+
+def _hash_of(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 
 def write_manifest(path: Path, scene: Scene, identity: RunnerIdentity, runs: int) -> None:
@@ -91,6 +107,7 @@ def write_manifest(path: Path, scene: Scene, identity: RunnerIdentity, runs: int
         "scene": flat_scene(scene),
         "scene_text": scene.text,
     }
+    content["sha256"] = _hash_of(content)
     write_atomically(path, json.dumps(content, indent=1).encode())
 
 
@@ -104,43 +121,67 @@ def read_manifest(path: Path) -> Manifest | None:
     """
     try:
         content = json.loads(path.read_bytes())
-        if content["format"] != FORMAT:
+        if content["format"] not in _FORMATS:
             raise UsageError(
                 f"{path}: expected format {FORMAT}, got {content['format']}. Use another folder."
             )
-        return Manifest(content["scene"], content["scene_hash"], content)
+        return _checked(content)
     except FileNotFoundError:
         return None
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise UsageError(
-            f"{path}: expected the manifest of a campaign, got a damaged file ({error}). Use another folder."
+            f"{path}: expected the manifest of a campaign, got a damaged file ({error}). "
+            "Put a copy of it back, or use another folder."
         ) from error
 
 
-def refuse_other_scene(path: Path, manifest: Manifest, scene: Scene) -> None:
+def _checked(content: dict[str, Any]) -> Manifest:
+    """Return what a manifest says, if it is what was once written.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError, AttributeError
+        When it is not.
+    """
+    recorded = content.pop("sha256", None)
+    if recorded is None and content["format"] == 1:
+        recorded, content_hash = content["scene_hash"], _hash_of(content["scene"])
+    else:
+        content_hash = _hash_of(content)
+    if recorded != content_hash:
+        raise ValueError("its content is not the one whose SHA-256 it has")
+    identity = RunnerIdentity(content["execution"], content["instruction_set"], dict(content["fmu_hashes"]))
+    return Manifest(
+        dict(content["scene"]), content["scene_hash"], content["scene_text"], int(content["runs"]), identity
+    )
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """Return in words what differs between two flat scenes in what results depend on."""
+    keys = sorted((old.keys() | new.keys()) - set(NO_EFFECT))
+    return [
+        f"{key} was {_shown(old.get(key))}, is {_shown(new.get(key))}"
+        for key in keys
+        # as text -0.0 is not 0.0
+        if json.dumps(old.get(key)) != json.dumps(new.get(key))
+    ]
+
+
+def refuse_other_scene(path: Path, different: Sequence[str]) -> NoReturn:
     """Refuse to go on with another scene than the one the campaign was started with.
 
     Raises
     ------
     UsageError
-        With the keys that differ.
+        With what differs, the first few.
     """
-    if manifest.scene_hash == scene_hash(scene):
-        return
-    differences = list(_differences(manifest.scene, flat_scene(scene)))
-    shown = "; ".join(differences[:_MOST_DIFFERENCES])
-    hidden = len(differences) - _MOST_DIFFERENCES
+    shown = "; ".join(different[:_MOST_DIFFERENCES])
+    hidden = len(different) - _MOST_DIFFERENCES
     more = f"; and {hidden} more" if hidden > 0 else ""
     raise UsageError(
         f"{path.parent}: expected the scene that this campaign was started with, got a changed one: "
         f"{shown}{more}. Choose another folder with -o, or restore the scene to resume."
     )
-
-
-def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Iterator[str]:
-    for key in sorted(old.keys() | new.keys()):
-        if old.get(key) != new.get(key):
-            yield f"{key} was {_shown(old.get(key))}, is {_shown(new.get(key))}"
 
 
 def _shown(value: Any) -> str:
@@ -160,15 +201,14 @@ def refuse_other_runner(path: Path, manifest: Manifest, identity: RunnerIdentity
     UsageError
         With what differs.
     """
-    now = {
-        "execution": identity.execution,
-        "instruction_set": identity.instruction_set,
-        "fmu_hashes": dict(identity.fmu_hashes),
-    }
-    old = {key: manifest.content.get(key) for key in now}
-    differences = "; ".join(_differences(dict(_flat("", old)), dict(_flat("", now))))
-    if differences:
+    now, old = _facts(identity), _facts(manifest.identity)
+    different = "; ".join(differences(old, now))
+    if different:
         raise UsageError(
             f"{path.parent}: expected the components and machine that this campaign was started with: "
-            f"{differences}. Results of two kinds are never mixed: choose another folder with -o."
+            f"{different}. Results of two kinds are never mixed: choose another folder with -o."
         )
+
+
+def _facts(identity: RunnerIdentity) -> dict[str, Any]:
+    return dict(_flat("", asdict(identity)))

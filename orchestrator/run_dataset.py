@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import Direction, RunRecord, build_dataset, file_names
+from vibroimpact.analysis.dataset import RESERVED_NAMES, Direction, RunRecord, build_dataset, file_names
 from vibroimpact.orchestrator.empty_record import sample_variables
 from vibroimpact.orchestrator.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene import Scene
@@ -42,8 +42,7 @@ def dataset_of_runs(
     attrs : mapping
         Attributes of the file.
     """
-    keys = [axis.key for axis in scene.sweep]
-    names = dict(zip(keys, file_names([scene.sweep_coordinate_name(key) for key in keys]), strict=True))
+    names = coordinate_names(scene)
     dataset = build_dataset(
         records,
         coordinates={
@@ -63,6 +62,17 @@ def dataset_of_runs(
     for file, long_name in _long_names(scene, names).items():
         dataset[file].attrs["long_name"] = long_name
     return dataset
+
+
+def coordinate_names(scene: Scene) -> dict[str, str]:
+    """Return the name that each swept key has in the file, by key."""
+    keys = [axis.key for axis in scene.sweep]
+    return dict(zip(keys, file_names([scene.sweep_coordinate_name(key) for key in keys]), strict=True))
+
+
+def stored_samples(scene: Scene) -> tuple[str, ...]:
+    """Return the name that each sampled variable has in the file, in the order of the scene."""
+    return file_names(sample_variables(scene), RESERVED_NAMES | set(coordinate_names(scene).values()))
 
 
 def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:

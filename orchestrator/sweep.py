@@ -20,7 +20,7 @@ from typing import Literal, Protocol, overload
 Path = Literal["independent", "up", "down", "up-down"]
 Direction = Literal["independent", "up", "down"]
 
-_DIRECTIONS: dict[Path, tuple[Direction, ...]] = {
+DIRECTIONS: dict[Path, tuple[Direction, ...]] = {
     "independent": ("independent",),
     "up": ("up",),
     "down": ("down",),
@@ -152,11 +152,11 @@ def _continuation_branches(carried: SweepAxis, spanning: Sequence[SweepAxis]) ->
     keys = [axis.key for axis in spanning]
     for combination in product(*(axis.values for axis in spanning)):
         fixed = dict(zip(keys, combination, strict=True))
-        for direction in _DIRECTIONS[carried.path]:
+        for direction in DIRECTIONS[carried.path]:
             yield Branch(direction, fixed, Points(first_index, fixed, (travelled[direction],)))
             first_index += len(carried.values)
 
 
 def run_count(axes: Sequence[SweepAxis]) -> int:
     """Return the length of the `run` dimension that these axes span (1 without axes)."""
-    return prod(len(axis.values) * len(_DIRECTIONS[axis.path]) for axis in axes)
+    return prod(len(axis.values) * len(DIRECTIONS[axis.path]) for axis in axes)

@@ -46,7 +46,7 @@ class BusyRunner:
         scene = self.scene.with_values(values)
         burn(scene.body.mass)
         displacement, velocity = start if start is not None else (scene.body.displacement_start, 0.0)
-        target = math.fsum(values.values())
+        target = self.target(scene, values)
         displacement = 0.9 * displacement + math.sin(target)
         velocity = 0.7 * velocity + displacement * 0.1
         periods = np.full((self.periods, 5), displacement)
@@ -64,8 +64,21 @@ class BusyRunner:
             time.perf_counter() - began,
         )
 
+    def target(self, scene: Scene, values: Mapping[str, float]) -> float:
+        """Return the number that tells points apart."""
+        return math.fsum(values.values())
+
     def close(self) -> None:
         """Hold nothing."""
+
+
+class SceneRunner(BusyRunner):
+    """Knows its scene only, as a real runner: which of its numbers are swept makes no difference."""
+
+    def target(self, scene: Scene, values: Mapping[str, float]) -> float:
+        """Return the number that tells points apart."""
+        keys = ("body.mass", "forcing.amplitude", "forcing.angular_frequency", "stop[1].restitution")
+        return math.fsum(map(scene.value, keys))
 
 
 class BrittleRunner(BusyRunner):

@@ -161,7 +161,7 @@ def test_damaged_parts_are_noticed_and_computed_again(
     cut, garbled = sorted((folder / "parts").glob("branch-*.nc"))[:2]
     cut.write_bytes(cut.read_bytes()[:1000])
     garbled.write_bytes(b"not a dataset")
-    (folder / "parts" / ".left-over.nc.1.tmp").write_bytes(b"half")
+    (folder / "parts" / f".{cut.name}.17.0123abcd.tmp").write_bytes(b"half")
     code, _, err = run_campaign_process(scene, folder, *TWO)
     assert code == 0
     assert f"{cut.name} was damaged and is removed" in err

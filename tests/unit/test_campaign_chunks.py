@@ -6,7 +6,7 @@ import pytest
 from busy_runner import BrittleRunner, BusyRunner
 from campaign_scenes import amplitude_text, assert_same_rows, frequency_text, plane_text, scene_of
 
-from vibroimpact.analysis.dataset import Outcome, read_flat
+from vibroimpact.analysis.dataset import Outcome, read_flat, write_dataset
 from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.chunks import (
     Chunk,
@@ -22,9 +22,9 @@ from vibroimpact.orchestrator.manifest import scene_hash
 from vibroimpact.orchestrator.parts import (
     StoredPart,
     compact,
-    damaged_parts,
     list_parts,
     remove_temporary_files,
+    unfit_parts,
 )
 from vibroimpact.orchestrator.schedule import gaps_between
 from vibroimpact.orchestrator.single_run import run_scene
@@ -60,6 +60,7 @@ def test_rows_do_not_depend_on_how_runs_are_cut_into_chunks(tmp_path: Path, path
     compact(fine, tmp_path / "fine.nc", {})
     compact(coarse, tmp_path / "coarse.nc", {})
     assert_same_rows(tmp_path / "fine.nc", tmp_path / "coarse.nc")
+    assert read_flat(tmp_path / "fine.nc").attrs == read_flat(tmp_path / "coarse.nc").attrs
     run_scene(scene_of(text), tmp_path / "run.nc", runner=BUSY)
     assert_same_rows(tmp_path / "run.nc", tmp_path / "coarse.nc")
 
@@ -172,17 +173,26 @@ def test_a_part_of_another_scene_is_removed_with_a_note(tmp_path: Path) -> None:
 
 
 def test_only_files_of_a_killed_writer_are_taken_away(tmp_path: Path) -> None:
-    for name in (".x.nc.1.tmp", "notes.tmp", "mine.txt"):
+    left = f".{Chunk(0, 0, 5).part_name}.17.0123abcd.tmp"
+    others = [".dataset.nc.17.0123abcd.tmp.bak", ".x.nc.1.tmp", "mine.txt", "notes.tmp"]
+    for name in (left, ".dataset.nc.17.0123abcd.tmp", *others):
         (tmp_path / name).touch()
     remove_temporary_files(tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.txt", "notes.tmp"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == others
 
 
-def test_damaged_parts_are_told_from_sound_ones(tmp_path: Path) -> None:
-    work = work_in(tmp_path, frequency_text(10, milliseconds=0.01))
-    sound, damaged = run_all(work, [(0, 5), (5, 10)], 10)
-    damaged.write_bytes(damaged.read_bytes()[:-2000])
-    assert damaged_parts([sound, damaged]) == [damaged]
+def test_parts_that_do_not_fit_are_named_with_the_reason(tmp_path: Path) -> None:
+    text = frequency_text(10, milliseconds=0.01)
+    work = work_in(tmp_path, text)
+    sound, cut, foreign = run_all(work, [(0, 3), (3, 6), (6, 10)], 10)
+    cut.write_bytes(cut.read_bytes()[:-2000])
+    rows = read_flat(foreign)
+    write_dataset(
+        rows.drop_vars("final_phase").assign(final_phase=rows.final_phase.assign_attrs(units="m")), foreign
+    )
+    unfit = dict(unfit_parts([sound, cut, foreign], scene_of(text)))
+    assert list(unfit) == [cut, foreign]
+    assert "final_phase: expected units 'rad'" in unfit[foreign]
 
 
 def test_the_dataset_of_a_campaign_says_where_it_comes_from(tmp_path: Path) -> None:

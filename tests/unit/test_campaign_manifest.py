@@ -9,6 +9,8 @@ from vibroimpact.orchestrator.chunks import RunnerIdentity
 from vibroimpact.orchestrator.folder_lock import locked_folder
 from vibroimpact.orchestrator.manifest import (
     Manifest,
+    differences,
+    flat_scene,
     read_manifest,
     refuse_other_runner,
     refuse_other_scene,
@@ -47,14 +49,15 @@ def test_layout_and_comments_do_not_make_another_scene() -> None:
 def test_a_changed_scene_is_refused_with_the_key(tmp_path: Path, old: str, new: str, told: str) -> None:
     manifest = written(tmp_path)
     assert old in TEXT
+    different = differences(manifest.scene, flat_scene(scene_of(TEXT.replace(old, new))))
     with pytest.raises(UsageError) as caught:
-        refuse_other_scene(tmp_path / "campaign.json", manifest, scene_of(TEXT.replace(old, new)))
+        refuse_other_scene(tmp_path / "campaign.json", different)
     assert told in str(caught.value)
     assert str(tmp_path) in str(caught.value)
 
 
 def test_the_same_scene_is_not_refused(tmp_path: Path) -> None:
-    refuse_other_scene(tmp_path / "campaign.json", written(tmp_path), scene_of(TEXT))
+    assert not differences(written(tmp_path).scene, flat_scene(scene_of(TEXT)))
     refuse_other_runner(tmp_path / "campaign.json", written(tmp_path), IDENTITY)
 
 
@@ -84,9 +87,10 @@ def test_a_damaged_manifest_is_refused(tmp_path: Path, content: str) -> None:
 
 
 def test_a_manifest_of_a_later_format_is_refused(tmp_path: Path) -> None:
-    content = dict(written(tmp_path).content) | {"format": 99}
+    written(tmp_path)
+    content = json.loads((tmp_path / "campaign.json").read_text()) | {"format": 99}
     (tmp_path / "campaign.json").write_text(json.dumps(content))
-    with pytest.raises(UsageError, match="expected format 1, got 99"):
+    with pytest.raises(UsageError, match="expected format 2, got 99"):
         read_manifest(tmp_path / "campaign.json")
 
 
