@@ -385,7 +385,8 @@ def _described(path: Path, folder: Path, digest: str) -> UnpackedFmu:
     known = version == "2.0" or version.startswith("3.0")
     if version.startswith("1."):
         raise ComponentFileError(
-            f"{path}: expected FMI 2.0 or 3.0, got FMI {version}. Export it in one of these versions."
+            f"{path}: modelDescription.xml: expected FMI 2.0 or 3.0, got FMI {version[:20]}. "
+            "Export it in one of these versions."
         )
     if not (known and token and identifiers and all(identifiers)):
         raise ComponentFileError(

@@ -260,7 +260,7 @@ def test_fmi_1_is_called_by_its_name(folder: Path, tmp_path: Path) -> None:
     old = redescribed(
         folder / "Faulty.fmi2.fmu", tmp_path / "old.fmu", ('fmiVersion="2.0"', 'fmiVersion="1.0"')
     )
-    with pytest.raises(ComponentFileError, match=r"old\.fmu: expected FMI 2\.0 or 3\.0, got FMI 1\.0\. "):
+    with pytest.raises(ComponentFileError, match=r"old\.fmu: modelDescription\.xml: .*got FMI 1\.0\. "):
         unpack(old)
 
 
