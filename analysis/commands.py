@@ -11,7 +11,7 @@ from vibroimpact.analysis import estimate_command, replay_fmu_command, spikes_co
 from vibroimpact.analysis.dataset import open_dataset, open_measured
 from vibroimpact.analysis.fingerprints import matches_recorded_hash
 from vibroimpact.analysis.opening import DAMAGE, unreadable
-from vibroimpact.analysis.outputs import writing
+from vibroimpact.analysis.outputs import refuse_outputs, writing
 from vibroimpact.analysis.recording_files import is_recording, open_recording
 from vibroimpact.analysis.results import results_kind
 from vibroimpact.fmus.errors import DatasetError, UsageError
@@ -58,6 +58,7 @@ def plot(
         raise UsageError(f"--kind: expected one of {', '.join(_KINDS)}, got {kind!r}.")
     # as `open_dataset` takes the folder of a campaign
     file = file / "dataset.nc" if file.is_dir() else file
+    refuse_outputs([file], None, output)
     found = results_kind(file)
     try:
         if kind == "auto" and run is None and is_recording(file):

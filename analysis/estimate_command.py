@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from vibroimpact.analysis.outputs import refuse_outputs, writing
+from vibroimpact.analysis.outputs import FORCE_HELP, refuse_outputs, refuse_overwriting, writing
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.terminal import Terminal
 
@@ -86,6 +86,7 @@ def estimate(
     ] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:
     """Estimate damping, frequency, damping law, frequency response, or restitution from a signal.
 
@@ -111,6 +112,10 @@ def estimate(
         clock_drifts,
     )
     refuse_outputs([data], output, figure)
+    same = ("estimates", data.name)
+    refuse_overwriting(
+        output, force, lambda there: (there.get("results_kind"), there.get("source_file")) == same
+    )
     kind = chosen_kind(data, kind, run, drive, impacts)
     refuse_far_options(
         kind,

@@ -44,7 +44,7 @@ def replay(
     from vibroimpact.analysis.recording_files import open_signals
     from vibroimpact.fmus.replay_fmu import build_replay
 
-    refuse_outputs([recording], output)
+    refuse_outputs([recording], output, ending=".fmu")
     source = open_signals(recording, run)
     chosen = _chosen(source, channel or ())
     build_replay({item.name: replay_signal(item, si=si) for item in chosen}, output)

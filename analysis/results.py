@@ -19,11 +19,17 @@ RESULTS_SCHEMA = "1"
 
 def results_kind(path: str | os.PathLike[str]) -> str | None:
     """Return what kind of analysis wrote a file; None for any other file, also one that cannot be read."""
+    kind = file_attributes(path).get("results_kind")
+    return None if kind is None else str(kind)
+
+
+def file_attributes(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the global attributes of a NetCDF file; none of a file that cannot be read."""
     try:
         with opened_netcdf(path) as file:
-            return str(file.getncattr("results_kind")) if "results_kind" in file.ncattrs() else None
+            return {name: file.getncattr(name) for name in file.ncattrs()}
     except DatasetError:
-        return None
+        return {}
 
 
 def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: str) -> None:

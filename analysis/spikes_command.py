@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vibroimpact.analysis.outputs import refuse_outputs, writing
+from vibroimpact.analysis.outputs import FORCE_HELP, refuse_outputs, refuse_overwriting, writing
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.terminal import Terminal
 
@@ -92,6 +92,7 @@ def spikes(
     theiler: Annotated[
         int, typer.Option(help="Theiler window: vectors no further apart than this are no pair.", min=0)
     ] = _THEILER,
+    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:
     """Find impacts and shocks in a signal: instants, peaks, impulses, contact times, intervals.
 
@@ -103,6 +104,8 @@ def spikes(
     from vibroimpact.analysis.spikes import Mechanics, SpikeSettings
 
     refuse_outputs([data], output, figure)
+    same = ("spikes", data.name)
+    refuse_overwriting(output, force, lambda there: (there.get("results_kind"), there.get("source")) == same)
     part = threshold is not None and threshold.strip().endswith("%")
     settings = SpikeSettings(
         method=method,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from vibroimpact.analysis.outputs import refuse_outputs, writing
+from vibroimpact.analysis.outputs import FORCE_HELP, refuse_outputs, refuse_overwriting, writing
 from vibroimpact.fmus.errors import UsageError
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ def import_files(
         typer.Option(help="The same as keys of a TOML file; without it, FILE.toml beside each file."),
     ] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure of the channels (.png, .pdf, .svg).")] = None,
+    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:
     """Import measurements of one laboratory run into a recording, and say what is odd about them.
 
@@ -99,6 +100,8 @@ def import_files(
     common = None if settings is None else read_settings(settings)
     refuse_outputs(files, output, figure)
     recording = import_recording(files, given, common)
+    sources = recording.attrs.get("source_sha256")
+    refuse_overwriting(output, force, lambda there: there.get("source_sha256", "") == sources)
     _write(recording, output, figure)
     show_recording(recording, output, figure)
 

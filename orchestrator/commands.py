@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vibroimpact.analysis.outputs import FORCE_HELP
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.replay_commands import register as register_replay
 
@@ -34,17 +35,22 @@ def register(app: typer.Typer) -> None:
 def run(
     scene: Annotated[Path, typer.Argument(help="Scene file (TOML).")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset to write (.nc).")],
+    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:
     """Run a scene in this process, one point after the other, into one dataset.
 
     Example: vibroimpact run examples/single_run.toml -o run.nc
     """
+    from vibroimpact.analysis.outputs import refuse_outputs, refuse_overwriting
+    from vibroimpact.orchestrator.manifest import holds_scene
     from vibroimpact.orchestrator.progress import shown_progress
     from vibroimpact.orchestrator.scene import load_scene
     from vibroimpact.orchestrator.single_run import run_scene
 
     began = time.perf_counter()
     loaded = load_scene(scene)
+    refuse_outputs([scene], output)
+    refuse_overwriting(output, force, lambda there: holds_scene(there, loaded))
     with shown_progress() as progress:
         outcomes = run_scene(loaded, output, progress=progress)
     runs = sum(outcomes.values())
@@ -67,6 +73,7 @@ def campaign(
 
     Example: vibroimpact campaign examples/bifurcation.toml -o bifurcation --workers 2
     """
+    from vibroimpact.analysis.outputs import refuse_folder
     from vibroimpact.fmus.errors import UsageError
     from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
     from vibroimpact.orchestrator.progress import shown_progress
@@ -77,6 +84,7 @@ def campaign(
             "--workers and --scheduler: expected one of them, got both. A scheduler has its own workers."
         )
     loaded = load_scene(scene)
+    refuse_folder(output)
     try:
         with shown_progress() as progress:
             report = run_campaign(loaded, output, workers=workers, scheduler=scheduler, progress=progress)

@@ -204,15 +204,16 @@ class GeneralRunner:
         """A component that answers NaN is broken: say which and when, where samples show it."""
         if self._sampler is None:
             return
-        for row in self._sampler.rows:
-            if not np.all(np.isfinite(row)):
-                column = int(np.flatnonzero(~np.isfinite(row))[0]) - 1
-                name = self._scene.general.variables[column] if self._scene.general is not None else ""
-                raise ComponentError(
-                    f"{name}: expected a finite value, got {row[column + 1]} at time {row[0]:.17g}.",
-                    instance=component_variable(name)[0],
-                    time=float(row[0]),
-                )
+        rows = self._sampler.rows
+        bad = np.argwhere(~np.isfinite(rows))
+        if len(bad):
+            row, column = bad[0]
+            name = self._scene.general.variables[column - 1] if self._scene.general is not None else ""
+            raise ComponentError(
+                f"{name}: expected a finite value, got {rows[row, column]} at time {rows[row, 0]:.17g}.",
+                instance=component_variable(name)[0],
+                time=float(rows[row, 0]),
+            )
 
     # ---- what happens during a run ----
 
@@ -254,10 +255,7 @@ class GeneralRunner:
         )
 
     def _sample_rows(self) -> NDArray[np.float64] | None:
-        general = self._scene.general
-        if self._sampler is None or general is None:
-            return None
-        return np.array(self._sampler.rows, dtype=np.float64).reshape(-1, 1 + len(general.variables))
+        return None if self._sampler is None else self._sampler.rows
 
     def close(self) -> None:
         """Free the components."""

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from vibroimpact.analysis.atomic import write_atomically
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.chunks import RunnerIdentity
 from vibroimpact.orchestrator.provenance import git_commit, versions
-from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 FORMAT = 2
 _FORMATS = (1, FORMAT)
@@ -91,6 +91,17 @@ def scene_hash(scene: Scene) -> str:
 
 def _hash_of(content: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+
+def holds_scene(attrs: Mapping[str, Any], scene: Scene) -> bool:
+    """Whether the global attributes of a dataset are of one made from a scene: equal but for comments and layout."""
+    text = str(attrs.get("scene", ""))
+    try:
+        return bool(text) and (
+            text == scene.text or scene_hash(parse_scene(text, scene.source)) == scene_hash(scene)
+        )
+    except SceneError:
+        return False
 
 
 def write_manifest(path: Path, scene: Scene, identity: RunnerIdentity, runs: int) -> None:

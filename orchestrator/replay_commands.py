@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vibroimpact.analysis.outputs import FORCE_HELP
 from vibroimpact.fmus.terminal import Terminal, say
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ def replay(
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Worker processes of a campaign.", min=1)] = None,
     scheduler: Annotated[str | None, typer.Option(help="Dask scheduler of a campaign.")] = None,
+    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:
     """Drive a scene by recorded channels and compare its motion with what was measured.
 
@@ -60,13 +62,16 @@ def replay(
 
     Example: vibroimpact replay examples/recordings/board.toml a0.nc -o fit.nc --fit body.damping_ratio --score a1.nc
     """
-    from vibroimpact.analysis.outputs import refuse_outputs
+    from vibroimpact.analysis.outputs import refuse_folder, refuse_outputs, refuse_overwriting
     from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.manifest import holds_scene
     from vibroimpact.orchestrator.scene import load_scene
 
     loaded = load_scene(scene)
     if output is not None and output.suffix == ".nc":
         refuse_outputs([scene, *(recordings or []), *(score or [])], output, figure)
+        named = with_recordings(loaded, recordings or [])
+        refuse_overwriting(output, force, lambda there: holds_scene(there, named))
     if output is None:
         raise UsageError(
             "--output: expected a dataset (.nc) or the folder of a campaign, got nothing. Add -o."
@@ -76,6 +81,7 @@ def replay(
             f"{output}: expected a dataset NAME.nc or the folder of a campaign, got neither. Choose another name."
         )
     if output.suffix != ".nc":
+        refuse_folder(output)
         _refuse_with_campaign(fit, score, figure, execution)
         _campaign(with_recordings(loaded, recordings or []), output, workers, scheduler)
         return

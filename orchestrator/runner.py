@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import platform
 import time
+from array import array
 from collections.abc import Mapping
 
 import numpy as np
@@ -129,7 +130,7 @@ class _Run:
         self.driver = driver
         self.plan = plan
         self.parameters = float_parameters(scene, start)
-        self.samples: list[tuple[float, ...]] = []
+        self.samples = array("d")
         self.begin_time, self.end_time = self._window()
 
     def _window(self) -> tuple[float, float]:
@@ -173,7 +174,7 @@ class _Run:
         for i in range(count):
             self.driver.advance(min(self.begin_time + i / series.rate, self.end_time))
             row = self.plan.row(self.driver.sampled(), self.scene.forcing, self._angle())
-            self.samples.append((self.driver.time, *row))
+            self.samples.extend((self.driver.time, *row))
 
     def _angle(self) -> float:
         """Phase angle of the forcing at the present time, rad."""
@@ -247,4 +248,4 @@ class _Run:
         series = self.scene.record.time_series
         if series is None:
             return None
-        return np.array(self.samples, dtype=np.float64).reshape(-1, 1 + len(series.variables))
+        return np.array(self.samples).reshape(-1, 1 + len(series.variables))

@@ -23,6 +23,7 @@ from vibroimpact.orchestrator.chunks import (
 from vibroimpact.orchestrator.empty_record import empty_record
 from vibroimpact.orchestrator.progress import Progress, Silence
 from vibroimpact.orchestrator.provenance import provenance
+from vibroimpact.orchestrator.result_size import refuse_large_results
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.sweep import expand
 
@@ -54,9 +55,10 @@ def run_scene(
     Raises
     ------
     UsageError
-        When the dataset cannot be written.
+        When the dataset cannot be written, or would be larger than memory.
     """
     target = Path(path)
+    refuse_large_results(scene)
     _refuse_unwritable(target)
     opened = open_runner(scene, runner)
     try:

@@ -7,6 +7,7 @@ communication points, with straight lines between them.
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 
 import numpy as np
@@ -57,7 +58,7 @@ class Sampler:
 
     Attributes
     ----------
-    rows : list of ndarray
+    rows : ndarray, shape (sample, 1 + variables)
         One row for each sample: time, then the variables.
     """
 
@@ -69,13 +70,18 @@ class Sampler:
         for i, (component, name) in enumerate(variables, start=1):
             columns.setdefault(component, []).append((i, name))
         self._probes = [_Probe(importer.components[c], found) for c, found in columns.items()]
-        self.rows: list[NDArray[np.float64]] = []
+        self._values = array("d")
         self._first, self._index, self._end = np.inf, 0, -np.inf
         importer.watchers.append(StepWatcher(self._before_step, self._after_step))
 
+    @property
+    def rows(self) -> NDArray[np.float64]:
+        """The samples so far."""
+        return np.array(self._values).reshape(-1, self._width)
+
     def begin(self, first: float, end: float) -> None:
         """Sample from `first` to `end`, s; the first sample is taken when the run gets there."""
-        self.rows = []
+        self._values = array("d")
         self._first, self._index, self._end = first, 0, end
         if self._importer.time >= first - self._room(first):
             self._importer.keeps_start = True
@@ -94,7 +100,7 @@ class Sampler:
         row[0] = time
         for probe in self._probes:
             probe.read(row)
-        self.rows.append(row)
+        self._values.extend(row)
         self._index += 1
 
     def _before_step(self, time: float) -> None:
@@ -122,7 +128,8 @@ class Sampler:
                 self._revisit(probe, time, instants, rows)
             else:
                 self._interpolate(probe, time, end, instants, rows)
-        self.rows.extend(rows)
+        for row in rows:
+            self._values.extend(row)
 
     def _revisit(
         self, probe: _Probe, time: float, instants: Sequence[float], rows: Sequence[NDArray[np.float64]]

@@ -136,7 +136,7 @@ def test_a_dataset_that_cannot_be_written_is_refused_before_anything_runs(
     (tmp_path / "file").write_text("not a folder")
     (tmp_path / "folder").mkdir()
     done = in_this_process("run", EXAMPLES / "bifurcation.toml", "-o", tmp_path / target)
-    assert_misuse(done, "expected a place where a dataset can be written")
+    assert_misuse(done, "expected a place where a file can be written")
     assert len(done.stderr.splitlines()) == 1
 
 

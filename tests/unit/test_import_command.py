@@ -169,7 +169,7 @@ def test_numbers_in_settings_are_numbers(tmp_path: Path) -> None:
         (["base.txt", "--name", "a", "--name", "b"], "name: expected at most 1"),
         (["base.txt", "--delimiter", "dot"], "delimiter: expected tab, comma"),
         (["base.txt", "--settings", "none.toml"], "none.toml: expected a settings file"),
-        (["base.txt", "--figure", "base.gif"], "--figure: expected a name ending in"),
+        (["base.txt", "--figure", "base.gif"], "expected a name ending in .png"),
     ],
 )
 def test_misuse_is_one_clear_error_with_exit_code_2_and_no_file(

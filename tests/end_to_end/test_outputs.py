@@ -1,0 +1,137 @@
+"""What a command is to write is looked at before it computes: names, what is there already, and how large it gets."""
+
+from __future__ import annotations
+
+import resource
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import in_this_process, vibroimpact
+
+SCENE = """
+[scene]
+units = "nondimensional"
+[body]
+mass = {mass}
+stiffness = 1.0
+displacement_start = 1.0
+[record]
+recorded_time = 5.0
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.toml"
+    path.write_text(SCENE.format(mass=1.0))
+    return path
+
+
+def misuse(done: CompletedProcess[str], told: str) -> None:
+    assert done.returncode == 2, done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert told in done.stderr
+
+
+@pytest.mark.parametrize("name", ["x.csv", "x", "x.png", "x.NC", "x.nc.txt", ".nc"])
+def test_a_dataset_ends_in_nc(name: str, scene: Path, tmp_path: Path) -> None:
+    misuse(in_this_process("run", scene, "-o", tmp_path / name), "expected a name ending in .nc")
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.toml"]
+
+
+@pytest.mark.parametrize("command", ["campaign", "replay"])
+@pytest.mark.parametrize("ending", [".csv", ".png", ".txt"])
+def test_a_campaign_is_no_file(command: str, ending: str, scene: Path, tmp_path: Path) -> None:
+    done = in_this_process(command, scene, "-o", tmp_path / f"x{ending}")
+    misuse(done, f"expected the name of a folder, got that of a file ({ending})")
+
+
+@pytest.mark.parametrize("command", ["import", "spikes", "estimate", "plot", "fmu replay"])
+def test_every_command_names_the_ending_that_it_writes_before_it_reads(command: str, tmp_path: Path) -> None:
+    ending = {"plot": ".png", "fmu replay": ".fmu"}.get(command, ".nc")
+    done = in_this_process(*command.split(), tmp_path / "absent.nc", "-o", tmp_path / "x.docx")
+    misuse(done, f"expected a name ending in {ending}")
+
+
+def test_a_run_may_be_repeated_but_another_scene_needs_force(scene: Path, tmp_path: Path) -> None:
+    output = tmp_path / "run.nc"
+    command = ("run", scene, "-o", output)
+    assert in_this_process(*command).returncode == 0
+    scene.write_text("# the same, told otherwise\n" + SCENE.format(mass="1"))
+    assert in_this_process(*command).returncode == 0
+    scene.write_text(SCENE.format(mass=2.0))
+    before = output.read_bytes()
+    misuse(in_this_process(*command), "got one that holds something else. Choose another name, or overwrite")
+    assert output.read_bytes() == before
+    assert in_this_process(*command, "--force").returncode == 0
+    with xr.open_dataset(output) as dataset:
+        assert "mass = 2.0" in dataset.attrs["scene"]
+
+
+@pytest.mark.parametrize("content", [b"notes of a whole year", b"\x89HDF\r\n\x1a\n" + bytes(200), b""])
+def test_a_file_that_is_no_dataset_is_not_overwritten_without_force(
+    content: bytes, scene: Path, tmp_path: Path
+) -> None:
+    output = tmp_path / "run.nc"
+    output.write_bytes(content)
+    misuse(in_this_process("run", scene, "-o", output), "--force")
+    assert output.read_bytes() == content
+    assert in_this_process("run", scene, "-o", output, "--force").returncode == 0
+
+
+def test_imports_and_analyses_may_be_repeated_and_nothing_else_is_overwritten(tmp_path: Path) -> None:
+    time = np.arange(4000) / 1000.0
+    signal = np.exp(-0.3 * time) * np.cos(40.0 * time)
+    for name, scale in (("a", 1.0), ("b", 2.0)):
+        rows = "".join(f"{t:.4f},{scale * x:.6f}\n" for t, x in zip(time, signal, strict=True))
+        (tmp_path / f"{name}.csv").write_text(f"time (s),x (m)\n{rows}")
+    recording, other, found = tmp_path / "a.nc", tmp_path / "b.nc", tmp_path / "found.nc"
+    for _ in range(2):
+        assert in_this_process("import", tmp_path / "a.csv", "-o", recording).returncode == 0
+    misuse(in_this_process("import", tmp_path / "b.csv", "-o", recording), "--force")
+    assert in_this_process("import", tmp_path / "b.csv", "-o", other).returncode == 0
+    for _ in range(2):
+        assert in_this_process("estimate", recording, "--kind", "decay", "-o", found).returncode == 0
+    misuse(in_this_process("estimate", other, "--kind", "decay", "-o", found), "--force")
+    misuse(in_this_process("spikes", recording, "-o", found), "--force")
+    assert in_this_process("spikes", recording, "-o", found, "--force").returncode == 0
+    assert in_this_process("spikes", recording, "-o", found).returncode == 0
+
+
+LARGE = {
+    "a hundred million points": (
+        "[sweep]\n"
+        '"body.mass" = { start = 1, stop = 2, points = 10000 }\n'
+        '"body.stiffness" = { start = 1, stop = 2, points = 10000 }\n',
+        "Use `vibroimpact campaign`",
+    ),
+    "samples": ("[record.time_series]\nrate = 1.9e7\n", "sample fewer variables, more slowly"),
+    "points with samples": (
+        '[record.time_series]\nrate = 1e4\n[sweep]\n"body.mass" = { start = 1, stop = 2, points = 2000 }\n',
+        "Use `vibroimpact campaign`",
+    ),
+    "periods": (
+        "[forcing]\namplitude = 1.0\nangular_frequency = 1.0\n",
+        "Record fewer periods",
+    ),
+}
+
+
+@pytest.mark.parametrize(("more", "todo"), LARGE.values(), ids=LARGE)
+def test_what_does_not_fit_into_memory_is_refused_before_it_is_computed(
+    more: str, todo: str, scene: Path, tmp_path: Path
+) -> None:
+    text = SCENE.format(mass=1.0)
+    if "[forcing]" in more:
+        text = text.replace("recorded_time = 5.0", "transient_periods = 0\nrecorded_periods = 100000000")
+    scene.write_text(text + more)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    done = vibroimpact("run", scene, "-o", tmp_path / "x.nc")
+    misuse(done, "expected results of at most 1 GiB")
+    assert todo in done.stderr
+    # kB: what any command takes, not what 10^8 points would
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < max(before, 600_000)
+    assert not (tmp_path / "x.nc").exists()
