@@ -290,12 +290,13 @@ double vi_structure_pressing_noise(const vi_structure *s, int k)
 static void pressing(const situation *now, int k, const double depth[VI_ORDER + 1], double sense[VI_ORDER + 1])
 {
     const vi_press *press = &now->press[k];
-    for (int n = 0; n <= VI_ORDER; ++n) {
-        const double rate = n < VI_ORDER ? (double)(n + 1) * depth[n + 1] : 0.0;
-        const bool power = press->kind == VI_PRESS_POWER;
-        const double level = n > 0 ? 0.0 : power ? 1.0 : press->constant;
-        sense[n] = level + (power ? 0.0 : press->stiffness * depth[n]) + press->damping * rate;
+    const bool power = press->kind == VI_PRESS_POWER;
+    const double stiffness = power ? 0.0 : press->stiffness, damping = press->damping;
+    for (int n = 0; n < VI_ORDER; ++n) {
+        sense[n] = stiffness * depth[n] + damping * ((double)(n + 1) * depth[n + 1]);
     }
+    sense[VI_ORDER] = stiffness * depth[VI_ORDER];
+    sense[0] += power ? 1.0 : press->constant;
 }
 
 static void separations(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double length,
