@@ -41,6 +41,8 @@ class Child:
 
     def _start(self) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="vibroimpact-soak-"))
+        # what is remembered of random files must not fill the cache of the person who starts this
+        own = {"TMPDIR": str(self._folder), "VIBROIMPACT_CACHE": str(self._folder / "cache")}
         path = os.pathsep.join(filter(None, [str(TESTS), *(entry for entry in sys.path if entry)]))
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "soak._case", self.package],
@@ -48,11 +50,12 @@ class Child:
             stdout=subprocess.PIPE,
             text=True,
             cwd=self._folder,
-            env=os.environ | {"PYTHONPATH": path, "TMPDIR": str(self._folder)},
+            env=os.environ | own | {"PYTHONPATH": path},
             start_new_session=True,
         )
         self._facts = psutil.Process(self._process.pid)
         self._allowance = START_SECONDS
+        self._kind, self._handed = "", 0
 
     @property
     def answers(self) -> IO[str]:
@@ -61,7 +64,10 @@ class Child:
         return self._process.stdout
 
     def hand(self, kind: Kind, case: int, seed: int) -> None:
-        """Let it try a case."""
+        """Let it try a case, in a new process where the last one was of another kind."""
+        if self._kind not in ("", kind.name):
+            self._replace()
+        self._kind, self._handed = kind.name, self._handed + 1
         assert self._process.stdin is not None
         self.at = (kind, case, seed)
         self._began, self._used = time.monotonic(), self._processor_time()
@@ -80,7 +86,7 @@ class Child:
             return float(seconds), problem
         seconds = time.monotonic() - self._began
         status = self._process.wait()
-        said = self._last_words() or "it said nothing"
+        said = f"{self._last_words() or 'it said nothing'} (its case {self._handed})"
         self._replace()
         return seconds, f"the process died: {_named(status)}; {said}"
 

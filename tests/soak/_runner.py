@@ -11,6 +11,8 @@ from soak._child import Child
 from soak._journal import Journal, Tried
 from soak._kinds import Kind
 
+BLOCK = 50
+"""Cases of one kind in a row: what one of them does to its process shows within the same kind."""
 LOOK_SECONDS = 0.2
 """Time between looks at children that do not answer."""
 
@@ -78,7 +80,9 @@ def _waiting(
     """Yield cases that are not yet tried, all kinds advancing by equal shares."""
     tried = _tried(kinds, counts, journal)
     order = sorted(
-        (case / counts[kind.name], kind.name, case) for kind in kinds for case in range(counts[kind.name])
+        (case // BLOCK * BLOCK / counts[kind.name], kind.name, case)
+        for kind in kinds
+        for case in range(counts[kind.name])
     )
     by_name = {kind.name: kind for kind in kinds}
     for _, name, case in order:
