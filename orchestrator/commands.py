@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +13,8 @@ from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.replay_commands import register as register_replay
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from vibroimpact.orchestrator.campaign import CampaignReport
 
 #: Different warnings that a command repeats.
@@ -42,6 +43,7 @@ def run(
     Example: vibroimpact run examples/single_run.toml -o run.nc
     """
     from vibroimpact.analysis.outputs import refuse_outputs, refuse_overwriting
+    from vibroimpact.orchestrator.failures import FAILED
     from vibroimpact.orchestrator.manifest import holds_scene
     from vibroimpact.orchestrator.progress import shown_progress
     from vibroimpact.orchestrator.scene import load_scene
@@ -55,8 +57,9 @@ def run(
         outcomes = run_scene(loaded, output, progress=progress)
     runs = sum(outcomes.values())
     say(f"{_counted(runs, 'run')} in {time.perf_counter() - began:.1f} s: {output}")
-    _tell_failures(outcomes)
-    _tell_warnings(output)
+    _tell_rows(output, runs)
+    if runs == 1 and any(kind.name in outcomes for kind in FAILED):
+        raise typer.Exit(1)
 
 
 def campaign(
@@ -110,25 +113,25 @@ def tell(report: CampaignReport) -> None:
         say(
             f"{_counted(report.lost_workers, 'worker')} {lost} had not finished was computed again.", err=True
         )
-    _tell_failures(report.outcomes)
-    if report.runs <= MOST_RUNS_READ:
-        _tell_warnings(report.dataset)
+    _tell_rows(report.dataset, report.runs)
 
 
-def _tell_failures(outcomes: Mapping[str, int]) -> None:
-    failed = {name: count for name, count in outcomes.items() if name in ("error", "crash", "timeout")}
-    for name, count in failed.items():
-        told = f"{_counted(count, 'point')} ended with the outcome {name}; see their messages in the dataset."
-        say(told, err=True)
-
-
-def _tell_warnings(dataset: Path) -> None:
-    """Repeat what bodies said of runs that went well: such runs have a message only then."""
+def _tell_rows(dataset: Path, runs: int) -> None:
+    """List the points that failed, and repeat what bodies said of runs that went well."""
     from vibroimpact.analysis import open_dataset
+    from vibroimpact.orchestrator.failures import failure_lines
 
     with open_dataset(dataset) as opened:
-        fine = opened.outcome.isin([0, 1]).values  # ok, stuck
-        messages = sorted({str(text) for text in opened.message.values[fine] if text})
+        for line in failure_lines(opened):
+            say(line, err=True)
+        if runs <= MOST_RUNS_READ:
+            _tell_warnings(opened)
+
+
+def _tell_warnings(opened: xr.Dataset) -> None:
+    """Repeat the messages of runs that went well: such runs have one only where their body warned."""
+    fine = opened.outcome.isin([0, 1]).values  # ok, stuck
+    messages = sorted({str(text) for text in opened.message.values[fine] if text})
     for message in messages[:MOST_WARNINGS]:
         say(f"warning: {message}", err=True)
     if len(messages) > MOST_WARNINGS:

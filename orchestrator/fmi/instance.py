@@ -98,6 +98,8 @@ class Instance(ABC):
     def _fail(self, function: str, what: str) -> NoReturn:
         lines = self.log.take()
         reason = lines[-1] if lines else "the component logged nothing"
+        # Our own components say who and where too: once is enough.
+        reason = reason.removeprefix(f"{self.name}: {self.prefix}{function}: ")
         raise ComponentError(
             f"{self.name}: {self.prefix}{function} {what}: {reason}",
             instance=self.name,

@@ -229,6 +229,9 @@ def test_a_failed_point_is_a_row_with_its_message(tmp_path: Path) -> None:
     assert code == 0
     assert "61 points computed" in out
     assert "15 points ended with the outcome error" in err
+    assert "  amplitude = -0.3: oscillator: the step failed" in err
+    assert "  5 more are in the dataset" in err
+    assert err.count("the step failed") == 10
     rows = read_flat(tmp_path / "campaign" / "dataset.nc")
     failed = rows["amplitude"].values < 0
     assert (rows["outcome"].values == failed * Outcome.error).all()
