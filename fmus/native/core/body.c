@@ -259,10 +259,12 @@ static double low_bounce(const vi_body *body, vi_phase phase, double held)
 /* A flight to the target over which no stop can be met: one evaluation, however long. */
 static void fly_free(vi_body *body, const vi_segment *segment, vi_instant target)
 {
+    const vi_instant start = body->now;
     double x, v;
     vi_segment_end(segment, vi_clock_elapsed(&body->clock, body->now, target),
                    body->clock.angular_frequency * target.rest, &x, &v);
     move(body, 0.0, x, v, ENDS_AT_TARGET, target);
+    vi_origin_reach(&body->origin, segment, start, x, v);
 }
 
 /* Fly to the next contact, the end of the segment, or the target, whichever comes first; false where the motion goes
@@ -277,6 +279,9 @@ static bool fly(vi_body *body, vi_instant target, const vi_step_request *request
     vi_segment segment;
     vi_segment_start(&segment, &body->mode, body->displacement, body->velocity, phase, held, body->held_rate,
                      vi_min(length + room, bounce), bounce < HUGE_VAL);
+    const vi_instant start = body->now;
+    vi_since since = {start, 0.0, 0.0};
+    vi_origin_follow(&body->origin, &segment, &body->clock, start, body->displacement, body->velocity, &since);
     if (free_for_ever(body, &segment)) {
         fly_free(body, &segment, target);
         return isfinite(body->displacement) && isfinite(body->velocity);
@@ -303,7 +308,9 @@ static bool fly(vi_body *body, vi_instant target, const vi_step_request *request
     }
     if (k < 0) {
         move(body, u, end_displacement, m.v, whole ? end : ENDS_ANYWHERE, target);
+        vi_origin_reach(&body->origin, &segment, start, segment.origin + m.x, m.v);
     } else {
+        body->origin.known = 0;
         move(body, u, body->contacts[k].position, direction(body, k) * approach, landing(end, u, length, room), target);
         meet(body, k, approach, vi_clock_elapsed(&body->clock, body->now, target), request);
     }
@@ -388,6 +395,7 @@ void vi_body_start(vi_body *body, vi_instant now, double displacement, double ve
     body->now = body->held_since = now;
     body->standstill = (vi_standstill){now, 0};
     vi_budget_start(&body->budget, now);
+    body->origin.known = 0;
     body->displacement = displacement;
     body->velocity = velocity;
     body->stuck = body->leaving = body->pending = body->passed = 0;

@@ -13,6 +13,7 @@
 #include "complaint.h"
 #include "contact.h"
 #include "flow.h"
+#include "origin.h"
 #include "record.h"
 #include "step.h"
 
@@ -29,6 +30,7 @@ typedef struct {
     vi_standstill standstill;
     vi_budget budget;
     double displacement, velocity;
+    vi_origin origin;
     double held, held_rate; /* input per unit mass at held_since, and its slope */
     vi_instant held_since;
     int32_t stuck;          /* 0, or the contact (1-based) that the body rests on */

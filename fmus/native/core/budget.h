@@ -18,7 +18,7 @@ typedef struct {
     int64_t since_mark; /* evaluations since `mark` */
     vi_instant mark;
     int64_t events;     /* of contacts since the start: impacts, grazes, touch-downs, rests */
-    int32_t unfinished; /* the last step ended for no reason of the motion: the next one is its rest */
+    int64_t unfinished; /* the last step ended for no reason of the motion: the next one is its rest */
 } vi_budget;
 
 static inline void vi_budget_spend(vi_budget *budget, int64_t evaluations)

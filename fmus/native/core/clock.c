@@ -112,6 +112,17 @@ bool vi_clock_stands(vi_standstill *standstill, vi_instant now)
     return standstill->events >= VI_MOST_EVENTS;
 }
 
+double vi_clock_elapsed_twofold(const vi_clock *clock, vi_instant a, vi_instant b, double *low)
+{
+    const double count = (double)(b.periods - a.periods), whole = count * clock->period;
+    const double rests = b.rest - a.rest, sum = whole + rests;
+    double rounding = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, rests) + sum_error(whole, rests, sum);
+    rounding += count * clock->period_low + fma(count, clock->period, -whole);
+    const double high = sum + rounding;
+    *low = rounding - (high - sum);
+    return high;
+}
+
 double vi_clock_to_period_end(const vi_clock *clock, vi_instant instant)
 {
     return (clock->period - instant.rest) + (clock->period_low - instant.rest_low);

@@ -48,6 +48,9 @@ double vi_clock_time(const vi_clock *clock, vi_instant instant);
 /* Seconds from `a` to `b`. */
 double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b);
 
+/* The same to twice the digits: the sum of what is returned and *low. */
+double vi_clock_elapsed_twofold(const vi_clock *clock, vi_instant a, vi_instant b, double *low);
+
 /* Seconds from `instant` to the end of its period. */
 double vi_clock_to_period_end(const vi_clock *clock, vi_instant instant);
 

@@ -95,6 +95,28 @@ static inline propagator propagate(const vi_mode *mode, double u)
     return p;
 }
 
+/* `u` seconds after the start of a segment that is counted from before: the phase angle to twice the digits, so that it
+ * is as exact after 10^6 periods as after one. */
+static propagator propagate_from_before(const vi_segment *s, double u)
+{
+    const vi_mode *mode = s->mode;
+    const double time = s->since + u, part = time - s->since;
+    const double low = (s->since - (time - part)) + (u - part) + s->since_low;
+    const double angle = mode->rate * time, rest = fma(mode->rate, time, -angle) + mode->rate * low;
+    const double c = cos(angle), sn = sin(angle);
+    propagator p;
+    p.slow = p.fast = exp(-mode->decay * time);
+    p.e_cos = p.slow * (c - rest * sn);
+    p.e_sin = p.slow * ((sn + rest * c) / mode->rate);
+    p.back = p.e_cos - mode->decay * p.e_sin;
+    return p;
+}
+
+static inline propagator propagate_segment(const vi_segment *s, double u)
+{
+    return s->since > 0.0 ? propagate_from_before(s, u) : propagate(s->mode, u);
+}
+
 /* ---- the split form ---- */
 
 /* The steady response that may be split off: a multiple of the displacements that the segment shows. */
@@ -176,7 +198,7 @@ static void split_at(const vi_segment *s, double u, vi_motion *m)
 {
     const vi_mode *mode = s->mode;
     const double w = mode->angular_frequency;
-    const propagator p = propagate(mode, u);
+    const propagator p = propagate_segment(s, u);
     const double x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
     const double v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
     const double angle = s->phase.angle + w * u;
@@ -265,7 +287,7 @@ void vi_segment_part(const vi_segment *s, double u, vi_part *part)
         return;
     }
     const vi_mode *mode = s->mode;
-    const propagator p = propagate(mode, u);
+    const propagator p = propagate_segment(s, u);
     part->x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
     part->v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
     part->a = -2.0 * mode->decay * part->v - mode->stiffness * part->x;
@@ -307,6 +329,7 @@ void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double
     segment->held = held;
     segment->held_rate = held_rate;
     segment->length = length;
+    segment->since = segment->since_low = 0.0;
     segment->series = local || !split(segment, x, v);
     if (segment->series) {
         if (mode->fastest > 0.0) {
@@ -315,8 +338,19 @@ void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double
         start_series(segment, x, v);
         bound_series(segment);
     } else {
+        segment->start = segment->x;
         bound_split(segment);
     }
+}
+
+void vi_segment_continue(vi_segment *segment, double x, double v, double amplitude, double since, double since_low)
+{
+    segment->scale += fabs(x) - fabs(segment->x);
+    segment->x = x;
+    segment->v = v;
+    segment->amplitude = amplitude;
+    segment->since = since;
+    segment->since_low = since_low;
 }
 
 void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion)
@@ -332,7 +366,7 @@ void vi_segment_end(const vi_segment *segment, double u, double phase, double *x
 {
     const vi_mode *mode = segment->mode;
     const double w = mode->angular_frequency;
-    const propagator p = propagate(mode, u);
+    const propagator p = propagate_segment(segment, u);
     const double c = cos(phase), sn = sin(phase);
     *x = (p.e_cos + mode->decay * p.e_sin) * segment->x + p.e_sin * segment->v
          + (mode->steady_cos * c + mode->steady_sin * sn) + (segment->level + segment->level_rate * u);

@@ -62,7 +62,9 @@ typedef struct {
     bool series;
     double coefficient[VI_SERIES_ORDER + 1]; /* Taylor, when series */
     double series_snap_bound;
-    double x, v;          /* homogeneous state at the start, when split */
+    double x, v;          /* homogeneous state, when split, `since` before the start */
+    double since, since_low; /* s, and its rounding */
+    double start;         /* homogeneous displacement at the start, when split */
     double level, level_rate; /* particular solution of the held input */
     double amplitude;     /* |homogeneous| <= amplitude e^{-decay u} when underdamped */
     double slow_part, fast_part; /* amplitudes of the two exponentials when overdamped */
@@ -78,6 +80,10 @@ void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness,
  * stop at 1 m keeps all its digits. */
 void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
                       double held_rate, double length, bool local);
+
+/* Count the homogeneous part of a split segment, whose mode is underdamped, from its state (x, v), of that
+ * amplitude, `since` seconds (with their rounding) before the start, on the same motion: what rounding has added meanwhile is left behind. */
+void vi_segment_continue(vi_segment *segment, double x, double v, double amplitude, double since, double since_low);
 
 vi_phase vi_phase_of(double angle);
 

@@ -18,6 +18,21 @@ void vi_flight_start(vi_flight *flight, const vi_structure_model *model, const d
     }
 }
 
+void vi_flight_follow(vi_flight *flight, vi_instant now, const double q[], const double p[], const vi_origin origin[])
+{
+    vi_since since = {now, 0.0, 0.0};
+    for (int j = 0; j < flight->model->modes; ++j) {
+        vi_origin_follow(&origin[j], &flight->segment[j], &flight->model->clock, now, q[j], p[j], &since);
+    }
+}
+
+void vi_flight_reach(const vi_flight *flight, vi_instant start, const double q[], const double p[], vi_origin origin[])
+{
+    for (int j = 0; j < flight->model->modes; ++j) {
+        vi_origin_reach(&origin[j], &flight->segment[j], start, q[j], p[j]);
+    }
+}
+
 void vi_point_start(vi_point *point, const vi_flight *flight, const double shape[], double sign, double clearance)
 {
     *point = (vi_point){.shape = shape, .sign = sign, .scale = fabs(clearance)};
@@ -28,7 +43,7 @@ void vi_point_start(vi_point *point, const vi_flight *flight, const double shape
         if (segment->series) {
             continue;
         }
-        start += shape[j] * segment->x;
+        start += shape[j] * segment->start;
         point->cosine += shape[j] * segment->mode->steady_cos;
         point->sine += shape[j] * segment->mode->steady_sin;
         point->level += shape[j] * segment->level;

@@ -6,6 +6,7 @@
 
 #include "flow.h"
 #include "majorant.h"
+#include "origin.h"
 #include "structure.h"
 
 typedef struct {
@@ -28,6 +29,12 @@ typedef struct {
  * bounces keep their digits so). The series form may shorten the length. */
 void vi_flight_start(vi_flight *flight, const vi_structure_model *model, const double q[], const double p[],
                      vi_phase phase, const double held[], const double held_rate[], double length, bool local);
+
+/* Count the flight, which starts now in (q, p), from where its modes were first followed; see origin.h. */
+void vi_flight_follow(vi_flight *flight, vi_instant now, const double q[], const double p[], const vi_origin origin[]);
+
+/* The flight, begun at `start`, has reached (q, p) without an event. */
+void vi_flight_reach(const vi_flight *flight, vi_instant start, const double q[], const double p[], vi_origin origin[]);
 
 /* A point whose clearance at the start is known (exactly 0 on a stop). */
 void vi_point_start(vi_point *point, const vi_flight *flight, const double shape[], double sign, double clearance);

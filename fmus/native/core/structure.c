@@ -239,12 +239,21 @@ static double low_bounce(const vi_structure *s)
     return shortest;
 }
 
+/* Contacts have changed the motion: the next flight begins anew. */
+static void forget_origins(const vi_structure *s)
+{
+    for (int j = 0; j < s->model->modes; ++j) {
+        s->state->origin[j].known = 0;
+    }
+}
+
 /* A flight to the target over which no stop can be met: one evaluation, however long. */
 static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant target)
 {
     const vi_clock *clock = &s->model->clock;
     const double u = vi_clock_elapsed(clock, s->state->now, target);
     vi_flight_end(flight, u, clock->angular_frequency * target.rest, s->state->q, s->state->p);
+    vi_flight_reach(flight, s->state->now, s->state->q, s->state->p, s->state->origin);
     move(s, u, ENDS_AT_TARGET, target);
 }
 
@@ -262,6 +271,7 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     vi_structure_held_now(s, held);
     vi_flight_start(&flight, s->model, state->q, state->p, vi_structure_phase(s), held, state->held_rate,
                     vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), bounce < HUGE_VAL);
+    vi_flight_follow(&flight, state->now, state->q, state->p, state->origin);
     start_points(s, &flight, points);
     const bool unreachable = out_of_reach(s, &flight, points);
     if (unreachable && only_end_matters(s, &flight)) {
@@ -283,9 +293,11 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     }
     vi_flight_end(&flight, u, flight.angle + flight.angular_frequency * u, state->q, state->p);
     if (k < 0) {
+        vi_flight_reach(&flight, state->now, state->q, state->p, state->origin);
         move(s, u, whole ? end : ENDS_ANYWHERE, target);
         return true;
     }
+    forget_origins(s);
     move(s, u, landing(end, u, length, room), target);
     const double remaining = vi_clock_elapsed(&s->model->clock, state->now, target);
     vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
@@ -302,6 +314,7 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     const double length = segment_length(s, target, &end);
     const double room = end == ENDS_AT_TARGET ? landing_room(s) : 0.0;
     const double u = vi_structure_drift(s, length, room, &event, &k);
+    forget_origins(s);
     const bool whole = event == VI_DRIFT_NO_EVENT && u >= length;
     move(s, u, whole ? end : event == VI_DRIFT_NO_EVENT ? ENDS_ANYWHERE : landing(end, u, length, room), target);
     const double remaining = vi_clock_elapsed(&s->model->clock, s->state->now, target);

@@ -18,6 +18,7 @@
 #include "complaint.h"
 #include "contact.h"
 #include "flow.h"
+#include "origin.h"
 #include "record.h"
 #include "sizes.h"
 #include "step.h"
@@ -70,6 +71,7 @@ typedef struct {
     vi_standstill standstill;
     vi_budget budget;
     double q[VI_MODES], p[VI_MODES]; /* modal displacements and velocities */
+    vi_origin origin[VI_MODES];
     vi_instant held_since;
     double held[VI_MODES], held_rate[VI_MODES]; /* modal forces of the inputs at held_since, and their slopes */
     int32_t status[VI_PORTS];   /* vi_contact_status */
