@@ -18,7 +18,7 @@ from vibroimpact.hardware.import_settings import ImportSettings
 from vibroimpact.hardware.importers.labels import is_known_unit, seconds_in
 from vibroimpact.hardware.importers.table import MOST_SAMPLES, Column, Table
 from vibroimpact.hardware.naming import channel_name
-from vibroimpact.hardware.sources import Source, named
+from vibroimpact.hardware.sources import Source, named, shortened
 from vibroimpact.hardware.time_axis import Placement, place
 
 _NUMBERED = re.compile(r"column_\d+")
@@ -71,7 +71,7 @@ class Parts:
     def remark(self, lines: Sequence[str], title: str = "") -> None:
         """Add what was noticed, each line once."""
         for line in lines:
-            told = f"{title}: {line}" if title else line
+            told = shortened(f"{title}: {line}" if title else line)
             if told not in self.remarks:
                 self.remarks.append(told)
 

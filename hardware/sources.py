@@ -17,6 +17,7 @@ from vibroimpact.hardware.importers.table import Table
 from vibroimpact.hardware.importers.text import WORDS_FOR_DELIMITERS
 from vibroimpact.hardware.segments import joined, split_at_restarts
 
+_LONGEST_LINE = 500
 _PER_COLUMN = frozenset({"name", "unit", "scale", "offset"})
 
 
@@ -85,9 +86,14 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     return Source(path, own, raw.source_format, found, told, dict(raw.attrs), raw.rate)
 
 
+def shortened(line: str) -> str:
+    """Return a line of a bearable length: names in files may have millions of characters."""
+    return line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE - 3]}..."
+
+
 def named(problem: DatasetError, path: Path) -> DatasetError:
     """Return an error whose lines begin with the name of their file."""
-    return DatasetError("\n".join(f"{path}: {line}" for line in str(problem).splitlines()))
+    return DatasetError("\n".join(f"{path}: {line}" for line in map(shortened, str(problem).splitlines())))
 
 
 def spread(sources: Sequence[Source], given: ImportSettings) -> None:

@@ -15,6 +15,9 @@ _TIME_NAMES = frozenset(
     | {"time_axis", "timevector", "time_vector", "tid", "cas"}
 )
 
+LONGEST_LABEL = 120
+"""Characters of a heading that are read: it is a name and a unit, and goes into names and messages."""
+
 
 def split_label(text: str) -> tuple[str, str]:
     """Return name and unit of a heading.
@@ -22,7 +25,7 @@ def split_label(text: str) -> tuple[str, str]:
     >>> split_label("acceleration (m/s^2)"), split_label("force / N"), split_label("board")
     (('acceleration', 'm/s^2'), ('force', 'N'), ('board', ''))
     """
-    label = " ".join(text.strip().strip('"').split())
+    label = " ".join(text.strip().strip('"')[:LONGEST_LABEL].split())
     for pattern in (_WITH_UNIT, _AFTER_SLASH):
         match = pattern.fullmatch(label)
         if match is not None:

@@ -206,3 +206,17 @@ def test_a_text_without_a_record_is_refused_in_one_sentence(tmp_path: Path, text
         import_recording([path])
     assert said in str(caught.value)
     assert str(caught.value).startswith(str(path))
+
+
+def test_a_cell_of_a_million_digits_and_a_letter_is_no_number(tmp_path: Path) -> None:
+    rows = [f"{k / 10},{'7' * 10**6 + 'x' if k == 5 else k}" for k in range(40)]
+    recording = import_recording([written(tmp_path, "time,force\n" + "\n".join(rows) + "\n")])
+    assert np.isnan(recording.channels["force"].values[5])
+
+
+def test_a_heading_of_a_million_letters_makes_no_long_remark(tmp_path: Path) -> None:
+    rows = [f"{k / 10},{'x' if k == 5 else k}" for k in range(40)]
+    recording = import_recording([written(tmp_path, f"time,{'f' * 10**6}\n" + "\n".join(rows) + "\n")])
+    assert recording.remarks
+    assert max(map(len, recording.remarks)) <= 500
+    assert max(map(len, recording.channels)) < 200
