@@ -336,7 +336,7 @@ class EarlierSweep:
                 self._store(rows, left)
             hashed = scene_hash(new)
             write_dataset(kept.assign_attrs(scene_hash=hashed), kept_path(self._folder, hashed))
-            self._note(f"{count} points of the earlier sweep are kept; {runs - count} are to be computed.")
+            self._note(f"{count} of {runs} points are kept from the earlier sweep.")
         outdated = own_files(self._folder)
         write_manifest(self._home / "campaign.json", new, self._manifest.identity, runs)
         for path in outdated:
