@@ -151,13 +151,14 @@ class GeneralRunner:
         self._set_gains(general)
         end = record.transient_time + record.recorded_time
         try:
-            self._importer.begin(0.0, _start_values(general))
-            self._energy.begin(general.connections)
-            self._importer.advance(record.transient_time)
-            self._recording = True
-            if self._sampler is not None:
-                self._sampler.begin(record.transient_time, end)
-            self._importer.advance(end)
+            with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused at the end
+                self._importer.begin(0.0, _start_values(general))
+                self._energy.begin(general.connections)
+                self._importer.advance(record.transient_time)
+                self._recording = True
+                if self._sampler is not None:
+                    self._sampler.begin(record.transient_time, end)
+                self._importer.advance(end)
         except ImpactLimitReached:
             return (
                 Outcome.impact_limit,

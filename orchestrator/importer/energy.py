@@ -80,7 +80,7 @@ class _Connection:
         self.residual = 0.0
 
     def before(self) -> None:
-        self._force_start = self._gain * self._source.get()[0]
+        self._force_start = self._gain * float(self._source.get()[0])
         self._displacement_start = float(self._displacement.get()[0])
 
     def after(self, time: float, end: float) -> None:

@@ -14,6 +14,7 @@ from command_line import ENVIRONMENT, in_this_process
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.general_runner import GeneralRunner
 from vibroimpact.orchestrator.runner import PointRunner
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
@@ -189,3 +190,15 @@ def test_every_point_of_a_campaign_whose_steps_are_long_gets_its_outcome(tmp_pat
     assert done.returncode == 0, done.stderr
     outcomes = read_flat(tmp_path / "out" / "dataset.nc")["outcome"].values
     np.testing.assert_array_equal(outcomes, [Outcome.timeout] * 3)
+
+
+def test_a_coupling_that_throws_its_bodies_beyond_the_numbers_is_one_error() -> None:
+    text = (EXAMPLES / "two_oscillators.toml").read_text(encoding="utf-8")
+    text, count = re.subn(r"^gain = .*$", "gain = 1e9", text, count=1, flags=re.M)
+    assert count == 1
+    runner = GeneralRunner(parse_scene(text, "two_oscillators.toml"))
+    try:
+        with pytest.raises(ComponentError, match="finite"):
+            runner.run({})
+    finally:
+        runner.close()
