@@ -46,14 +46,15 @@ def test_a_file_of_each_kind_has_its_figure(old: Path, name: str) -> None:
     assert (old / "figure.png").stat().st_size > 5_000
 
 
-@pytest.mark.parametrize("name", ["run", "beam"])
-def test_a_scene_gives_the_motion_that_it_gave(old: Path, name: str) -> None:
+# the beam meets a Hertz stop: each contact has an error of 1e-10 of its own, which later impacts amplify
+@pytest.mark.parametrize(("name", "tolerance"), [("run", SEQUENCE), ("beam", 1e-8)])
+def test_a_scene_gives_the_motion_that_it_gave(old: Path, name: str, tolerance: float) -> None:
     done = in_this_process("run", old / f"{name}.toml", "-o", old / "now.nc")
     assert done.returncode == 0, done.stderr
     before, now = read_flat(old / f"{name}.nc"), read_flat(old / "now.nc")
     assert before.sizes["impact"] > 1
     for variable in ("impact_time", "impact_velocity", "displacement_max", "displacement_min"):
-        np.testing.assert_allclose(now[variable], before[variable], rtol=SEQUENCE, atol=SEQUENCE)
+        np.testing.assert_allclose(now[variable], before[variable], rtol=tolerance, atol=tolerance)
 
 
 def test_a_finished_campaign_has_nothing_left_to_do(old: Path) -> None:
