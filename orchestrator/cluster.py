@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Set
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -381,7 +382,7 @@ def open_workers(
             stack.enter_context(safe_module_path())
             scratch = stack.enter_context(ScratchFolder("workers"))
             stack.enter_context(dask.config.set({"temporary-directory": scratch.name}))
-            connect = partial(_embedded_cluster, workers or processor_count())
+            connect = partial(_embedded_cluster, workers or processor_count(), Path(scratch.name))
         else:
             connect = partial(_remote_cluster, scheduler)
         pool = stack.enter_context(WorkerPool(connect, scheduler or "this machine", progress or Silence()))
@@ -424,8 +425,8 @@ def _remote_cluster(address: str) -> Iterator[_Cluster]:
 
 
 @contextmanager
-def _embedded_cluster(workers: int) -> Iterator[_Cluster]:
-    cluster = _started_workers(workers)
+def _embedded_cluster(workers: int, scratch: Path) -> Iterator[_Cluster]:
+    cluster = _started_workers(workers, scratch)
     try:
         with Client(cluster, set_as_default=False) as client:
             yield _Cluster(client, workers, lambda: _replace_dead_workers(cluster, workers))
@@ -439,7 +440,7 @@ def _embedded_cluster(workers: int) -> Iterator[_Cluster]:
         _kill_workers(cluster)
 
 
-def _started_workers(workers: int) -> LocalCluster:
+def _started_workers(workers: int, scratch: Path) -> LocalCluster:
     """Start workers on this machine, again where one of them died before it was up."""
     for _ in range(MOST_STARTS):
         try:
@@ -453,7 +454,7 @@ def _started_workers(workers: int) -> LocalCluster:
                     dashboard_address="127.0.0.1:0",
                     scheduler_kwargs={"dashboard": False},
                     protocol="tls://",
-                    security=_own_certificates(),
+                    security=_own_certificates(scratch),
                     memory_limit=0,
                     silence_logs=logging.CRITICAL,
                 )
@@ -465,16 +466,25 @@ def _started_workers(workers: int) -> LocalCluster:
     ) from failure
 
 
-def _own_certificates() -> Security:
-    """Return a key made for this cluster: Dask runs what it is sent, so other users must not reach it."""
+def _own_certificates(folder: Path) -> Security:
+    """Return a key made for this cluster: Dask runs what it is sent, so other users must not reach it.
+
+    Key and certificate are files in `folder`, which nobody else may read: one that Dask holds in memory it writes to a
+    temporary folder for each connection, which stays where a process is killed meanwhile.
+    """
     try:
-        certificates: Security = Security.temporary()
+        made = Security.temporary()
     except ImportError as error:
         raise UsageError(
             "this machine: expected the package cryptography, which keeps other users of this machine away from the "
             "workers, got none. Install it: `pip install cryptography`."
         ) from error
-    return certificates
+    certificate, key = folder / "certificate.pem", folder / "key.pem"
+    certificate.write_text(made.tls_client_cert)
+    key.write_text(made.tls_client_key)
+    names = {f"tls_{role}_cert": str(certificate) for role in ("client", "scheduler", "worker")}
+    names |= {f"tls_{role}_key": str(key) for role in ("client", "scheduler", "worker")}
+    return Security(require_encryption=True, tls_ca_file=str(certificate), **names)
 
 
 def _replace_dead_workers(cluster: LocalCluster, workers: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import ssl
 import sys
 import time
@@ -123,6 +124,17 @@ def test_nobody_without_the_key_of_a_campaign_reaches_its_processes() -> None:
                 assert not _answers(f"{protocol}://{address.partition('://')[2]}", options)
 
 
+def test_the_key_of_a_campaign_lies_where_only_its_user_reads_and_the_next_command_sweeps() -> None:
+    # one in memory would be written to a folder of its own for each connection, and stay there after kill -9
+    with open_workers(workers=1) as pool:
+        security = pool._client.security
+        for role in ("client", "scheduler", "worker"):
+            folder = Path(getattr(security, f"tls_{role}_key")).parent
+            assert folder.name.startswith("vibroimpact-scratch-workers-")
+            assert os.name == "nt" or folder.stat().st_mode & 0o077 == 0
+    assert not folder.exists()
+
+
 def test_a_machine_without_cryptography_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cryptography", None)
     with pytest.raises(UsageError, match="pip install cryptography"), open_workers(workers=1):
@@ -142,16 +154,20 @@ class _Stillborn:
         return "started"
 
 
-def test_workers_that_die_while_they_start_are_started_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_die_while_they_start_are_started_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     starts: list[int] = []
     monkeypatch.setattr(cluster, "LocalCluster", _Stillborn(starts, MOST_STARTS - 1))
-    assert cluster._started_workers(3) == "started"
+    assert cluster._started_workers(3, tmp_path) == "started"
     assert starts == [3] * MOST_STARTS
 
 
-def test_workers_that_never_start_are_one_clear_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_that_never_start_are_one_clear_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     starts: list[int] = []
     monkeypatch.setattr(cluster, "LocalCluster", _Stillborn(starts, 100))
     with pytest.raises(CampaignError, match="expected 3 workers that start, got a failure 5 times"):
-        cluster._started_workers(3)
+        cluster._started_workers(3, tmp_path)
     assert len(starts) == MOST_STARTS
