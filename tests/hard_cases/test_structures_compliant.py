@@ -295,8 +295,26 @@ def test_a_load_presses_a_compliant_stop_beside_a_rigid_one_without_a_touch_of_r
 
 #: Adversarial bodies (tests/soak) that once stood still, or were put on a stop that they were not at.
 DEGENERATE = (1032, 1111, 1113, 1118, 1194, 1195, 1235, 3007, 3019, 10123, 10350)
+#: Those whose power laws began without force, or turned below rounding; whose energies were rounding.
+UNPRESSED = (116, 2044, 3040, 3440, 10229, 10486, 20184, 30150, 30250, 30263, 30298, 5000466, 5000822)
 
 
-@pytest.mark.parametrize("seed", DEGENERATE)
+@pytest.mark.parametrize("seed", DEGENERATE + UNPRESSED)
 def test_a_body_whose_stops_leave_it_no_room_or_no_choice_goes_on(seed: int) -> None:
     assert check(seed) is None
+
+
+def test_a_stop_whose_damping_lets_it_press_again_does_so_from_that_instant() -> None:
+    """It recedes too fast for any force until 1 + chi d' > 0; the same motion by scipy."""
+    stiffness, chi, position = 1.0, 3.0, -0.5
+    stop = Stop([1.0], position, side="upper", law="hunt_crossley", stiffness=stiffness, damping=chi)
+
+    def motion(t: float, y: np.ndarray) -> list[float]:
+        force = stiffness * max(y[0] - position, 0.0) ** 1.5 * max(0.0, 1.0 + chi * y[1])
+        return [y[1], -y[0] - force]
+
+    with Structure(Modes(1.0), [stop], 0.0, -0.4) as body:
+        assert body.advance(2.0) == DONE
+        found = np.array([body.displacement[0], body.velocity[0]])
+    expected = solve_ivp(motion, (0.0, 2.0), [0.0, -0.4], rtol=1e-11, atol=1e-13, max_step=1e-3).y[:, -1]
+    assert np.allclose(found, expected, rtol=1e-8, atol=0.0)

@@ -188,7 +188,7 @@ def _problem(scene: Scene) -> str | None:
     many, seconds = _timed(scene, STEPS)
     if seconds > LONGEST:
         return f"took {seconds:.1f} s in {STEPS} steps"
-    # stops at one place let rounding decide which is hit: a run that was decided otherwise is another run
+    # runs whose impacts differ in number were decided otherwise by rounding; the others `apart` judges
     if IMPACT_LIMIT not in (one.ended, many.ended) and one.counts == many.counts:
         for _, difference, allowed in apart(scene, one, many, [scene.duration]):
             if not difference <= allowed:

@@ -13,6 +13,12 @@ static const double RELAXED = 1e-16;
 /* A power law is entered as a thin contact from this much of the depth of that thin contact. */
 static const double ENTRY = 1e-3;
 
+/* Or from so many roundings of the displacement: the series, whose steps are parts of the depth, would not move it. */
+static const double SHALLOW = 32.0;
+
+/* Of the square of the rate of a contact on its way out, what its force does over the way at most. */
+static const double COASTS = 1e-2;
+
 /* A receding contact that is pressed by more than so many roundings was thrown back. */
 static const double THROWN = 1e4;
 
@@ -26,83 +32,11 @@ typedef struct {
     double length;      /* that thin contacts and relaxing surfaces allow, s */
 } situation;
 
-/* ---- thin contacts: the first and last instants of a power law, where its series does not converge ---- */
-
-/* Mobility-weighted stiffness of a power law at this rate of penetration. */
-static double thin_stiffness(const vi_structure *s, int k, double rate)
+/* Does a contact on its way out keep its rate, whatever still presses it? */
+static bool coasts(const vi_structure *s, int k, double depth, double rate)
 {
-    const vi_press press = vi_structure_press(s, k);
-    return press.stiffness * vi_max(0.0, 1.0 + press.damping * rate) * s->model->compliance[k][k];
-}
-
-/* How long the force may act as that of a penetration at constant rate, within the tolerance. */
-static double thin_time(const vi_structure *s, int k, double rate, double acceleration)
-{
-    const double n = vi_structure_press(s, k).exponent, stiffness = thin_stiffness(s, k, rate);
-    const double speed = fabs(rate), pull = fabs(acceleration), tolerance = s->model->tolerance;
-    const double fastest = s->model->fastest;
-    double t = fastest > 0.0 ? 1.0 / fastest : 1.0;
-    for (int halving = 0; halving < 1000 && t > 0.0; ++halving, t *= 0.5) {
-        const double depth = speed * t + 0.5 * pull * t * t;
-        const double most = stiffness * pow(depth, n) * t, total = speed + pull * t; /* velocity change at most */
-        const double turned = pull * t + speed * (fastest * t) * (fastest * t); /* by everything else */
-        const double error = most * n * (turned + most);
-        if (most <= tolerance * total || error <= tolerance * speed * speed) {
-            vi_budget_spend(&s->state->budget, halving);
-            return t;
-        }
-    }
-    return t;
-}
-
-/* Give the impulse of a thin contact over u seconds of constant rate, to the state at the end. */
-static void give_thin_impulse(const vi_structure *s, int k, double depth, double rate, double u)
-{
-    const vi_press press = vi_structure_press(s, k);
-    const double n = press.exponent, after = vi_max(0.0, depth + rate * u);
-    if (rate == 0.0) {
-        return;
-    }
-    const double strength = press.stiffness * vi_max(0.0, 1.0 + press.damping * rate) / ((n + 1.0) * rate);
-    const double begun = pow(depth, n + 1.0);
-    const double impulse = strength * (pow(after, n + 1.0) - begun);
-    const double moved = strength * ((pow(after, n + 2.0) - begun * depth) / ((n + 2.0) * rate) - begun * u);
-    const double sign = vi_structure_direction(s, k);
-    const double before = vi_structure_kinetic(s);
-    for (int j = 0; j < s->model->modes; ++j) {
-        s->state->p[j] -= sign * s->model->shape[k][j] * impulse;
-        s->state->q[j] -= sign * s->model->shape[k][j] * moved;
-    }
-    s->state->touch_down[k].impulse += impulse;
-    s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
-}
-
-/* What thin contacts, which the series leave out, add to the force of held contact k after u seconds; *size: the sum of
- * the moduli. */
-static double thin_part(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double u,
-                        double *size)
-{
-    double g[VI_PORTS][VI_PORTS], column[VI_PORTS], share[VI_PORTS], sum = 0.0;
-    int held[VI_PORTS] = {0};
-    *size = 0.0;
-    vi_structure_signed(s, s->model->compliance, g);
-    for (int l = 0; l < s->model->contacts; ++l) {
-        held[l] = s->state->status[l] == VI_CONTACT_HELD;
-    }
-    for (int l = 0; l < s->model->contacts; ++l) {
-        if (now->thin[l]) {
-            const vi_press press = vi_structure_press(s, l);
-            const double rate = drift->penetration[l][1], depth = vi_max(0.0, now->at[l] + rate * u);
-            const double force = press.stiffness * pow(depth, press.exponent) * vi_max(0.0, 1.0 + press.damping * rate);
-            for (int i = 0; i < s->model->contacts; ++i) {
-                column[i] = g[i][l];
-            }
-            vi_solve_active(s->model->contacts, g, column, held, share);
-            sum -= share[k] * force;
-            *size += fabs(share[k] * force);
-        }
-    }
-    return sum;
+    const double force = vi_structure_yield(s, k).force;
+    return rate < 0.0 && force * s->model->compliance[k][k] * depth <= COASTS * rate * rate;
 }
 
 static void look(const vi_structure *s, situation *now)
@@ -133,10 +67,13 @@ static void look(const vi_structure *s, situation *now)
         }
         const double rate = vi_structure_approach(s, k), depth = vi_max(0.0, now->at[k]);
         const double a = vi_structure_at(s->model, s->model->shape[k], now->acceleration);
-        const double time = thin_time(s, k, rate, a);
+        const double time = vi_thin_time(s, k, rate, now->acceleration);
         /* the way in: as far as its series would need steps much shorter than this one */
-        const double entered = ENTRY * (rate + 0.5 * vi_max(0.0, vi_structure_direction(s, k) * a) * time) * time;
-        if (rate <= 0.0 ? depth <= -rate * time || depth == 0.0 : depth <= entered) {
+        const double reached = (rate + 0.5 * vi_max(0.0, vi_structure_direction(s, k) * a) * time) * time;
+        const double shallow = SHALLOW * DBL_EPSILON * vi_structure_displacement_size(s, k);
+        const double entered = vi_max(ENTRY * reached, shallow);
+        const double left = vi_max(-rate * time, coasts(s, k, depth, rate) ? shallow : 0.0);
+        if (rate <= 0.0 ? depth <= left || depth == 0.0 : depth <= entered) {
             now->thin[k] = 1;
             now->any_thin = true;
             now->press[k] = (vi_press){.kind = VI_PRESS_NONE};
@@ -243,18 +180,18 @@ static vi_fall release_beside_thin(const vi_structure *s, const vi_drift *drift,
 {
     double value[4], size;
     vi_polynomial_at(drift->force[k], alone.time, value);
-    if (value[0] + thin_part(s, drift, now, k, alone.time, &size) <= noise) {
+    if (value[0] + vi_thin_part(s, drift, now->thin, now->at, k, alone.time, &size) <= noise) {
         return alone;
     }
     vi_polynomial_at(drift->force[k], length, value);
-    if (value[0] + thin_part(s, drift, now, k, length, &size) >= 0.0) {
+    if (value[0] + vi_thin_part(s, drift, now->thin, now->at, k, length, &size) >= 0.0) {
         return (vi_fall){false, length, 0.0};
     }
     double pressed = alone.time, lifted = length;
     for (int halving = 0; halving < DBL_MANT_DIG; ++halving) {
         const double middle = 0.5 * (pressed + lifted);
         vi_polynomial_at(drift->force[k], middle, value);
-        *(value[0] + thin_part(s, drift, now, k, middle, &size) >= 0.0 ? &pressed : &lifted) = middle;
+        *(value[0] + vi_thin_part(s, drift, now->thin, now->at, k, middle, &size) >= 0.0 ? &pressed : &lifted) = middle;
     }
     return (vi_fall){true, lifted, 1.0};
 }
@@ -264,7 +201,7 @@ static void releases(const vi_structure *s, const vi_drift *drift, const situati
 {
     const double *force = drift->force[k];
     double size = 0.0;
-    const double thin = now->any_thin ? thin_part(s, drift, now, k, 0.0, &size) : 0.0;
+    const double thin = now->any_thin ? vi_thin_part(s, drift, now->thin, now->at, k, 0.0, &size) : 0.0;
     const double noise = VI_ROUNDING * (drift->force_scale[k] + size);
     vi_fall fall = {true, 0.0, 1.0};
     if (force[0] + thin >= -noise) {
@@ -406,7 +343,7 @@ static void add_impulses(const vi_structure *s, const vi_drift *drift, const sit
 {
     for (int k = 0; k < s->model->contacts; ++k) {
         if (now->thin[k]) {
-            give_thin_impulse(s, k, vi_max(0.0, now->at[k]), drift->penetration[k][1], u);
+            vi_thin_impulse(s, k, now->at[k], drift->penetration[k][1], u);
         } else if (s->state->status[k] == VI_CONTACT_YIELDING) {
             double sum = 0.0;
             for (int n = VI_ORDER; n >= 0; --n) {
@@ -415,6 +352,39 @@ static void add_impulses(const vi_structure *s, const vi_drift *drift, const sit
             s->state->touch_down[k].impulse += sum * u;
         }
     }
+}
+
+/* Kinetic and elastic energy of the modes, J. */
+static double energy_now(const vi_structure *s)
+{
+    double elastic = 0.0;
+    for (int j = 0; j < s->model->modes; ++j) {
+        elastic += 0.5 * s->model->mode[j].stiffness * s->state->q[j] * s->state->q[j];
+    }
+    return vi_structure_kinetic(s) + elastic;
+}
+
+/* What is added at a segment's end, thin contacts' impulses and what holds the held ones against them, is energy that
+ * the stops have taken. */
+static void finish(const vi_structure *s, const vi_drift *drift, const situation *now, double u)
+{
+    const bool follow = now->any_thin && s->state->follow_energies;
+    const double before = follow ? energy_now(s) : 0.0;
+    add_impulses(s, drift, now, u);
+    vi_structure_project(s);
+    s->state->energies.contact_loss += follow ? before - energy_now(s) : 0.0;
+}
+
+static void follow_energies(const vi_structure *s, const vi_drift *drift, const situation *now, double u)
+{
+    int still[VI_PORTS] = {0};
+    for (int k = 0; k < s->model->contacts; ++k) {
+        double moved[VI_ORDER + 1];
+        memcpy(moved, drift->penetration[k], sizeof moved);
+        moved[0] = 0.0;
+        still[k] = s->state->status[k] == VI_CONTACT_YIELDING && stays(s, drift, k, moved, u);
+    }
+    vi_energies_of_drift(s, drift, now->held, still, u);
 }
 
 /* Nothing moves and nothing will: a body at rest on a stop under constant loads. */
@@ -467,12 +437,11 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
         vi_extremes_of_drift(s, &drift, u);
     }
     if (state->follow_energies) {
-        vi_energies_of_drift(s, &drift, now.held, u);
+        follow_energies(s, &drift, &now, u);
     }
     double q[VI_MODES];
     memcpy(q, state->q, sizeof q);
     vi_drift_at(&drift, u, q, state->p, state->q);
-    add_impulses(s, &drift, &now, u);
-    vi_structure_project(s);
+    finish(s, &drift, &now, u);
     return u;
 }

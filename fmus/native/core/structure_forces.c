@@ -29,15 +29,15 @@ vi_press vi_structure_press(const vi_structure *s, int k)
     return (vi_press){VI_PRESS_LINEAR, constant, contact->applied_stiffness, contact->applied_damping, 1.0};
 }
 
-/* Force of a yielding contact now, N. */
-static double yield_force(const vi_structure *s, int k)
+vi_contact_force vi_structure_yield(const vi_structure *s, int k)
 {
     const vi_press press = vi_structure_press(s, k);
     const double d = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
     if (press.kind == VI_PRESS_LINEAR) {
-        return vi_max(0.0, press.constant + press.stiffness * d + press.damping * rate);
+        const double force = press.constant + press.stiffness * d + press.damping * rate;
+        return (vi_contact_force){vi_max(0.0, force), press.stiffness, press.damping};
     }
-    return press.kind == VI_PRESS_POWER ? vi_contact_law_force(&s->contacts[k].law, d, rate).force : 0.0;
+    return vi_contact_law_force(&s->contacts[k].law, d, rate);
 }
 
 void vi_structure_push(const vi_structure *s, int k, double force, double acceleration[])
@@ -62,7 +62,7 @@ void vi_structure_accelerate_freely(const vi_structure *s, double acceleration[]
                                           : 2.0 * mode->decay * state->p[j];
     }
     for (int k = 0; k < model->contacts; ++k) {
-        force[k] = state->status[k] == VI_CONTACT_YIELDING ? yield_force(s, k) : 0.0;
+        force[k] = state->status[k] == VI_CONTACT_YIELDING ? vi_structure_yield(s, k).force : 0.0;
         vi_structure_push(s, k, force[k], acceleration);
     }
 }

@@ -39,6 +39,8 @@ void vi_structure_accelerate(const vi_structure *s, double acceleration[], doubl
 void vi_structure_accelerate_freely(const vi_structure *s, double acceleration[], double force[]);
 
 /* Add to a modal vector what a force (or impulse, over mass-normalised modes) of contact k on the body adds. */
+/* Force of a yielding contact now, and its slopes. */
+vi_contact_force vi_structure_yield(const vi_structure *s, int k);
 void vi_structure_push(const vi_structure *s, int k, double force, double modal[]);
 
 /* A matrix between contacts, seen from their stops: towards them counts positive. */
@@ -103,6 +105,21 @@ typedef enum {
 
 double vi_structure_drift(const vi_structure *s, double length, double room, vi_drift_event *event, int *k);
 
+/* ---- thin contacts: a power law so little pressed in that its force acts as an impulse ---- */
+
+/* How long the force of power law k may act as that of a penetration at constant rate, s: within the tolerance, but no
+ * shorter than moves it by a rounding of its displacement, else it would never get on. What ends that may still be to
+ * come: it may begin without speed or, pressed in, where its damping leaves no force. */
+double vi_thin_time(const vi_structure *s, int k, double rate, const double acceleration[]);
+
+/* Give the impulse of a thin contact over u seconds of constant rate, to the state at the end. */
+void vi_thin_impulse(const vi_structure *s, int k, double depth, double rate, double u);
+
+/* What thin contacts at these depths, which the series leave out, add to the force of held contact k after u seconds;
+ * *size: the sum of the moduli. */
+double vi_thin_part(const vi_structure *s, const vi_drift *drift, const int thin[], const double at[], int k, double u,
+                    double *size);
+
 /* Is any contact held, yielding or receding, or is the damping coupled? */
 bool vi_structure_is_coupled(const vi_structure *s);
 
@@ -111,7 +128,9 @@ bool vi_structure_is_coupled(const vi_structure *s);
 /* How long a flight may be for its energies, s: HUGE_VAL when they are not followed. */
 double vi_energies_reach(const vi_structure *s);
 void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const double held[], double u);
-void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], double u);
+/* Contacts that are `still` do no work: what their series say of their motion is rounding. */
+void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], const int still[],
+                          double u);
 double vi_structure_kinetic(const vi_structure *s);
 
 /* ---- extremes of the observed point ---- */

@@ -158,7 +158,8 @@ void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const
     }
 }
 
-void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], double u)
+void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], const int still[],
+                          double u)
 {
     const double w = s->model->clock.angular_frequency, angle = w * s->state->now.rest;
     double q[VI_MODES], p[VI_MODES], weight, value[4];
@@ -167,7 +168,7 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
         vi_drift_at(drift, t, s->state->q, p, q);
         add_powers(s, p, held, t, angle + w * t, weight);
         for (int k = 0; k < s->model->contacts; ++k) {
-            if (s->state->status[k] == VI_CONTACT_YIELDING) {
+            if (s->state->status[k] == VI_CONTACT_YIELDING && !still[k]) {
                 vi_polynomial_at(drift->force[k], t, value);
                 const double force = value[0];
                 vi_polynomial_at(drift->penetration[k], t, value);
