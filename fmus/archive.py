@@ -40,6 +40,8 @@ MEMBER_LIMIT = 10_000
 #: Most folders that a member may lie in, and most characters of its name that messages show.
 DEEPEST = 50
 LONGEST_NAME = 100
+#: Characters of a library's reason in a message.
+LONGEST_REASON = 200
 #: Most bytes of a model identifier: with an ending it is the name of a file.
 LONGEST_IDENTIFIER = 240
 #: Age after which the temporary folder of a process that was killed is swept, s.
@@ -336,12 +338,19 @@ def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo
                 shutil.copyfileobj(source, file, BLOCK)
     except OSError as error:
         if error.errno is None:  # bz2 says so that its data are damaged
-            raise ComponentFileError(f"{path}: {_DAMAGED}: {error}.") from error
+            raise _damaged(path, error) from error
         raise ComponentFileError(
             f"{path}: could not be unpacked into {folder.parent}: {error.strerror}."
         ) from error
     except DAMAGE as error:
-        raise ComponentFileError(f"{path}: {_DAMAGED}: {error}.") from error
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception) -> ComponentFileError:
+    """Return the refusal of an archive that a library finds damaged; its reason may quote names of any length."""
+    reason = str(error)
+    shown = reason if len(reason) <= LONGEST_REASON else reason[:LONGEST_REASON] + "..."
+    return ComponentFileError(f"{path}: {_DAMAGED}: {shown}.")
 
 
 def _check_xml(path: Path, folder: Path) -> None:

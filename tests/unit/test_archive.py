@@ -279,6 +279,14 @@ def test_texts_of_great_length_are_refused_in_short(tmp_path: Path, old: str, ne
     assert len(message) < 1000
 
 
+def test_a_long_name_that_is_damaged_is_refused_in_short(tmp_path: Path) -> None:
+    path = written(tmp_path / "M.fmu", {"resources/" + "x" * 5000: b"1"})
+    path.write_bytes(path.read_bytes().replace(b"xxxx", b"xxxy", 1))
+    message = refusal(path)
+    assert "a damaged one: File name in directory" in message
+    assert len(message) < 1000
+
+
 def test_a_pipe_is_no_fmu(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "M.fmu")
     assert "a device" in refusal(tmp_path / "M.fmu")
