@@ -11,8 +11,8 @@ from soak._child import Child
 from soak._journal import Journal, Tried
 from soak._kinds import Kind
 
-BLOCK = 50
-"""Cases of one kind in a row: what one of them does to its process shows within the same kind."""
+LONGEST_BLOCK, BLOCKS = 50, 100
+"""Cases of one kind in a row, at most, and blocks of a kind, at least: a process is left to one kind for a block."""
 LOOK_SECONDS = 0.2
 """Time between looks at children that do not answer."""
 
@@ -79,13 +79,13 @@ def _waiting(
 ) -> Iterator[tuple[Kind, int, int]]:
     """Yield cases that are not yet tried, all kinds advancing by equal shares."""
     tried = _tried(kinds, counts, journal)
-    order = sorted(
-        (case // BLOCK * BLOCK / counts[kind.name], kind.name, case)
-        for kind in kinds
-        for case in range(counts[kind.name])
-    )
+    order: list[tuple[float, str, int]] = []
+    for kind in kinds:
+        count = counts[kind.name]
+        block = min(LONGEST_BLOCK, -(-count // BLOCKS))
+        order += ((case // block * block / count, kind.name, case) for case in range(count))
     by_name = {kind.name: kind for kind in kinds}
-    for _, name, case in order:
+    for _, name, case in sorted(order):
         if (name, case) not in tried:
             yield by_name[name], case, by_name[name].seed(base, case)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import psutil
@@ -121,8 +122,26 @@ def test_kinds_advance_by_equal_shares_and_the_end_of_the_time_is_said(kinds: st
     assert not run(both, {"good": 8, "bad": 8}, 5, journal, 0.0, processes=1, tell=told.append)
     assert told == []
     assert run(both, {"good": 2, "bad": 1}, 5, journal, 60.0, processes=1, tell=told.append)
-    journal.close()
     assert [entry.kind for entry in told] == ["bad", "good", "good"]
+    told.clear()
+    assert not run([kind("good", kinds)], {"good": 10**6}, 5, journal, 1.0, processes=1, tell=told.append)
+    journal.close()
+    assert 0 < len(told) < 10**6
+
+
+def test_few_long_cases_wait_for_no_more_than_their_share_of_many_short_ones(
+    kinds: str, tmp_path: Path
+) -> None:
+    journal, told = Journal(tmp_path / "journal.jsonl"), list[Tried]()
+    both = [kind("good", kinds), replace(kind("good", kinds), name="better")]
+    (tmp_path / "packages" / kinds / "better.py").write_text(
+        "def check(seed):\n    return None\n", encoding="utf-8"
+    )
+    assert run(both, {"good": 400, "better": 4}, 0, journal, 120.0, processes=1, tell=told.append)
+    journal.close()
+    places = [place for place, entry in enumerate(told) if entry.kind == "better"]
+    assert len(told) == 404
+    assert all(abs(place - 100 * number) <= 8 for number, place in enumerate(places))
 
 
 def test_what_was_tried_with_other_sources_is_tried_again(tmp_path: Path) -> None:
