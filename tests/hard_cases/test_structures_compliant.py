@@ -296,7 +296,23 @@ def test_a_load_presses_a_compliant_stop_beside_a_rigid_one_without_a_touch_of_r
 #: Adversarial bodies (tests/soak) that once stood still, or were put on a stop that they were not at.
 DEGENERATE = (1032, 1111, 1113, 1118, 1194, 1195, 1235, 3007, 3019, 10123, 10350)
 #: Those whose power laws began without force, or turned below rounding; whose energies were rounding.
-UNPRESSED = (116, 2044, 3040, 3440, 10229, 10486, 20184, 30150, 30250, 30263, 30298, 5000466, 5000822)
+UNPRESSED = (
+    116,
+    2044,
+    3040,
+    3440,
+    10229,
+    10486,
+    20184,
+    30150,
+    30250,
+    30263,
+    30298,
+    5000366,
+    5000466,
+    5000822,
+    5000890,
+)
 
 
 @pytest.mark.parametrize("seed", DEGENERATE + UNPRESSED)

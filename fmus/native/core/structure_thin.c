@@ -6,6 +6,9 @@
 #include "majorant.h"
 #include "structure_parts.h"
 
+/* A depth that changes by less than this of itself hardly changes. */
+static const double SLOW = 0.1;
+
 /* How the other forces change the modal accelerations: no projection on held stops makes that longer,
  * m/s^3 kg^(1/2). */
 static double jerk_size(const vi_structure *s, int k, const double acceleration[])
@@ -62,22 +65,38 @@ double vi_thin_time(const vi_structure *s, int k, double rate, const double acce
     return vi_max(accurate_time(s, k, rate, acceleration, longest), vi_min(moves, longest));
 }
 
+/* The integral of max(0, depth + rate t)^n over u seconds; *moment: of what it adds to the displacement meanwhile. */
+static double integrate(double n, double depth, double rate, double u, double *moment)
+{
+    static const double NODES[] = {0.1127016653792583, 0.5, 0.8872983346207417}, WEIGHTS[] = {5.0, 8.0, 5.0};
+    const double after = vi_max(0.0, depth + rate * u), begun = pow(vi_max(0.0, depth), n + 1.0);
+    double sum = 0.0;
+    *moment = 0.0;
+    if (fabs(rate * u) >= SLOW * fabs(depth) && fabs(rate) > DBL_MIN / DBL_EPSILON) {
+        sum = (pow(after, n + 1.0) - begun) / ((n + 1.0) * rate);
+        *moment = ((pow(after, n + 2.0) - begun * vi_max(0.0, depth)) / ((n + 2.0) * rate) - begun * u)
+                  / ((n + 1.0) * rate);
+        return sum;
+    }
+    for (int i = 0; i < 3; ++i) { /* the depth hardly changes: differences of its powers would be rounding */
+        const double part = WEIGHTS[i] / 18.0 * u * pow(vi_max(0.0, depth + rate * u * NODES[i]), n);
+        sum += part;
+        *moment += part * u * (1.0 - NODES[i]);
+    }
+    return sum;
+}
+
 void vi_thin_impulse(const vi_structure *s, int k, double depth, double rate, double u)
 {
     const vi_press press = vi_structure_press(s, k);
-    const double n = press.exponent, after = vi_max(0.0, depth + rate * u);
-    const double strength = press.stiffness * vi_max(0.0, 1.0 + press.damping * rate) / ((n + 1.0) * rate);
-    if (rate == 0.0 || !isfinite(strength)) {
-        return; /* rates next to the smallest number do not press anything in */
-    }
-    const double begun = pow(vi_max(0.0, depth), n + 1.0);
-    const double whole = strength * (pow(after, n + 1.0) - begun);
+    const double strength = press.stiffness * vi_max(0.0, 1.0 + press.damping * rate);
+    double moment;
+    const double whole = strength * integrate(press.exponent, depth, rate, u, &moment);
     const double stopping = vi_max(0.0, vi_structure_approach(s, k)) / s->model->compliance[k][k];
     /* only what stops below the rounding of its displacement would be thrown back at once */
     const double impulse = rate > 0.0 ? vi_min(whole, stopping) : whole;
-    const double moved = strength * ((pow(after, n + 2.0) - begun * depth) / ((n + 2.0) * rate) - begun * u);
     vi_structure_push(s, k, impulse, s->state->p);
-    vi_structure_push(s, k, moved, s->state->q);
+    vi_structure_push(s, k, impulse < whole ? strength * moment * (impulse / whole) : strength * moment, s->state->q);
     s->state->touch_down[k].impulse += impulse;
 }
 
