@@ -222,7 +222,8 @@ class GuardedRunner:
             helps = used or not self._noting
             self._noting = True
         else:
-            helps = used and loss.function.endswith(AFTER_A_POINT)
+            # no call known: the process was stopped, perhaps by what the point before has left
+            helps = used and (not loss.function or loss.function.endswith(AFTER_A_POINT))
         if not helps:
             return loss
         try:
