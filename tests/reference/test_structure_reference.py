@@ -145,7 +145,8 @@ def test_the_chatter_of_a_chain_accumulates_at_the_printed_time() -> None:
         np.zeros(2),
         np.zeros(2),
     ).advance(2.5)
-    assert motion.sticks[0].start == pytest.approx(1.649577027167, abs=5e-12)
+    # cutting the chatter off errs by 5e-12, the integration by up to 1e-11 with the order of the processor's sums
+    assert motion.sticks[0].start == pytest.approx(1.649577027167, abs=2e-11)
 
 
 def test_a_held_mass_leaves_the_printed_motion_of_the_others_and_the_printed_force() -> None:
