@@ -226,3 +226,13 @@ def test_two_masses_let_go_at_one_instant_write_one_stick_each() -> None:
         assert body.advance(2.0 * np.pi / 0.3) == DONE
         assert sorted(body.sticks[:, 3]) == [1.0, 2.0]
         assert np.all(body.sticks[:, 2] > body.sticks[:, 1] + 1.0)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_of_two_stops_at_one_place_the_livelier_one_throws_the_body_off(order: int) -> None:
+    # the dead one has no impulse left to give, and does not hold a body that leaves it
+    stops = [Stop([1.0], 0.0, restitution=r) for r in (0.0, 0.3)[::order]]
+    with Structure(Modes(1.0), stops, 0.0, 1.0) as body:
+        assert body.advance(0.5) == DONE
+        assert body.displacement[0] == pytest.approx(-0.3 * math.sin(0.5), rel=ROUNDING)
+        assert body.statuses == ("free", "free")

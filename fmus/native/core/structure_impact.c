@@ -163,11 +163,19 @@ static void count_impact(const vi_structure *s, int k, double approach, double i
     vi_record_impact(s->record, contact->last_time, contact->last_phase, approach, impulse, k + 1, restitution);
 }
 
+/* Speed at which contact k leaves after the impulses: that of its law, or more where others have thrown it off. */
+static double rebound_of(const vi_structure *s, int k, double approach, double impulse, double restitution)
+{
+    const double own = restitution * approach, speed = -vi_structure_approach(s, k);
+    const bool thrown = !(impulse > 0.0) && speed > own + VI_ROUNDING * vi_structure_velocity_size(s, k);
+    return thrown ? speed : own;
+}
+
 /* One contact after the impulses: count it, and let it rest where its chatter can be summed. */
 static void after_impact(const vi_structure *s, int k, double approach, double impulse, double restitution)
 {
     vi_structure_state *state = s->state;
-    const double rebound = restitution * approach;
+    const double rebound = rebound_of(s, k, approach, impulse, restitution);
     double acceleration[VI_MODES], force[VI_PORTS];
     vi_structure_accelerate(s, acceleration, force);
     const double a = vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], acceleration);
