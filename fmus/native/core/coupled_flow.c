@@ -129,9 +129,12 @@ static void scale_of_holding(vi_drift *drift, const vi_drift_start *start)
         double size = 0.0;
         for (int j = 0; j < model->modes; ++j) {
             const vi_mode *mode = &model->mode[j];
-            size += fabs(model->shape[k][j])
-                    * (fabs(mode->force) + fabs(start->held[j]) + mode->stiffness * fabs(start->q[j])
-                       + 2.0 * mode->decay * fabs(start->p[j]));
+            double terms = fabs(mode->force) + fabs(start->held[j]) + mode->stiffness * fabs(start->q[j])
+                           + 2.0 * mode->decay * fabs(start->p[j]);
+            for (int l = 0; l < model->contacts; ++l) { /* of stops that yield, and of the others that hold */
+                terms += l == k ? 0.0 : fabs(model->shape[l][j] * drift->force[l][0]);
+            }
+            size += fabs(model->shape[k][j]) * terms;
         }
         drift->force_scale[k] = size / fabs(model->mobility[k][k]);
     }

@@ -25,6 +25,9 @@ static const double LAST_STEP = 1e-5;
 /* A contact nearer than this over the fastest rate may be near enough to be told without another evaluation. */
 static const double NEAR_CONTACT = 1e-4;
 
+/* Modal displacements and velocities below this have squares below the smallest normal number. */
+static const double SMALLEST = 1e-154;
+
 /* ---- segments ---- */
 
 typedef enum { ENDS_ANYWHERE, ENDS_AT_TARGET, ENDS_AT_PERIOD } segment_end;
@@ -123,8 +126,15 @@ static void correct_start(const vi_structure *s, int k, vi_approach *p)
     if (s->state->status[k] == VI_CONTACT_TOUCHING) {
         p->clearance = 0.0;
         p->velocity = s->state->leaving[k] ? 0.0 : p->velocity;
-        p->acceleration = s->state->leaving[k] == 2 ? 0.0 : p->acceleration;
+        p->acceleration = s->state->leaving[k] >= 2 ? 0.0 : p->acceleration;
     }
+}
+
+/* Does a contact that is at its stop but for rounding approach it by no more than rounding, before it is pulled off? */
+static bool turns_back(const vi_approach *p, double noise)
+{
+    return p->clearance <= noise && p->velocity > 0.0
+           && p->velocity * p->velocity <= -2.0 * p->acceleration * noise;
 }
 
 /* In place of a contact: the motion goes beyond the largest numbers. */
@@ -155,6 +165,9 @@ static int locate(const vi_structure *s, const vi_flight *flight, const vi_point
                 return BEYOND_NUMBERS;
             }
             p.clearance = vi_max(0.0, p.clearance);
+            if (*u == 0.0 && turns_back(&p, VI_ROUNDING * points[k].scale)) {
+                p.velocity = 0.0;
+            }
             if (p.velocity > 0.0 && p.clearance <= VI_ROUNDING * points[k].scale) {
                 *u = land(s->model, &p, *u);
                 return k;
@@ -306,6 +319,18 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
 
 /* ---- coupled motion ---- */
 
+/* A mode that moves less than numbers can square has come to rest: between stops that take a share of its speed each time
+ * it would go on until nothing is left of its digits. */
+static void end_smallest(const vi_structure *s)
+{
+    vi_structure_state *state = s->state;
+    for (int j = 0; j < s->model->modes; ++j) {
+        if (fabs(state->q[j]) < SMALLEST && fabs(state->p[j]) < SMALLEST) {
+            state->q[j] = state->p[j] = 0.0;
+        }
+    }
+}
+
 static void drift(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
     segment_end end;
@@ -318,6 +343,9 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     const bool whole = event == VI_DRIFT_NO_EVENT && u >= length;
     move(s, u, whole ? end : event == VI_DRIFT_NO_EVENT ? ENDS_ANYWHERE : landing(end, u, length, room), target);
     const double remaining = vi_clock_elapsed(&s->model->clock, s->state->now, target);
+    if (event != VI_DRIFT_NO_EVENT) {
+        end_smallest(s);
+    }
     switch (event) {
     case VI_DRIFT_NO_EVENT: break;
     case VI_DRIFT_ARRIVAL:
@@ -336,7 +364,8 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
 bool vi_structure_is_coupled(const vi_structure *s)
 {
     for (int k = 0; k < s->model->contacts; ++k) {
-        if (s->state->status[k] >= VI_CONTACT_HELD) {
+        const int32_t status = s->state->status[k];
+        if (status >= VI_CONTACT_HELD || (status == VI_CONTACT_TOUCHING && s->state->leaving[k] == 3)) {
             return true;
         }
     }

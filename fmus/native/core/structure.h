@@ -82,8 +82,8 @@ typedef struct {
     double fastest_impact[VI_PORTS]; /* largest approach since the last stick, m/s */
     int64_t low_impacts[VI_PORTS];   /* impacts in a row that are far below it */
     double tail_impulse[VI_PORTS];   /* of the chatter summed at the last stick, N s */
-    /* touching: leaves with velocity exactly 0 (1), with acceleration 0 too (2); yielding: began at this instant, at depth
-     * exactly 0, with speed (1) or without (2) */
+    /* touching: leaves with velocity exactly 0 (1), with acceleration 0 too (2), with its rate 0 but for rounding (3);
+     * yielding: began at this instant, at depth exactly 0, with speed (1) or without (2) */
     int32_t leaving[VI_PORTS];
     int32_t asking[VI_PORTS];        /* external contacts that wait for an answer at this instant */
     vi_touch_down touch_down[VI_PORTS];

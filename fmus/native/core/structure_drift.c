@@ -139,6 +139,49 @@ static bool stays(const vi_structure *s, const vi_drift *drift, int k, const dou
     return moved <= VI_ROUNDING * terms;
 }
 
+double vi_structure_series_noise(const vi_structure *s, const vi_drift *drift, int k, int n)
+{
+    const vi_structure_model *model = s->model;
+    double terms = 0.0, drive = 1.0;
+    for (int i = 1; i <= n - 2; ++i) {
+        drive *= model->clock.angular_frequency / (double)i;
+    }
+    for (int j = 0; j < model->modes; ++j) {
+        const vi_mode *mode = &model->mode[j];
+        double size = fabs(mode->force) * drive + mode->stiffness * fabs(drift->modal[n - 2][j]);
+        size += n == 3 ? fabs(s->state->held_rate[j]) : 0.0;
+        for (int i = 0; i < model->modes; ++i) {
+            const double damping = model->coupled ? model->coupling[j][i] : i == j ? 2.0 * mode->decay : 0.0;
+            size += fabs(damping * drift->modal[n - 1][i]) * (double)(n - 1);
+        }
+        terms += fabs(model->shape[k][j]) * size;
+    }
+    for (int l = 0; l < model->contacts; ++l) {
+        terms += vi_structure_push_size(model, k, l) * fabs(drift->force[l][n - 2]);
+    }
+    return VI_ROUNDING * terms / ((double)n * (double)(n - 1));
+}
+
+int vi_structure_first_of_force(const vi_structure *s, const vi_drift *drift, int k)
+{
+    for (int n = 1; n <= VI_ORDER - 2; ++n) {
+        const double pressure = drift->force[k][n] * s->model->compliance[k][k] / (double)((n + 1) * (n + 2));
+        if (fabs(pressure) > vi_structure_series_noise(s, drift, k, n + 2)) {
+            return n;
+        }
+    }
+    return VI_ORDER + 1;
+}
+
+/* Let the series of what is 0 at the start, but for rounding, begin with coefficient `first`: divided by that power of time
+ * it has the same zeros but that one. */
+static void divide(double c[VI_ORDER + 1], int first)
+{
+    for (int n = 0; n <= VI_ORDER; ++n) {
+        c[n] = n + first <= VI_ORDER ? c[n + first] : 0.0;
+    }
+}
+
 /* What is known exactly of the motion of contact k, which touches: thin contacts, which its series leaves out, lift it
  * off, or have just ceased to hold it. */
 static void correct_start(const vi_structure *s, const situation *now, int k, double clearance[VI_ORDER + 1])
@@ -146,12 +189,26 @@ static void correct_start(const vi_structure *s, const situation *now, int k, do
     const int exact = s->state->leaving[k];
     clearance[0] = 0.0;
     clearance[1] = exact ? 0.0 : clearance[1];
-    if (exact == 2) {
+    if (exact >= 2) {
         clearance[2] = now->any_thin ? vi_max(0.0, clearance[2]) : 0.0;
     } else if (now->any_thin) {
         clearance[2] = -0.5 * vi_structure_direction(s, k)
                        * vi_structure_at(s->model, s->model->shape[k], now->acceleration);
     }
+}
+
+/* A contact that leaves its stop with neither speed nor acceleration: the first coefficient that is more than rounding
+ * moves it. Divided by that power of time, its clearance has the same zeros but the one at the start. False where
+ * nothing moves it. */
+static bool divide_by_start(const vi_structure *s, const vi_drift *drift, int k, double clearance[VI_ORDER + 1])
+{
+    int first = 2;
+    while (first <= VI_ORDER && (first == 2 ? clearance[2] == 0.0
+                                            : fabs(clearance[first]) <= vi_structure_series_noise(s, drift, k, first))) {
+        ++first;
+    }
+    divide(clearance, first);
+    return first <= VI_ORDER;
 }
 
 static void arrivals(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double length,
@@ -164,12 +221,21 @@ static void arrivals(const vi_structure *s, const vi_drift *drift, const situati
     if (s->state->status[k] == VI_CONTACT_TOUCHING) {
         correct_start(s, now, k, clearance);
     }
-    if (fabs(clearance[0]) <= VI_ROUNDING * vi_structure_displacement_size(s, k)
-        && stays(s, drift, k, clearance, length)) {
+    if (vi_structure_only_touches(s, k)
+        || (fabs(clearance[0]) <= VI_ROUNDING * vi_structure_displacement_size(s, k)
+            && stays(s, drift, k, clearance, length))) {
         return;
     }
-    const double noise = VI_ROUNDING * (fabs(s->contacts[k].position) + vi_polynomial_size(clearance, length));
-    const vi_fall fall = vi_polynomial_fall(clearance, 0.0, length, noise);
+    double noise = VI_ROUNDING * (fabs(s->contacts[k].position) + vi_polynomial_size(clearance, length));
+    bool pressed = false;
+    if (s->state->status[k] == VI_CONTACT_TOUCHING && s->state->leaving[k] >= 2) {
+        if (!divide_by_start(s, drift, k, clearance)) {
+            return;
+        }
+        noise = VI_ROUNDING * vi_polynomial_size(clearance, length);
+        pressed = clearance[0] < 0.0; /* by what has happened at this instant since it left */
+    }
+    const vi_fall fall = pressed ? (vi_fall){true, 0.0, 0.0} : vi_polynomial_fall(clearance, 0.0, length, noise);
     consider(first, &fall, VI_DRIFT_ARRIVAL, k);
 }
 
@@ -199,12 +265,17 @@ static vi_fall release_beside_thin(const vi_structure *s, const vi_drift *drift,
 static void releases(const vi_structure *s, const vi_drift *drift, const situation *now, int k, double length,
                      event_found *first)
 {
-    const double *force = drift->force[k];
-    double size = 0.0;
+    double force[VI_ORDER + 1], size = 0.0;
+    memcpy(force, drift->force[k], sizeof force);
     const double thin = now->any_thin ? vi_thin_part(s, drift, now->thin, now->at, k, 0.0, &size) : 0.0;
     const double noise = VI_ROUNDING * (drift->force_scale[k] + size);
     vi_fall fall = {true, 0.0, 1.0};
-    if (force[0] + thin >= -noise) {
+    if (fabs(force[0]) <= noise && !now->any_thin) {
+        divide(force, vi_structure_first_of_force(s, drift, k));
+        if (force[0] >= 0.0) {
+            fall = fall_through(force, length, VI_ROUNDING * vi_polynomial_size(force, length));
+        }
+    } else if (force[0] + thin >= -noise) {
         fall = force[0] >= -noise ? fall_through(force, length, noise) : fall;
         fall = now->any_thin && fall.found ? release_beside_thin(s, drift, now, k, fall, length, noise) : fall;
     }
@@ -258,7 +329,7 @@ static void separations(const vi_structure *s, const vi_drift *drift, const situ
     }
     if (depth[0] > 0.0 || depth[1] < 0.0) {
         const double noise = VI_ROUNDING * (fabs(s->contacts[k].position) + vi_polynomial_size(depth, length));
-        vi_fall fall = vi_polynomial_fall(depth, 0.0, length, now->thin[k] ? VI_ROUNDING * fabs(depth[0]) : noise);
+        const vi_fall fall = fall_through(depth, length, now->thin[k] ? VI_ROUNDING * fabs(depth[0]) : noise);
         consider(first, &fall, VI_DRIFT_SEPARATION, k);
     }
 }

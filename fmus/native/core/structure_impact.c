@@ -73,6 +73,8 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     view->slope = drift.force[k][1] * view->mobility;
     view->bend = 2.0 * drift.force[k][2] * view->mobility;
     view->noise = VI_ROUNDING * drift.force_scale[k] * view->mobility;
+    view->first = vi_structure_first_of_force(s, &drift, k);
+    view->lead = view->first <= VI_ORDER ? drift.force[k][view->first] : 0.0;
 }
 
 /* The end of a chatter sequence: equations.md 3.1. */
@@ -127,7 +129,7 @@ static void rest_if_summable(const vi_structure *s, int k, double rebound, doubl
 {
     vi_held_view view;
     vi_structure_look_at_held(s, k, &view);
-    if (rebound == 0.0 && view.slope >= 0.0 && fabs(view.pressure) <= view.noise) {
+    if (rebound == 0.0 && view.lead >= 0.0 && fabs(view.pressure) <= view.noise) {
         come_to_rest(s, k, &view, 0.0, 0.0); /* neither pressed nor lifted */
         return;
     }
@@ -287,6 +289,9 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
     give_impulses(s, impulse, impulse_low);
     state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
     for (int k = 0; k < n; ++k) {
+        if (in_play[k] && !hit[k] && state->leaving[k] > 1) {
+            state->leaving[k] = 1; /* its acceleration may be another now */
+        }
         if (in_play[k] && !hit[k] && !(impulse[k] > 0.0)
             && vi_structure_approach(s, k) < -VI_ROUNDING * vi_structure_velocity_size(s, k)) {
             if (state->status[k] == VI_CONTACT_HELD) {

@@ -21,12 +21,19 @@ double vi_structure_approach(const vi_structure *s, int k);
 /* Clearance of contact k, m: exactly 0 where it is known to touch. */
 double vi_structure_clearance(const vi_structure *s, int k);
 
-/* Size of the terms that a displacement, or a velocity, of contact k is the sum of. */
+/* Size of the terms that a displacement, or a velocity, of contact k is the sum of: velocities that displacements and
+ * loads turn into within a radian are among them. */
 double vi_structure_displacement_size(const vi_structure *s, int k);
 double vi_structure_velocity_size(const vi_structure *s, int k);
 
+/* Size of the terms that the acceleration of contact k for a unit force at contact l is the sum of, 1/kg. */
+double vi_structure_push_size(const vi_structure_model *model, int k, int l);
+
 /* Is this contact looked for? */
 bool vi_structure_watched(const vi_structure *s, int k);
+
+/* Does contact k stand at its stop, neither pressed in nor going to be, since rigid stops hold its point there? */
+bool vi_structure_only_touches(const vi_structure *s, int k);
 
 /* How contact k presses now. */
 vi_press vi_structure_press(const vi_structure *s, int k);
@@ -52,6 +59,8 @@ typedef struct {
     double mobility;         /* of the contact with those held beside it, 1/kg */
     double pressure, slope, bend; /* acceleration towards the stop if it were free, and its rates, m/s^2, .. m/s^4 */
     double noise;            /* of the pressure */
+    int first;               /* the first Taylor coefficient, from the slope (1) on, that is more than rounding */
+    double lead;             /* that one; 0: none */
 } vi_held_view;
 
 void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view);
@@ -103,6 +112,12 @@ typedef enum {
     VI_DRIFT_FREE    /* a receding contact is out, or its surface has relaxed */
 } vi_drift_event;
 
+/* Rounding of Taylor coefficient n >= 3 of contact k's motion, which is the sum of larger terms, m/s^n. */
+double vi_structure_series_noise(const vi_structure *s, const vi_drift *drift, int k, int n);
+
+/* The first coefficient, from the slope on, of the force of held contact k that is more than rounding; VI_ORDER + 1: none. */
+int vi_structure_first_of_force(const vi_structure *s, const vi_drift *drift, int k);
+
 double vi_structure_drift(const vi_structure *s, double length, double room, vi_drift_event *event, int *k);
 
 /* ---- thin contacts: a power law so little pressed in that its force acts as an impulse ---- */
@@ -120,7 +135,7 @@ void vi_thin_impulse(const vi_structure *s, int k, double depth, double rate, do
 double vi_thin_part(const vi_structure *s, const vi_drift *drift, const int thin[], const double at[], int k, double u,
                     double *size);
 
-/* Is any contact held, yielding or receding, or is the damping coupled? */
+/* Is any contact held, yielding, receding, or lifted by a high derivative only, or is the damping coupled? */
 bool vi_structure_is_coupled(const vi_structure *s);
 
 /* ---- energies, when they are followed ---- */

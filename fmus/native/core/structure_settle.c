@@ -13,10 +13,14 @@ static const double KEPT = 1e-9;
 static bool kept_by_others(const vi_structure *s, int k, double g[VI_PORTS][VI_PORTS])
 {
     double column[VI_PORTS], share[VI_PORTS], left = g[k][k];
-    int held[VI_PORTS] = {0};
+    int held[VI_PORTS] = {0}, any = 0;
     for (int l = 0; l < s->model->contacts; ++l) {
         held[l] = l != k && s->state->status[l] == VI_CONTACT_HELD;
+        any |= held[l];
         column[l] = g[l][k];
+    }
+    if (!any) {
+        return false;
     }
     vi_solve_active(s->model->contacts, g, column, held, share);
     for (int l = 0; l < s->model->contacts; ++l) {
@@ -85,7 +89,8 @@ static void decide(const vi_structure *s, int k, double gap, double push, double
     const double taken = compliant ? push : push * view.mobility;
     const bool tie = fabs(gap) <= noise && taken <= noise;
     const bool idle = (tie || compliant) && kept_by_others(s, k, g);
-    const bool stays = view.slope > 0.0 || (view.slope == 0.0 && leaving != 2 && !compliant) || was_held;
+    const bool neither = view.lead == 0.0 && (view.slope == 0.0 ? leaving < 2 : leaving == 0);
+    const bool stays = view.lead > 0.0 || (neither && !compliant) || was_held;
     const bool presses = !idle && (tie ? stays : taken > noise);
     if (presses && compliant) {
         vi_structure_touch_down(s, k);
@@ -94,7 +99,7 @@ static void decide(const vi_structure *s, int k, double gap, double push, double
     } else if (!presses && was_held) {
         vi_structure_release(s, k, 1);
     } else if (!presses) {
-        s->state->leaving[k] = tie || idle ? 2 : 1;
+        s->state->leaving[k] = !(tie || idle) ? 1 : view.first == 1 ? 2 : 3;
     }
 }
 
@@ -111,12 +116,13 @@ static void settle_resting(const vi_structure *s, const int candidate[])
     }
 }
 
-/* Is yielding contact k neither pressed in nor going to be, since rigid stops hold its point where it touches? */
-static bool only_touches(const vi_structure *s, int k)
+bool vi_structure_only_touches(const vi_structure *s, int k)
 {
+    const double speed = vi_structure_velocity_size(s, k);
+    const double reach = s->model->fastest > 0.0 ? speed / s->model->fastest : 0.0; /* within a radian */
     double g[VI_PORTS][VI_PORTS];
-    if (fabs(vi_structure_clearance(s, k)) > VI_ROUNDING * vi_structure_displacement_size(s, k)
-        || fabs(vi_structure_approach(s, k)) > VI_ROUNDING * vi_structure_velocity_size(s, k)) {
+    if (fabs(vi_structure_clearance(s, k)) > VI_ROUNDING * (vi_structure_displacement_size(s, k) + reach)
+        || fabs(vi_structure_approach(s, k)) > VI_ROUNDING * speed) {
         return false;
     }
     vi_structure_signed(s, s->model->compliance, g);
@@ -127,7 +133,7 @@ void vi_structure_settle(const vi_structure *s, const vi_step_request *request)
 {
     vi_structure_state *state = s->state;
     for (int k = 0; k < s->model->contacts; ++k) {
-        if (state->status[k] == VI_CONTACT_YIELDING && only_touches(s, k)) {
+        if (state->status[k] == VI_CONTACT_YIELDING && vi_structure_only_touches(s, k)) {
             vi_structure_separate(s, k, false);
             state->leaving[k] = 2;
         }

@@ -113,6 +113,11 @@ static double size_at(const vi_structure_model *model, const double shape[], con
     return sum;
 }
 
+double vi_structure_push_size(const vi_structure_model *model, int k, int l)
+{
+    return size_at(model, model->shape[k], model->shape[l]);
+}
+
 double vi_structure_displacement_size(const vi_structure *s, int k)
 {
     return fabs(s->contacts[k].position) + size_at(s->model, s->model->shape[k], s->state->q);
@@ -120,7 +125,16 @@ double vi_structure_displacement_size(const vi_structure *s, int k)
 
 double vi_structure_velocity_size(const vi_structure *s, int k)
 {
-    return size_at(s->model, s->model->shape[k], s->state->p);
+    const vi_structure_model *model = s->model;
+    const double radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
+    double sum = 0.0;
+    for (int j = 0; j < model->modes; ++j) {
+        const vi_mode *mode = &model->mode[j];
+        const double loads = fabs(mode->force) + fabs(s->state->held[j]);
+        sum += fabs(model->shape[k][j])
+               * (fabs(s->state->p[j]) + mode->natural * fabs(s->state->q[j]) + loads * radian);
+    }
+    return sum;
 }
 
 bool vi_structure_watched(const vi_structure *s, int k)

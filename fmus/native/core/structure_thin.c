@@ -61,7 +61,10 @@ static double accurate_time(const vi_structure *s, int k, double rate, const dou
 double vi_thin_time(const vi_structure *s, int k, double rate, const double acceleration[])
 {
     const double longest = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0;
-    const double moves = rate != 0.0 ? DBL_EPSILON * vi_structure_displacement_size(s, k) / fabs(rate) : 0.0;
+    const double pull = fabs(vi_structure_at(s->model, s->model->shape[k], acceleration));
+    const double rounding = DBL_EPSILON * vi_structure_displacement_size(s, k);
+    const double turned = 2.0 * pull * rounding;
+    const double moves = rate != 0.0 ? 2.0 * rounding / (fabs(rate) + sqrt(rate * rate + turned)) : 0.0;
     return vi_max(accurate_time(s, k, rate, acceleration, longest), vi_min(moves, longest));
 }
 
