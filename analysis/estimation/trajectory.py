@@ -37,6 +37,8 @@ _STEP = 1e-7
 _CHATTER = 1e-5
 _FEWEST_IN_HEAD = 5
 _MOST_TRIALS = 20
+# A trial that is no oscillator fits this many times the range of the signal badly.
+_FAR = 1e3
 # Pieces whose rests are larger than typical by more than so many standard errors are left out, up to this part.
 _BEYOND_CHANCE = 5.0
 _MOST_ODD = 0.34
@@ -334,6 +336,9 @@ class _Problem:
 
     def rests(self, x: Floats) -> Floats:
         parameters = self.parameters(x)
+        if parameters.damping_ratio < 0.0 or parameters.natural_frequency < 0.0:
+            # no oscillator; a trial that fits so badly makes the search take a shorter step
+            return np.full(self.rows[-1], _FAR * float(np.ptp(self.signal.values)))
         return np.concatenate([self.rests_of(x, k, parameters) for k in range(len(self.pieces))])
 
     def distance(self) -> float:

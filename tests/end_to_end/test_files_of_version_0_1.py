@@ -102,4 +102,5 @@ def test_a_recording_is_estimated_as_it_was(old: Path) -> None:
     assert done.returncode == 0, done.stderr
     with xr.open_dataset(old / "now.nc") as now, xr.open_dataset(old / "estimates.nc") as before:
         assert "angular_frequency" in before.quantity
-        np.testing.assert_allclose(now.estimate, before.estimate, rtol=1e-6, equal_nan=True)
+        # what is 0 but for rounding, an offset of 4e-9 say, depends on the versions of numpy and scipy
+        np.testing.assert_allclose(now.estimate, before.estimate, rtol=1e-6, atol=1e-12, equal_nan=True)
