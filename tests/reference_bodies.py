@@ -199,7 +199,8 @@ def period_one_orbits(
         phase = float(np.angle(turned / y)) % (2.0 * math.pi)
         rotor = steady * np.exp(1j * phase)
         after = np.concatenate([rotor.real, (1j * w * rotor).real]) + velocity * unit
-        after[:n] += impulse * (position - contact @ after[:n])  # on the stop: off what the sums above have rounded
+        # on the stop: takes off what the sums above have rounded
+        after[:n] += impulse * (position - contact @ after[:n])
         clear = velocity > 0.0 and _stays_below(body, contact, rotor, w, velocity * unit, position, duration)
         saltation = _saltation(body, contact, rotor, force, phase, after, velocity, r, w)
         orbits.append(

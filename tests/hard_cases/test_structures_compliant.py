@@ -65,6 +65,25 @@ def test_hunt_crossley_rebounds_as_its_implicit_formula_whatever_the_exponent(
         assert body.impacts[0, 6] == pytest.approx(e, rel=1e-9)
 
 
+@pytest.mark.parametrize("position", [0.0, 0.1, 1.0])
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.5])
+def test_a_power_law_rebounds_to_its_tolerance_or_the_rounding_of_its_depth(
+    exponent: float, position: float
+) -> None:
+    speed, stiffness, p = 1e-4, 1e8, 0.1
+
+    def residual(e: float) -> float:
+        return p * (1.0 + e) - math.log((1.0 + p) / (1.0 - p * e))
+
+    e, depth = brentq(residual, 1e-9, 1.0, xtol=1e-15), (speed**2 / stiffness) ** (1.0 / (exponent + 1.0))
+    stop = Stop(
+        [1.0], position, law="hunt_crossley", stiffness=stiffness, damping=p / speed, exponent=exponent
+    )
+    with Structure(Modes([0.0]), [stop], position - 0.1 * speed, speed) as body:
+        body.advance(2.0)
+        assert abs(body.impacts[0, 6] - e) <= 4e-10 + np.finfo(float).eps * position / depth
+
+
 @pytest.mark.parametrize(("stiffness", "damping"), [(100.0, 0.4), (100.0, 1e3), (1e6, 1e3), (0.5, 0.0)])
 def test_a_mass_started_in_its_static_place_within_a_stop_stays_there(
     stiffness: float, damping: float

@@ -9,18 +9,24 @@
 /* Of its own mobility, what is left to a contact whose point others hold. */
 static const double KEPT = 1e-9;
 
+static bool others_hold(const vi_structure *s, int k)
+{
+    for (int l = 0; l < s->model->contacts; ++l) {
+        if (l != k && s->state->status[l] == VI_CONTACT_HELD) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Is the point of contact k kept in place by the contacts that are held beside it? */
 static bool kept_by_others(const vi_structure *s, int k, double g[VI_PORTS][VI_PORTS])
 {
     double column[VI_PORTS], share[VI_PORTS], left = g[k][k];
-    int held[VI_PORTS] = {0}, any = 0;
+    int held[VI_PORTS] = {0};
     for (int l = 0; l < s->model->contacts; ++l) {
         held[l] = l != k && s->state->status[l] == VI_CONTACT_HELD;
-        any |= held[l];
         column[l] = g[l][k];
-    }
-    if (!any) {
-        return false;
     }
     vi_solve_active(s->model->contacts, g, column, held, share);
     for (int l = 0; l < s->model->contacts; ++l) {
@@ -118,6 +124,9 @@ static void settle_resting(const vi_structure *s, const int candidate[])
 
 bool vi_structure_only_touches(const vi_structure *s, int k)
 {
+    if (!others_hold(s, k)) {
+        return false;
+    }
     const double speed = vi_structure_velocity_size(s, k);
     const double reach = s->model->fastest > 0.0 ? speed / s->model->fastest : 0.0; /* within a radian */
     double g[VI_PORTS][VI_PORTS];
