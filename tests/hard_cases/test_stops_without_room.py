@@ -98,6 +98,12 @@ def test_an_impact_elsewhere_at_the_instant_of_release_keeps_a_body_on_its_stop(
         (1998008486, "rocking on two stops while a third one yields"),
         (1998008454, "thousands of touches of rounding size: 3 s"),
         (1998012530, "thousands of touches of rounding size: 4 s"),
+        (77003633, "elastic and dying impacts in a corner of two stops"),
+        (77006017, "clamped between two stops beside a third one of nearly the same shape"),
+        (77006936, "pressed by the third power of time as a power law begins to press elsewhere"),
+        (77006884, "held on a rigid stop with a Hunt-Crossley stop pressed in by 1e-15 m: 20 s"),
+        (88001137, "let go with a speed of 1e-42 m/s towards a Hertz stop: 30 % off in speed"),
+        (88007988, "clamped by stiff stops that turn the rounding of a rate into force"),
         (5000528, "let go by two stops at one instant: motions of 1e-19 m"),
     ],
 )

@@ -157,8 +157,7 @@ static void put_on_stop(const vi_structure *s, int k)
     s->state->leaving[k] = 0;
 }
 
-/* Does this free contact meet its stop at this instant, as far as rounding can tell? */
-static bool meets_now(const vi_structure *s, int k)
+bool vi_structure_meets_now(const vi_structure *s, int k)
 {
     if (!vi_structure_watched(s, k) || s->state->status[k] != VI_CONTACT_FREE) {
         return false;
@@ -215,7 +214,7 @@ void vi_structure_meet(const vi_structure *s, int k, bool stop_here)
     put_on_stop(s, k);
     hit[k] = 1;
     for (int l = 0; l < s->model->contacts; ++l) {
-        if (l != k && meets_now(s, l)) {
+        if (l != k && vi_structure_meets_now(s, l)) {
             s->state->status[l] = VI_CONTACT_TOUCHING;
             s->state->leaving[l] = 0;
             hit[l] = 1;

@@ -27,6 +27,7 @@ typedef struct {
     double held[VI_MODES];
     vi_press press[VI_PORTS];
     int thin[VI_PORTS]; /* of a power law: so little penetration that its force acts as an impulse */
+    int kept[VI_PORTS]; /* yielding: stays as it is, its point is held */
     bool any_thin;
     double acceleration[VI_MODES]; /* with all forces; only where there is a power law */
     double length;      /* that thin contacts and relaxing surfaces allow, s */
@@ -54,6 +55,10 @@ static void look(const vi_structure *s, situation *now)
         if (now->press[k].kind == VI_PRESS_NONE && s->state->status[k] == VI_CONTACT_RECEDING
             && vi_structure_surface_lags(s, k)) {
             now->length = vi_min(now->length, s->contacts[k].relaxation_time);
+        }
+        now->kept[k] = s->state->status[k] == VI_CONTACT_YIELDING && vi_structure_is_kept(s, k);
+        if (now->kept[k]) { /* its force is what it is: rounding would move it, and set the pace */
+            now->press[k] = (vi_press){VI_PRESS_LINEAR, vi_structure_yield(s, k).force, 0.0, 0.0, 1.0};
         }
         any_power = any_power || now->press[k].kind == VI_PRESS_POWER;
     }
@@ -142,9 +147,10 @@ static bool stays(const vi_structure *s, const vi_drift *drift, int k, const dou
 double vi_structure_series_noise(const vi_structure *s, const vi_drift *drift, int k, int n)
 {
     const vi_structure_model *model = s->model;
-    double terms = 0.0, drive = 1.0;
+    double terms = 0.0, drive = 1.0, turn = 1.0;
     for (int i = 1; i <= n - 2; ++i) {
         drive *= model->clock.angular_frequency / (double)i;
+        turn *= (i == 1 ? 1.0 : model->fastest) / (double)i;
     }
     for (int j = 0; j < model->modes; ++j) {
         const vi_mode *mode = &model->mode[j];
@@ -157,7 +163,13 @@ double vi_structure_series_noise(const vi_structure *s, const vi_drift *drift, i
         terms += fabs(model->shape[k][j]) * size;
     }
     for (int l = 0; l < model->contacts; ++l) {
-        terms += vi_structure_push_size(model, k, l) * fabs(drift->force[l][n - 2]);
+        double force = fabs(drift->force[l][n - 2]);
+        if (s->state->status[l] == VI_CONTACT_YIELDING) { /* which turns the rounding of its rate into force */
+            const vi_contact_force slopes = vi_structure_yield(s, l);
+            const double stiffness = slopes.stiffness + slopes.damping * model->fastest;
+            force += stiffness * vi_structure_velocity_size(s, l) * turn;
+        }
+        terms += vi_structure_push_size(model, k, l) * force;
     }
     return VI_ROUNDING * terms / ((double)n * (double)(n - 1));
 }
@@ -270,10 +282,11 @@ static void releases(const vi_structure *s, const vi_drift *drift, const situati
     const double thin = now->any_thin ? vi_thin_part(s, drift, now->thin, now->at, k, 0.0, &size) : 0.0;
     const double noise = VI_ROUNDING * (drift->force_scale[k] + size);
     vi_fall fall = {true, 0.0, 1.0};
-    if (fabs(force[0]) <= noise && !now->any_thin) {
+    if (fabs(force[0]) <= noise && fabs(thin) <= noise) {
         divide(force, vi_structure_first_of_force(s, drift, k));
         if (force[0] >= 0.0) {
             fall = fall_through(force, length, VI_ROUNDING * vi_polynomial_size(force, length));
+            fall = now->any_thin && fall.found ? release_beside_thin(s, drift, now, k, fall, length, noise) : fall;
         }
     } else if (force[0] + thin >= -noise) {
         fall = force[0] >= -noise ? fall_through(force, length, noise) : fall;
@@ -399,7 +412,11 @@ static event_found first_event(const vi_structure *s, const vi_drift *drift, con
         case VI_CONTACT_FREE:
         case VI_CONTACT_TOUCHING: arrivals(s, drift, now, k, searched, &first); break;
         case VI_CONTACT_HELD: releases(s, drift, now, k, length, &first); break;
-        case VI_CONTACT_YIELDING: separations(s, drift, now, k, length, &first); break;
+        case VI_CONTACT_YIELDING:
+            if (!now->kept[k]) {
+                separations(s, drift, now, k, length, &first);
+            }
+            break;
         default: returns(s, drift, k, length, &first); break;
         }
     }

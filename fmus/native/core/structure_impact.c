@@ -73,6 +73,7 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     view->slope = drift.force[k][1] * view->mobility;
     view->bend = 2.0 * drift.force[k][2] * view->mobility;
     view->noise = VI_ROUNDING * drift.force_scale[k] * view->mobility;
+    view->free_noise = VI_ROUNDING * drift.force_scale[k] * fabs(model->mobility[k][k]);
     view->first = vi_structure_first_of_force(s, &drift, k);
     view->lead = view->first <= VI_ORDER ? drift.force[k][view->first] : 0.0;
 }
@@ -334,8 +335,12 @@ void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
         collide_once(s, now);
         int any = 0;
         for (int k = 0; k < s->model->contacts; ++k) {
-            const bool touches = s->state->status[k] == VI_CONTACT_TOUCHING && !s->state->leaving[k]
-                                 && s->contacts[k].law.law == VI_LAW_RESTITUTION;
+            const bool rigid = s->contacts[k].law.law == VI_LAW_RESTITUTION;
+            if (rigid && vi_structure_meets_now(s, k)) { /* thrown against it by the last round, in a corner */
+                s->state->status[k] = VI_CONTACT_TOUCHING;
+                s->state->leaving[k] = 0;
+            }
+            const bool touches = s->state->status[k] == VI_CONTACT_TOUCHING && !s->state->leaving[k] && rigid;
             now[k] = touches && vi_structure_approach(s, k) > VI_ROUNDING * vi_structure_velocity_size(s, k);
             any |= now[k];
         }

@@ -32,6 +32,9 @@ double vi_structure_push_size(const vi_structure_model *model, int k, int l);
 /* Is this contact looked for? */
 bool vi_structure_watched(const vi_structure *s, int k);
 
+/* Is the point of contact k kept in place by the contacts that are held beside it? */
+bool vi_structure_is_kept(const vi_structure *s, int k);
+
 /* Does contact k stand at its stop, neither pressed in nor going to be, since rigid stops hold its point there? */
 bool vi_structure_only_touches(const vi_structure *s, int k);
 
@@ -59,6 +62,7 @@ typedef struct {
     double mobility;         /* of the contact with those held beside it, 1/kg */
     double pressure, slope, bend; /* acceleration towards the stop if it were free, and its rates, m/s^2, .. m/s^4 */
     double noise;            /* of the pressure */
+    double free_noise;       /* of its acceleration with no contact held beside it, m/s^2 */
     int first;               /* the first Taylor coefficient, from the slope (1) on, that is more than rounding */
     double lead;             /* that one; 0: none */
 } vi_held_view;
@@ -75,6 +79,9 @@ void vi_structure_resolve_hits(const vi_structure *s, const int hit[]);
 
 /* Contact k has arrived at its stop (others may have, too): resolve it, or wait for an answer, or pass (FMI 2.0). */
 void vi_structure_meet(const vi_structure *s, int k, bool stop_here);
+
+/* Does contact k, which is free, meet its stop at this instant, as far as rounding can tell? */
+bool vi_structure_meets_now(const vi_structure *s, int k);
 
 /* Joint impulses of all contacts that touch with an approach; answers of external laws are used where `answered`. */
 void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS]);

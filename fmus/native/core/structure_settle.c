@@ -19,9 +19,13 @@ static bool others_hold(const vi_structure *s, int k)
     return false;
 }
 
-/* Is the point of contact k kept in place by the contacts that are held beside it? */
-static bool kept_by_others(const vi_structure *s, int k, double g[VI_PORTS][VI_PORTS])
+bool vi_structure_is_kept(const vi_structure *s, int k)
 {
+    if (!others_hold(s, k)) {
+        return false;
+    }
+    double g[VI_PORTS][VI_PORTS];
+    vi_structure_signed(s, s->model->compliance, g);
     double column[VI_PORTS], share[VI_PORTS], left = g[k][k];
     int held[VI_PORTS] = {0};
     for (int l = 0; l < s->model->contacts; ++l) {
@@ -85,16 +89,16 @@ static void push_resting(const vi_structure *s, double g[VI_PORTS][VI_PORTS], re
 }
 
 /* What a contact that touches without speed does: `push` is the acceleration that its stop would have to take. */
-static void decide(const vi_structure *s, int k, double gap, double push, double g[VI_PORTS][VI_PORTS])
+static void decide(const vi_structure *s, int k, double gap, double push)
 {
     vi_held_view view;
     vi_structure_look_at_held(s, k, &view);
     const bool compliant = gives_way(s, k), was_held = s->state->status[k] == VI_CONTACT_HELD;
     const int32_t leaving = s->state->leaving[k];
-    const double noise = compliant ? view.noise / view.mobility * s->model->mobility[k][k] : view.noise;
+    const double noise = compliant ? view.free_noise : view.noise;
     const double taken = compliant ? push : push * view.mobility;
-    const bool tie = fabs(gap) <= noise && taken <= noise;
-    const bool idle = (tie || compliant) && kept_by_others(s, k, g);
+    const bool tie = fabs(gap) <= view.free_noise && taken <= noise;
+    const bool idle = (tie || compliant) && vi_structure_is_kept(s, k);
     const bool neither = view.lead == 0.0 && (view.slope == 0.0 ? leaving < 2 : leaving == 0);
     const bool stays = view.lead > 0.0 || (neither && !compliant) || was_held;
     const bool presses = !idle && (tie ? stays : taken > noise);
@@ -118,7 +122,7 @@ static void settle_resting(const vi_structure *s, const int candidate[])
     push_resting(s, g, &resting);
     for (int i = 0; i < resting.count; ++i) {
         const double push = i >= resting.rigid ? -resting.gap[i] : resting.push[i];
-        decide(s, resting.index[i], resting.gap[i], push, g);
+        decide(s, resting.index[i], resting.gap[i], push);
     }
 }
 
@@ -129,13 +133,11 @@ bool vi_structure_only_touches(const vi_structure *s, int k)
     }
     const double speed = vi_structure_velocity_size(s, k);
     const double reach = s->model->fastest > 0.0 ? speed / s->model->fastest : 0.0; /* within a radian */
-    double g[VI_PORTS][VI_PORTS];
     if (fabs(vi_structure_clearance(s, k)) > VI_ROUNDING * (vi_structure_displacement_size(s, k) + reach)
         || fabs(vi_structure_approach(s, k)) > VI_ROUNDING * speed) {
         return false;
     }
-    vi_structure_signed(s, s->model->compliance, g);
-    return kept_by_others(s, k, g);
+    return vi_structure_is_kept(s, k);
 }
 
 void vi_structure_settle(const vi_structure *s, const vi_step_request *request)

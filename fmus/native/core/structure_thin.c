@@ -61,11 +61,17 @@ static double accurate_time(const vi_structure *s, int k, double rate, const dou
 double vi_thin_time(const vi_structure *s, int k, double rate, const double acceleration[])
 {
     const double longest = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 1.0;
-    const double pull = fabs(vi_structure_at(s->model, s->model->shape[k], acceleration));
+    const double accurate = accurate_time(s, k, rate, acceleration, longest);
     const double rounding = DBL_EPSILON * vi_structure_displacement_size(s, k);
-    const double turned = 2.0 * pull * rounding;
-    const double moves = rate != 0.0 ? 2.0 * rounding / (fabs(rate) + sqrt(rate * rate + turned)) : 0.0;
-    return vi_max(accurate_time(s, k, rate, acceleration, longest), vi_min(moves, longest));
+    const double moves = rate != 0.0 ? vi_min(rounding / fabs(rate), longest) : 0.0;
+    if (moves <= accurate) {
+        return accurate;
+    }
+    /* a rate of rounding size is not what moves it */
+    const double pull = fabs(vi_structure_at(s->model, s->model->shape[k], acceleration));
+    const double jerk = jerk_size(s, k, acceleration) * sqrt(s->model->compliance[k][k]);
+    const double turned = vi_min(sqrt(2.0 * rounding / pull), cbrt(6.0 * rounding / jerk));
+    return vi_max(accurate, vi_min(moves, turned));
 }
 
 /* The integral of max(0, depth + rate t)^n over u seconds; *moment: of what it adds to the displacement meanwhile. */
