@@ -104,6 +104,11 @@ def test_an_impact_elsewhere_at_the_instant_of_release_keeps_a_body_on_its_stop(
         (77006884, "held on a rigid stop with a Hunt-Crossley stop pressed in by 1e-15 m: 20 s"),
         (88001137, "let go with a speed of 1e-42 m/s towards a Hertz stop: 30 % off in speed"),
         (88007988, "clamped by stiff stops that turn the rounding of a rate into force"),
+        (99005272, "both of two opposite stops seemed to hold it, with opposite forces"),
+        (99007972, "a dashpot thrown back at the instant at which another stop holds"),
+        (99004727, "3000 impacts 1e-15 m within a dashpot's stop: each took energy from nowhere"),
+        (66000033, "pressed by a stop that another, nearly parallel, cannot replace"),
+        (66000641, "held by what the damping of other modes leaves of their speed"),
         (5000528, "let go by two stops at one instant: motions of 1e-19 m"),
     ],
 )

@@ -129,6 +129,12 @@ void vi_structure_outputs(const vi_structure *s, double acceleration[VI_MODES]);
 /* Does a contact lie beyond its stop by more than rounding? (a start state is refused then); its number or 0 */
 int vi_structure_beyond(const vi_structure *s);
 
+/* Entry of the modal damping matrix, 1/s. */
+static inline double vi_structure_damping(const vi_structure_model *model, int i, int j)
+{
+    return model->coupled ? model->coupling[i][j] : i == j ? 2.0 * model->mode[j].decay : 0.0;
+}
+
 /* shape . vector */
 double vi_structure_at(const vi_structure_model *model, const double shape[], const double vector[]);
 

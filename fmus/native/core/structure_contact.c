@@ -9,7 +9,7 @@
 static const double SAME_INSTANT = 16.0;
 /* A contact whose force ends at a penetration of so many roundings, or of a power law with 1 + damping d' above so
  * little, ends with its penetration. */
-static const double WITH_IT = 64.0, GONE = 1e-9;
+static const double WITH_IT = 4.0, GONE = 1e-9;
 
 /* ---- rest and release ---- */
 

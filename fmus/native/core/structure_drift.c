@@ -157,7 +157,7 @@ double vi_structure_series_noise(const vi_structure *s, const vi_drift *drift, i
         double size = fabs(mode->force) * drive + mode->stiffness * fabs(drift->modal[n - 2][j]);
         size += n == 3 ? fabs(s->state->held_rate[j]) : 0.0;
         for (int i = 0; i < model->modes; ++i) {
-            const double damping = model->coupled ? model->coupling[j][i] : i == j ? 2.0 * mode->decay : 0.0;
+            const double damping = vi_structure_damping(model, j, i);
             size += fabs(damping * drift->modal[n - 1][i]) * (double)(n - 1);
         }
         terms += fabs(model->shape[k][j]) * size;
@@ -404,8 +404,12 @@ static event_found first_event(const vi_structure *s, const vi_drift *drift, con
                                double searched)
 {
     event_found first = {HUGE_VAL, VI_DRIFT_NO_EVENT, -1, length};
-    for (int k = 0; k < s->model->contacts; ++k) {
-        if (!vi_structure_watched(s, k) && s->state->status[k] < VI_CONTACT_HELD) {
+    /* compliant stops first: of events at one instant theirs comes first, one that would pull no longer bears on others */
+    for (int turn = 0; turn < 2 * s->model->contacts; ++turn) {
+        const int k = turn % s->model->contacts;
+        const bool compliant = s->state->status[k] >= VI_CONTACT_YIELDING;
+        if (compliant != (turn < s->model->contacts)
+            || (!vi_structure_watched(s, k) && s->state->status[k] < VI_CONTACT_HELD)) {
             continue;
         }
         switch (s->state->status[k]) {

@@ -8,6 +8,8 @@
 
 /* Of its own mobility, what is left to a contact whose point others hold. */
 static const double KEPT = 1e-9;
+/* Of a contact whose point others hold, a force of so many roundings is none. */
+static const double LITTLE = 16.0;
 
 static bool others_hold(const vi_structure *s, int k)
 {
@@ -98,7 +100,8 @@ static void decide(const vi_structure *s, int k, double gap, double push)
     const double noise = compliant ? view.free_noise : view.noise;
     const double taken = compliant ? push : push * view.mobility;
     const bool tie = fabs(gap) <= view.free_noise && taken <= noise;
-    const bool idle = (tie || compliant) && vi_structure_is_kept(s, k);
+    const bool nothing = fabs(gap) <= view.free_noise && taken <= LITTLE * noise;
+    const bool idle = (nothing || compliant) && vi_structure_is_kept(s, k);
     const bool neither = view.lead == 0.0 && (view.slope == 0.0 ? leaving < 2 : leaving == 0);
     const bool stays = view.lead > 0.0 || (neither && !compliant) || was_held;
     const bool presses = !idle && (tie ? stays : taken > noise);
