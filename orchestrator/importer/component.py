@@ -37,6 +37,10 @@ def kind_of(variable: ModelVariable) -> str:
     return KINDS.get(name, name)
 
 
+#: Instants closer than this times (1 + |time|), s, are one.
+SAME_INSTANT = 1e-13
+
+
 class Component:
     """An FMU in an importer.
 
@@ -162,11 +166,29 @@ class Component:
             instance.is_flagged = any(kept[1:])
 
     def step_from_start(self, time: float, size: float) -> None:
-        """Go back to the start of the step just made, at `time`, and `size` s into it again."""
+        """Go back to the start of the step just made, at `time`, and `size` s into it again.
+
+        Raises
+        ------
+        ComponentError
+            It ends before: what it does depends on more than its state.
+        """
         self.revisit_start()
-        status = self.instance.step(time, size)
+        instance = self.instance
+        status = instance.step(time, size)
         if status == DISCARD:
-            self.instance.check(status, "DoStep")
+            instance.check(status, "DoStep")
+        end = time + size
+        if instance.time < end - SAME_INSTANT * (1.0 + abs(end)) - instance.internal_step:
+            raise ComponentError(
+                f"{instance.name}: {instance.prefix}DoStep: expected a step from a saved state at time {time:.12g} to "
+                f"reach {end:.12g}, as before, got an end at {instance.time:.12g}. "
+                "Its states do not hold all it depends on.",
+                instance=instance.name,
+                function=f"{instance.prefix}DoStep",
+                time=instance.time,
+                log=instance.log.take(),
+            )
 
     def free(self) -> None:
         """Give back its saved states and its instance."""

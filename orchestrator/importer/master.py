@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.beginning import settle_connections
-from vibroimpact.orchestrator.importer.component import Component, Value
+from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, Value
 from vibroimpact.orchestrator.importer.contact_bond import (
     CONTACT_STEPS,
     MOST_REPETITIONS,
@@ -37,8 +37,6 @@ from vibroimpact.orchestrator.importer.wiring import (
 
 #: Steps without progress before the run is given up.
 STANDSTILLS = 100
-#: A communication point closer than this times (1 + |time|), s, is reached.
-SAME_INSTANT = 1e-13
 #: Repetitions of a step with exchange "iterated", and the relative change at which they end.
 STEP_ITERATIONS = 50
 STEP_TOLERANCE = 1e-13

@@ -14,12 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
-from vibroimpact.orchestrator.importer.component import Component, kind_of
+from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, kind_of
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
-
-#: A sample closer to the end of a step than this times (1 + |time|), s, is taken at the end.
-SAME_INSTANT = 1e-13
 
 
 class _Probe:

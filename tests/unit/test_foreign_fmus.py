@@ -13,6 +13,7 @@ from vibroimpact.fmus.archive import unpack
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, SceneError
 from vibroimpact.orchestrator.fmi import rounding
 from vibroimpact.orchestrator.general_runner import GeneralRunner
+from vibroimpact.orchestrator.runners import make_runner
 from vibroimpact.orchestrator.scene import parse_scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "bouncing_ball.toml"
@@ -194,6 +195,22 @@ def test_a_component_that_asks_for_the_end_inside_a_step_ends_the_run_there(
     if found.samples is not None:
         assert found.samples[-1, 0] == pytest.approx(0.35)
         np.testing.assert_allclose(found.samples[:, 1], found.samples[:, 0], rtol=0, atol=1e-12)  # y' = 1
+
+
+def test_a_component_that_ends_a_repeated_step_early_is_an_error_and_no_wrong_sample(folder: Path) -> None:
+    # it counts its calls in the process, not in its state: sampled inside a step, it ended short of the sample
+    text = LIES.format(major="3", fault="end_short", early=0, record='variables = ["culprit.y"]\nrate = 100')
+    text = text.replace("says_early = 0", "fault_after = 1").replace(
+        "macro_step = 0.1", "macro_step = 0.1\nguard = true"
+    )
+    runner = make_runner(parse_scene(text, str(folder / "scene.toml")))
+    try:
+        with pytest.raises(
+            ComponentError, match=r"culprit: fmi3DoStep: expected .* at time 0\.3 .*as before"
+        ):
+            runner.run({})
+    finally:
+        runner.close()
 
 
 def test_two_components_end_together_where_the_second_asks_for_the_end(folder: Path) -> None:
