@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -137,26 +138,31 @@ class Heard(Exception):
     """Raised where a signal is."""
 
 
-@pytest.fixture
+@contextmanager
 def alarm() -> Iterator[None]:
-    """A signal after a moment, as Ctrl-C is one."""
+    """Send a signal after a moment, as Ctrl-C is one; only here, so that it never ends what runs the tests."""
 
     def hear(number: int, frame: object) -> None:
         raise Heard
 
     before = signal.signal(signal.SIGALRM, hear)
-    signal.setitimer(signal.ITIMER_REAL, DEADLINE)
-    yield
-    signal.setitimer(signal.ITIMER_REAL, 0.0)
-    signal.signal(signal.SIGALRM, before)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, DEADLINE)
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
-@pytest.mark.usefixtures("alarm")
 @pytest.mark.parametrize("how", ["fused", "coupled"])
 @pytest.mark.parametrize("case", ["stiff dashpot, nearly plastic", "light beam"])
 def test_a_signal_is_heard_within_one_step(case: str, how: str) -> None:
-    with pytest.raises(Heard):
-        ran(changed(*LONG_STEPS[case], ""), how)
+    runner = PointRunner(changed(*LONG_STEPS[case], ""), execution=how)
+    try:
+        with pytest.raises(Heard), alarm():
+            runner.run({})
+    finally:
+        runner.close()
 
 
 INTERRUPTED = """
