@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,10 @@ _RECORD_KEYS = {
     "sample": "time_series (in a scene of components, variables and rate)",
     "event": "events = true",
 }
+
+
+# Of a parameter with one value only, how far another may be from it and still mean it.
+_SAME = 1e-6
 
 
 @xr.register_dataset_accessor("vibroimpact")
@@ -50,7 +55,7 @@ class VibroimpactAccessor:
         Parameters
         ----------
         exact : bool
-            Demand the very value of each swept parameter instead of the nearest.
+            Demand the very value of each swept parameter instead of the nearest, which is at most half a step away.
         **selection
             Values of coordinates (`direction="up"`, `angular_frequency=0.9`), or `run_id=`; what is not
             given must be the same for all runs that are left.
@@ -58,7 +63,8 @@ class VibroimpactAccessor:
         Raises
         ------
         DatasetError
-            If impacts were not recorded, a name is unknown, or the selection is not one run.
+            If impacts were not recorded, a name is unknown, a value lies beyond those computed, or the selection is
+            not one run.
         """
         return self._rows("impact", exact, selection)
 
@@ -67,8 +73,14 @@ class VibroimpactAccessor:
         return self._rows("stick", exact, selection)
 
     def samples(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
-        """Return the time series of one run along `sample`; parameters as for `impacts`."""
-        return self._rows("sample", exact, selection)
+        """Return the time series of one run along `time`, s; parameters as for `impacts`.
+
+        Examples
+        --------
+        >>> samples = ds.vibroimpact.samples(angular_frequency=0.9)            # doctest: +SKIP
+        >>> samples.displacement.sel(time=slice(1.0, 2.0)).plot()              # doctest: +SKIP
+        """
+        return self._rows("sample", exact, selection).swap_dims(sample="time")
 
     def events(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
         """Return the events of one run along `event`; parameters as for `impacts`.
@@ -152,8 +164,31 @@ def _matches(
     if values.dtype.kind == "f" and not exact and left.any():
         if not np.isfinite(value):
             raise DatasetError(f"selection: {name}: expected a number, got {value}.")
-        value = values[left][np.argmin(np.abs(values[left] - value))]
+        there = np.unique(values[left])
+        nearest = there[np.argmin(np.abs(there - value))]
+        if not abs(value - nearest) <= _room_beyond(there, value):
+            raise DatasetError(
+                f"selection: {name}: expected {_span(there)}, got {value:g}. "
+                "Give a value that was computed, or near one."
+            )
+        value = nearest
     return np.asarray(values == value)
+
+
+def _room_beyond(there: NDArray[Any], value: float) -> float:
+    """Return how far a value may be from the nearest of those there: half a step, beyond the ends too."""
+    if there.size == 1:
+        return float(_SAME * abs(there[0]))
+    if there[0] <= value <= there[-1]:
+        return math.inf
+    return float(0.5 * (there[1] - there[0] if value < there[0] else there[-1] - there[-2]))
+
+
+def _span(there: NDArray[Any]) -> str:
+    """Return what there is to choose from, in words."""
+    if there.size == 1:
+        return f"{there[0]:g}, the only value there is"
+    return f"a value of {there[0]:g} to {there[-1]:g}"
 
 
 def _not_one(columns: dict[str, NDArray[Any]], found: NDArray[np.intp], selection: dict[str, Any]) -> str:

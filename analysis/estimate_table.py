@@ -1,4 +1,4 @@
-"""Estimates as a dataset: one row for each method, one column for each quantity."""
+"""Estimates as a dataset: one row for each estimator, one column for each quantity."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ _NOTHING: Cell = (float("nan"),) * 4
 def estimate_table(
     cells: Mapping[str, Mapping[str, Cell]], units: Mapping[str, str], confidence: float
 ) -> xr.Dataset:
-    """Return estimates on the dimensions method and quantity.
+    """Return estimates on the dimensions estimator and quantity.
 
     Units differ by quantity, so the variables carry `1` and the coordinate `unit` says each quantity's own.
 
     Parameters
     ----------
     cells : mapping
-        By method, then quantity; what a method does not estimate is NaN.
+        By estimator, then quantity; what an estimator does not give is NaN.
     units : mapping of str to str
         CF unit of each quantity, in the order of the columns.
     confidence : float
@@ -31,7 +31,7 @@ def estimate_table(
     Examples
     --------
     >>> table = estimate_table({"fit": {"mass": (2.0, 0.1, 1.8, 2.2)}}, {"mass": "kg"}, 0.95)
-    >>> float(table.estimate.sel({"method": "fit", "quantity": "mass"})), table.interval_low.attrs["long_name"]
+    >>> float(table.estimate.sel(estimator="fit", quantity="mass")), table.interval_low.attrs["long_name"]
     (2.0, 'lower end of the 95% interval')
     """
     rows = [[found.get(quantity, _NOTHING) for quantity in units] for found in cells.values()]
@@ -43,11 +43,11 @@ def estimate_table(
         "interval_high": f"upper end of the {confidence:.0%} interval",
     }
     data = {
-        name: (("method", "quantity"), values[:, :, place], _attrs(said))
+        name: (("estimator", "quantity"), values[:, :, place], _attrs(said))
         for place, (name, said) in enumerate(words.items())
     }
     coords = {
-        "method": ("method", list(cells), _attrs("method of estimation")),
+        "estimator": ("estimator", list(cells), _attrs("method of estimation")),
         "quantity": ("quantity", list(units), _attrs("estimated quantity")),
         "unit": ("quantity", list(units.values()), _attrs("unit of the quantity")),
     }

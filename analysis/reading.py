@@ -132,7 +132,8 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     own dimension; `impact_run` and so on give the `run_id` each row belongs to, under any selection.
     `energy_residual` is along `connection`, the names of the connections; scores of replays are along `compared`.
     `displacement_range` is the largest displacement minus the smallest over the recorded periods (m).
-    A variable is read from the file when it is first used.
+    A variable is read from the file when it is first used. What `to_netcdf` has saved of such a dataset, all of it or a
+    selection, opens as it was saved.
 
     Parameters
     ----------
@@ -155,18 +156,20 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     flat = _open_flat(file)
     try:
         with one_error(file):
-            _refuse_misfits(file, flat)
-            opened = _on_grid(flat)
+            opened = _saved_again(flat) if "run_id" in flat.variables else _on_grid(_fitting(file, flat))
     except DatasetError:
         flat.close()
         raise
-    opened.set_close(flat.close)
+    if opened is not flat:
+        opened.set_close(flat.close)
     opened.encoding["source"] = str(file)
     return opened
 
 
 def open_measured(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Open what a benchmark measured: any NetCDF file, as it is.
+    """Open what an analysis found or a benchmark measured: any NetCDF file, as it is.
+
+    Estimates of version 0.1 come with their dimension `method`, which `sel` has a keyword of, as `estimator`.
 
     Raises
     ------
@@ -174,7 +177,12 @@ def open_measured(path: str | os.PathLike[str]) -> xr.Dataset:
         If the file is missing or damaged.
     """
     with one_error(path):
-        return _open_checked(path)
+        opened = _open_checked(path)
+    if not {"method", "quantity"} <= set(opened.dims):
+        return opened
+    renamed = opened.rename(method="estimator")
+    renamed.set_close(opened.close)
+    return renamed
 
 
 def _open_flat(file: Path) -> xr.Dataset:
@@ -203,6 +211,19 @@ def _open_checked(path: str | os.PathLike[str]) -> xr.Dataset:
         dataset.close()
         raise
     return dataset
+
+
+def _saved_again(opened: xr.Dataset) -> xr.Dataset:
+    """Return an opened dataset as it was before `to_netcdf` marked what is missing."""
+    for variable in opened.variables.values():
+        variable.attrs.pop("_FillValue", None)
+    return opened
+
+
+def _fitting(file: str | os.PathLike[str], flat: xr.Dataset) -> xr.Dataset:
+    """Return a dataset whose variables are those of the schema."""
+    _refuse_misfits(file, flat)
+    return flat
 
 
 def _refuse_misfits(file: str | os.PathLike[str], flat: xr.Dataset) -> None:

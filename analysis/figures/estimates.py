@@ -108,7 +108,7 @@ def _draw_peaks(axis: Axes, dataset: xr.Dataset) -> None:
         elinewidth=0.4,
         label="turning points",
     )
-    decrement = float(dataset.estimate.sel({"method": "decrement", "quantity": "logarithmic_decrement"}))
+    decrement = float(dataset.estimate.sel(estimator="decrement", quantity="logarithmic_decrement"))
     # The line of the fit: its level is the weighted mean of the logarithms about it.
     line = -0.5 * decrement * (number - number[0])
     level = np.average(np.log(height) - line, weights=height**2)
@@ -189,19 +189,19 @@ def _draw_methods(dataset: xr.Dataset) -> Figure:
     panels = []
     for name in dataset["quantity"].values:
         chosen = dataset.sel(quantity=name)
-        panels.append(chosen.isel(method=np.flatnonzero(np.isfinite(chosen.estimate.values))))
-    panels = [chosen for chosen in panels if chosen.sizes["method"]]
-    rows = [1 + chosen.sizes["method"] for chosen in panels] or [1]
+        panels.append(chosen.isel(estimator=np.flatnonzero(np.isfinite(chosen.estimate.values))))
+    panels = [chosen for chosen in panels if chosen.sizes["estimator"]]
+    rows = [1 + chosen.sizes["estimator"] for chosen in panels] or [1]
     figure = canvas(6 + 10 * len(rows) + 3.2 * sum(rows))
     axes = figure.subplots(len(rows), 1, squeeze=False, height_ratios=rows)[:, 0]
     for axis, chosen in zip(axes, panels, strict=False):
-        _draw_intervals(axis, chosen, list(dataset["method"].values))
+        _draw_intervals(axis, chosen, list(dataset["estimator"].values))
     return figure
 
 
 def _draw_intervals(axis: Axes, chosen: xr.Dataset, methods: list[str]) -> None:
     """Draw values as points and their intervals as bars; a value without an interval is open."""
-    names = [str(name) for name in chosen["method"].values]
+    names = [str(name) for name in chosen["estimator"].values]
     ends = []
     for place, name in enumerate(names):
         value = float(chosen.estimate[place])

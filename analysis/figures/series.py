@@ -28,7 +28,7 @@ def sampled_names(dataset: xr.Dataset) -> list[str]:
     return [
         str(name)
         for name, variable in dataset.variables.items()
-        if variable.dims == ("sample",) and name not in RULES and name != "sample_run"
+        if variable.dims in (("sample",), ("time",)) and name not in RULES and name != "sample_run"
     ]
 
 

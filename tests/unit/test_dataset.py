@@ -40,6 +40,7 @@ from vibroimpact.analysis.dataset import (
     read_part,
     write_dataset,
 )
+from vibroimpact.analysis.figures import draw
 from vibroimpact.fmus.errors import DatasetError
 
 CF_CHECK = """
@@ -270,6 +271,49 @@ def test_sticks_and_samples_are_given_like_impacts(tmp_path: Path) -> None:
         assert opened.vibroimpact.samples(run_index=2).displacement.values.tolist() == [2.0, 2.0]
 
 
+@pytest.mark.parametrize("selection", [{}, {"direction": "down"}, {"angular_frequency": slice(0.5, 2.5)}])
+def test_what_is_saved_of_an_opened_dataset_opens_again(tmp_path: Path, selection: dict[str, object]) -> None:
+    with open_dataset(written(up_down(), tmp_path)) as opened:
+        chosen = opened.sel(selection)
+        chosen.to_netcdf(tmp_path / "again.nc")
+        with open_dataset(tmp_path / "again.nc") as again:
+            xr.testing.assert_equal(again.load(), chosen.load())
+            assert again.displacement_range.attrs == chosen.displacement_range.attrs
+            hits = again.vibroimpact.impacts(direction="down", angular_frequency=1.0)
+            assert hits.impact_time.min() == 4.0
+            assert draw(again).axes
+
+
+def test_samples_are_along_their_time(tmp_path: Path) -> None:
+    with open_dataset(written(up_down(), tmp_path)) as opened:
+        samples = opened.vibroimpact.samples(run_index=2)
+        assert samples.displacement.dims == ("time",)
+        assert samples.time.attrs["units"] == "s"
+        first = float(samples.time[0])
+        assert float(samples.displacement.sel(time=first)) == 2.0
+        assert samples.displacement.plot(x="time") is not None
+
+
+@pytest.mark.parametrize(
+    ("value", "found"),
+    [(0.4, 0.0), (-0.49, 0.0), (1.6, 2.0), (2.49, 2.0), (2.51, None), (-0.6, None), (99.0, None)],
+)
+def test_a_value_far_from_all_that_were_computed_names_no_run(value: float, found: float | None) -> None:
+    selection = up_down().vibroimpact
+    if found is None:
+        with pytest.raises(DatasetError, match=f"expected a value of 0 to 2, got {value:g}. Give a value"):
+            selection.impacts(direction="up", angular_frequency=value)
+    else:
+        assert float(selection.impacts(direction="up", angular_frequency=value).angular_frequency) == found
+
+
+def test_a_parameter_with_one_value_is_asked_for_by_that_value() -> None:
+    dataset = dataset_of([record(1.0, impacts=1)], coordinates={"mass": np.array([0.7])})
+    assert float(dataset.vibroimpact.impacts(mass=0.7 * (1.0 + 1e-9)).mass) == 0.7
+    with pytest.raises(DatasetError, match=r"mass: expected 0\.7, the only value there is, got 0\.8"):
+        dataset.vibroimpact.impacts(mass=0.8)
+
+
 def test_events_are_given_run_by_run_with_their_component_and_superdense_index(tmp_path: Path) -> None:
     runs = [coupled_record(float(k), events=k) for k in range(5)]
     with open_dataset(written(coupled_dataset(runs), tmp_path)) as opened:
@@ -301,7 +345,7 @@ def test_energy_residuals_are_selected_by_the_name_of_their_connection(tmp_path:
         lost = opened.energy_residual.sel(connection=CONNECTIONS[1])
         np.testing.assert_array_equal(lost, [0.0, np.nan, -2e-9])
         np.testing.assert_array_equal(opened.loop_residual, [0.0, np.nan, 2e-12])
-        assert opened.sel(connection=CONNECTIONS[0]).vibroimpact.samples(mass=2.0).sizes["sample"] == 0
+        assert opened.sel(connection=CONNECTIONS[0]).vibroimpact.samples(mass=2.0).sizes["time"] == 0
         assert opened.vibroimpact.runs.energy_residual.dims == ("run", "connection")
 
 

@@ -50,7 +50,7 @@ def test_a_decay_is_printed_written_and_drawn(
     with xr.open_dataset(output) as found:
         assert found.attrs["results_kind"] == "estimates"
         assert found.attrs["best_law"] == "viscous+coulomb"
-        row = found.sel({"method": "law", "quantity": "coulomb"})
+        row = found.sel(estimator="law", quantity="coulomb")
         assert float(row.interval_low) < TRUTH.coulomb < float(row.interval_high)
         assert str(row.unit.values) == "m s-2"
         # The motion under the law is the measured one but for its noise of .03.
@@ -111,7 +111,7 @@ def test_a_simulated_free_decay_and_a_swept_resonance_need_no_options(
     # The scene: stiffness 800, mass 2, damping ratio .03.
     for name, method in (("one.nc", "exponential"), ("two.nc", "response")):
         with xr.open_dataset(tmp_path / name) as found:
-            values = found.estimate.sel({"method": method})
+            values = found.estimate.sel(estimator=method)
             assert float(values.sel(quantity="natural_angular_frequency")) == pytest.approx(20.0, rel=1e-9)
             assert float(values.sel(quantity="damping_ratio")) == pytest.approx(0.03, rel=1e-7)
     assert "modal constant" in capsys.readouterr().out
@@ -126,7 +126,7 @@ def test_an_impacting_run_takes_forcing_and_stop_from_its_scene(
     assert estimate(run, "-o", tmp_path / "found.nc", "--figure", tmp_path / "found.png") == 0
     assert "restitution" in capsys.readouterr().out
     with xr.open_dataset(tmp_path / "found.nc") as found:
-        best = found.estimate.sel({"method": "trajectory"})
+        best = found.estimate.sel(estimator="trajectory")
         assert float(best.sel(quantity="restitution")) == pytest.approx(0.8, abs=1e-4)
         assert float(best.sel(quantity="damping_ratio")) == pytest.approx(0.03, abs=1e-4)
     assert (tmp_path / "found.png").read_bytes().startswith(PNG)
@@ -137,7 +137,7 @@ def test_each_run_of_a_sweep_of_the_stop_is_estimated_with_its_own_stop(tmp_path
     run_scene(parse_scene(BODY + IMPACTING + SWEPT_STOP, "stops.toml"), swept)
     assert estimate(swept, "--run", "1", "-o", tmp_path / "found.nc") == 0
     with xr.open_dataset(tmp_path / "found.nc") as found:
-        best = found.estimate.sel({"method": "trajectory"})
+        best = found.estimate.sel(estimator="trajectory")
         # Held at the stop that the scene has written, the trajectories would not follow the motion.
         assert float(best.sel(quantity="restitution")) == pytest.approx(0.8, abs=1e-4)
 
@@ -148,7 +148,7 @@ def test_an_accelerated_base_is_the_force_of_the_mass_turned_round(tmp_path: Pat
     run_scene(parse_scene(BODY + based, "base.toml"), tmp_path / "base.nc")
     assert estimate(tmp_path / "base.nc", "-o", tmp_path / "found.nc") == 0
     with xr.open_dataset(tmp_path / "found.nc") as found:
-        best = found.estimate.sel({"method": "trajectory"})
+        best = found.estimate.sel(estimator="trajectory")
         assert float(best.sel(quantity="restitution")) == pytest.approx(0.8, abs=1e-4)
         assert float(best.sel(quantity="damping_ratio")) == pytest.approx(0.03, abs=1e-4)
 
@@ -159,7 +159,7 @@ def test_a_clock_that_drifts_has_its_frequency_fitted_when_asked_for(tmp_path: P
     # The scene says 35 rad/s; the generator of an experiment would say something else.
     assert estimate(run, "--angular-frequency", "35.03", "--clock-drifts", "-o", tmp_path / "found.nc") == 0
     with xr.open_dataset(tmp_path / "found.nc") as found:
-        best = found.estimate.sel({"method": "trajectory"})
+        best = found.estimate.sel(estimator="trajectory")
         assert float(best.sel(quantity="angular_frequency")) == pytest.approx(35.0, rel=1e-6)
 
 

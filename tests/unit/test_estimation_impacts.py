@@ -151,8 +151,8 @@ def test_table_and_dataset_have_every_method_side_by_side(tmp_path):
         *("weak_form", "trajectory", "period_one"),
     }
     dataset = found.dataset()
-    assert dataset.estimate.dims == ("method", "quantity")
-    row = dataset.sel({"method": "trajectory", "quantity": "restitution"})
+    assert dataset.estimate.dims == ("estimator", "quantity")
+    row = dataset.sel(estimator="trajectory", quantity="restitution")
     assert float(row.interval_low) < float(row.estimate) < float(row.interval_high)
     assert "conditioning_joint_restitution_per_relative_velocity" in dataset.attrs
     write_results(dataset, tmp_path / "estimates.nc", kind="estimates")
