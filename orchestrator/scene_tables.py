@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,14 @@ from vibroimpact.orchestrator.general_scene import GeneralScene
 from vibroimpact.orchestrator.replay_models import Replay
 from vibroimpact.orchestrator.replay_rules import recording_axis
 from vibroimpact.orchestrator.scene_draft import Draft
-from vibroimpact.orchestrator.scene_errors import Problem, choice_problem, quoted, unknown_key
+from vibroimpact.orchestrator.scene_errors import (
+    Problem,
+    choice_problem,
+    key_path,
+    known_keys,
+    quoted,
+    unknown_key,
+)
 from vibroimpact.orchestrator.scene_keys import parse_key
 from vibroimpact.orchestrator.scene_models import (
     BODY_MODELS,
@@ -146,6 +153,19 @@ def _applicable(record: Record) -> Record:
     return record.model_copy(update={"extrema": False, "strobe": False})
 
 
+def _keys_of_other_kinds(
+    raw: object, models: Mapping[str, type[Table]], tag: str, kind: str, path: tuple[str | int, ...]
+) -> dict[str, str]:
+    """Return advice for each key, by its path, that a table of another kind has and one of this kind has not."""
+    advice = {}
+    for name in raw if isinstance(raw, dict) else ():
+        owners = [quoted(other) for other, model in models.items() if name in known_keys(model)]
+        if owners and name not in known_keys(models[kind]):
+            listed = " or ".join([", ".join(owners[:-1]), owners[-1]] if len(owners) > 1 else owners)
+            advice[key_path((*path, name))] = f"It belongs to {tag} = {listed}."
+    return advice
+
+
 class _Reader:
     """Reads tables of one document and collects the problems of all of them."""
 
@@ -206,7 +226,14 @@ class _Reader:
         """Read a table whose kind decides its keys; of an unknown kind nothing else is judged."""
         kind = raw.get(tag, default) if isinstance(raw, dict) else default
         if isinstance(kind, str) and kind in models:
-            return self._table(models[kind], raw, path)
+            there = len(self.problems)
+            table = self._table(models[kind], raw, path)
+            belongs = _keys_of_other_kinds(raw, models, tag, kind, path)
+            self.problems[there:] = [
+                replace(problem, hint=belongs[problem.key]) if problem.key in belongs else problem
+                for problem in self.problems[there:]
+            ]
+            return table
         model = models[default]
         self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, models))
         return None

@@ -129,7 +129,14 @@ def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list
             return f'Indices start at 1 and this scene has {count} [[stop]]: for example "stop[1].position".'
     if table in SWEEPABLE and table not in document:
         return f"This scene has no {'[[stop]]' if table == 'stop' else f'[{table}]'}."
-    return _element_hint(text, document, known) or nearest(text, known)
+    return _element_hint(text, document, known) or _nearest_key(text, known)
+
+
+def _nearest_key(text: str, known: list[str]) -> str:
+    """Return advice for a key of a table that is there: the nearest of that table's, or all of them."""
+    where, _, name = text.rpartition(".")
+    names = [key.rpartition(".")[2] for key in known if key.rpartition(".")[0] == where]
+    return nearest(name, names, f"{where}.") if names else nearest(text, known)
 
 
 def _element_hint(text: str, document: Mapping[str, Any], known: list[str]) -> str:
