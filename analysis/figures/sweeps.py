@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import sys
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,10 @@ from matplotlib.ticker import MaxNLocator
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label
 from vibroimpact.analysis.schema import swept_names
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.safe_toml import parse_toml
+
+# Of their size, what runs on one orbit differ by: rounding, and what is left of their transients.
+_NOISE = 1e-9
 
 # Where both sweeps agree the small dark crosses lie inside the large light rings, and both stay visible.
 _SWEEPS: dict[str, dict[str, Any]] = {
@@ -25,6 +31,40 @@ _SWEEPS: dict[str, dict[str, Any]] = {
 def varied(dataset: xr.Dataset) -> list[str]:
     """Return the swept parameters that take more than one value."""
     return [name for name in swept_names(dataset) if dataset[name].size > 1]
+
+
+def _in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
+    """Return swept parameters as the scene lists them; a displacement before a velocity, as in any phase plane."""
+    try:
+        keys = list(parse_toml(str(dataset.attrs.get("scene", ""))).get("sweep", {}))
+    except ValueError:
+        keys = []
+    written = [re.sub(r"\W+", "_", key).strip("_") for key in keys]
+
+    def rank(name: str) -> tuple[int, int]:
+        plane = ("displacement_start", "velocity_start")
+        in_plane = plane.index(name) if set(plane) <= set(names) and name in plane else 0
+        return in_plane, next(
+            (place for place, key in enumerate(written) if key.endswith(name)), len(written)
+        )
+
+    return sorted(names, key=rank)
+
+
+def one_value(values: Any) -> float | None:
+    """Return the value that all numbers share but for rounding; None where they differ, or where there is none.
+
+    Examples
+    --------
+    >>> one_value([3.0037242956181855, 3.003724295618186, float("nan")]), one_value([1.0, 1.001])
+    (3.0037242956181855, None)
+    """
+    finite = np.asarray(values, dtype=np.float64)
+    finite = finite[np.isfinite(finite)]
+    if finite.size == 0:
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    return low if high - low <= _NOISE * max(abs(low), abs(high)) else None
 
 
 def draw_bifurcation(dataset: xr.Dataset) -> Figure:
@@ -47,7 +87,11 @@ def draw_bifurcation(dataset: xr.Dataset) -> Figure:
                 x, y, linestyle="none", rasterized=True, label=f"{direction} sweep", **_SWEEPS[direction]
             )
         axis.set_ylabel(label(dataset[quantity]))
-        axis.set_ylim(bottom=0)
+        drawn = np.concatenate([line.get_ydata() for line in axis.lines])  # type: ignore[misc]  # arrays here
+        largest = float(np.nanmax(drawn, initial=0.0))
+        axis.set_ylim(0.0, 1.05 * largest if largest > 0.0 else 1.0)
+        if drawn.size > 1 and one_value(drawn) is not None:
+            _note(axis, f"one value, to {_NOISE:g} of it: {one_value(drawn):.9g}")
     axes[-1].set_xlabel(label(dataset[name]))
     axes[-1].margins(x=0.02)
     if len(directions) > 1:
@@ -75,13 +119,19 @@ def _points(
     return x[kept], dataset["impact_velocity"].values[kept]
 
 
+def _note(axis: Axes, text: str) -> None:
+    """Say above a panel what cannot be seen in it."""
+    axis.set_title(text, fontsize=7, loc="left")
+
+
 def draw_map(dataset: xr.Dataset) -> Figure:
     """Draw displacement range and largest impact velocity as colours over two swept parameters."""
     quantities = []
     if "displacement_range" in dataset.variables:
-        quantities.append((dataset["displacement_range"], label(dataset["displacement_range"])))
+        quantities.append((dataset["displacement_range"], label(dataset["displacement_range"]), "no value"))
     if "impact_velocity" in dataset.variables:
-        quantities.append((largest_impact_velocity(dataset), f"largest {label(dataset['impact_velocity'])}"))
+        name = f"largest {label(dataset['impact_velocity'])}"
+        quantities.append((largest_impact_velocity(dataset), name, "no impact"))
     if not quantities or "run" in dataset["run_id"].dims:
         raise DatasetError(
             "figure: expected extrema or impacts on a grid of two parameters, got none or scattered runs. "
@@ -92,12 +142,15 @@ def draw_map(dataset: xr.Dataset) -> Figure:
     axes = np.asarray(
         figure.subplots(len(quantities), len(directions), sharex=True, sharey=True, squeeze=False)
     )
-    for row, (values, text) in zip(axes, quantities, strict=True):
+    along, across = _in_order_of_the_scene(dataset, varied(dataset))
+    for row, (values, text, missing) in zip(axes, quantities, strict=True):
         for axis, direction in zip(row, directions, strict=True):
             branch = values.sel(direction=direction) if "direction" in values.dims else values
-            _colours(axis, branch.squeeze(), text, (float(values.min()), float(values.max())))
-            if len(directions) > 1:
-                axis.set_title(f"{direction} sweep", fontsize=8)
+            notes = [f"{direction} sweep"] if len(directions) > 1 else []
+            branch = branch.squeeze().transpose(across, along)
+            notes += _colours(axis, branch, text, values.values)
+            notes += [] if np.isfinite(branch.values).all() else [f"gray: {missing}"]
+            axis.set_title("; ".join(notes), fontsize=8 if len(notes) == 1 else 7)
     return figure
 
 
@@ -111,17 +164,36 @@ def largest_impact_velocity(dataset: xr.Dataset) -> xr.DataArray:
     return dataset["run_id"].copy(data=np.where(np.isfinite(values), values, np.nan))
 
 
-def _colours(axis: Axes, values: xr.DataArray, text: str, limits: tuple[float, float]) -> None:
-    """Draw one colour map with its bar."""
+def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[str]:
+    """Draw one colour map with its bar; return what must be said of it.
+
+    Parameters
+    ----------
+    values : xarray.DataArray
+        Of one branch: dimensions of the vertical and the horizontal axis.
+    text : str
+        Beside the bar.
+    of_all : ndarray
+        Values of all branches, which share their colours.
+    """
     across, along = values.dims
+    same = one_value(of_all)
+    low, high = (
+        (float(np.nanmin(of_all)), float(np.nanmax(of_all))) if np.isfinite(of_all).any() else (0.0, 1.0)
+    )
+    if same is not None:
+        # a range of rounding would be drawn as a pattern
+        room = max(0.5 * abs(same), sys.float_info.min)
+        low, high = same - room, same + room
+    axis.set_facecolor("0.88")
     mesh = axis.pcolormesh(
         values[along].values,
         values[across].values,
         values.values,
         shading="nearest",
         cmap="viridis",
-        vmin=limits[0],
-        vmax=limits[1],
+        vmin=low,
+        vmax=high,
         rasterized=True,
     )
     # Long numbers of small distances would run into each other.
@@ -131,3 +203,7 @@ def _colours(axis: Axes, values: xr.DataArray, text: str, limits: tuple[float, f
     axis.label_outer()
     bar = axis.figure.colorbar(mesh, ax=axis)
     bar.set_label(text)
+    if same is None:
+        return []
+    bar.set_ticks([same], labels=[f"{same:.6g}"])
+    return [f"one value, to {_NOISE:g} of it"]

@@ -167,6 +167,59 @@ def test_a_map_of_an_up_down_sweep_has_a_column_for_each_direction(tmp_path: Pat
     assert {axis.get_title() for axis in figure.axes} >= {"up sweep", "down sweep"}
 
 
+def noisy(count: int, missing: tuple[int, ...] = ()) -> list[RunRecord]:
+    """Runs on one orbit, whose numbers differ by rounding; some without an impact."""
+    runs = [record(3.0037242956, impacts=0 if k in missing else 1) for k in range(count)]
+    for k, run in enumerate(runs):
+        assert run.periods is not None
+        run.periods[:, 0] *= 1.0 + 4e-16 * (k % 3)
+    return runs
+
+
+def test_a_map_of_rounding_is_one_colour_and_says_so(tmp_path: Path) -> None:
+    # drawn over its own range of 3e-15 it looked like a fractal basin
+    grid = {"mass": np.repeat([1.0, 2.0, 3.0], 3), "position": np.tile([0.1, 0.2, 0.3], 3)}
+    figure = figures.draw(opened(dataset_of(noisy(9, missing=(4,)), coordinates=grid), tmp_path))
+    above, below, bar, _ = figure.axes
+    (mesh,) = above.collections
+    assert mesh.get_clim()[1] - mesh.get_clim()[0] > 1.0
+    assert above.get_title() == "one value, to 1e-09 of it"
+    assert len(bar.get_yticks()) == 1
+    assert below.get_title() == "one value, to 1e-09 of it; gray: no impact"
+
+
+def test_a_diagram_of_rounding_keeps_its_points_within_the_frame(tmp_path: Path) -> None:
+    runs = noisy(4)
+    figure = figures.draw(opened(dataset_of(runs), tmp_path))
+    for axis in figure.axes:
+        for line in axis.get_lines():
+            assert np.max(line.get_ydata()) < 0.99 * axis.get_ylim()[1]
+        assert axis.get_title(loc="left").startswith("one value, to 1e-09 of it: ")
+
+
+@pytest.mark.parametrize(
+    ("keys", "x"),
+    [
+        (("body.velocity_start", "body.displacement_start"), "displacement start (m)"),
+        (("stop[1].restitution", "forcing.angular_frequency"), "restitution (-)"),
+        (("forcing.angular_frequency", "stop[1].restitution"), "angular frequency (rad/s)"),
+    ],
+)
+def test_a_map_has_the_first_key_of_the_scene_across_and_a_phase_plane_its_displacement(
+    tmp_path: Path, keys: tuple[str, str], x: str
+) -> None:
+    names = [key.rpartition(".")[2] for key in keys]
+    grid = {name: values for name, values in zip(names, ([1.0, 1.0, 2.0, 2.0], [0.1, 0.2] * 2), strict=True)}
+    scene = "[sweep]\n" + "".join(f'"{key}" = {{ values = [1] }}\n' for key in keys)
+    dataset = dataset_of(
+        [record(float(k), impacts=1) for k in range(4)],
+        coordinates={name: np.array(values) for name, values in grid.items()},
+        attrs={"scene": scene},
+    )
+    figure = figures.draw(opened(dataset, tmp_path))
+    assert figure.axes[1].get_xlabel() == x
+
+
 def test_a_run_shows_its_stop_and_a_velocity_that_breaks_at_the_impact(tmp_path: Path) -> None:
     figure = figures.draw(opened(sampled_run(), tmp_path))
     above, middle, below = figure.axes

@@ -83,6 +83,23 @@ def swept(*entries: str) -> str:
         ),
         (
             "restitution = 0.7",
+            'restitution = 0.7\nlaw = "hertz"\nstiffness = 1e3',
+            'stop[1].restitution: expected a known key, got the unknown key "restitution". '
+            'It belongs to law = "restitution".',
+        ),
+        (
+            "restitution = 0.7",
+            "restitution = 0.7\nstiffness = 1e3",
+            'stop[1].stiffness: expected a known key, got the unknown key "stiffness". '
+            'It belongs to law = "kelvin_voigt", "hertz" or "hunt_crossley".',
+        ),
+        (
+            "stiffness = 1.0",
+            "stiffness = 1.0\nmasses = [1.0]",
+            'body.masses: expected a known key, got the unknown key "masses". It belongs to kind = "chain".',
+        ),
+        (
+            "restitution = 0.7",
             'restitution = 0.7\nlaw = "hertzz"\nexponent = 1.5',
             'stop[1].law: expected "restitution", "kelvin_voigt", "hertz" or "hunt_crossley", got "hertzz". '
             'Did you mean "hertz"?',
@@ -164,6 +181,16 @@ def test_one_mistake_is_one_clear_line(old: str, new: str, problem: str) -> None
     ("entry", "where", "hint"),
     [
         ('"body.mas" = { values = [1] }', 'sweep."body.mas"', "Did you mean body.mass?"),
+        (
+            '"forcing.omega" = { values = [1] }',
+            'sweep."forcing.omega"',
+            "Known here: amplitude, angular_frequency, frequency, phase",
+        ),
+        (
+            '"forcing.amplitud" = { values = [1] }',
+            'sweep."forcing.amplitud"',
+            "Did you mean forcing.amplitude?",
+        ),
         ('"body.kind" = { values = [1] }', 'sweep."body.kind"', "cannot be swept"),
         ('"stop[1].side" = { values = [1] }', 'sweep."stop[1].side"', "cannot be swept"),
         ('"stop[0].position" = { values = [1] }', 'sweep."stop[0].position"', "Indices start at 1"),
