@@ -28,6 +28,11 @@ _SWEEPS: dict[str, dict[str, Any]] = {
 }
 
 
+# Of one column: more distinct values than this are a crowd, of which each point is small and faint, in points squared;
+# values closer than this part of the largest are one.
+_CROWD, _DOT, _FAINTEST, _TOLD_APART = 20, 0.7, 0.3, 1e-3
+
+
 def varied(dataset: xr.Dataset) -> list[str]:
     """Return the swept parameters that take more than one value."""
     return [name for name in swept_names(dataset) if dataset[name].size > 1]
@@ -83,11 +88,19 @@ def draw_bifurcation(dataset: xr.Dataset) -> Figure:
     for axis, quantity in zip(axes, panels, strict=True):
         for direction in directions:
             x, y = _points(dataset, runs, name, quantity, direction)
+            crowd = crowded(x, y)
+            single, style = crowd <= 1.0, _SWEEPS[direction]
             axis.plot(
-                x, y, linestyle="none", rasterized=True, label=f"{direction} sweep", **_SWEEPS[direction]
+                x[single], y[single], linestyle="none", rasterized=True, label=f"{direction} sweep", **style
             )
+            if not single.all():
+                faded = {"color": style["color"], "alpha": _alpha(crowd[~single]), "linewidths": 0.0}
+                axis.scatter(x[~single], y[~single], s=_DOT, rasterized=True, **faded)
         axis.set_ylabel(label(dataset[quantity]))
-        drawn = np.concatenate([line.get_ydata() for line in axis.lines])  # type: ignore[misc]  # arrays here
+        drawn = np.concatenate(
+            [np.asarray(line.get_ydata()) for line in axis.lines]
+            + [np.asarray(dots.get_offsets())[:, 1] for dots in axis.collections]
+        )
         largest = float(np.nanmax(drawn, initial=0.0))
         axis.set_ylim(0.0, 1.05 * largest if largest > 0.0 else 1.0)
         if drawn.size > 1 and one_value(drawn) is not None:
@@ -117,6 +130,27 @@ def _points(
     x = at[dataset["impact_run"].values]
     kept = np.isfinite(x)
     return x[kept], dataset["impact_velocity"].values[kept]
+
+
+def crowded(x: Any, y: Any) -> Any:
+    """Return how crowded the column of each point is: its distinct values over those that can be told apart.
+
+    Examples
+    --------
+    >>> crowded([1.0] * 3 + [2.0] * 300, [0.5] * 3 + [k / 300 for k in range(300)])[[0, -1]].tolist()
+    [0.05, 15.0]
+    """
+    places, owner = np.unique(x, return_inverse=True)
+    values = np.asarray(y, dtype=np.float64)
+    size = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
+    told = np.unique(np.column_stack([owner, np.round(values / (_TOLD_APART * size))]), axis=0)
+    distinct = np.bincount(told[:, 0].astype(np.intp), minlength=places.size)
+    return distinct[owner] / _CROWD
+
+
+def _alpha(crowd: Any) -> Any:
+    """Return how opaque each point of a crowd is."""
+    return np.clip(1.0 / crowd, _FAINTEST, 1.0)
 
 
 def _note(axis: Axes, text: str) -> None:

@@ -167,6 +167,19 @@ def test_a_map_of_an_up_down_sweep_has_a_column_for_each_direction(tmp_path: Pat
     assert {axis.get_title() for axis in figure.axes} >= {"up sweep", "down sweep"}
 
 
+def test_the_points_of_a_crowd_are_small_and_faint_and_all_there(tmp_path: Path) -> None:
+    # 300 impacts of chaos beside 300 of one periodic orbit and three of another
+    runs = [record(1.0, impacts=300), record(2.0, impacts=300), record(3.0, impacts=3)]
+    assert runs[1].impacts is not None
+    runs[1].impacts[:, 2] = 2.0
+    axis = figures.draw(opened(dataset_of(runs), tmp_path)).axes[1]
+    single = np.concatenate([line.get_xdata() for line in axis.get_lines()])
+    (dots,) = axis.collections
+    assert single.tolist() == [1.0] * 300 + [2.0] * 3
+    assert len(dots.get_offsets()) == 300
+    assert np.all(dots.get_alpha() < 0.5)
+
+
 def noisy(count: int, missing: tuple[int, ...] = ()) -> list[RunRecord]:
     """Runs on one orbit, whose numbers differ by rounding; some without an impact."""
     runs = [record(3.0037242956, impacts=0 if k in missing else 1) for k in range(count)]
