@@ -143,7 +143,7 @@ def _the_run(dataset: xr.Dataset, exact: bool, selection: dict[str, Any]) -> tup
 
 def _coordinates(dataset: xr.Dataset, run_id: xr.DataArray) -> dict[str, NDArray[Any]]:
     """Return each coordinate of the runs as one flat column."""
-    columns = {"run_id": run_id.values.ravel()}
+    columns = {"run_id": run_id.values.reshape(-1)}
     for name, coordinate in dataset.coords.items():
         if name not in ("run", "period", "connection", "compared") and set(coordinate.dims) <= set(
             run_id.dims
@@ -151,7 +151,7 @@ def _coordinates(dataset: xr.Dataset, run_id: xr.DataArray) -> dict[str, NDArray
             values = np.broadcast_to(
                 xr.broadcast(coordinate, run_id)[0].transpose(*run_id.dims).values, run_id.shape
             )
-            columns[str(name)] = values.ravel()
+            columns[str(name)] = values.reshape(-1)  # no copy of what is the same for all runs
     if "direction" in columns and columns["direction"].dtype.kind == "i":
         columns["direction"] = np.array([member.name for member in Direction])[columns["direction"]]
     return columns

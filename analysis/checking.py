@@ -25,6 +25,7 @@ from vibroimpact.analysis.schema import (
     Direction,
     Outcome,
     UnitSystem,
+    constant_names,
     swept_names,
 )
 from vibroimpact.fmus.errors import DatasetError
@@ -133,10 +134,8 @@ def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
     rule = RULES.get(name)
     problems = []
     if rule is None:
-        if variable.dims not in (("run",), ("sample",)):
-            problems.append(
-                f"{name}: expected dimensions of a swept parameter or a sample, got {variable.dims}."
-            )
+        if variable.dims not in ((), ("run",), ("sample",)):
+            problems.append(f"{name}: expected dimensions of a parameter or a sample, got {variable.dims}.")
         if variable.dtype != np.float64:
             problems.append(f"{name}: expected float64, got {variable.dtype}.")
     else:
@@ -167,9 +166,9 @@ def _content_problems(dataset: xr.Dataset) -> list[str]:
         problems.append(
             "run_index: expected each index once and none below 0, got a repeated or negative index."
         )
-    for name in swept_names(dataset):
+    for name in (*swept_names(dataset), *constant_names(dataset)):
         if not np.isfinite(dataset.variables[name].values).all():
-            problems.append(f"{name}: expected finite values of a swept parameter, got NaN or infinity.")
+            problems.append(f"{name}: expected finite values of a parameter, got NaN or infinity.")
     for dimension, count_name in RAGGED.items():
         if count_name in dataset.variables:
             count = dataset.variables[count_name].values

@@ -25,11 +25,12 @@ from vibroimpact.analysis.schema import (
     RunRecord,
     UnitSystem,
     VariableRule,
+    constant_names,
     file_name_of,
     file_names,
     swept_names,
 )
-from vibroimpact.analysis.writing import build_dataset, write_dataset
+from vibroimpact.analysis.writing import build_dataset, with_constants, write_dataset
 
 __all__ = [
     "CONVENTIONS",
@@ -48,6 +49,7 @@ __all__ = [
     "VibroimpactAccessor",
     "build_dataset",
     "check",
+    "constant_names",
     "file_name_of",
     "file_names",
     "marked",
@@ -60,5 +62,6 @@ __all__ = [
     "swept_names",
     "take_runs",
     "unreadable",
+    "with_constants",
     "write_dataset",
 ]

@@ -15,7 +15,7 @@ from vibroimpact.analysis.estimation.physics import Forcing, Known
 from vibroimpact.analysis.reading import read_flat
 from vibroimpact.analysis.recording import Channel, Recording
 from vibroimpact.analysis.recording_files import is_recording
-from vibroimpact.analysis.schema import file_name_of
+from vibroimpact.analysis.schema import file_name_of, swept_names
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
 
@@ -96,7 +96,7 @@ def chosen_kind(data: Path, kind: str, run: int | None, drive: str | None, optio
     if is_recording(data):
         return "decay"
     flat = read_flat(data)
-    swept = {"angular_frequency", "frequency"} & {str(name) for name in flat.coords}
+    swept = {"angular_frequency", "frequency"} & set(swept_names(flat))
     if run is None and flat.sizes["run"] > 1 and swept:
         return "response"
     rows = slice(None) if run is None else flat.run_index.values == run
@@ -151,7 +151,7 @@ def run_scene(data: Path, run: int | None, recording: Recording) -> dict[str, An
     row = 0 if run is None else flat.run_index.values.tolist().index(run)
     for key in scene.get("sweep", {}):
         owner, _, name = str(key).rpartition(".")
-        coordinate = next((c for c in (name, file_name_of(str(key))) if c in flat.coords), None)
+        coordinate = next((c for c in (name, file_name_of(str(key))) if c in swept_names(flat)), None)
         table = _table_of(scene, owner)
         if coordinate is not None and table is not None:
             table[name] = float(flat[coordinate].values[row])

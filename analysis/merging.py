@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,8 @@ from vibroimpact.analysis.reading import read_flat
 from vibroimpact.analysis.schema import IMPACT_COLUMNS, NEEDED_IMPACT_COLUMNS, RAGGED, flat_order
 from vibroimpact.fmus.errors import DatasetError
 
-# Not along run, the same in all parts.
-_SHARED = frozenset({"connection", "compared"})
+# Labels that are not along run, the same in all parts.
+_LABELS = frozenset({"connection", "compared"})
 _SHARED_SIZES = ("state", "interface", "comparison")
 # What runs may be without: a part of failed runs knows no loops, one of an older version no durations.
 _MAY_LACK = ("loop_residual", *(name for name in IMPACT_COLUMNS if name not in NEEDED_IMPACT_COLUMNS))
@@ -59,7 +59,7 @@ def _joined(parts: Sequence[xr.Dataset], names: Sequence[str]) -> xr.Dataset:
     columns = {
         str(name): _stacked([part.variables[name].values for part in parts], variable.dims, periods)
         for name, variable in first.variables.items()
-        if name not in _SHARED
+        if not _is_shared(name, variable)
     }
     index = columns["run_index"]
     if np.unique(index).size != index.size:
@@ -81,13 +81,18 @@ def take_runs(dataset: xr.Dataset, rows: NDArray[np.intp]) -> xr.Dataset:
     rows : ndarray of int, shape (run,)
         Places of the runs.
     """
-    columns = {str(name): v.values for name, v in dataset.variables.items() if name not in _SHARED}
+    columns = {str(name): v.values for name, v in dataset.variables.items() if not _is_shared(name, v)}
     return _with_columns(dataset, _ordered(columns, dataset, rows))
+
+
+def _is_shared(name: Hashable, variable: xr.Variable) -> bool:
+    """Whether a variable is the same for all runs: a label, or a number of the scene."""
+    return name in _LABELS or not variable.dims
 
 
 def _with_columns(first: xr.Dataset, columns: dict[str, NDArray[Any]]) -> xr.Dataset:
     """Return a dataset like another one with other values along run."""
-    columns |= {name: first.variables[name].values for name in _SHARED if name in first.variables}
+    columns |= {str(name): v.values for name, v in first.variables.items() if _is_shared(name, v)}
     data = {
         str(name): (variable.dims, columns[str(name)], variable.attrs)
         for name, variable in first.variables.items()
@@ -147,11 +152,12 @@ def _refuse_other_meaning(name: str, part: xr.Dataset, first_name: str, first: x
                 raise DatasetError(
                     f"{name}: {variable}: expected {key} {wanted!r} as in {first_name}, got {got!r}."
                 )
-    for label in _SHARED.intersection(map(str, first.variables)):
-        if not np.array_equal(part.variables[label].values, first.variables[label].values):
+    for label in [name for name, variable in first.variables.items() if _is_shared(name, variable)]:
+        wanted, got = (np.atleast_1d(source.variables[label].values) for source in (first, part))
+        if not np.array_equal(wanted, got):
             raise DatasetError(
-                f"{name}: {label}: expected those of {first_name} ({', '.join(first[label].values)}), "
-                f"got {', '.join(part[label].values)}."
+                f"{name}: {label}: expected those of {first_name} ({', '.join(map(str, wanted))}), "
+                f"got {', '.join(map(str, got))}."
             )
 
 

@@ -20,7 +20,15 @@ from xarray.core import indexing
 from vibroimpact.analysis.checking import structure_problems
 from vibroimpact.analysis.opening import one_error, opened_netcdf
 from vibroimpact.analysis.probing import check_sound, refuse_changed
-from vibroimpact.analysis.schema import RAGGED, RULES, SCHEMA_VERSION, Direction, Outcome, swept_names
+from vibroimpact.analysis.schema import (
+    RAGGED,
+    RULES,
+    SCHEMA_VERSION,
+    Direction,
+    Outcome,
+    constant_names,
+    swept_names,
+)
 from vibroimpact.fmus.errors import DatasetError
 
 # A sweep that is no grid (scattered points) would waste memory on a grid; then `run` stays the dimension.
@@ -104,9 +112,9 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
             name: (variable.dimensions, variable[...], _attributes(variable))
             for name, variable in file.variables.items()
         }
-        linked = sorted(
-            {name for v in file.variables.values() for name in getattr(v, "coordinates", "").split()}
-        )
+        # the library lists variables by the alphabet, this attribute as the scene does
+        links = " ".join(getattr(variable, "coordinates", "") for variable in file.variables.values())
+        linked = dict.fromkeys(links.split())
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
         flat = xr.Dataset(data, coords={name: data.pop(name) for name in linked}, attrs=attrs)
         _refuse_misfits(path, flat)
@@ -268,13 +276,13 @@ def _on_grid(flat: xr.Dataset) -> xr.Dataset:
     if "compared" in flat.variables:
         flat = flat.swap_dims(comparison="compared")
     axes, scalars, run_id = _grid(flat)
-    dims, swept = tuple(axes), swept_names(flat)
+    dims, swept, constants = tuple(axes), swept_names(flat), constant_names(flat)
     variables: dict[str, xr.Variable] = {}
     # The order of the schema reads better than the alphabet; sampled variables come last.
     order = [name for name in RULES if name in flat.variables]
     for name in [*order, *(name for name in flat.variables if name not in RULES)]:
         variable = flat.variables[name]
-        if name in swept or name == "direction":
+        if name in (*swept, *constants, "direction"):
             continue
         variables[str(name)] = _placed(variable, dims, run_id) if variable.dims[:1] == ("run",) else variable
     variables["run_id"] = xr.Variable(
@@ -285,6 +293,7 @@ def _on_grid(flat: xr.Dataset) -> xr.Dataset:
         variables["displacement_range"] = _displacement_range(flat, dims, run_id)
     coordinates = {"run_index": variables.pop("run_index")}
     coordinates |= {name: variables.pop(name) for name in ("connection", "compared") if name in variables}
+    coordinates |= {name: flat.variables[name] for name in constants}
     if dims == ("run",):
         coordinates |= {name: flat.variables[name] for name in swept}
         coordinates["direction"] = xr.Variable(
@@ -347,7 +356,7 @@ def _grid(flat: xr.Dataset) -> tuple[dict[str, xr.Variable], dict[str, xr.Variab
         places.append(place)
     elif directions.size:
         scalars["direction"] = xr.Variable((), names[0], _plain(flat.variables["direction"]))
-    for name in swept_names(flat):
+    for name in _in_order_of_the_scene(flat):
         values, place = np.unique(flat.variables[name].values, return_inverse=True)
         axes[name] = xr.Variable(name, values, flat.variables[name].attrs)
         places.append(place)
@@ -357,6 +366,12 @@ def _grid(flat: xr.Dataset) -> tuple[dict[str, xr.Variable], dict[str, xr.Variab
         count = np.arange(flat.sizes["run"], dtype=np.int32)
         return {"run": xr.Variable("run", count)}, {}, count
     return axes, scalars, run_id
+
+
+def _in_order_of_the_scene(flat: xr.Dataset) -> list[str]:
+    """Return the swept parameters as the scene lists them: variables of a file come by the alphabet."""
+    linked = str(flat["outcome"].encoding.get("coordinates", "")).split()
+    return sorted(swept_names(flat), key=lambda name: linked.index(name) if name in linked else len(linked))
 
 
 def _runs_on(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) -> NDArray[np.int32] | None:

@@ -255,6 +255,8 @@ RESERVED_NAMES = frozenset(
     | {"run_id", "displacement_range"}
 )
 """Names that mean something in a stored or opened dataset; nothing else may take them."""
+NOT_SWEPT = {"swept": "no"}
+"""Attribute of the numbers of a scene that are the same for all of its runs; scalar coordinates."""
 
 # Units of swept parameters and sampled variables, found by the end of their name.
 _QUANTITY_UNITS = {
@@ -298,6 +300,11 @@ _QUANTITY_UNITS = {
     "location": "1",
     "stuck": "1",
     "count": "1",
+    "frequency_slope": "m-1",
+    "damping_slope": "m-1",
+    "damping_reciprocal": "m",
+    "gain": "1",
+    "offset": "1",
 }
 
 
@@ -435,12 +442,26 @@ def attributes_of(name: str, system: UnitSystem) -> dict[str, Any]:
 
 
 def swept_names(dataset: xr.Dataset) -> tuple[str, ...]:
-    """Return the names of the swept parameters: the coordinates that the schema itself does not name."""
+    """Return the names of the swept parameters; those that a selection has made scalar are among them."""
     return tuple(
         str(name)
         for name, coordinate in dataset.coords.items()
-        if name not in RESERVED_NAMES and coordinate.dtype.kind == "f"
+        if name not in RESERVED_NAMES
+        and coordinate.dtype.kind == "f"
+        and not _is_constant(coordinate.variable)
     )
+
+
+def constant_names(dataset: xr.Dataset) -> tuple[str, ...]:
+    """Return the names of the numbers of the scene that are the same for all runs."""
+    return tuple(
+        str(name) for name, coordinate in dataset.coords.items() if _is_constant(coordinate.variable)
+    )
+
+
+def _is_constant(coordinate: xr.Variable) -> bool:
+    # what joins datasets of two scenes makes a dimension of such a number
+    return not coordinate.dims and coordinate.attrs.items() >= NOT_SWEPT.items()
 
 
 def flat_order(first_rows: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.int64]:

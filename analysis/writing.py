@@ -19,6 +19,7 @@ from vibroimpact.analysis.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,
     IMPACT_COLUMNS,
+    NOT_SWEPT,
     PERIOD_COLUMNS,
     RAGGED,
     RESERVED_NAMES,
@@ -30,6 +31,7 @@ from vibroimpact.analysis.schema import (
     RunRecord,
     UnitSystem,
     attributes_of,
+    constant_names,
     file_names,
     known_unit,
     names_list,
@@ -137,6 +139,36 @@ def build_dataset(
     named += (("connection",) if connections else ()) + (("compared",) if compared else ())
     coords = {name: variables.pop(name) for name in named} | swept
     return xr.Dataset(variables, coords=coords, attrs=described | dict(attrs or {}))
+
+
+def with_constants(
+    dataset: xr.Dataset, constants: Mapping[str, float], *, unit_of: Mapping[str, str] | None = None
+) -> xr.Dataset:
+    """Return a dataset with the numbers of its scene that are the same for all runs, as scalar coordinates.
+
+    They keep the datasets of two scenes apart when these are joined: `xr.concat([...], dim="restitution")`.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One-dimensional, as `build_dataset` and `merge_datasets` make it.
+    constants : mapping of str to float
+        By their names in the file; the dataset has nothing of such a name.
+    unit_of : mapping of str to str, optional
+        SI units of those whose name does not tell.
+
+    Raises
+    ------
+    DatasetError
+        If the unit of one is not known.
+    """
+    units = dataset.attrs["units_system"]
+    return dataset.assign_coords(
+        {
+            name: ((), np.float64(value), _quantity_attributes(name, units, unit_of or {}) | NOT_SWEPT)
+            for name, value in constants.items()
+        }
+    )
 
 
 def _check_lengths(
@@ -379,7 +411,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compress
 
 def _image(dataset: xr.Dataset, compression: int) -> memoryview:
     """Return the bytes of the NetCDF-4 file of a dataset."""
-    linked = " ".join(("run_index", "direction", *swept_names(dataset)))
+    linked = " ".join(("run_index", "direction", *swept_names(dataset), *constant_names(dataset)))
     file = netCDF4.Dataset("dataset.nc", "w", format="NETCDF4", memory=1)
     # Every value is written below: filling first would write everything twice.
     file.set_fill_off()
@@ -387,7 +419,7 @@ def _image(dataset: xr.Dataset, compression: int) -> memoryview:
     for name, size in dataset.sizes.items():
         file.createDimension(str(name), size)
     for name, variable in dataset.variables.items():
-        is_data = variable.dims[0] == "run" and name not in dataset.coords
+        is_data = variable.dims[:1] == ("run",) and name not in dataset.coords
         labels = " connection" if "interface" in variable.dims else ""
         labels += " compared" if "comparison" in variable.dims else ""
         _store(file, str(name), variable, compression, linked + labels if is_data else None)
@@ -400,7 +432,7 @@ def _store(
     """Store one variable with its attributes; floats mark what is missing by NaN."""
     is_text = variable.dtype.kind == "O"
     # CF forbids missing values in coordinates, so these have no fill value.
-    may_miss = variable.dtype.kind == "f" and (linked is not None or variable.dims[0] != "run")
+    may_miss = variable.dtype.kind == "f" and (linked is not None or variable.dims[:1] not in ((), ("run",)))
     kind: Any = str if is_text else variable.dtype
     level: Any = compression
     stored = file.createVariable(

@@ -330,7 +330,7 @@ class _Campaign:
         """Make the dataset; returns the parts that prevent it, which are removed, each with the reason."""
         began = time.perf_counter()
         try:
-            compact(parts, self._report.dataset, self._attributes())
+            compact(parts, self._report.dataset, self._scene, self._attributes())
         except DatasetError as error:
             unfit = list(unfit_parts(parts, self._scene))
             if not unfit:

@@ -33,7 +33,7 @@ from vibroimpact.orchestrator.chunks import CARRYING, Chunk, State
 from vibroimpact.orchestrator.manifest import Manifest, differences, flat_scene, scene_hash, write_manifest
 from vibroimpact.orchestrator.parts import NO_RUNS, Note, StoredPart, empty_part, list_parts, own_files
 from vibroimpact.orchestrator.provenance import provenance
-from vibroimpact.orchestrator.run_dataset import coordinate_names, stored_samples
+from vibroimpact.orchestrator.run_dataset import coordinate_names, stored_samples, with_constants_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.sweep import DIRECTIONS, SweepAxis, run_count
 
@@ -359,7 +359,8 @@ class EarlierSweep:
     def _store(self, rows: xr.Dataset, left: int) -> None:
         """Keep the points that the new sweep does not have where they can be opened."""
         path = self._home / f"earlier-{self._manifest.scene_hash[:8]}.nc"
-        write_dataset(rows.assign_attrs(provenance(self._scene, self._manifest.identity)), path)
+        attributed = rows.assign_attrs(provenance(self._scene, self._manifest.identity))
+        write_dataset(with_constants_of(attributed, self._scene), path)
         self._note(f"{left} points of the earlier sweep are not in this one; they stay in {path.name}.")
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec, Exchange
@@ -49,6 +49,8 @@ class GeneralScene:
         Whether points run in a child process that may crash or hang.
     units : mapping of str to str
         Unit of each recorded variable and swept key as the description writes it; `1` where it has none.
+    start_units : mapping of str to str
+        The same of each start value and gain that the scene gives.
     """
 
     components: tuple[ComponentSpec, ...]
@@ -60,6 +62,7 @@ class GeneralScene:
     exchange: Exchange
     guard: bool
     units: Mapping[str, str]
+    start_units: Mapping[str, str] = field(default_factory=dict)
 
     def value(self, key: str) -> float:
         """Return the number that `COMPONENT.VARIABLE` or `connection[N].gain` has.
@@ -74,6 +77,15 @@ class GeneralScene:
             return self._connection(place, key).gain
         component, variable = self._start_value(key)
         return float(self.components[component].parameters[variable])
+
+    def numbers(self) -> Iterator[tuple[str, float]]:
+        """Yield each start value that is a number and each gain, with its key."""
+        for component in self.components:
+            for variable, start in component.parameters.items():
+                if isinstance(start, int | float) and not isinstance(start, bool):
+                    yield f"{component.name}.{variable}", float(start)
+        for number, connection in enumerate(self.connections, start=1):
+            yield f"connection[{number}].gain", connection.gain
 
     def with_values(self, values: Mapping[str, float]) -> GeneralScene:
         """Return this scene with other start values and gains, without validating it again.

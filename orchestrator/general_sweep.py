@@ -127,10 +127,11 @@ def _names_differ(axes: list[SweepAxis]) -> Iterator[Problem]:
 
 def swept_units(axes: tuple[SweepAxis, ...], draft: GeneralDraft) -> Mapping[str, str]:
     """Return the unit of each swept key as its description or connection writes it; `1` where it has none."""
-    return {axis.key: _unit(axis.key, draft) for axis in axes}
+    return {axis.key: unit_of_key(axis.key, draft) for axis in axes}
 
 
-def _unit(key: str, draft: GeneralDraft) -> str:
+def unit_of_key(key: str, draft: GeneralDraft) -> str:
+    """Return the unit of a start value or gain as its description or connection writes it; `1` where it has none."""
     variable = draft.variable(key)
     if variable:
         return variable.unit_name or "1"

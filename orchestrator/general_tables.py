@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ from vibroimpact.orchestrator.general_components import DraftComponent, read_com
 from vibroimpact.orchestrator.general_models import ConnectionTable, EventTable, GeneralRecord
 from vibroimpact.orchestrator.general_rules import GeneralDraft, general_problems, split
 from vibroimpact.orchestrator.general_scene import GeneralScene
-from vibroimpact.orchestrator.general_sweep import read_general_sweep, swept_units
+from vibroimpact.orchestrator.general_sweep import read_general_sweep, swept_units, unit_of_key
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
 from vibroimpact.orchestrator.scene_errors import Problem
 from vibroimpact.orchestrator.scene_models import Execution, Record, SceneHeader
@@ -92,7 +92,7 @@ def _general(
 ) -> GeneralScene:
     recorded = ((name, draft.variable(name)) for name in record.variables)
     units = {name: (variable.unit_name or "1") if variable else "1" for name, variable in recorded}
-    return GeneralScene(
+    general = GeneralScene(
         components=tuple(_component(component, axes) for component in draft.components.values()),
         connections=tuple(_connection(table) for table in draft.connections if table),
         events=tuple(_event(table) for table in draft.events if table),
@@ -103,6 +103,7 @@ def _general(
         guard=execution.guard,
         units={**units, **swept_units(axes, draft)},
     )
+    return replace(general, start_units={key: unit_of_key(key, draft) for key, _ in general.numbers()})
 
 
 def _component(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> ComponentSpec:

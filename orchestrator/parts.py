@@ -39,6 +39,7 @@ from vibroimpact.orchestrator.chunks import (
     points_of,
 )
 from vibroimpact.orchestrator.empty_record import empty_record
+from vibroimpact.orchestrator.run_dataset import with_constants_of
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.sweep import expand
 
@@ -142,8 +143,8 @@ def _read(path: Path, chunk: Chunk, scene_hash: str, kept: NDArray[np.int64]) ->
     return StoredPart(path, chunk, carried_state(part.attrs), part.run_index.size)
 
 
-def compact(parts: Sequence[Path], target: Path, attrs: Mapping[str, Any]) -> xr.Dataset:
-    """Write the rows of all parts as one dataset, whole or not at all.
+def compact(parts: Sequence[Path], target: Path, scene: Scene, attrs: Mapping[str, Any]) -> xr.Dataset:
+    """Write the rows of all parts as one dataset, whole or not at all, with the numbers that the scene does not sweep.
 
     Returns
     -------
@@ -161,6 +162,7 @@ def compact(parts: Sequence[Path], target: Path, attrs: Mapping[str, Any]) -> xr
     # Those of the first part: what they say of it is not true of all runs.
     own = (*CARRIED, CARRIED_STATE, "scene_hash")
     dataset.attrs = {name: value for name, value in dataset.attrs.items() if name not in own} | dict(attrs)
+    dataset = with_constants_of(dataset, scene)
     write_dataset(dataset, target)
     return dataset
 

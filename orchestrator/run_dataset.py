@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import RESERVED_NAMES, Direction, RunRecord, build_dataset, file_names
+from vibroimpact.analysis.dataset import (
+    RESERVED_NAMES,
+    Direction,
+    RunRecord,
+    build_dataset,
+    file_names,
+    with_constants,
+)
 from vibroimpact.orchestrator.empty_record import sample_variables
 from vibroimpact.orchestrator.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene_keys import parse_key
+from vibroimpact.orchestrator.scene_keys import coordinate_name, parse_key
 
 EXTREMA = ("displacement_max", "displacement_min")
 STROBE = ("strobe_displacement", "strobe_velocity")
@@ -59,9 +67,31 @@ def dataset_of_runs(
         connections=_energy_connections(scene),
         compared=compared_names(scene),
     )
+    return _described(dataset, scene, names)
+
+
+def _described(dataset: xr.Dataset, scene: Scene, names: Mapping[str, str]) -> xr.Dataset:
     for file, long_name in _long_names(scene, names).items():
         dataset[file].attrs["long_name"] = long_name
     return dataset
+
+
+def with_constants_of(dataset: xr.Dataset, scene: Scene) -> xr.Dataset:
+    """Return the dataset of a scene's runs with what the scene does not sweep as scalar coordinates."""
+    constants = scene.constants()
+    names = constant_names(scene, constants)
+    named = {file: constants[key] for key, file in names.items()}
+    return _described(with_constants(dataset, named, unit_of=_units(scene, names)), scene, names)
+
+
+def constant_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
+    """Return the name in the file of each key that is not swept: named as if swept, beside those that are."""
+    every = [*keys, *(axis.key for axis in scene.sweep)]
+    short = {key: coordinate_name(key, every) for key in keys}
+    twice = Counter(short.values())
+    taken = RESERVED_NAMES | set(coordinate_names(scene).values()) | set(stored_samples(scene))
+    wanted = [name if twice[name] == 1 else key for key, name in short.items()]
+    return dict(zip(short, file_names(wanted, taken), strict=True))
 
 
 def coordinate_names(scene: Scene) -> dict[str, str]:
@@ -80,7 +110,7 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
     if scene.units != "SI":
         return {}
     if scene.general is not None:
-        units = dict(scene.general.units)
+        units = {**scene.general.start_units, **scene.general.units}
         return units | {file: units[key] for key, file in names.items() if key in units}
     swept = {file: unit for key, file in names.items() if (unit := _unit_of_key(scene, key))}
     forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}

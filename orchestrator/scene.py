@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
+from itertools import chain
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
@@ -20,7 +21,14 @@ from vibroimpact.orchestrator.general_scene import GeneralScene
 from vibroimpact.orchestrator.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene_errors import lines_of
 from vibroimpact.orchestrator.scene_file import parse_toml, read_text
-from vibroimpact.orchestrator.scene_keys import Key, coordinate_name, number_of, numeric_key, replacement
+from vibroimpact.orchestrator.scene_keys import (
+    Key,
+    coordinate_name,
+    number_of,
+    numbers_of,
+    numeric_key,
+    replacement,
+)
 from vibroimpact.orchestrator.scene_models import Body, Execution, Forcing, Record, Sensor, Stop
 from vibroimpact.orchestrator.scene_tables import read_tables
 from vibroimpact.orchestrator.sweep import SweepAxis
@@ -86,6 +94,7 @@ class Scene(BaseModel):
         document = asdict(general)
         for component in document["components"]:
             component["fmu"] = component["fmu"].name
+        del document["start_units"]  # they follow from the FMUs
         return document
 
     @property
@@ -160,6 +169,18 @@ class Scene(BaseModel):
         changed = {name: tables[name] for name in ("forcing", "sensor")}
         return self.model_copy(update={"body_given": tables["body"], "stops": stops, **changed})
 
+    def constants(self) -> dict[str, float]:
+        """Return the numbers that a sweep could vary and this one does not, by key, defaults too."""
+        if self.general is not None:
+            numbers = self.general.numbers()
+        else:
+            tables = ((_table_name(slot), owner) for slot, owner in self._numbered_tables().items())
+            numbers = chain.from_iterable(
+                numbers_of(owner, name) for name, owner in tables if owner is not None
+            )
+        swept = {axis.key for axis in self.sweep}
+        return {key: value for key, value in numbers if key not in swept}
+
     def sweep_coordinate_name(self, key: str) -> str:
         """Return the name that a swept key has as a coordinate of the dataset."""
         return coordinate_name(key, [axis.key for axis in self.sweep])
@@ -172,6 +193,10 @@ class Scene(BaseModel):
 
 def _slot(key: Key) -> str | int:
     return key.table if key.place is None else key.place
+
+
+def _table_name(slot: str | int) -> str:
+    return f"stop[{slot + 1}]" if isinstance(slot, int) else slot
 
 
 def load_scene(path: str | PathLike[str]) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -93,6 +93,26 @@ def number_of(owner: object, key: Key) -> float | None:
         array = isinstance(value, tuple) and key.element < len(value)
         return float(value[key.element]) if array and value is not None else None
     return float(value) if isinstance(value, int | float) else None
+
+
+def numbers_of(owner: BaseModel, table: str) -> Iterator[tuple[str, float]]:
+    """Yield each number of a table that a sweep may vary, with its key; of two related keys the one that counts.
+
+    Parameters
+    ----------
+    owner : BaseModel
+        The table.
+    table : str
+        Its name in keys: `body`, or `stop[1]`.
+    """
+    for word in SWEEPABLE[table.partition("[")[0]]:
+        value = getattr(owner, word, None)
+        if getattr(owner, _OVERRIDDEN_BY.get(word, ""), None) is not None:
+            continue
+        if isinstance(value, tuple):
+            yield from ((f"{table}.{word}[{place}]", number) for place, number in enumerate(value, start=1))
+        elif value is not None:
+            yield f"{table}.{word}", value
 
 
 def replacement(owner: BaseModel, key: Key, value: float) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from vibroimpact.orchestrator.empty_record import empty_record
 from vibroimpact.orchestrator.progress import Progress, Silence
 from vibroimpact.orchestrator.provenance import provenance
 from vibroimpact.orchestrator.result_size import refuse_large_results
+from vibroimpact.orchestrator.run_dataset import with_constants_of
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.sweep import expand
 
@@ -64,9 +65,11 @@ def run_scene(
     try:
         points = _all_points(scene)
         # A dataset that cannot be made is found out before an hour of work, not after it.
-        dataset_of(scene, points[:1], [empty_record(scene, Outcome.error, "rehearsal", 0.0)], {})
+        rehearsal = [empty_record(scene, Outcome.error, "rehearsal", 0.0)]
+        with_constants_of(dataset_of(scene, points[:1], rehearsal, {}), scene)
         records = _run_all(scene, opened, points, progress or Silence())
         dataset = dataset_of(scene, points, records, provenance(scene, identify(opened)))
+        dataset = with_constants_of(dataset, scene)
     finally:
         opened.close()
     try:

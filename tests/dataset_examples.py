@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset
+from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset, with_constants
 
 PERIODS = 3
 
@@ -140,7 +140,7 @@ def everything(**changes: Any) -> xr.Dataset:
     runs[0].loop_residual = coupled.loop_residual
     runs[0].scores = np.array([[98.5, 1.01, 8.3e-3, 3e-6, -1.0, 0.4], [97.0, 0.99, 0.0, 0.0, 1.0, 0.1]])
     runs[0].final_state, runs[1].final_state = np.array([1.0, -1.0, 0.5, 0.25]), np.zeros(4)
-    return dataset_of(
+    dataset = dataset_of(
         runs,
         sample_variables=["body.displacement", "stop.contact[1].force"],
         unit_of={"stop.contact[1].force": "N"},
@@ -149,3 +149,4 @@ def everything(**changes: Any) -> xr.Dataset:
         compared=COMPARED,
         **changes,
     )
+    return with_constants(dataset, {"restitution": 0.7, "stop_1_position": 1e-3})

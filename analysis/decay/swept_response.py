@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.decay.resonance import Curve
 from vibroimpact.analysis.reading import read_flat
-from vibroimpact.analysis.schema import Outcome
+from vibroimpact.analysis.schema import Outcome, swept_names
 from vibroimpact.fmus.errors import DatasetError
 
 Floats = NDArray[np.float64]
@@ -45,13 +45,14 @@ def swept_response(
         Nothing is swept, no extrema are recorded, or too few runs remain.
     """
     flat = read_flat(path)
-    name = next((name for name in ("angular_frequency", "frequency") if name in flat.coords), None)
+    swept = swept_names(flat)
+    name = next((name for name in ("angular_frequency", "frequency") if name in swept), None)
     if name is None or "displacement_max" not in flat:
         raise DatasetError(
             f"{os.fspath(path)}: expected a sweep of the forcing frequency with extrema, got none. "
             "Sweep forcing.angular_frequency and record extrema."
         )
-    others = [str(key) for key in flat.coords if key not in (name, "direction", "run_index")]
+    others = [key for key in swept if key != name]
     half = 0.5 * (flat.displacement_max.values - flat.displacement_min.values)
     free = flat.outcome.values == int(Outcome.ok)
     if "impact_count" in flat:

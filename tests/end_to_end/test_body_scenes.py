@@ -237,7 +237,9 @@ def test_a_continuation_of_a_chain_is_the_same_however_it_is_cut_into_chunks(tmp
     carried = None
     for first, stop in ((6, 9), (9, 12)):
         carried = run_chunk(work, Chunk(1, first, stop, carried)).carried
-    compact([part.path for part in list_parts(folder, work.scene_hash, print)], tmp_path / "cut.nc", {})
+    compact(
+        [part.path for part in list_parts(folder, work.scene_hash, print)], tmp_path / "cut.nc", scene, {}
+    )
     run_scene(scene, tmp_path / "whole.nc")
     assert_same_rows(tmp_path / "cut.nc", tmp_path / "whole.nc")
     with open_dataset(tmp_path / "whole.nc") as ds:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -81,11 +81,11 @@ def test_a_part_that_is_damaged_after_it_was_written_is_computed_again_by_the_sa
 ) -> None:
     compact, notes, damaged = campaign.compact, Notes(), []
 
-    def damage_first(parts: Sequence[Path], target: Path, attrs: Mapping[str, Any]) -> xr.Dataset:
+    def damage_first(parts: Sequence[Path], *others: Any) -> xr.Dataset:
         if not damaged:
             damaged.append(parts[2])
             flip(parts[2], 5000)
-        return compact(parts, target, attrs)
+        return compact(parts, *others)
 
     monkeypatch.setattr(campaign, "compact", damage_first)
     campaign_here(monkeypatch, TEXT, half, notes=notes)

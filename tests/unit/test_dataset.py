@@ -526,7 +526,7 @@ def test_check_finds_a_lost_variable_a_wrong_type_and_lost_units() -> None:
         ("stick_end", 0, 0.1, "not before its start"),
         ("time", 1, -1.0, "do not decrease in a run"),
         ("direction", 0, 3, "direction: expected 0 to 2"),
-        ("angular_frequency", 0, np.inf, "expected finite values of a swept parameter"),
+        ("angular_frequency", 0, np.inf, "expected finite values of a parameter"),
     ],
 )
 def test_check_refuses_impossible_contents(name: str, row: int, value: float, message: str) -> None:
