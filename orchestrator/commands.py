@@ -22,6 +22,15 @@ MOST_WARNINGS = 3
 #: Larger campaigns keep their warnings to the dataset.
 MOST_RUNS_READ = 100_000
 
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the scene before it is checked, the key as messages write it; may be repeated.",
+    ),
+]
+
 # Each command imports what it needs when it runs: `vibroimpact --help` loads neither xarray nor Dask.
 
 
@@ -36,6 +45,7 @@ def register(app: typer.Typer) -> None:
 def run(
     scene: Annotated[Path, typer.Argument(help="Scene file (TOML).")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Dataset to write (.nc).")],
+    changes: Changes = None,
     force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
 ) -> None:
     """Run a scene in this process, one point after the other, into one dataset.
@@ -50,7 +60,7 @@ def run(
     from vibroimpact.orchestrator.single_run import run_scene
 
     began = time.perf_counter()
-    loaded = load_scene(scene)
+    loaded = load_scene(scene, changes or ())
     refuse_outputs([scene], output)
     refuse_overwriting(output, force, lambda there: holds_scene(there, loaded))
     with shown_progress() as progress:
@@ -65,6 +75,7 @@ def run(
 def campaign(
     scene: Annotated[Path, typer.Argument(help="Scene file (TOML) that sweeps something.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the campaign.")],
+    changes: Changes = None,
     workers: Annotated[
         int | None, typer.Option(help="Worker processes; one for each processor by default.", min=1)
     ] = None,
@@ -86,7 +97,7 @@ def campaign(
         raise UsageError(
             "--workers and --scheduler: expected one of them, got both. A scheduler has its own workers."
         )
-    loaded = load_scene(scene)
+    loaded = load_scene(scene, changes or ())
     refuse_folder(output)
     try:
         with shown_progress() as progress:

@@ -7,18 +7,20 @@ The keys are described in `docs/scene.md`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from itertools import chain
 from os import PathLike
 from pathlib import Path
 from typing import Any, Literal
 
+import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.general_scene import GeneralScene
 from vibroimpact.orchestrator.replay_models import RECORDING_KEY, Replay
+from vibroimpact.orchestrator.scene_changes import changed_document
 from vibroimpact.orchestrator.scene_errors import lines_of
 from vibroimpact.orchestrator.scene_file import parse_toml, read_text
 from vibroimpact.orchestrator.scene_keys import (
@@ -199,13 +201,15 @@ def _table_name(slot: str | int) -> str:
     return f"stop[{slot + 1}]" if isinstance(slot, int) else slot
 
 
-def load_scene(path: str | PathLike[str]) -> Scene:
+def load_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
     """Read a scene file.
 
     Parameters
     ----------
     path : path-like
         A TOML file, UTF-8, at most 1 MiB.
+    changes : sequence of str
+        `KEY=VALUE`, made before anything is checked: see `scene_changes.changed_document`.
 
     Raises
     ------
@@ -213,10 +217,10 @@ def load_scene(path: str | PathLike[str]) -> Scene:
         With all problems of the file, each on one line.
     """
     source = str(path)
-    return parse_scene(read_text(Path(path), source), source)
+    return parse_scene(read_text(Path(path), source), source, changes)
 
 
-def parse_scene(text: str, source: str) -> Scene:
+def parse_scene(text: str, source: str, changes: Sequence[str] = ()) -> Scene:
     """Read a scene from TOML text.
 
     Parameters
@@ -225,15 +229,20 @@ def parse_scene(text: str, source: str) -> Scene:
         The TOML text.
     source : str
         The name of the text in messages, usually its file.
+    changes : sequence of str
+        `KEY=VALUE`; the text of the scene is then one that says the same as the changed tables.
 
     Raises
     ------
     SceneError
         With all problems of the text, each on one line.
     """
-    tables, problems = read_tables(parse_toml(text, source), Path(source).parent)
+    document, changed = changed_document(parse_toml(text, source), changes)
+    tables, problems = read_tables(document, Path(source).parent)
     if tables is None:
-        raise SceneError(lines_of(problems, source))
+        raise SceneError(lines_of(problems, source, changed))
+    if changed:
+        text = tomli_w.dumps(document)
     return Scene(
         source=source,
         text=text,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
@@ -27,6 +27,8 @@ LONGEST_QUOTE = 60
 MOST_PROBLEMS = 50
 """Problems that are told of one file; more of them help nobody, and only their number is said."""
 MOST_WORDS_LISTED = 12
+CHANGES = "--set"
+"""The option that changes keys of a scene."""
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+\Z")
 _TOML_PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)\Z")
@@ -61,15 +63,29 @@ class Problem:
         return f"{where}expected {self.expected}, got {self.got}.{f' {hint}' if hint else ''}"
 
 
-def lines_of(problems: Sequence[Problem], source: str) -> tuple[str, ...]:
-    """Return the lines that a user reads of all problems of a file, each once; of very many, how many more."""
+def lines_of(problems: Sequence[Problem], source: str, changed: Collection[str] = ()) -> tuple[str, ...]:
+    """Return the lines that a user reads of all problems of a file, each once; of very many, how many more.
+
+    Problems of keys that the command line has changed name its option in place of the file.
+    """
     lines: dict[str, None] = {}
+    if changed:
+        source = f"{source} with {CHANGES}"
     for place, problem in enumerate(problems):
         if len(lines) == MOST_PROBLEMS:
             more = len(problems) - place
             return (*lines, f"{source}: and {more} more {'problem' if more == 1 else 'problems'}.")
-        lines[problem.line(source)] = None
+        lines[problem.line(CHANGES if _concerns(problem.key, changed) else source)] = None
     return tuple(lines)
+
+
+def _concerns(key: str, changed: Collection[str]) -> bool:
+    """Whether a key is one of those that were changed, within one of them, or a table of one."""
+
+    def within(inner: str, outer: str) -> bool:
+        return inner == outer or inner.startswith((f"{outer}.", f"{outer}["))
+
+    return any(within(key, other) or within(other, key) for other in changed)
 
 
 @dataclass(frozen=True, slots=True)

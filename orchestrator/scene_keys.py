@@ -30,6 +30,8 @@ START_STATE = ("body.displacement_start", "body.velocity_start")
 
 # The second of each pair has the last word in its model, so that giving the first must clear it.
 _OVERRIDDEN_BY = {"damping": "damping_ratio", "angular_frequency": "frequency"}
+ALTERNATIVES = _OVERRIDDEN_BY | {second: first for first, second in _OVERRIDDEN_BY.items()}
+"""Keys of one table that say the same thing, of which a scene gives one."""
 _NUMBER = r"\[([1-9][0-9]{0,8})\]"
 _KEY = re.compile(rf"(?:(body|forcing|sensor)|(stop){_NUMBER})\.([a-z_]+)(?:{_NUMBER})?")
 
