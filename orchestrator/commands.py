@@ -1,4 +1,4 @@
-"""The commands `run`, `campaign` and `demo`."""
+"""The commands `check`, `run`, `campaign` and `demo`."""
 
 from __future__ import annotations
 
@@ -36,10 +36,33 @@ Changes = Annotated[
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this package to the command line."""
+    app.command("check")(check)
     app.command("run")(run)
     app.command("campaign")(campaign)
     app.command("demo")(demo)
     register_replay(app)
+
+
+def check(scene: Annotated[Path, typer.Argument(help="Scene file (TOML).")], changes: Changes = None) -> None:
+    """Say what is wrong with a scene or, where nothing is, what would run and what it would cost.
+
+    One point of the scene is computed, the middle one of its sweep, for 20 s at most; times, memory and sizes are
+    those of this point, for all points. Nothing is written. Exit code 2: the scene has problems; 1: the point failed.
+
+    Example: vibroimpact check examples/bifurcation.toml
+    """
+    from vibroimpact.orchestrator.check_lines import check_lines
+    from vibroimpact.orchestrator.failures import FAILED
+    from vibroimpact.orchestrator.scene import load_scene
+    from vibroimpact.orchestrator.scene_check import cost_of
+
+    loaded = load_scene(scene, changes or ())
+    say(f"{scene}: no problems")
+    cost = cost_of(loaded)
+    for line in check_lines(loaded, cost):
+        say(line)
+    if cost.trial is not None and cost.trial.outcome in FAILED and not cost.trial.given_up:
+        raise typer.Exit(1)
 
 
 def run(
