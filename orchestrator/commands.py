@@ -80,6 +80,7 @@ def run(
     from vibroimpact.orchestrator.manifest import holds_scene
     from vibroimpact.orchestrator.progress import shown_progress
     from vibroimpact.orchestrator.scene import load_scene
+    from vibroimpact.orchestrator.scene_summary import in_one_line
     from vibroimpact.orchestrator.single_run import run_scene
 
     began = time.perf_counter()
@@ -90,6 +91,7 @@ def run(
         outcomes = run_scene(loaded, output, progress=progress)
     runs = sum(outcomes.values())
     say(f"{_counted(runs, 'run')} in {time.perf_counter() - began:.1f} s: {output}")
+    say(in_one_line(loaded))
     _tell_rows(output, runs)
     if runs == 1 and any(kind.name in outcomes for kind in FAILED):
         raise typer.Exit(1)

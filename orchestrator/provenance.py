@@ -12,6 +12,7 @@ from typing import Any
 
 from vibroimpact.orchestrator.chunks import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene_summary import in_one_line
 
 _PACKAGES = ("vibroimpact", "numpy", "fmpy", "xarray", "netCDF4", "dask", "distributed")
 _GIT_SECONDS = 5.0
@@ -28,6 +29,7 @@ def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
         "git_commit": git_commit(),
         "seed": "none: nothing in the scene is random",
         "execution": identity.execution,
+        "engine": in_one_line(scene),
         "instruction_set": identity.instruction_set,
     }
 

@@ -26,8 +26,10 @@ def engine(scene: Scene) -> str:
         names = ", ".join(component.name for component in scene.general.components)
         step = f"{scene.general.macro_step:g} {'s' if scene.units == 'SI' else 'units of time'}"
         return f"coupled: {names}; {scene.general.exchange} exchange every {step}"
-    if scene.execution.how == "coupled" and scene.stops:
-        return f"coupled: {_body(scene)}; an ImpactStop for each stop"
+    if scene.replay is not None:
+        return f"replay from sample to sample: {_body(scene)}"
+    if scene.execution.how == "coupled":
+        return f"coupled: {_body(scene)}{'; an ImpactStop for each stop' if scene.stops else ''}"
     return f"fused: {_body(scene)}"
 
 

@@ -257,7 +257,7 @@ def test_a_campaign_over_a_beam_that_was_broken_off_resumes_with_the_same_rows(
     class Stopped(Exception):
         pass
 
-    def stop(parts: object, target: object, attrs: object) -> None:
+    def stop(*_: object) -> None:
         raise Stopped
 
     with monkeypatch.context() as patch:

@@ -57,8 +57,8 @@ def test_rows_do_not_depend_on_how_runs_are_cut_into_chunks(tmp_path: Path, path
     stops = [*cut[1:], runs]
     fine = run_all(work_in(tmp_path / "fine", text), list(zip(cut, stops, strict=True)), length)
     coarse = run_all(work_in(tmp_path / "coarse", text), [(0, runs)], length)
-    compact(fine, tmp_path / "fine.nc", {})
-    compact(coarse, tmp_path / "coarse.nc", {})
+    compact(fine, tmp_path / "fine.nc", scene_of(text), {})
+    compact(coarse, tmp_path / "coarse.nc", scene_of(text), {})
     assert_same_rows(tmp_path / "fine.nc", tmp_path / "coarse.nc")
     assert read_flat(tmp_path / "fine.nc").attrs == read_flat(tmp_path / "coarse.nc").attrs
     run_scene(scene_of(text), tmp_path / "run.nc", runner=BUSY)
@@ -89,7 +89,7 @@ def test_a_failed_run_hands_on_the_state_it_was_given() -> None:
 def test_a_chunk_of_failed_runs_merges_with_any_other(tmp_path: Path) -> None:
     work = work_in(tmp_path / "parts", amplitude_text(20, start=-0.9), "busy_runner:BrittleRunner")
     paths = run_all(work, [(0, 5), (5, 20)], 20)
-    compact(paths, tmp_path / "all.nc", {})
+    compact(paths, tmp_path / "all.nc", scene_of(work.scene_text), {})
     outcome = read_flat(tmp_path / "all.nc")["outcome"].values
     assert (outcome[:10] == Outcome.error).all()
     assert (outcome[10:] == Outcome.ok).all()

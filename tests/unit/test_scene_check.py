@@ -10,7 +10,7 @@ from command_line import in_this_process
 
 import vibroimpact.orchestrator.scene_check as scene_check
 import vibroimpact.orchestrator.sweep as sweep
-from vibroimpact.analysis.dataset import Outcome
+from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene_check import BYTES_BESIDE, cost_of
 from vibroimpact.orchestrator.scene_summary import effects, engine, in_one_line, laws
@@ -90,6 +90,16 @@ def test_a_scene_is_told_in_one_line_with_its_laws() -> None:
     )
     assert laws(scene) == {"stop[1]": "restitution", "stop[2]": "hertz"}
     assert in_one_line(scene).endswith("a stop yields; stop[1] restitution, stop[2] hertz; damping")
+
+
+def test_a_run_and_its_dataset_say_what_ran(scene_file: Path) -> None:
+    text = BODY + "damping = 0.1\n" + HERTZ + RECORD
+    scene_file.write_text(text)
+    output = scene_file.with_suffix(".nc")
+    done = in_this_process("run", scene_file, "-o", output)
+    line = "fused: Oscillator, one mass, as a structure because a stop yields; stop[1] hertz; damping"
+    assert done.stdout.splitlines()[1:] == [line]
+    assert read_flat(output).attrs["engine"] == line
 
 
 def test_points_and_branches_are_those_of_the_sweep() -> None:
