@@ -17,10 +17,13 @@ NATIVE := $(shell find fmus/native -name '*.c' -o -name '*.h' -o -name '*.toml' 
 # tests side by side, four at most, as many start processes of their own; `make test PARALLEL=` runs them one by one
 PARALLEL ?= -n logical --maxprocesses 4 --dist worksteal
 SETUP := pyproject.toml hatch_build.py
-INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# pip says what it does: it takes minutes, and silence looks like a stall
+INSTALL = $(BIN)/python -m pip install --disable-pip-version-check
 # what pyproject.toml names at its lower bounds, what those need in turn at its newest; pip has no such way
-INSTALL_LOWEST = $(INSTALL_UV) && $(BIN)/uv pip install --quiet --python $(BIN)/python --resolution lowest-direct --reinstall
-INSTALL_UV = $(BIN)/python -m pip install --quiet --disable-pip-version-check 'uv>=0.8'
+INSTALL_LOWEST = $(INSTALL_UV) && $(BIN)/uv pip install --python $(BIN)/python --resolution lowest-direct --reinstall
+INSTALL_UV = $(BIN)/python -m pip install --disable-pip-version-check 'uv>=0.8'
+
+ANNOUNCE = @echo "Installing vibroimpact and what it needs into $(VENV); the first time this takes some minutes."
 
 help: ## show this
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -58,23 +61,28 @@ clean: ## remove what make has made
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "make: needs Python 3.11 or newer, found none on PATH. Install it, or say where it is: make PYTHON=/path/to/python3" >&2; exit 1; }
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "make: expected Python 3.11 or newer, got $$($(PYTHON) --version 2>&1). Say where one is: make PYTHON=/path/to/python3" >&2; exit 1; }
+	@echo "Making the virtual environment $(VENV)."
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); echo "make: $(PYTHON) could not make a virtual environment. On Debian and Ubuntu: apt install python3-venv" >&2; exit 1; }
 
 # one environment; each purpose adds what it needs, once
 $(VENV)/demo.stamp: $(SETUP) | $(BIN)/python
+	$(ANNOUNCE)
 	$(INSTALL) -e .
 	@touch $@ $(VENV)/fmus.stamp
 
 $(VENV)/test.stamp: $(SETUP) | $(BIN)/python
+	$(ANNOUNCE)
 	$(INSTALL) -e '.[test]'
 	@touch $@ $(VENV)/demo.stamp $(VENV)/fmus.stamp
 
 # the benchmarks compare with other people's packages too
 $(VENV)/bench.stamp: $(SETUP) | $(BIN)/python
+	$(ANNOUNCE)
 	$(INSTALL) -e '.[test,bench]'
 	@touch $@ $(VENV)/test.stamp $(VENV)/demo.stamp $(VENV)/fmus.stamp
 
 $(VENV)/lint.stamp: $(SETUP) | $(BIN)/python
+	$(ANNOUNCE)
 	$(INSTALL) -e '.[lint]'
 	@touch $@ $(VENV)/demo.stamp $(VENV)/fmus.stamp
 

@@ -51,3 +51,14 @@ def test_the_lowest_versions_are_refused_on_another_python() -> None:
     refused = make("oldest", "PYTHON=false")
     assert refused.returncode != 0
     assert "expected Python 3.11" in refused.stderr
+
+
+@pytest.mark.parametrize("target", ["demo", "test", "bench", "lint", "oldest"])
+def test_an_installation_says_what_it_does(target: str) -> None:
+    commands = make("--dry-run", "--always-make", target, f"OLDEST={sys.executable}").stdout.splitlines()
+    installing = [line for line in commands if " pip install" in line]
+    assert installing
+    assert [line for line in installing if "--quiet" in line or " -q" in line] == []
+    assert any(
+        line.startswith('echo "Installing vibroimpact and what it needs into .venv') for line in commands
+    )
