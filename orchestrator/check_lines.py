@@ -29,10 +29,18 @@ _DURATIONS = (
 )
 
 
-def check_lines(scene: Scene, cost: SceneCost) -> Iterator[str]:
-    """Yield the lines, one for each thing that is told."""
-    for name, text in (*_what_runs(scene), *_what_it_costs(scene, cost)):
-        yield f"  {name:<{_WIDTH}}{text}"
+def engine_lines(scene: Scene) -> Iterator[str]:
+    """Yield the lines that say what runs, which need no trial."""
+    return _aligned(_what_runs(scene))
+
+
+def cost_lines(scene: Scene, cost: SceneCost) -> Iterator[str]:
+    """Yield the lines that say what it costs."""
+    return _aligned(_what_it_costs(scene, cost))
+
+
+def _aligned(told: Iterator[tuple[str, str]]) -> Iterator[str]:
+    return (f"  {name:<{_WIDTH}}{text}" for name, text in told)
 
 
 def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:

@@ -51,15 +51,17 @@ def check(scene: Annotated[Path, typer.Argument(help="Scene file (TOML).")], cha
 
     Example: vibroimpact check examples/bifurcation.toml
     """
-    from vibroimpact.orchestrator.check_lines import check_lines
+    from vibroimpact.orchestrator.check_lines import cost_lines, engine_lines
     from vibroimpact.orchestrator.failures import FAILED
     from vibroimpact.orchestrator.scene import load_scene
     from vibroimpact.orchestrator.scene_check import cost_of
 
     loaded = load_scene(scene, changes or ())
     say(f"{scene}: no problems")
+    for line in engine_lines(loaded):
+        say(line)
     cost = cost_of(loaded)
-    for line in check_lines(loaded, cost):
+    for line in cost_lines(loaded, cost):
         say(line)
     if cost.trial is not None and cost.trial.outcome in FAILED and not cost.trial.given_up:
         raise typer.Exit(1)
