@@ -30,6 +30,7 @@ def print_spikes(console: Terminal, report: SpikeReport) -> None:
     console.print(_settings(report))
     if count:
         console.print(_spikes(data))
+        console.print(_contacts(data))
         if count > _MOST_ROWS:
             console.print(f"{count - _MOST_ROWS} more spikes are in the dataset.")
         console.print(_waveforms(data))
@@ -89,10 +90,10 @@ def _automatic_merge(method: str) -> str:
 def _spikes(data: xr.Dataset) -> Table:
     """Return one row for each spike."""
     peak, impulse = str(data["spike_peak"].attrs["units"]), str(data["spike_impulse"].attrs["units"])
-    heads = ["time (s)", "above (ms)", f"peak ({peak})", f"impulse ({impulse})", "passes"]
+    heads = ["time (s)", f"peak ({peak})", f"impulse ({impulse})", "passes"]
     columns = [("spike_peak", "spike_peak_error"), ("spike_impulse", "spike_impulse_error")]
     if "spike_velocity" in data:
-        heads.insert(4, "velocity (m/s)")
+        heads.insert(3, "velocity (m/s)")
         columns.append(("spike_velocity", "spike_velocity_error"))
     table = Table(*heads, title="Spikes", title_justify="left")
     table.columns[0].no_wrap = True
@@ -101,9 +102,24 @@ def _spikes(data: xr.Dataset) -> Table:
         clipped = " clipped" if int(one["spike_clipped"]) else ""
         table.add_row(
             f"{float(one['spike_time']):.6f}{clipped}",
-            f"{1e3 * float(one['spike_duration']):.4g}",
             *(_with_error(float(one[value]), float(one[error])) for value, error in columns),
             f"{int(one['spike_excursions'])}",
+        )
+    return table
+
+
+def _contacts(data: xr.Dataset) -> Table:
+    """Return how long each spike lasts, and its sum above the threshold, which depends on the threshold."""
+    heads = ("time (s)", "foot to foot (ms)", "above (ms)")
+    sums = f"sum above ({data['spike_impulse'].attrs['units']})"
+    table = Table(*heads, sums, title="Contacts, and what is above the threshold", title_justify="left")
+    for place in range(min(int(data.sizes["spike"]), _MOST_ROWS)):
+        one = data.isel(spike=place)
+        table.add_row(
+            f"{float(one['spike_time']):.6f}",
+            f"{1e3 * float(one['spike_length']):.4g}",
+            f"{1e3 * float(one['spike_duration']):.4g}",
+            f"{float(one['spike_impulse_above']):.4g}",
         )
     return table
 
