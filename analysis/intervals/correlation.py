@@ -119,7 +119,7 @@ def fitted_slopes(sums: CorrelationSums, window: Span = WINDOW, *, above: float 
     -------
     ndarray of float, shape (embedding,)
         0 where C is the same over the lowest octave and not below the window, as for a finite number of points;
-        NaN where fewer than three radii lie in the window.
+        NaN where fewer than three radii lie in the window, those between the same steps of a grid being one.
     """
     return np.array([_fitted_slope(sums, place, window, above) for place in range(len(sums.pairs))])
 
@@ -132,7 +132,9 @@ def _fitted_slope(sums: CorrelationSums, place: int, window: Span, above: float)
     if share[usable][0] >= window[0] and np.all(lowest == lowest[0]):
         return 0.0
     chosen = usable & (share >= window[0]) & (share <= window[1]) & (near >= FEWEST_PAIRS)
-    if np.count_nonzero(chosen) < FEWEST_RADII:
+    # between two steps of a grid C stands still, and many radii are worth one
+    enough = len(np.unique(near[chosen])) if above > 0.0 else np.count_nonzero(chosen)
+    if enough < FEWEST_RADII:
         return float("nan")
     return float(np.polyfit(np.log(sums.radii[chosen]), np.log(share[chosen]), 1)[0])
 

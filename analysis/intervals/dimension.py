@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.intervals.correlation import (
     FEWEST_PAIRS,
@@ -38,6 +39,8 @@ REPEATS = 0.5
 STILL, KEEPS_UP, AHEAD, FLATTENS = 0.15, 0.85, 1.3, 0.75
 # So near to its end a slope has saturated.
 REACHED = 0.2
+# Embeddings whose slopes make a verdict, one after the other.
+FEWEST_SLOPES = 3
 # Slope of a plateau, and how much of all pairs it leaves out at least.
 FLAT, LEFT_OUT = 0.1, 0.1
 
@@ -137,26 +140,46 @@ def interval_dimension(
 def verdict(slopes: Floats, surrogate: Floats) -> str:
     """Return in words what slopes in m = 1, 2, ... say, beside those of a shuffled surrogate.
 
+    Embeddings without a slope on either side are left out and named: on a coarse grid C of m = 1 may be above the
+    window at every radius, and in a short train C of the largest m below it.
+
     Examples
     --------
     >>> verdict(np.array([0.9, 1.2, 1.2, 1.2]), np.array([0.9, 1.8, 2.7, 3.6]))
     'saturation at 1.20 from m = 2 on, where the surrogate goes on to 3.60: low-dimensional'
     """
+    first, stop = _longest_run(np.isfinite(slopes) & np.isfinite(surrogate))
+    if stop - first < FEWEST_SLOPES:
+        return "not decided: too few radii with C in the window"
+    said = _verdict(slopes[first:stop], surrogate[first:stop], first + 1)
+    missing = [str(place + 1) for place in range(len(slopes)) if not first <= place < stop]
+    return said + (
+        f"; without m = {', '.join(missing)}: too few radii with C in the window" if missing else ""
+    )
+
+
+def _longest_run(known: NDArray[np.bool_]) -> tuple[int, int]:
+    """Return where the longest run of True begins and where it is over; the first of those as long."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
+    runs = [(int(first), int(stop)) for first, stop in zip(edges[::2], edges[1::2], strict=True)]
+    return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
+
+
+def _verdict(slopes: Floats, surrogate: Floats, lowest: int) -> str:
+    """Return the verdict on finite slopes of successive embeddings, the first of which is m = `lowest`."""
     if np.all(slopes == 0.0):
         return "slope 0 at every embedding: a finite number of points, a periodic motion"
-    if np.any(~np.isfinite(slopes)) or np.any(~np.isfinite(surrogate)):
-        return "not decided: too few radii with C in the window"
-    top, against = slopes[-1], surrogate[-1]
-    numbers = f"{top:.2f} at m = {len(slopes)}, shuffled {against:.2f}"
+    top, against, highest = slopes[-1], surrogate[-1], lowest + len(slopes) - 1
+    numbers = f"{top:.2f} at m = {highest}, shuffled {against:.2f}"
     growth, expected = np.diff(slopes)[-2:].mean(), np.diff(surrogate)[-2:].mean()
     if top > AHEAD * against:
         return f"no saturation: noise at these radii, about an ordered motion ({numbers})"
-    if surrogate[-1] < FLATTENS * len(slopes) * min(surrogate[0], 1.0) and top > KEEPS_UP * against:
+    if against < FLATTENS * highest * min(surrogate[0] / lowest, 1.0) and top > KEEPS_UP * against:
         return f"flattens as its shuffled surrogate does ({numbers}): the distribution, not dynamics; no dimension"
     if top > KEEPS_UP * against and growth > STILL:
         return f"no saturation: noise-like, as its shuffled surrogate ({numbers})"
     if growth < STILL * max(expected, 1.0):
-        first = int(np.argmax(slopes > top - max(REACHED, 0.1 * top))) + 1
+        first = int(np.argmax(slopes > top - max(REACHED, 0.1 * top))) + lowest
         return (
             f"saturation at {top:.2f} from m = {first} on, where the surrogate goes on to {against:.2f}: "
             "low-dimensional"

@@ -149,6 +149,31 @@ def test_the_verdict_on_slopes_follows_their_surrogate() -> None:
     assert verdict(np.zeros(6), growing).startswith("slope 0")
 
 
+def test_an_embedding_without_a_slope_does_not_lose_the_verdict_of_the_others() -> None:
+    growing = np.array([np.nan, 1.9, 2.8, 3.7, 4.5, 5.2])
+    said = verdict(growing, growing)
+    assert said.startswith(
+        "no saturation: noise-like, as its shuffled surrogate (5.20 at m = 6, shuffled 5.20)"
+    )
+    assert said.endswith("without m = 1: too few radii with C in the window")
+    assert "from m = 3 on" in verdict(np.minimum(growing, 2.8), growing)
+    assert "(4.50 at m = 5, shuffled 4.50); without m = 6:" in verdict(
+        np.append(growing[1:2] / 2.0, [*growing[1:5], np.nan]), np.append(growing[1:2] / 2.0, growing[1:])
+    )
+    assert verdict(np.array([np.nan, 1.9, np.nan, 3.7, 4.5, np.nan]), growing).startswith("not decided")
+
+
+@pytest.mark.parametrize("mean", [0.02, 0.03])
+def test_intervals_on_a_coarse_grid_have_a_verdict_without_their_first_embedding(mean: float) -> None:
+    # at 2 ms, twice the grid, a tenth of all pairs are near already; at 30 ms all radii lie between 2 and 3 ms
+    times = 1e-3 * np.round(np.cumsum(np.random.default_rng(1).exponential(1e3 * mean, 800)))
+    report = interval_report(times, resolution=1e-3)
+    assert np.isfinite(report["slope_raw"].values).tolist() == [False] + 5 * [True]
+    assert report.attrs["dimension_raw"].startswith("no saturation: noise-like")
+    assert "without m = 1" in report.attrs["dimension_raw"]
+    assert "without m = 1" in printed(report)
+
+
 def test_the_figure_shows_delay_points_density_and_every_embedding(tmp_path: Path) -> None:
     report = interval_report(np.cumsum(np.random.default_rng(6).exponential(size=400)))
     figure = draw_intervals(report)
