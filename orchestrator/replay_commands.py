@@ -46,6 +46,12 @@ def replay(
     score: Annotated[
         list[Path] | None, typer.Option(help="Recording to score that was not fitted on; may be repeated.")
     ] = None,
+    save_scene: Annotated[
+        Path | None,
+        typer.Option(
+            help="Scene to write with the numbers found (.toml); one that is there only with --force."
+        ),
+    ] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
     execution: Annotated[
         str | None,
@@ -72,6 +78,9 @@ def replay(
         refuse_outputs([scene, *(recordings or []), *(score or [])], output, figure)
         named = with_recordings(loaded, recordings or [])
         refuse_overwriting(output, force, lambda there: holds_scene(there, named))
+        if save_scene is not None:
+            refuse_outputs([scene, *(recordings or []), *(score or [])], save_scene, ending=".toml")
+            _refuse_saving(save_scene, fit, force)
     if output is None:
         raise UsageError(
             "--output: expected a dataset (.nc) or the folder of a campaign, got nothing. Add -o."
@@ -82,7 +91,7 @@ def replay(
         )
     if output.suffix != ".nc":
         refuse_folder(output)
-        _refuse_with_campaign(fit, score, figure, execution)
+        _refuse_with_campaign(fit, score, save_scene, figure, execution)
         _campaign(with_recordings(loaded, recordings or []), output, workers, scheduler)
         return
     if workers is not None or scheduler is not None:
@@ -95,7 +104,10 @@ def replay(
         raise UsageError(
             f"--figure: expected a scene that compares something, got {scene} without. Add compare."
         )
-    _to_dataset(loaded, recordings or [], score or [], output, fit, figure, execution or loaded.execution.how)
+    _to_dataset(
+        *(loaded, recordings or [], score or [], output, fit, save_scene, figure),
+        execution or loaded.execution.how,
+    )
 
 
 def _refuse_with_campaign(*others: object) -> None:
@@ -103,8 +115,21 @@ def _refuse_with_campaign(*others: object) -> None:
 
     if any(other is not None for other in others):
         raise UsageError(
-            "--output: expected a dataset (.nc) beside --fit, --score, --figure or --execution, got a "
-            "folder. Campaigns replay; they do not fit."
+            "--output: expected a dataset (.nc) beside --fit, --score, --save-scene, --figure or --execution, "
+            "got a folder. Campaigns replay; they do not fit."
+        )
+
+
+def _refuse_saving(path: Path, fit: str | None, force: bool) -> None:
+    from vibroimpact.fmus.errors import UsageError
+
+    if fit is None:
+        raise UsageError(
+            "--save-scene: expected --fit beside it, got nothing to save. Name numbers to be found."
+        )
+    if path.exists() and not force:
+        raise UsageError(
+            f"{path}: expected a new file, got one that is there. Choose another name, or overwrite it with --force."
         )
 
 
@@ -167,6 +192,7 @@ def _to_dataset(
     scored: Sequence[Path],
     output: Path,
     fit: str | None,
+    save_scene: Path | None,
     figure: Path | None,
     execution: str,
 ) -> None:
@@ -185,6 +211,8 @@ def _to_dataset(
         _print(console, replays, fitted, verdict)
         dataset = replay_dataset(replays, fitted, verdict)
         _write(dataset, output, figure)
+        if save_scene is not None and fitted is not None:
+            _save_scene(scene, fitted, [path.name for path in paths], save_scene)
     console.print(f"{output} in {time.perf_counter() - began:.1f} s", soft_wrap=True)
 
 
@@ -265,6 +293,18 @@ def _print(
         console.print(verdict.words, soft_wrap=True)
         for reason in verdict.reasons[1:]:
             console.print(f"  also: {reason}", soft_wrap=True)
+
+
+def _save_scene(scene: Scene, fit: ReplayFit, recordings: Sequence[str], path: Path) -> None:
+    from vibroimpact.analysis.atomic import write_atomically
+    from vibroimpact.analysis.outputs import writing
+    from vibroimpact.orchestrator.replay_output import fitted_scene_text
+    from vibroimpact.orchestrator.scene import parse_scene
+
+    text = fitted_scene_text(scene, fit, recordings, path.parent)
+    parse_scene(text, str(path))  # a number found may break a rule between two keys
+    with writing(path):
+        write_atomically(path, text.encode())
 
 
 def _write(dataset: object, output: Path, figure: Path | None) -> None:

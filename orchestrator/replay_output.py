@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +16,18 @@ import xarray as xr
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.replay_dataset import comparison_dataset
 from vibroimpact.analysis.replay.trust import Verdict
+from vibroimpact.fmus.terminal import printable
 from vibroimpact.orchestrator.chunks import RunnerIdentity
 from vibroimpact.orchestrator.drive_signal import DRIVEN_UNITS
 from vibroimpact.orchestrator.provenance import provenance
-from vibroimpact.orchestrator.replay import Motion, Replayer
+from vibroimpact.orchestrator.replay import Motion, Replayer, replay_table
 from vibroimpact.orchestrator.replay_fit import ReplayFit
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene_text import text_with_values
+
+_HEAD = "# Fitted by vibroimpact replay to"
+_HEADING = re.compile(rf"\A{_HEAD} .*\n(?:# [^\n]* \+- .*\n)*\n?")
+"""What `fitted_scene_text` writes above a scene, to be replaced when it is fitted anew."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +89,30 @@ def replay_dataset(
     return dataset.assign_attrs(
         dataset.attrs | _provenance(replays) | attrs | _remarks(dataset, replays, fit)
     )
+
+
+def fitted_scene_text(scene: Scene, fit: ReplayFit, recordings: Sequence[str], folder: Path) -> str:
+    """Return the file of a scene with the numbers found, and above it what they were fitted to and their errors.
+
+    Parameters
+    ----------
+    scene : Scene
+        As it was loaded.
+    fit : ReplayFit
+    recordings : sequence of str
+        Files that it was fitted to.
+    folder : Path
+        Where the text will lie: recordings that the scene names are named from there.
+    """
+    here = Path(scene.source).parent
+    named = replay_table(scene).recordings
+    moved = [name if Path(name).is_absolute() else os.path.relpath(here / name, folder) for name in named]
+    text = text_with_values(scene.text, fit.numbers, () if here.resolve() == folder.resolve() else moved)
+    files = ", ".join(printable(json.dumps(name, ensure_ascii=False)) for name in recordings)
+    lines = [f"{_HEAD} {files}; +- is the standard error:"]
+    for key, value, error in zip(fit.keys, fit.values, fit.standard_error, strict=True):
+        lines.append(f"# {key} = {value:.6g} +- {error:.2g}")
+    return "\n".join(lines) + "\n\n" + _HEADING.sub("", text)
 
 
 def _words(words: str, unit: str = "1") -> dict[str, Any]:

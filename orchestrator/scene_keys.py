@@ -29,8 +29,8 @@ SWEEPABLE: dict[str, tuple[str, ...]] = {
 START_STATE = ("body.displacement_start", "body.velocity_start")
 
 # The second of each pair has the last word in its model, so that giving the first must clear it.
-_OVERRIDDEN_BY = {"damping": "damping_ratio", "angular_frequency": "frequency"}
-ALTERNATIVES = _OVERRIDDEN_BY | {second: first for first, second in _OVERRIDDEN_BY.items()}
+OVERRIDDEN_BY = {"damping": "damping_ratio", "angular_frequency": "frequency"}
+ALTERNATIVES = OVERRIDDEN_BY | {second: first for first, second in OVERRIDDEN_BY.items()}
 """Keys of one table that say the same thing, of which a scene gives one."""
 _NUMBER = r"\[([1-9][0-9]{0,8})\]"
 _KEY = re.compile(rf"(?:(body|forcing|sensor)|(stop){_NUMBER})\.([a-z_]+)(?:{_NUMBER})?")
@@ -109,7 +109,7 @@ def numbers_of(owner: BaseModel, table: str) -> Iterator[tuple[str, float]]:
     """
     for word in SWEEPABLE[table.partition("[")[0]]:
         value = getattr(owner, word, None)
-        if getattr(owner, _OVERRIDDEN_BY.get(word, ""), None) is not None:
+        if getattr(owner, OVERRIDDEN_BY.get(word, ""), None) is not None:
             continue
         if isinstance(value, tuple):
             yield from ((f"{table}.{word}[{place}]", number) for place, number in enumerate(value, start=1))
@@ -125,7 +125,7 @@ def replacement(owner: BaseModel, key: Key, value: float) -> dict[str, Any]:
         numbers = getattr(owner, attribute)
         return {attribute: (*numbers[: key.element], value, *numbers[key.element + 1 :])}
     update: dict[str, Any] = {attribute: value}
-    other = _OVERRIDDEN_BY.get(key.name)
+    other = OVERRIDDEN_BY.get(key.name)
     if other in model.model_fields:
         update[str(other)] = None
     return update
