@@ -22,6 +22,7 @@ from vibroimpact.analysis.recording_files import open_signals
 from vibroimpact.analysis.schema import file_name_of, known_unit, sample_rule
 from vibroimpact.analysis.units import measured_unit
 from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError, UsageError
+from vibroimpact.orchestrator.beam_parameters import AMPLITUDE_KEYS
 from vibroimpact.orchestrator.body_record import DeadlineReached, ImpactLimitReached
 from vibroimpact.orchestrator.drive_signal import DriveSignal, drive_of, step_instants
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
@@ -264,6 +265,11 @@ def replay_table(scene: Scene) -> Replay:
             [f"{scene.source}: replay: expected a [replay] table, got none. Add drive, from and compare."]
         )
     return scene.replay
+
+
+def is_linear(scene: Scene) -> bool:
+    """Whether a multiple of a motion of this scene is one too: no stops, and nothing that follows the amplitude."""
+    return not scene.stops and not any(np.any(getattr(scene.body, key, 0.0)) for key in AMPLITUDE_KEYS)
 
 
 def recording_of(scene: Scene, number: int) -> Path:

@@ -231,10 +231,10 @@ def _replays(
     execution: str,
 ) -> tuple[ReplayFit | None, Verdict | None, list[Replayed]]:
     from vibroimpact.analysis.replay.trust import trust
-    from vibroimpact.orchestrator.replay import opened_replays
-    from vibroimpact.orchestrator.replay_fit import fit_keys, scores_of
+    from vibroimpact.orchestrator.replay import is_linear, opened_replays
+    from vibroimpact.orchestrator.replay_fit import fit_keys
     from vibroimpact.orchestrator.replay_output import Replayed
-    from vibroimpact.orchestrator.replay_scoring import compare_motion
+    from vibroimpact.orchestrator.replay_scoring import compare_motion, scores_of
 
     keys = fit_keys(scene, fit) if fit is not None else ()
     # a number that the scene leaves at its default counts as written from now on
@@ -247,10 +247,15 @@ def _replays(
         motion = replayer.simulate(numbers)
         use = "replayed" if found is None else ("fitted" if place < len(paths) else "scored")
         replays.append(Replayed(replayer, motion, compare_motion(replayer, motion), use))
-    if found is None:
-        return None, None, replays
-    scores = scores_of(replayers, [replay.comparisons for replay in replays], len(paths))
-    verdict = trust(scores.fitted, scores.others, scores.without_dynamics)
+    if not any(replay.comparisons for replay in replays):
+        return found, None, replays
+    fitted = len(paths) if found is not None else 0
+    scores = scores_of(replayers, [replay.comparisons for replay in replays], fitted)
+    verdict = trust(
+        *(scores.fitted, scores.others, scores.without_dynamics),
+        held=scores.held,
+        linear=is_linear(scene.with_values(numbers or {})),
+    )
     return found, replace(verdict, reasons=(*verdict.reasons, *scores.remarks)), replays
 
 
@@ -276,12 +281,10 @@ def _print(
 
     from vibroimpact.analysis.replay.table import print_comparison
 
-    for replay in replays:
-        console.print(f"{replay.name} ({replay.use})", style="bold")
-        for line in (*replay.replayer.remarks, *replay.motion.warnings):
-            console.print(f"  {line}", soft_wrap=True)
-        if replay.comparisons:
-            print_comparison(console, replay.comparisons)
+    if verdict is not None:
+        console.print(verdict.words, soft_wrap=True, style="bold")
+        for reason in verdict.beside:
+            console.print(f"  also: {reason}", soft_wrap=True)
     if fit is not None:
         table = Table("number", "found", "standard error", "began with", title="Fit", title_justify="left")
         for key, value, error, start in zip(fit.keys, fit.values, fit.standard_error, fit.start, strict=True):
@@ -289,10 +292,12 @@ def _print(
         console.print(table)
         for line in fit.remarks:
             console.print(f"  {line}", soft_wrap=True)
-    if verdict is not None:
-        console.print(verdict.words, soft_wrap=True)
-        for reason in verdict.reasons[1:]:
-            console.print(f"  also: {reason}", soft_wrap=True)
+    for replay in replays:
+        console.print(f"{replay.name} ({replay.use})", style="bold")
+        for line in (*replay.replayer.remarks, *replay.motion.warnings):
+            console.print(f"  {line}", soft_wrap=True)
+        if replay.comparisons:
+            print_comparison(console, replay.comparisons)
 
 
 def _save_scene(scene: Scene, fit: ReplayFit, recordings: Sequence[str], path: Path) -> None:

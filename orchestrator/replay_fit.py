@@ -7,9 +7,8 @@ numbers they are found again, until they stay.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.fmus.errors import ComponentError, EstimationError, UsageError
 from vibroimpact.orchestrator.replay import Replayer
 from vibroimpact.orchestrator.replay_covariance import LagSlopes, covariance_of, lag_slopes
-from vibroimpact.orchestrator.replay_scoring import compare_motion, score_without_dynamics
+from vibroimpact.orchestrator.replay_scoring import compare_motion
 from vibroimpact.orchestrator.scene import Scene
 
 Floats = NDArray[np.float64]
@@ -37,8 +36,6 @@ NOT_NEGATIVE = frozenset(
 FRACTIONS = frozenset({"restitution", "location"})
 #: How the natural frequency enters a number: frequencies as such, stiffnesses by their square.
 _FREQUENCY_POWER = {"frequency": 1.0, "stiffness": 2.0, "flexural_rigidity": 2.0, "youngs_modulus": 2.0}
-#: A record with less than this share of the motion of those fitted has nothing to be scored: its drive did not act.
-LEAST_MOTION = 1e-4
 MOST_ALIGNMENTS = 6
 #: Condition of the scaled normal matrix above which two numbers are one: their difference is derivative noise.
 MOST_CONDITION = 1e8
@@ -351,61 +348,3 @@ def _have_settled(before: Sequence[Sequence[Comparison]], after: Sequence[Sequen
         old.polarity == new.polarity and abs(new.lag - old.lag) <= LAG_STAYS * new.lag_error + 1e-12
         for old, new in pairs
     )
-
-
-@dataclass(frozen=True, slots=True)
-class Scores:
-    """Scores of recordings, percent, by the name of their file.
-
-    Attributes
-    ----------
-    fitted, others : mapping of str to float
-        Variance accounted for, of the recordings that were fitted and of those that were not; NaN where nothing
-        happened in a record.
-    without_dynamics : mapping of str to float
-        Of the best prediction without dynamics, of all of them.
-    remarks : tuple of str
-    """
-
-    fitted: Mapping[str, float]
-    others: Mapping[str, float]
-    without_dynamics: Mapping[str, float]
-    remarks: tuple[str, ...]
-
-
-def scores_of(
-    replayers: Sequence[Replayer], comparisons: Sequence[Sequence[Comparison]], fitted: int
-) -> Scores:
-    """Return the score of each channel of each recording; a recording with several channels has several rows.
-
-    A record in which nothing happened has nothing to be scored: beside the largest motion of the same channel in any
-    of them, it has less than `LEAST_MOTION` of the energy.
-
-    Parameters
-    ----------
-    replayers, comparisons : sequences, one for each recording
-    fitted : int
-        The first so many recordings were fitted.
-    """
-    motions = [[_motion(comparison) for comparison in compared] for compared in comparisons]
-    own: dict[str, float] = {}
-    others: dict[str, float] = {}
-    naive: dict[str, float] = {}
-    remarks: list[str] = []
-    for number, (replayer, compared) in enumerate(zip(replayers, comparisons, strict=True)):
-        for place, (reading, comparison) in enumerate(zip(replayer.readings, compared, strict=True)):
-            name = Path(replayer.recording.title).name
-            name = name if len(compared) == 1 else f"{name}: {reading.channel.name}"
-            share = motions[number][place] / max(max(rows[place] for rows in motions), 1e-300)
-            moved = share > LEAST_MOTION
-            if not moved:
-                remarks.append(
-                    f"{name}: its motion has {share:.1e} of the energy of the other's: there is nothing to be scored"
-                )
-            (own if number < fitted else others)[name] = comparison.variance if moved else float("nan")
-            naive[name] = score_without_dynamics(replayer, reading, comparison)
-    return Scores(own, others, naive, tuple(remarks))
-
-
-def _motion(comparison: Comparison) -> float:
-    return float(np.var(comparison.values[comparison.scored]))

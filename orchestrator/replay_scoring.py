@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
+
+import numpy as np
 
 from vibroimpact.analysis.recording import Floats
 from vibroimpact.analysis.replay.baseline import naive_variance
 from vibroimpact.analysis.replay.comparison import Comparison, compare
 from vibroimpact.analysis.replay.event import find_event
+from vibroimpact.analysis.replay.held import Held
 from vibroimpact.fmus.errors import EstimationError
 from vibroimpact.orchestrator.drive_signal import quiet_level
 from vibroimpact.orchestrator.replay import Motion, Reading, Replayer
 
 #: Longest lag tried between channels of separate triggers, as a share of the shorter record.
 MOST_LAG_SHARE = 0.5
+#: A record with less than this share of the motion of those fitted has nothing to be scored: its drive did not act.
+LEAST_MOTION = 1e-4
 
 
 def compare_motion(replayer: Replayer, motion: Motion) -> list[Comparison]:
@@ -119,3 +127,67 @@ def score_without_dynamics(replayer: Replayer, reading: Reading, comparison: Com
         return 0.0
     most_lag, lag = _most_lag(replayer, reading), _clock(replayer, reading)[0]
     return naive_variance(drive.time, drive.values, comparison.measured, most_lag=most_lag, lag=lag)
+
+
+@dataclass(frozen=True, slots=True)
+class Scores:
+    """Scores of recordings, percent, by the name of their file.
+
+    Attributes
+    ----------
+    fitted, others : mapping of str to float
+        Variance accounted for, of the recordings that were fitted and of those that were not; NaN where nothing
+        happened in a record.
+    without_dynamics : mapping of str to float
+        Of the best prediction without dynamics, of all of them.
+    held : mapping of str to Held
+        Over which span of each the replay holds.
+    remarks : tuple of str
+    """
+
+    fitted: Mapping[str, float]
+    others: Mapping[str, float]
+    without_dynamics: Mapping[str, float]
+    held: Mapping[str, Held]
+    remarks: tuple[str, ...]
+
+
+def scores_of(
+    replayers: Sequence[Replayer], comparisons: Sequence[Sequence[Comparison]], fitted: int
+) -> Scores:
+    """Return the score of each channel of each recording; a recording with several channels has several rows.
+
+    A record in which nothing happened has nothing to be scored: beside the largest motion of the same channel in any
+    of them, it has less than `LEAST_MOTION` of the energy.
+
+    Parameters
+    ----------
+    replayers, comparisons : sequences, one for each recording
+    fitted : int
+        The first so many recordings were fitted.
+    """
+    motions = [[_motion(comparison) for comparison in compared] for compared in comparisons]
+    own: dict[str, float] = {}
+    others: dict[str, float] = {}
+    naive: dict[str, float] = {}
+    held: dict[str, Held] = {}
+    remarks: list[str] = []
+    for number, (replayer, compared) in enumerate(zip(replayers, comparisons, strict=True)):
+        for place, (reading, comparison) in enumerate(zip(replayer.readings, compared, strict=True)):
+            name = Path(replayer.recording.title).name
+            name = name if len(compared) == 1 else f"{name}: {reading.channel.name}"
+            name = name if name not in naive else f"{name} ({number + 1})"
+            share = motions[number][place] / max(max(rows[place] for rows in motions), 1e-300)
+            moved = share > LEAST_MOTION
+            if not moved:
+                remarks.append(
+                    f"{name}: its motion has {share:.1e} of the energy of the other's: there is nothing to be scored"
+                )
+            (own if number < fitted else others)[name] = comparison.variance if moved else float("nan")
+            held[name] = comparison.held
+            naive[name] = score_without_dynamics(replayer, reading, comparison)
+    return Scores(own, others, naive, held, tuple(remarks))
+
+
+def _motion(comparison: Comparison) -> float:
+    return float(np.var(comparison.values[comparison.scored]))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.recording import Channel, Quality
 from vibroimpact.analysis.replay.alignment import Alignment, Interpolated, align
 from vibroimpact.analysis.replay.event import Event, find_event
+from vibroimpact.analysis.replay.held import Held, held_over
 from vibroimpact.analysis.replay.matching import EventMatch, match_events
 from vibroimpact.analysis.replay.peaks import PeakErrors, compare_peaks
 from vibroimpact.analysis.replay.scoring import (
@@ -113,6 +114,19 @@ class Comparison:
     def running_variance(self) -> Floats:
         """Scores of the running windows, percent, shape (running window,)."""
         return self._variance_in(self.running)
+
+    @property
+    def running_ceiling(self) -> Floats:
+        """What a perfect model would score in the running windows, percent, shape (running window,)."""
+        clock = self.measured.time - self.event.onset
+        noise = np.full(len(clock), self.event.noise)
+        return windowed_variance(clock, self.values, self.values + noise, self.scored, self.running)
+
+    @property
+    def held(self) -> Held:
+        """Over which span the simulation stays within the error that is trusted, by the running windows."""
+        since = "the onset" if self.event.quiet is not None else "the start of the record"
+        return held_over(self.running, self.running_variance, self.running_ceiling, since=since)
 
     def _variance_in(self, windows: list[Span]) -> Floats:
         clock = self.measured.time - self.event.onset

@@ -116,6 +116,8 @@ def comparison_dataset(comparisons: Sequence[Comparison]) -> xr.Dataset:
         variables[name] = ("comparison", numbers, _attrs(unit, words))
     simulated = [comparison.simulated_name for comparison in comparisons]
     variables["simulated_name"] = ("comparison", simulated, _attrs("1", "what was compared"))
+    held = [comparison.held.words for comparison in comparisons]
+    variables["held"] = ("comparison", held, _attrs("1", "where the error stays within what is trusted"))
     variables |= _windows(
         "window",
         "window from the onset",

@@ -9,6 +9,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from vibroimpact.analysis.replay.comparison import Comparison
+from vibroimpact.analysis.replay.held import MOST_ERROR, instant
 from vibroimpact.analysis.replay.replay_dataset import comparison_names
 from vibroimpact.analysis.replay.spectra import DominantFrequency
 from vibroimpact.analysis.units import measured_unit
@@ -52,10 +53,6 @@ def _lag(comparison: Comparison) -> str:
     return f"{1e3 * found.lag:.4f} +- {1e3 * found.lag_error:.2g} ms"
 
 
-def _instant(time: float) -> str:
-    return f"{1e3 * time:.4g} ms" if abs(time) < 1.0 else f"{time:.4g} s"
-
-
 def _margin(value: float) -> str:
     return f"{value:.3f}" if np.isfinite(value) else "-"
 
@@ -87,13 +84,14 @@ _ROWS: tuple[tuple[str, Callable[[Comparison], str]], ...] = (
     ("simulated", lambda c: c.simulated_name),
     ("variance accounted for", lambda c: _percent(c.variance)),
     ("  of a perfect model (noise)", lambda c: _percent(c.noise_ceiling)),
+    (f"error within {100 * MOST_ERROR:.0f} %", lambda c: c.held.words),
     ("best gain", lambda c: f"{c.gain:.4f}"),
     ("lag", _lag),
     ("polarity", lambda c: f"{c.alignment.polarity:+d}"),
     ("correlation at the start", lambda c: f"{c.alignment.correlation:.4f}"),
     ("  less the other polarity's", lambda c: _margin(c.alignment.polarity_margin)),
     ("  less the next best lag's", lambda c: _margin(c.alignment.lag_margin)),
-    ("onset of the event", lambda c: _instant(c.event.onset)),
+    ("onset of the event", lambda c: instant(c.event.onset)),
     (
         "offset removed",
         lambda c: f"{c.offset:.4g} {measured_unit(c.measured.unit).si.removeprefix('1')}".rstrip(),
@@ -123,4 +121,4 @@ def _add_windows(table: Table, comparisons: Sequence[Comparison]) -> None:
                     _percent(float(scores[mine.index((start, stop))])) if (start, stop) in mine else ""
                 )
             heading = "  window" if what == "windows" else "  running"
-            table.add_row(f"{heading} {_instant(start)} to {_instant(stop)}", *cells)
+            table.add_row(f"{heading} {instant(start)} to {instant(stop)}", *cells)

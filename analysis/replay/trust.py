@@ -1,8 +1,8 @@
-"""Whether a linear replay is to be trusted: a verdict in words from scores on records it was, and was not, fitted on.
+"""Whether a replay is to be trusted: a verdict in words from scores on records it was, and was not, fitted on.
 
 The error of a replay per standard deviation of the measured signal is sqrt(1 - VAF/100): 11 % for a VAF of 98.8,
-50 % for one of 75. A linear model whose parameters are right leaves noise; what it leaves beyond that is motion it
-does not describe (contact, friction, frequencies that drift), and no parameter will mend it.
+50 % for one of 75. A model whose parameters are right leaves noise; what it leaves beyond that is motion it does not
+describe (of a linear one contact, friction, frequencies that drift), and no parameter will mend it.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-MOST_ERROR = 0.25
-"""Largest error per standard deviation of the measured signal, about VAF 94: the geometric mean between an error in
-which a motion is recognised and no more (.5, VAF 75) and that of a good linear replay of a real structure (.12)."""
+from vibroimpact.analysis.replay.held import MOST_ERROR, Held, instant
+
 LEAST_SKILL = 0.5
 """A model must leave less than this share of the residual energy of a prediction without dynamics."""
 MOST_LOSS = 2.0
@@ -31,12 +30,17 @@ class Verdict:
         One sentence.
     trusted : bool
     reasons : tuple of str
-        One line for each criterion that failed, or that should be known.
+        One line for each criterion that failed, the first of which is in `words`, or that should be known.
     """
 
     words: str
     trusted: bool
     reasons: tuple[str, ...]
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """The reasons that `words` does not hold."""
+        return self.reasons if self.trusted else self.reasons[1:]
 
 
 def trust(
@@ -44,9 +48,11 @@ def trust(
     others: Mapping[str, float] | None = None,
     baseline: Mapping[str, float] | None = None,
     *,
+    held: Mapping[str, Held] | None = None,
+    linear: bool = True,
     most_error: float = MOST_ERROR,
 ) -> Verdict:
-    """Say whether a linear replay is to be trusted.
+    """Say whether a replay is to be trusted, and over which span.
 
     It is, where all of these hold:
 
@@ -56,7 +62,8 @@ def trust(
        (`naive_variance`: no response, or the drive times the gain that suits the record best).
 
     Where the residual energy on other records is more than twice that on its own, this is said too: the fit has
-    learnt its record, and its standard errors do not hold for others.
+    learnt its record, and its standard errors do not hold for others. Where nothing was fitted, all records are
+    others, if the numbers of the scene do not come from them: the verdict says this condition.
 
     Parameters
     ----------
@@ -65,6 +72,10 @@ def trust(
         record has nothing to be scored.
     baseline : mapping of str to float, optional
         Score of the prediction without dynamics on the same records, percent.
+    held : mapping of str to Held, optional
+        Where the replay holds on the same records; the verdict says the shortest.
+    linear : bool
+        Whether the model is linear: without stops, and with nothing that follows the amplitude.
     most_error : float
         Error that the user can live with.
 
@@ -74,27 +85,65 @@ def trust(
     True
     >>> print(trust({"05": 75.0}).words)
     Do not trust this linear replay: even on 05, which it was fitted on, it errs by 50 % (VAF 75.0 %).
+    >>> print(trust({}, {"05": 75.0}, linear=False).words)
+    Do not trust this replay: on 05 it errs by 50 % (VAF 75.0 %).
     """
     scored = {name: value for name, value in (others or {}).items() if np.isfinite(value)}
+    other = ", which it was not fitted on," if fitted else ""
     reasons = [
         *_own(fitted, most_error),
-        *_other(scored, most_error),
+        *_other(scored, other, most_error),
         *_skill(scored or fitted, baseline or {}),
+        *_nothing_scored(fitted, scored),
     ]
-    if not scored:
-        reasons.append(
-            "there is no record with an event that it was not fitted on: give one to be scored, or fit on a part"
-        )
-    trusted = not reasons
-    if trusted:
-        name = min(scored, key=lambda key: scored[key])
-        words = (
-            f"This linear replay is to be trusted for events like these: on {name}, which it was not fitted on, it "
-            f"errs by {_said(scored[name])}."
-        )
-    else:
-        words = f"Do not trust this linear replay: {reasons[0]}."
-    return Verdict(words, trusted, (*reasons, *_loss(fitted, scored)))
+    judged = {name: span for name, span in (held or {}).items() if name in scored or name in fitted}
+    beside = (*_breaks(judged, trusted=not reasons), *_loss(fitted, scored))
+    replay = "linear replay" if linear else "replay"
+    if reasons:
+        return Verdict(f"Do not trust this {replay}: {reasons[0]}.", False, (*reasons, *beside))
+    name = min(scored, key=lambda key: scored[key])
+    these = "this record" if len(scored) == 1 else "these records"
+    words = (
+        f"This {replay} is to be trusted for events like these{_span(judged, name)}"
+        f"{'' if fitted else f', if its numbers do not come from {these}'}: on {name}{other} it errs by "
+        f"{_said(scored[name])}."
+    )
+    return Verdict(words, True, beside)
+
+
+def _nothing_scored(fitted: Mapping[str, float], scored: Mapping[str, float]) -> list[str]:
+    if scored:
+        return []
+    if not fitted:
+        return ["there is no record with an event to be scored"]
+    return [
+        "there is no record with an event that it was not fitted on: give one to be scored, or fit on a part"
+    ]
+
+
+def _span(judged: Mapping[str, Held], name: str) -> str:
+    """Return over which span to trust: that of the record which breaks first; without one, that of the named one."""
+    broken = {key: held for key, held in judged.items() if held.broken is not None}
+    shortest = min(broken.values(), key=lambda held: (held.broken or ())[:1], default=judged.get(name))
+    return f", {shortest.words}" if shortest is not None and shortest.spans else ""
+
+
+def _breaks(judged: Mapping[str, Held], *, trusted: bool) -> list[str]:
+    """Say of each record where the replay first errs by more than is trusted, or where alone it does not."""
+    lines = []
+    for name, held in judged.items():
+        if held.broken is None:
+            continue
+        start, stop, variance = held.broken
+        again = any(span[0] > start for span in held.spans)
+        until = f" to {instant(stop)} after {held.since}" if again else f" after {held.since} on"
+        if trusted:
+            lines.append(
+                f"on {name} it does not hold from {instant(start)}{until}: there it errs by {_said(variance)}"
+            )
+        elif held.spans:
+            lines.append(f"on {name} it errs by less {held.words} only")
+    return lines
 
 
 def _error(variance: float) -> float:
@@ -115,9 +164,9 @@ def _own(fitted: Mapping[str, float], most_error: float) -> list[str]:
     ]
 
 
-def _other(scored: Mapping[str, float], most_error: float) -> list[str]:
+def _other(scored: Mapping[str, float], clause: str, most_error: float) -> list[str]:
     return [
-        f"on {name}, which it was not fitted on, it errs by {_said(value)}"
+        f"on {name}{clause} it errs by {_said(value)}"
         for name, value in scored.items()
         if not _error(value) <= most_error
     ]

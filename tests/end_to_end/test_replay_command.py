@@ -55,7 +55,10 @@ def test_replay_fits_scores_draws_and_gives_its_verdict(folder: Path) -> None:
         ),
     )
     assert done.returncode == 0, done.stderr
-    assert "is to be trusted for events like these: on two.nc" in done.stdout
+    assert done.stdout.startswith(
+        "This linear replay is to be trusted for events like these, over the whole record"
+    )
+    assert ": on two.nc, which it was not fitted on, it errs by" in done.stdout.splitlines()[0]
     with xr.open_dataset(folder / "fit.nc") as found:
         assert found.fitted_value.values == pytest.approx([812.0, 0.9], rel=1e-3)
         assert found.use.values.tolist() == ["fitted", "scored"]

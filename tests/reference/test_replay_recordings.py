@@ -14,8 +14,8 @@ from vibroimpact.analysis.replay.trust import trust
 from vibroimpact.hardware.import_settings import checked, read_settings
 from vibroimpact.hardware.importing import import_recording
 from vibroimpact.orchestrator.replay import opened_replays
-from vibroimpact.orchestrator.replay_fit import ReplayFit, fit_replay, scores_of
-from vibroimpact.orchestrator.replay_scoring import compare_motion
+from vibroimpact.orchestrator.replay_fit import ReplayFit, fit_replay
+from vibroimpact.orchestrator.replay_scoring import compare_motion, scores_of
 from vibroimpact.orchestrator.scene import load_scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "recordings"

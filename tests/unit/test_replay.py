@@ -20,9 +20,9 @@ from vibroimpact.orchestrator.cli import main
 from vibroimpact.orchestrator.drive_signal import drive_of, quiet_level, step_instants
 from vibroimpact.orchestrator.replay import Replayer, named, opened_replays
 from vibroimpact.orchestrator.replay_covariance import covariance_of, drawn_noise
-from vibroimpact.orchestrator.replay_fit import ReplayFit, fit_keys, fit_replay, scores_of
+from vibroimpact.orchestrator.replay_fit import ReplayFit, fit_keys, fit_replay
 from vibroimpact.orchestrator.replay_output import Replayed, replay_dataset
-from vibroimpact.orchestrator.replay_scoring import compare_motion
+from vibroimpact.orchestrator.replay_scoring import compare_motion, scores_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.single_run import run_scene
 

@@ -17,6 +17,7 @@ from vibroimpact.analysis.replay import (
     variance_accounted_for,
     windowed_variance,
 )
+from vibroimpact.analysis.replay.held import held_over
 from vibroimpact.fmus.errors import EstimationError
 
 TIME = clock()
@@ -258,3 +259,78 @@ def test_a_fit_that_has_learnt_its_record_is_told() -> None:
 
 def test_a_score_that_is_not_a_number_earns_no_trust() -> None:
     assert not trust({"a": float("nan")}, {"b": 99.0}).trusted
+
+
+def test_a_replay_holds_to_where_it_gets_out_of_step() -> None:
+    # two rings 1 % apart differ by 2 sin(pi .01 n) of their size after n of its 5 ms periods: by 25 % after 4
+    comparison = compare(TIME, ring(TIME - HIT, 1.01 * FREQUENCY), channel(MODEL), lag=0.0, polarity=1)
+    ((start, stop),) = comparison.held.spans
+    assert start == 0.0
+    assert 0.01 <= stop <= 0.03
+    assert comparison.held.broken is not None
+    assert comparison.held.broken[0] == stop
+    assert comparison.held.words == f"to {1e3 * stop:.4g} ms after the onset"
+
+
+def test_what_is_lost_in_noise_neither_holds_nor_fails() -> None:
+    drawn = np.random.default_rng(8).normal(0.0, 0.05, len(TIME))
+    perfect = compare(TIME, MODEL, channel(MODEL + drawn), lag=0.0, polarity=1)
+    # 100 ms after the hit the ring has fallen to e^(-1.26), with a mean square of 16 times that of the noise
+    assert perfect.running_variance[-1] < 75.0
+    assert perfect.held.broken is None
+    assert perfect.held.words == "to 107.8 ms after the onset (noise hides the rest)"
+    # a model that rings on in that noise fails
+    on = compare(TIME, ring(TIME - HIT, damping_ratio=0.004), channel(MODEL + drawn), lag=0.0, polarity=1)
+    assert on.held.broken is not None
+
+
+def test_a_window_without_samples_does_not_end_what_holds_around_it() -> None:
+    windows = running_windows(0.0, 5.0, 1.0)
+    held = held_over(windows, np.array([99.0, np.nan, 99.0, 20.0, 99.0]), np.full(5, np.nan))
+    assert held.spans == ((0.0, 3.0), (4.0, 5.0))
+    assert held.broken == (3.0, 4.0, 20.0)
+    assert held.words == "to 3 s, from 4 s to 5 s after the onset"
+    assert (
+        held_over(windows, np.full(5, 99.0), np.full(5, 100.0)).words
+        == "over the whole record (5 s after the onset)"
+    )
+    assert held_over(windows, np.full(5, 9.0), np.full(5, 100.0)).words == "nowhere"
+
+
+def test_the_verdict_says_over_which_span_it_holds_of_the_record_that_breaks_first() -> None:
+    windows, ceiling = running_windows(0.0, 0.03, 0.01), np.full(3, 100.0)
+    whole, early = (held_over(windows, np.array(scores), ceiling) for scores in ((99, 98, 97), (99, 60, 20)))
+    assert trust({"a": 98.0}, {"b": 97.0}, held={"a": whole, "b": whole}).words == (
+        "This linear replay is to be trusted for events like these, over the whole record (30 ms after the onset): "
+        "on b, which it was not fitted on, it errs by 17 % (VAF 97.0 %)."
+    )
+    verdict = trust({"a": 98.0}, {"b": 97.0, "c": 98.0}, held={"a": whole, "b": whole, "c": early})
+    assert "for events like these, to 10 ms after the onset: on b" in verdict.words
+    assert verdict.beside == (
+        "on c it does not hold from 10 ms after the onset on: there it errs by 63 % (VAF 60.0 %)",
+    )
+    refused = trust({"a": 90.0}, {"b": 80.0}, held={"a": whole, "b": early})
+    assert refused.beside[-1] == "on b it errs by less to 10 ms after the onset only"
+
+
+def test_a_replay_that_was_not_fitted_is_trusted_on_a_condition() -> None:
+    verdict = trust({}, {"a": 99.0})
+    assert verdict.trusted
+    assert verdict.words == (
+        "This linear replay is to be trusted for events like these, if its numbers do not come from this record: "
+        "on a it errs by 10 % (VAF 99.0 %)."
+    )
+    assert (
+        trust({}, {"a": 60.0}).words == "Do not trust this linear replay: on a it errs by 63 % (VAF 60.0 %)."
+    )
+    assert trust({}, {"a": float("nan")}).words.endswith("there is no record with an event to be scored.")
+
+
+def test_a_replay_that_is_not_linear_is_not_called_so() -> None:
+    for scores in ({"b": 99.0}, {"b": 60.0}):
+        assert "linear" not in trust({"a": 99.0}, scores, linear=False).words
+
+
+def test_what_should_be_known_beside_trust_is_told_whole() -> None:
+    assert trust({"a": 99.9}, {"b": 96.0}).beside == trust({"a": 99.9}, {"b": 96.0}).reasons != ()
+    assert trust({"a": 70.0}, {"b": 60.0}).beside == trust({"a": 70.0}, {"b": 60.0}).reasons[1:] != ()
