@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from vibroimpact.orchestrator.replay_scoring import compare_motion
 from vibroimpact.orchestrator.scene import Scene
 
 Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 #: Numbers that mean nothing at or below 0, by the end of their key.
 POSITIVE = frozenset(
@@ -41,6 +41,10 @@ MOST_ALIGNMENTS = 6
 MOST_CONDITION = 1e8
 #: A number that changes what is compared by less than this share, were it doubled, does not change it: rounding.
 LEAST_CHANGE = 1e-9
+#: Step beside a start without effect, relative to the larger of a number and its scale.
+BESIDE = 0.1
+#: A square less than so many of its errors is not told from 0.
+FLAT_ERRORS = 3.0
 #: The lag stays where it moves by less than this share of its own error.
 LAG_STAYS = 0.1
 #: Draws of the noise of what drives: standard errors from it are good to about 1/sqrt(2 draws), a sixth.
@@ -147,17 +151,19 @@ class _Fit:
         self.lower, self.upper = (np.array(ends) for ends in zip(*map(_bounds, keys), strict=True))
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
         self.simulations = 0
+        self.flat: dict[int, float] = {}
 
     def run(self) -> ReplayFit:
         values, remarks = self.start.copy(), []
         comparisons = self.compared(values)
         values, comparisons = self.better_start(values, comparisons)
+        values, comparisons, told = self.start_with_effect(values, comparisons)
+        remarks += told
         self.refuse_alike(self._slopes(values, comparisons))  # before a search that would wander about
         alignments = 0
         while alignments < MOST_ALIGNMENTS:
             alignments += 1
-            solution = self.solve(values, comparisons)
-            values = solution.x * self.scale
+            values = self.solve(values, comparisons)
             renewed = self.compared(values)
             settled = _have_settled(comparisons, renewed)
             comparisons = renewed
@@ -168,7 +174,7 @@ class _Fit:
         covariance = self.covariance(values, comparisons)
         errors = np.sqrt(np.diag(covariance))
         correlation = covariance / np.outer(errors, errors)
-        remarks += self._remarks(values, correlation)
+        remarks += self._remarks(values, correlation) + self._at_flat(values, errors)
         return ReplayFit(
             self.keys, self.start, values, errors, correlation, comparisons, alignments, self.simulations,
             tuple(remarks),
@@ -189,6 +195,57 @@ class _Fit:
         other = np.clip(values * ratio**powers, self.lower, self.upper)
         others = self.compared(other)
         return (other, others) if _explained(others) > _explained(comparisons) else (values, comparisons)
+
+    def start_with_effect(
+        self, values: Floats, comparisons: tuple[list[Comparison], ...]
+    ) -> tuple[Floats, tuple[list[Comparison], ...], list[str]]:
+        """Begin where each number has an effect, if there is such a start beside the one that was given.
+
+        First beside a number that has none, such as the place of a sensor where the shape is flat. Where nothing moves
+        or is read (a gain of 0), no other number has one: those that do are found first.
+        """
+        values, told = self._beside_idle(values, comparisons)
+        idle = self._idle(self._slopes(values, comparisons))
+        if idle.any() and not idle.all():
+            values = self.solve(values, comparisons, ~idle)
+            comparisons = self.compared(values)
+            late = ", ".join(self.keys[place] for place in np.flatnonzero(idle))
+            told.append(f"{late}: without effect where the search began; the other numbers were found first")
+            values, more = self._beside_idle(values, comparisons)
+            told += more
+        return values, comparisons, told
+
+    def _beside_idle(
+        self, values: Floats, comparisons: Sequence[Sequence[Comparison]]
+    ) -> tuple[Floats, list[str]]:
+        told = []
+        for place in np.flatnonzero(self._idle(self._slopes(values, comparisons))).tolist():
+            tried = [
+                (sum(float(one @ one) for one in self.residuals(other, comparisons)), float(other[place]))
+                for other in self._beside(values, place)
+                if not self._idle(self._slopes(other, comparisons))[place]
+            ]
+            if tried:
+                told.append(
+                    f"{self.keys[place]} has no effect at {values[place]:.6g}: the search began beside it, at "
+                    f"{min(tried)[1]:.6g}"
+                )
+                self.flat[place] = float(values[place])
+                values = np.where(np.arange(len(values)) == place, min(tried)[1], values)
+        return values, told
+
+    def _idle(self, slopes: Sequence[Floats]) -> Flags:
+        """Return which numbers do not change what is compared, beyond rounding."""
+        energy = sum((np.sum(slope**2, axis=0) for slope in slopes), np.zeros(len(self.keys)))
+        moved = np.sqrt(energy / sum(len(slope) for slope in slopes)) * self.scale
+        idle: Flags = ~(moved > LEAST_CHANGE)
+        return idle
+
+    def _beside(self, values: Floats, place: int) -> list[Floats]:
+        """Return values with one number a little larger, and a little smaller, within its bounds."""
+        step = BESIDE * self.scale[place] * np.eye(len(values))[place]
+        both = (values + step, values - step)
+        return [other for other in both if self.lower[place] < other[place] < self.upper[place]]
 
     def compared(self, values: Floats) -> tuple[list[Comparison], ...]:
         """Simulate every recording and find lag and polarity anew."""
@@ -221,16 +278,24 @@ class _Fit:
         self.told(self.simulations, float(np.sqrt(np.mean(np.concatenate(found) ** 2))))
         return found
 
-    def solve(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> Any:
-        def of(scaled: Floats) -> Floats:
-            return np.concatenate(self.residuals(scaled * self.scale, comparisons))
+    def solve(
+        self, values: Floats, comparisons: Sequence[Sequence[Comparison]], chosen: Flags | None = None
+    ) -> Floats:
+        """Return the values of least squares from a start, lag and polarity held; only the chosen ones are changed."""
+        rows = np.flatnonzero(np.ones(len(values)) if chosen is None else chosen)
+        lower, upper, scale = (ends[rows] for ends in (self.lower, self.upper, self.scale))
 
-        inside = np.clip(values, self.lower + 1e-12 * self.scale, self.upper - 1e-12 * self.scale)
+        def with_chosen(scaled: Floats) -> Floats:
+            found: Floats = values.copy()
+            found[rows] = scaled * scale
+            return found
+
+        inside = np.clip(values[rows], lower + 1e-12 * scale, upper - 1e-12 * scale)
         try:
-            return least_squares(
-                of,
-                inside / self.scale,
-                bounds=(self.lower / self.scale, self.upper / self.scale),
+            solution = least_squares(
+                lambda scaled: np.concatenate(self.residuals(with_chosen(scaled), comparisons)),
+                inside / scale,
+                bounds=(lower / scale, upper / scale),
                 x_scale="jac",
                 diff_step=DERIVATIVE_STEP,
                 xtol=1e-9,
@@ -242,6 +307,7 @@ class _Fit:
             raise EstimationError(
                 f"fit: the search reached numbers that the body refuses: {error} Start nearer, or fit fewer numbers."
             ) from error
+        return with_chosen(solution.x)
 
     def covariance(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> Floats:
         """Return the covariance of the numbers, see `replay_covariance`."""
@@ -269,14 +335,14 @@ class _Fit:
 
     def refuse_alike(self, slopes: Sequence[Floats]) -> None:
         """Refuse numbers that the recordings do not tell apart, by the normal matrix of their slopes."""
+        idle = self._idle(slopes)
+        if idle.any():
+            raise EstimationError(
+                f"fit: {self.keys[int(np.argmax(idle))]}: expected a number that changes what is compared, got one "
+                "that does not, beside its start either. Leave it out."
+            )
         bread: Floats = sum((slope.T @ slope for slope in slopes), np.zeros((len(self.keys), len(self.keys))))
         size = np.sqrt(np.diag(bread))
-        moved = size * self.scale / np.sqrt(sum(len(slope) for slope in slopes))
-        if not np.all(moved > LEAST_CHANGE):
-            idle = self.keys[int(np.argmin(moved))]
-            raise EstimationError(
-                f"fit: {idle}: expected a number that changes what is compared, got one that does not. Leave it out."
-            )
         scaled = bread / np.outer(size, size)
         if np.linalg.cond(scaled) > MOST_CONDITION:
             weakest = np.abs(np.linalg.eigh(scaled)[1][:, 0])
@@ -316,6 +382,14 @@ class _Fit:
                         f"(correlation {correlation[place, other]:.4f}): one hides in the other"
                     )
         return remarks
+
+    def _at_flat(self, values: Floats, errors: Floats) -> list[str]:
+        """Say which numbers ended where they have no effect: the data tell (value - flat)^2, and its error."""
+        return [
+            f"{self.keys[place]} is not told from {flat:.6g}, where it has no effect: its error is not to be relied on"
+            for place, flat in self.flat.items()
+            if abs(values[place] - flat) < 2.0 * FLAT_ERRORS * errors[place]
+        ]
 
 
 def _name(key: str) -> str:

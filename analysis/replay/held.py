@@ -51,7 +51,7 @@ class Held:
         if not self.spans:
             return "nowhere"
         if self.spans == ((0.0, self.end),):
-            return f"over the whole record ({instant(self.end)} after {self.since})"
+            return f"over the whole record ({instant(self.end)})"
         said = [
             f"to {instant(stop)}" if start == 0.0 else f"from {instant(start)} to {instant(stop)}"
             for start, stop in self.spans[:_MOST_SPANS]

@@ -290,10 +290,7 @@ def test_a_window_without_samples_does_not_end_what_holds_around_it() -> None:
     assert held.spans == ((0.0, 3.0), (4.0, 5.0))
     assert held.broken == (3.0, 4.0, 20.0)
     assert held.words == "to 3 s, from 4 s to 5 s after the onset"
-    assert (
-        held_over(windows, np.full(5, 99.0), np.full(5, 100.0)).words
-        == "over the whole record (5 s after the onset)"
-    )
+    assert held_over(windows, np.full(5, 99.0), np.full(5, 100.0)).words == "over the whole record (5 s)"
     assert held_over(windows, np.full(5, 9.0), np.full(5, 100.0)).words == "nowhere"
 
 
@@ -301,7 +298,7 @@ def test_the_verdict_says_over_which_span_it_holds_of_the_record_that_breaks_fir
     windows, ceiling = running_windows(0.0, 0.03, 0.01), np.full(3, 100.0)
     whole, early = (held_over(windows, np.array(scores), ceiling) for scores in ((99, 98, 97), (99, 60, 20)))
     assert trust({"a": 98.0}, {"b": 97.0}, held={"a": whole, "b": whole}).words == (
-        "This linear replay is to be trusted for events like these, over the whole record (30 ms after the onset): "
+        "This linear replay is to be trusted for events like these, over the whole record (30 ms): "
         "on b, which it was not fitted on, it errs by 17 % (VAF 97.0 %)."
     )
     verdict = trust({"a": 98.0}, {"b": 97.0, "c": 98.0}, held={"a": whole, "b": whole, "c": early})

@@ -52,7 +52,7 @@ def test_a_replay_without_a_fit_begins_with_its_verdict(
     assert "if its numbers do not come from this record: on one.nc it errs by" in first
     assert dataset.attrs["verdict"] == first
     assert dataset.attrs["trusted"] == 1
-    assert dataset["held"].values.tolist() == ["over the whole record (12.98 ms after the onset)"]
+    assert dataset["held"].values.tolist() == ["over the whole record (12.98 ms)"]
 
 
 def test_a_replay_that_gets_out_of_step_says_where(board: Path, capsys: pytest.CaptureFixture[str]) -> None:
