@@ -205,6 +205,7 @@ def _to_dataset(
         raise UsageError(
             "--score: expected --fit beside it: a recording is scored with numbers fitted on others."
         )
+    _refuse_scoring_fitted(paths, scored)
     console = Terminal()
     with ExitStack() as stack:
         fitted, verdict, replays = _replays(stack, scene, paths, scored, fit, execution)
@@ -214,6 +215,18 @@ def _to_dataset(
         if save_scene is not None and fitted is not None:
             _save_scene(scene, fitted, [path.name for path in paths], save_scene)
     console.print(f"{output} in {time.perf_counter() - began:.1f} s", soft_wrap=True)
+
+
+def _refuse_scoring_fitted(paths: Sequence[Path], scored: Sequence[Path]) -> None:
+    """Refuse a recording to be scored that is fitted too: it would earn a trust that it cannot give."""
+    from vibroimpact.fmus.errors import UsageError
+
+    fitted = {path.resolve() for path in paths}
+    for path in scored:
+        if path.resolve() in fitted:
+            raise UsageError(
+                f"--score: expected a recording that is not fitted, got {path}, which is. Score another one."
+            )
 
 
 def _paths(scene: Scene) -> list[Path]:

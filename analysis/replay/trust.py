@@ -18,6 +18,8 @@ LEAST_SKILL = 0.5
 """A model must leave less than this share of the residual energy of a prediction without dynamics."""
 MOST_LOSS = 2.0
 """Residual energy on other records per that on its own, above which the fit has learnt its record."""
+LEAST_LOSS = 1.0
+"""Percent of the variance of other records, an error of 10 %: what is left of less says nothing of learning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +63,8 @@ def trust(
     3. on each such record it leaves at most half of the residual energy of the prediction without dynamics
        (`naive_variance`: no response, or the drive times the gain that suits the record best).
 
-    Where the residual energy on other records is more than twice that on its own, this is said too: the fit has
-    learnt its record, and its standard errors do not hold for others. Where nothing was fitted, all records are
+    Where the residual energy on other records is more than twice that on its own, and 1 %, this is said too: the fit
+    has learnt its record, and its standard errors do not hold for others. Where nothing was fitted, all records are
     others, if the numbers of the scene do not come from them: the verdict says this condition.
 
     Parameters
@@ -185,7 +187,7 @@ def _loss(fitted: Mapping[str, float], scored: Mapping[str, float]) -> list[str]
     if not fitted or not scored:
         return []
     own, other = 100.0 - min(fitted.values()), 100.0 - min(scored.values())
-    if other <= MOST_LOSS * own:
+    if other <= max(MOST_LOSS * own, LEAST_LOSS):
         return []
     return [
         f"it leaves {other:.2g} % of the variance of records it was not fitted on, against {own:.2g} % of its own: "

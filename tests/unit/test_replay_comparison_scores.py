@@ -255,6 +255,8 @@ def test_a_fit_that_has_learnt_its_record_is_told() -> None:
     verdict = trust({"a": 99.9}, {"b": 96.0})
     assert verdict.trusted
     assert "learnt its record" in verdict.reasons[0]
+    # one in ten thousand of the variance is no loss, however much less its own record keeps
+    assert trust({"a": 99.9999}, {"b": 99.99}).reasons == ()
 
 
 def test_a_score_that_is_not_a_number_earns_no_trust() -> None:

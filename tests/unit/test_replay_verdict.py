@@ -66,7 +66,9 @@ def test_a_replay_that_gets_out_of_step_says_where(board: Path, capsys: pytest.C
 def test_the_verdict_of_a_fit_comes_before_its_numbers_and_tables(
     board: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    said, _ = replayed(BOARD, board, capsys, "--fit", "sensor.gain", "--score", str(board))
+    other = board.with_name("two.nc")
+    other.write_bytes(board.read_bytes())
+    said, _ = replayed(BOARD, board, capsys, "--fit", "sensor.gain", "--score", str(other))
     places = [
         said.index(text) for text in ("This linear replay", "sensor.gain", "Simulated against measured")
     ]
@@ -89,3 +91,28 @@ def test_linear_is_what_has_no_stops_and_does_not_follow_the_amplitude() -> None
     assert [is_linear(parse_scene(text, "board.toml")) for text in texts] == [True, True, False, False]
     followed = parse_scene(BOARD, "board.toml").with_values({"body.damping_reciprocal": 1e-6})
     assert not is_linear(followed)
+
+
+def test_a_recording_that_is_fitted_earns_no_trust_by_being_scored(
+    board: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene, output = board.with_name("board.toml"), board.with_name("x.nc")
+    scene.write_text(BOARD)
+    again = board.parent / "." / ".." / board.parent.name / board.name
+    with pytest.raises(SystemExit) as left:
+        main(
+            [
+                "replay",
+                str(scene),
+                str(board),
+                "-o",
+                str(output),
+                "--fit",
+                "sensor.gain",
+                "--score",
+                str(again),
+            ]
+        )
+    assert left.value.code == 2
+    assert "--score: expected a recording that is not fitted, got " in capsys.readouterr().err
+    assert not output.exists()
