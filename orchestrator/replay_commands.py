@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 import time
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -22,8 +20,6 @@ if TYPE_CHECKING:
     from vibroimpact.orchestrator.replay_fit import ReplayFit
     from vibroimpact.orchestrator.replay_output import Replayed
     from vibroimpact.orchestrator.scene import Scene
-
-_TABLE = re.compile(r"^\s*\[\s*replay\s*\]\s*(#.*)?$", re.MULTILINE)
 
 
 def register(app: typer.Typer) -> None:
@@ -144,27 +140,21 @@ def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:
     from vibroimpact.fmus.errors import UsageError
     from vibroimpact.orchestrator.replay import replay_table
     from vibroimpact.orchestrator.scene import parse_scene
+    from vibroimpact.orchestrator.scene_text import text_with_values
 
-    named = replay_table(scene).recordings
-    if named and recordings:
+    there = replay_table(scene).recordings
+    if there and recordings:
         raise UsageError(
             f"{scene.source}: replay.recordings: expected recordings in the scene or on the command line, got both."
         )
     if not recordings:
-        if not named:
+        if not there:
             raise UsageError(
                 f"{scene.source}: expected a recording to replay, got none. Name one after the scene."
             )
         return scene
-    # JSON's strings are TOML's, but for characters that JSON would write as pairs
-    line = f"recordings = {json.dumps([str(path.absolute()) for path in recordings], ensure_ascii=False)}"
-    text, count = _TABLE.subn(lambda match: f"{match[0]}\n{line}", scene.text, count=1)
-    if not count:
-        raise UsageError(
-            f"{scene.source}: replay: expected the table as a line [replay], got it written otherwise. Write [replay], "
-            "or name the recordings in it."
-        )
-    return parse_scene(text, scene.source)
+    named = [str(path.absolute()) for path in recordings]
+    return parse_scene(text_with_values(scene.text, {}, named), scene.source)
 
 
 def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
@@ -214,6 +204,7 @@ def _to_dataset(
         _write(dataset, output, figure)
         if save_scene is not None and fitted is not None:
             _save_scene(scene, fitted, [path.name for path in paths], save_scene)
+            console.print(f"Scene with the numbers found written to {save_scene}.", soft_wrap=True)
     console.print(f"{output} in {time.perf_counter() - began:.1f} s", soft_wrap=True)
 
 

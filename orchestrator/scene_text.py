@@ -27,7 +27,7 @@ def text_with_values(text: str, values: Mapping[str, float], recordings: Sequenc
     values : mapping of str to float
         By key, each a number of the scene.
     recordings : sequence of str
-        What `replay.recordings` is to name instead; as many as there are, or none to leave them.
+        What `replay.recordings` is to name; none to leave it as it is.
 
     Examples
     --------
@@ -54,8 +54,12 @@ def _put_all(
 ) -> None:
     for key, value in values.items():
         _put(document, numeric_key(key), value)
-    for place, name in enumerate(recordings):
-        document["replay"]["recordings"][place] = name
+    if recordings:
+        table = document["replay"]
+        if len(table.get("recordings", ())) != len(recordings):
+            _set(table, "recordings", [""] * len(recordings))
+        for place, name in enumerate(recordings):
+            table["recordings"][place] = name
 
 
 def _put(document: MutableMapping[str, Any], key: Key, value: float) -> None:
@@ -63,14 +67,15 @@ def _put(document: MutableMapping[str, Any], key: Key, value: float) -> None:
     table.pop(OVERRIDDEN_BY.get(key.name, ""), None)
     if key.element is not None:
         table[key.name][key.element] = value
-    elif key.name in table or not isinstance(table, Table):
-        table[key.name] = value
     else:
-        _append(table, key.name, value)
+        _set(table, key.name, value)
 
 
-def _append(table: Table, name: str, value: float) -> None:
-    """Add a key after the last one: comments at the end of a table are those of the next."""
+def _set(table: MutableMapping[str, Any], name: str, value: float | list[str]) -> None:
+    """Set a key; a new one goes after the last: comments at the end of a table are those of the next."""
+    if name in table or not isinstance(table, Table):
+        table[name] = value
+        return
     body, rest = table.value.body, []
     while body and body[-1][0] is None:
         rest.append(body.pop())

@@ -18,6 +18,7 @@ from vibroimpact.analysis.replay.alignment import Alignment, align
 from vibroimpact.analysis.replay.baseline import naive_variance
 from vibroimpact.analysis.replay.comparison import Comparison, compare
 from vibroimpact.analysis.replay.event import Event, find_event
+from vibroimpact.analysis.replay.held import Held, held_over
 from vibroimpact.analysis.replay.matching import EventMatch, match_events
 from vibroimpact.analysis.replay.peaks import PeakErrors, compare_peaks
 from vibroimpact.analysis.replay.replay_dataset import comparison_dataset
@@ -37,6 +38,7 @@ __all__ = [
     "DominantFrequency",
     "Event",
     "EventMatch",
+    "Held",
     "PeakErrors",
     "Verdict",
     "align",
@@ -46,6 +48,7 @@ __all__ = [
     "comparison_dataset",
     "dominant_frequency",
     "find_event",
+    "held_over",
     "match_events",
     "naive_variance",
     "print_comparison",

@@ -99,7 +99,7 @@ def trust(
         *_nothing_scored(fitted, scored),
     ]
     judged = {name: span for name, span in (held or {}).items() if name in scored or name in fitted}
-    beside = (*_breaks(judged, trusted=not reasons), *_loss(fitted, scored))
+    beside = (*_breaks(judged, most_error, trusted=not reasons), *_loss(fitted, scored))
     replay = "linear replay" if linear else "replay"
     if reasons:
         return Verdict(f"Do not trust this {replay}: {reasons[0]}.", False, (*reasons, *beside))
@@ -130,7 +130,7 @@ def _span(judged: Mapping[str, Held], name: str) -> str:
     return f", {shortest.words}" if shortest is not None and shortest.spans else ""
 
 
-def _breaks(judged: Mapping[str, Held], *, trusted: bool) -> list[str]:
+def _breaks(judged: Mapping[str, Held], most_error: float, *, trusted: bool) -> list[str]:
     """Say of each record where the replay first errs by more than is trusted, or where alone it does not."""
     lines = []
     for name, held in judged.items():
@@ -144,7 +144,7 @@ def _breaks(judged: Mapping[str, Held], *, trusted: bool) -> list[str]:
                 f"on {name} it does not hold from {instant(start)}{until}: there it errs by {_said(variance)}"
             )
         elif held.spans:
-            lines.append(f"on {name} it errs by less {held.words} only")
+            lines.append(f"on {name} it errs by at most {100 * most_error:.0f} % only {held.words}")
     return lines
 
 

@@ -95,10 +95,13 @@ def test_a_scene_that_cannot_be_saved_is_refused_before_anything_is_computed(
     assert not (folder / "fit.nc").exists()
 
 
-def test_a_saved_scene_replaces_one_that_is_there_with_force_only(folder: Path) -> None:
+def test_a_saved_scene_replaces_one_that_is_there_with_force_only(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     saved = folder / "fitted.toml"
     saved.write_text("mine")
     command = (folder / "board.toml", "-o", folder / "fit.nc", "--fit", "sensor.gain", "--save-scene", saved)
     assert replay(*command) == 2
     assert replay(*command, "--force") == 0
+    assert f"Scene with the numbers found written to {saved}." in capsys.readouterr().out
     assert load_scene(saved).value("sensor.gain") == pytest.approx(1.17, rel=1e-2)

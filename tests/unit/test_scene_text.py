@@ -59,6 +59,28 @@ def test_a_new_number_changes_nothing_else_of_the_text(
     assert text_with_values(text, values) == expected
 
 
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            "[replay] # r\nlag = 1 # s\n\n# where\n[sensor]\n",
+            "[replay] # r\nlag = 1 # s\nrecordings = {}\n\n# where\n[sensor]\n",
+        ),
+        ("replay = { lag = 1 } # r\n", "replay = { lag = 1, recordings = {}} # r\n"),
+        ("replay.lag = 1\n[sensor]\n", "replay.lag = 1\nreplay.recordings = {}\n[sensor]\n"),
+        ("[replay]\nrecordings = ['a.nc', # first\n 'b.nc']\n", "[replay]\nrecordings = [{}, # first\n {}]\n"),
+    ],
+)  # fmt: skip
+def test_recordings_are_named_in_whatever_way_the_table_is_written(text: str, expected: str) -> None:
+    names = ['/tmp/a "1".nc', "/tmp/\N{GREEK SMALL LETTER OMEGA}\\.nc"]
+    shown = [r'"/tmp/a \"1\".nc"', '"/tmp/\N{GREEK SMALL LETTER OMEGA}\\\\.nc"']
+    filled = expected.replace("{}", "[{}, {}]") if expected.count("{}") == 1 else expected
+    for name in shown:
+        filled = filled.replace("{}", name, 1)
+    assert text_with_values(text, {}, names) == filled
+    assert tomllib.loads(filled)["replay"]["recordings"] == names
+
+
 def test_every_digit_of_a_number_is_kept() -> None:
     for value in (1.0 / 3.0, -5e-324, 1.7976931348623157e308, 1e22):
         assert tomllib.loads(text_with_values("body.mass = 1", {"body.mass": value}))["body"]["mass"] == value
