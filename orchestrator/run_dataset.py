@@ -107,11 +107,12 @@ def stored_samples(scene: Scene) -> tuple[str, ...]:
 
 def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
     """Units that the names do not say."""
-    if scene.units != "SI":
-        return {}
     if scene.general is not None:
         units = {**scene.general.start_units, **scene.general.units}
-        return units | {file: units[key] for key, file in names.items() if key in units}
+        stored = {file: units[key] for key, file in names.items() if key in units}
+        return units | stored if scene.units == "SI" else stored
+    if scene.units != "SI":
+        return {}
     swept = {file: unit for key, file in names.items() if (unit := _unit_of_key(scene, key))}
     forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
     return forcing | swept

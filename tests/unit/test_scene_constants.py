@@ -144,6 +144,23 @@ def test_a_sampled_variable_keeps_its_name_beside_a_number_of_the_same(tmp_path:
     assert dataset.b_mass.attrs["units"] == "kg"
 
 
+def test_numbers_of_components_need_no_name_that_tells_their_unit(tmp_path: Path) -> None:
+    text = """
+    [scene]
+    units = "nondimensional"
+    [component.a]
+    fmu = "Oscillator"
+    parameters = { mass = 1.0, stiffness = 1.0, "contact[1].law" = "restitution", "contact[1].position" = 0.5 }
+    [record]
+    recorded_time = 1.0
+    [sweep]
+    "a.contact[1].side" = { values = [1, 2] }
+    """
+    dataset = opened(tmp_path, text)
+    assert constants(dataset).items() >= {"law": 1.0, "position": 0.5}.items()
+    assert {dataset[name].attrs["units"] for name in ("law", "position", "side", "mass")} == {"1"}
+
+
 @pytest.mark.parametrize("key", ["frequency_slope", "damping_slope", "damping_reciprocal"])
 def test_what_depends_on_the_amplitude_is_swept_like_any_number(key: str, tmp_path: Path) -> None:
     sweep = f'[sweep]\n"body.{key}" = {{ values = [0.0, 0.01] }}'
