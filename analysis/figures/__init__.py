@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from typing import Literal
 
+from vibroimpact.analysis.figures.style import page_style
+
+# isort: split
 import xarray as xr
 from matplotlib.figure import Figure
 
@@ -14,7 +17,7 @@ from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence
 from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
-from vibroimpact.analysis.figures.page import COLUMN_WIDTH, label, page_style, save
+from vibroimpact.analysis.figures.page import COLUMN_WIDTH, label, save
 from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait
 from vibroimpact.analysis.figures.recordings import draw_recording
 from vibroimpact.analysis.figures.replay import draw_replay

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import io
 import os
-from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, cast
 
-import matplotlib as mpl
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
@@ -16,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.atomic import write_atomically
+from vibroimpact.analysis.figures.style import page_style as page_style
 from vibroimpact.analysis.outputs import FIGURE_ENDINGS
 from vibroimpact.analysis.unit_symbols import written_unit
 from vibroimpact.fmus.errors import UsageError
@@ -25,30 +23,11 @@ Floats = npt.NDArray[np.float64]
 _MM = 1 / 25.4
 COLUMN_WIDTH = 85 * _MM
 _DPI = 300
-_STYLE: dict[str, Any] = {
-    "font.size": 8,
-    "axes.labelsize": 8,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "legend.fontsize": 7.5,
-    "axes.linewidth": 0.6,
-    "lines.linewidth": 0.7,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
-    "xtick.top": True,
-    "ytick.right": True,
-    "svg.hashsalt": "vibroimpact",
-}
 LINE = "#20567D"
 MARK = "#D55E00"
 STOP = "0.45"
 # Told apart with every kind of colour vision (Okabe and Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-
-
-def page_style() -> AbstractContextManager[None]:
-    """Return the context in which figures are drawn and saved."""
-    return mpl.rc_context(cast(Any, _STYLE))
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:

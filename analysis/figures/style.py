@@ -1,0 +1,33 @@
+"""The one style of all figures, whatever matplotlibrc there is; imported before all else that imports matplotlib."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+# matplotlib reads a matplotlibrc of the current folder while it is imported, and fails where that is no text.
+with contextlib.chdir(Path(__file__).parent) if os.path.exists("matplotlibrc") else contextlib.nullcontext():
+    import matplotlib.style
+
+_STYLE: dict[str, Any] = {
+    "font.size": 8,
+    "axes.labelsize": 8,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7.5,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 0.7,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "svg.hashsalt": "vibroimpact",
+}
+
+
+def page_style() -> AbstractContextManager[None]:
+    """Return the context in which figures are drawn and saved: matplotlib's defaults, and what is ours."""
+    return matplotlib.style.context(["default", _STYLE])
