@@ -1,4 +1,4 @@
-"""Figures of a ladder of macro steps: how the errors of a coupling fall with its step."""
+"""Figures of a ladder of steps or tolerances: how errors fall with the step, and what they cost."""
 
 from __future__ import annotations
 
@@ -59,6 +59,81 @@ def convergence(dataset: xr.Dataset) -> Figure:
     return figure
 
 
+def work_precision(dataset: xr.Dataset) -> Figure:
+    """Draw what accuracy costs: the errors of a ladder over the seconds that they took.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        `error`, and `energy_drift` where there is one, and `wall_time` (s), all on the steps or tolerances of the
+        ladder and, where several ways are compared, on their names. Magnitudes are drawn; what has no error or no
+        time leaves a gap. The attribute `title` is written above.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One column (85 mm) wide.
+
+    Raises
+    ------
+    DatasetError
+        If a variable is missing, or there is no ladder.
+
+    Examples
+    --------
+    >>> tolerance = np.array([1e-3, 1e-6, 1e-9])
+    >>> error = xr.DataArray(tolerance, dims="tolerance", attrs={"units": "m"})
+    >>> seconds = xr.DataArray([0.01, 0.02, 0.05], dims="tolerance", attrs={"units": "s"})
+    >>> figure = work_precision(xr.Dataset({"error": error, "wall_time": seconds}, {"tolerance": tolerance}))
+    >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
+    ('wall time (s)', 'error (m)')
+    """
+    along, ways = _ladder_of(dataset)
+    panels = [name for name in _QUANTITIES if name in dataset and along in dataset[name].dims]
+    with page_style():
+        figure = canvas(10 + 55 * len(panels))
+        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        for axis, name in zip(axes, panels, strict=True):
+            for place, way in enumerate(dataset[ways].values if ways else [""]):
+                line = (dataset.sel({ways: way}) if ways else dataset).sortby(along)
+                values, seconds = line[name].values, line["wall_time"].values
+                shown = (values != 0.0) & np.isfinite(values) & (seconds > 0.0)
+                axis.plot(
+                    seconds[shown],
+                    np.abs(values[shown]),
+                    color=COLOURS[place % len(COLOURS)],
+                    marker=_MARKERS[place % len(_MARKERS)],
+                    markersize=3,
+                    fillstyle="none",
+                    label=_way(str(way)),
+                )
+            axis.set(xscale="log", yscale="log", ylabel=label(dataset[name]))
+        axes[-1].set_xlabel(label(dataset["wall_time"]))
+        if ways:
+            figure.legend(
+                *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False
+            )
+        figure.suptitle(str(dataset.attrs.get("title", "")), fontsize=8)
+    return figure
+
+
+def _ladder_of(dataset: xr.Dataset) -> tuple[str, str | None]:
+    """Return the dimension of the steps or tolerances, and that of the ways that are compared."""
+    missing = [name for name in ("error", "wall_time") if name not in dataset]
+    if not missing:
+        dims = [str(name) for name in dataset["error"].dims]
+        numbers = [name for name in dims if name in dataset.coords and dataset[name].dtype.kind == "f"]
+        others = [name for name in dims if name not in numbers and name in dataset.coords]
+        is_ladder = len(numbers) == 1 and len(dims) == 1 + len(others) <= 2
+        if is_ladder and set(dataset["wall_time"].dims) == set(dims):
+            return numbers[0], others[0] if others else None
+        missing = ["error and wall_time on the same steps or tolerances"]
+    raise DatasetError(
+        "figure: expected error and wall_time (s) on a ladder of steps or tolerances, "
+        f"got no such {', '.join(missing)}. Draw what a benchmark of coupling measured."
+    )
+
+
 def _refuse_other(dataset: xr.Dataset) -> None:
     """Refuse a dataset that is no ladder of macro steps."""
     missing = [
@@ -112,11 +187,16 @@ def _draw_ladder(axis: Axes, quantity: xr.DataArray) -> None:
 def _mark_steps(axis: Axes, steps: NDArray[np.float64]) -> None:
     """Label the steps that were measured, every other one where there are many."""
     marked = steps[:: 1 if len(steps) <= MOST_LABELS else 2]
-    axis.set_xticks(marked, [f"{step:g}" for step in marked])
+    axis.set_xticks(marked, [f"{step:.3g}" for step in marked])
     axis.xaxis.set_minor_locator(NullLocator())
 
 
 def _entry(exchange: str, order: float) -> str:
     """Return the legend of one exchange; where there are no errors to compare it has no order."""
-    name = _WORDS.get(exchange, exchange.replace("_", " "))
+    name = _way(exchange)
     return f"{name} {order:.2f}" if np.isfinite(order) else f"{name} (none)"
+
+
+def _way(name: str) -> str:
+    """Return an exchange, or another way to compute, in words."""
+    return _WORDS.get(name, name.replace("_", " "))

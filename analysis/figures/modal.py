@@ -10,6 +10,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import COLOURS, LINE, STOP, Floats, canvas, label, unit_symbol
+from vibroimpact.analysis.figures.series import within
+from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.fmus.errors import DatasetError
 
 Places = npt.NDArray[np.int64]
@@ -18,7 +20,7 @@ _MODAL = re.compile(r"modal_energy_([0-9]+)")
 _START = re.compile(r"displacement_start_([0-9]+)")
 
 
-def draw_energies(dataset: xr.Dataset, run: int | None = None) -> Figure:
+def draw_energies(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
     """Draw the total energy of a run and the energies of its modes over time, with its impacts.
 
     Raises
@@ -27,7 +29,7 @@ def draw_energies(dataset: xr.Dataset, run: int | None = None) -> Figure:
         If energies were not sampled.
     """
     selection = {} if run is None else {"run_index": run}
-    samples = dataset.vibroimpact.samples(**selection)
+    samples = within(dataset, dataset.vibroimpact.samples(**selection), window)
     modal = [(int(m[1]), m[0]) for m in map(_MODAL.fullmatch, map(str, samples.data_vars)) if m]
     if not modal or not {"energy_kinetic", "energy_potential"} <= set(map(str, samples.data_vars)):
         raise DatasetError(

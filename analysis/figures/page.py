@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,8 @@ Floats = npt.NDArray[np.float64]
 _MM = 1 / 25.4
 COLUMN_WIDTH = 85 * _MM
 _DPI = 300
+_SMALLEST, _LARGEST = 20, 1000
+"""mm: of a side of a figure."""
 LINE = "#20567D"
 MARK = "#D55E00"
 STOP = "0.45"
@@ -49,6 +52,38 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     with page_style():
         figure.savefig(content, format=ending[1:], dpi=_DPI)
     write_atomically(path, content.getvalue())
+
+
+def laid_out(figure: Figure, title: str | None, width: float | None, height: float | None) -> Figure:
+    """Return a figure with a title and a size (mm); None leaves what it has.
+
+    Raises
+    ------
+    UsageError
+        If its panels have no room.
+    """
+    if title is not None:
+        figure.suptitle(title, fontsize=8)
+    if width is None and height is None:
+        return figure
+    size = [
+        old if given is None else given * _MM
+        for given, old in zip((width, height), figure.get_size_inches(), strict=True)
+    ]
+    asked = " x ".join(f"{inches / _MM:.4g}" for inches in size)
+    if not all(_SMALLEST <= inches / _MM <= _LARGEST for inches in size):
+        raise UsageError(f"figure: size: expected {_SMALLEST} to {_LARGEST} mm, got {asked} mm.")
+    figure.set_size_inches(size[0], size[1])
+    with warnings.catch_warnings():
+        # all that the layout warns of is that there is no room
+        warnings.simplefilter("error", UserWarning)
+        try:
+            figure.draw_without_rendering()
+        except UserWarning:
+            raise UsageError(
+                f"figure: size: expected room for {len(figure.axes)} panels, got {asked} mm. Give more width or height."
+            ) from None
+    return figure
 
 
 def label(variable: xr.DataArray) -> str:

@@ -10,14 +10,27 @@ import xarray as xr
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, Floats, canvas, label, title
-from vibroimpact.analysis.schema import swept_names
+from vibroimpact.analysis.figures.page import (
+    COLOURS,
+    LINE,
+    MARK,
+    STOP,
+    Floats,
+    canvas,
+    label,
+    title,
+    unit_symbol,
+)
+from vibroimpact.analysis.figures.scene_text import limits, scene_of, swept_keys, table
+from vibroimpact.analysis.figures.series import impacts_within, within
+from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.safe_toml import parse_toml
 
 _PANEL_MM = 62
 # Small enough that ten thousand impacts do not run into one blot.
 _DOT = 1.1
+# Samples of one motion: about a hundred periods.
+_LONG = 20_000
 _QUARTERS = ("0", "π/2", "π", "3π/2", "2π")
 
 
@@ -30,7 +43,7 @@ class _Orbit(NamedTuple):
     velocity: Floats
 
 
-def draw_portrait(dataset: xr.Dataset, run: int | None = None) -> Figure:
+def draw_portrait(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
     """Draw velocity against displacement for each sampled pair; of a whole chain its modes too.
 
     Lines end at an impact and begin again after it, joined by dots.
@@ -41,7 +54,7 @@ def draw_portrait(dataset: xr.Dataset, run: int | None = None) -> Figure:
         If no displacement was sampled together with its velocity.
     """
     selection = {} if run is None else {"run_index": run}
-    samples = dataset.vibroimpact.samples(**selection)
+    samples = within(dataset, dataset.vibroimpact.samples(**selection), window)
     orbits = _sampled_orbits(samples)
     if not orbits:
         raise DatasetError(
@@ -51,7 +64,7 @@ def draw_portrait(dataset: xr.Dataset, run: int | None = None) -> Figure:
     hits = dataset.vibroimpact.impacts(**selection) if "impact" in dataset.dims else None
     jumps = np.searchsorted(samples["time"].values, [] if hits is None else hits["impact_time"].values)
     nondimensional = dataset.attrs.get("units_system") == "nondimensional"
-    modal = _modal_orbits(_scene(dataset), orbits)
+    modal = _modal_orbits(dataset, orbits)
     panels = [(orbits, ("-", "-") if nondimensional else ("m", "m/s"))]
     if modal:
         panels.append((modal, ("-", "-") if nondimensional else ("√kg m", "√kg m/s")))
@@ -68,18 +81,19 @@ def draw_portrait(dataset: xr.Dataset, run: int | None = None) -> Figure:
             axis.legend(
                 frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1
             )
-    for position in _observed_stops(_scene(dataset)):
+    for position in sorted({place for orbit in orbits for place in limits(dataset, orbit.name)}):
         axes[0].axvline(position, color=STOP, linestyle="--", linewidth=0.6, zorder=0)
     return figure
 
 
 def _draw_orbit(axis: Any, orbit: _Orbit, jumps: Any, colour: str) -> None:
-    """Draw one line, broken where the velocity jumps."""
+    """Draw one line, broken where the velocity jumps; a long one is thin and faint, so that its layers show."""
+    long = {"linewidth": 0.3, "alpha": 0.5} if orbit.displacement.size > _LONG else {}
     inside = jumps[(jumps > 0) & (jumps < orbit.displacement.size)]
     broken = [np.insert(values, inside, np.nan) for values in (orbit.displacement, orbit.velocity)]
-    axis.plot(*broken, color=colour, label=orbit.words, rasterized=True)
+    axis.plot(*broken, color=colour, label=orbit.words, rasterized=True, **long)
     joined = [_joined(values, inside) for values in (orbit.displacement, orbit.velocity)]
-    axis.plot(*joined, color=colour, linestyle=":", linewidth=0.6, rasterized=True)
+    axis.plot(*joined, color=colour, linestyle=":", **({"linewidth": 0.6} | long), rasterized=True)
 
 
 def _joined(values: Floats, jumps: Any) -> Floats:
@@ -98,9 +112,10 @@ def _sampled_orbits(samples: xr.Dataset) -> list[_Orbit]:
     ]
 
 
-def _modal_orbits(scene: dict[str, Any], orbits: list[_Orbit]) -> list[_Orbit]:
+def _modal_orbits(dataset: xr.Dataset, orbits: list[_Orbit]) -> list[_Orbit]:
     """Return the modal coordinates q = Psi' M y of a chain all of whose masses were sampled (equations.md 5.2)."""
-    body = scene.get("body", {})
+    scene = scene_of(dataset)
+    body = {} if any(key.startswith("body.") for key in swept_keys(scene)) else table(scene, "body")
     masses = np.atleast_1d(np.asarray(body.get("masses", []), dtype=float))
     by_name = {orbit.name: orbit for orbit in orbits}
     chosen = [by_name.get(f"displacement_{i}") for i in range(1, masses.size + 1)]
@@ -118,23 +133,7 @@ def _modal_orbits(scene: dict[str, Any], orbits: list[_Orbit]) -> list[_Orbit]:
     return [_Orbit(f"mode_{j + 1}", f"mode {j + 1}", q[j], p[j]) for j in range(masses.size)]
 
 
-def _scene(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the scene of a dataset; nothing where a sweep changed it or it cannot be read."""
-    if swept_names(dataset):
-        return {}
-    try:
-        return parse_toml(str(dataset.attrs.get("scene", "")))
-    except ValueError:
-        # The text is only provenance here: a portrait without stops and modes is still right.
-        return {}
-
-
-def _observed_stops(scene: dict[str, Any]) -> list[float]:
-    """Return the positions of the stops of a scene."""
-    return [float(stop["position"]) for stop in scene.get("stop", []) if "position" in stop]
-
-
-def draw_impact_map(dataset: xr.Dataset, run: int | None = None) -> Figure:
+def draw_impact_map(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
     """Draw the impacts of one run in the plane of the impact map: forcing phase and velocity before impact.
 
     Raises
@@ -142,7 +141,7 @@ def draw_impact_map(dataset: xr.Dataset, run: int | None = None) -> Figure:
     DatasetError
         If the run has no impacts, or no forcing that gives them a phase.
     """
-    hits = dataset.vibroimpact.impacts(**({} if run is None else {"run_index": run}))
+    hits = impacts_within(dataset, run, window)
     phase = hits["impact_phase"].values
     if not np.isfinite(phase).any():
         raise DatasetError(
@@ -171,5 +170,49 @@ def draw_impact_map(dataset: xr.Dataset, run: int | None = None) -> Figure:
     axis.set_xlabel(label(hits["impact_phase"]))
     axis.set_ylabel(label(hits["impact_velocity"]))
     if len(contacts) > 1:
+        figure.legend(loc="outside upper center", ncols=4, markerscale=2.0, frameon=False)
+    return figure
+
+
+def draw_return_map(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+    """Draw the velocity of each impact over that of the one before it on the same stop.
+
+    Points on the diagonal repeat; a motion of period n has n points, chaos a line or a thin set.
+
+    Raises
+    ------
+    DatasetError
+        If no stop is hit twice.
+    """
+    hits = impacts_within(dataset, run, window)
+    velocity, contact = hits["impact_velocity"].values, hits["impact_contact"].values
+    chains = {int(number): velocity[contact == number] for number in np.unique(contact)}
+    chains = {number: values for number, values in chains.items() if values.size > 1}
+    if not chains:
+        raise DatasetError(
+            f"figure: expected two impacts on one stop at least, got {velocity.size} impacts. "
+            "Record a longer motion with impacts = true."
+        )
+    figure = canvas(82)
+    axis = figure.subplots()
+    for place, (number, values) in enumerate(chains.items()):
+        axis.plot(
+            values[:-1],
+            values[1:],
+            linestyle="none",
+            marker="o",
+            markersize=_DOT if values.size > 200 else 3.0,
+            markeredgewidth=0.0,
+            color=COLOURS[place % len(COLOURS)] if len(chains) > 1 else MARK,
+            label=f"stop {number}",
+            rasterized=True,
+        )
+    limit = 1.05 * max(float(values.max()) for values in chains.values())
+    axis.plot([0.0, limit], [0.0, limit], color=STOP, linewidth=0.4, zorder=0)
+    unit = unit_symbol(hits["impact_velocity"])
+    axis.set(xlim=(0.0, limit), ylim=(0.0, limit), xlabel=f"impact velocity $v_n$ ({unit})")
+    axis.set_ylabel(f"next impact velocity $v_{{n+1}}$ ({unit})")
+    axis.set_box_aspect(1.0)
+    if len(chains) > 1:
         figure.legend(loc="outside upper center", ncols=4, markerscale=2.0, frameon=False)
     return figure

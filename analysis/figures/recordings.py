@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,20 +11,34 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, STOP, Floats, canvas, page_style
+from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording
 from vibroimpact.analysis.unit_symbols import written_unit
 from vibroimpact.fmus.errors import DatasetError
 
+_QUANTITIES = {
+    "m": "displacement",
+    "m s-1": "velocity",
+    "m s-2": "acceleration",
+    "N": "force",
+    "N m": "moment",
+    "Pa": "pressure",
+    "V": "voltage",
+    "A": "current",
+    "rad": "angle",
+    "rad s-1": "angular velocity",
+}
 _PANEL_MM = 22
 _TRAIN_MM = 20
-_MOST_PANELS = 12
+#: Channels, and event trains, of one figure at most.
+MOST_PANELS = 12
 _MOST_POINTS = 4000
 _LONGEST_NAME = 34
 _MOST_BANDS = 200
 _LOG_FROM = 30.0
 
 
-def draw_recording(recording: Recording) -> Figure:
+def draw_recording(recording: Recording, window: Window = ANY) -> Figure:
     """Draw the channels of a recording, a panel for each on its own time axis, then its event trains.
 
     Clipped samples are marked; where samples are missing or overrange a band runs through the panel. Event trains
@@ -34,6 +49,8 @@ def draw_recording(recording: Recording) -> Figure:
     ----------
     recording : Recording
         Of more than twelve channels the first twelve are drawn.
+    window : Window, optional
+        Default: all there is.
 
     Returns
     -------
@@ -45,32 +62,43 @@ def draw_recording(recording: Recording) -> Figure:
     DatasetError
         There is nothing to draw.
     """
-    channels = list(recording.channels.values())[:_MOST_PANELS]
-    trains = list(recording.events.values())[:_MOST_PANELS]
+    channels = list(recording.channels.values())[:MOST_PANELS]
+    trains = list(recording.events.values())[:MOST_PANELS]
     if not channels and not trains:
         raise DatasetError(f"{recording.title}: expected channels or events to draw, got none.")
+    shown = channels
+    if window.given:
+        shown = [channel.between(*window.part(channel.time)) for channel in channels]
+        trains = [_train_part(train, window) for train in trains]
     with page_style():
         heights = [_PANEL_MM] * len(channels) + [_TRAIN_MM] * len(trains)
         figure = canvas(10 + sum(heights) + 4 * len(heights), COLUMN_WIDTH)
         axes = list(figure.subplots(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0])
-        for axis, channel in zip(axes, channels, strict=False):
+        for axis, channel in zip(axes, shown, strict=False):
             _draw_channel(axis, channel)
         for axis, train in zip(axes[len(channels) :], trains, strict=True):
             _draw_train(axis, train)
-        _share_time(axes[: len(channels)], channels)
+        _share_time(axes[: len(channels)], channels, shown)
         figure.align_ylabels(axes)
     return figure
 
 
-def _share_time(axes: Sequence[Axes], channels: Sequence[Channel]) -> None:
+def _share_time(axes: Sequence[Axes], channels: Sequence[Channel], shown: Sequence[Channel]) -> None:
     """Write the instants once below each group of panels that have one axis."""
-    for place, (axis, channel) in enumerate(zip(axes, channels, strict=True)):
-        if len(channel.time) > 1:
-            axis.set_xlim(channel.time[0], channel.time[-1])
+    for place, (axis, channel, part) in enumerate(zip(axes, channels, shown, strict=True)):
+        if len(part.time) > 1:
+            axis.set_xlim(part.time[0], part.time[-1])
         last = place + 1 == len(channels) or channels[place + 1].axis is not channel.axis
         axis.tick_params(labelbottom=last)
         if last:
             axis.set_xlabel("time (s)")
+
+
+def _train_part(train: EventTrain, window: Window) -> EventTrain:
+    """Return the events in a window."""
+    start, stop = window.part(train.times)
+    inside = (train.times >= start) & (train.times <= stop)
+    return replace(train, times=train.times[inside], window=(start, stop))
 
 
 def _draw_channel(axis: Axes, channel: Channel) -> None:
@@ -94,12 +122,26 @@ def _draw_channel(axis: Axes, channel: Channel) -> None:
         )
         entries.append(f"{int(clipped.sum())} clipped")
     axis.set_title(_titled(channel.name, entries), fontsize=7.5, loc="left", pad=2)
-    axis.set_ylabel(f"({written_unit(channel.unit)})")
+    axis.set_ylabel(f"{_quantity(channel.unit)}\n({written_unit(channel.unit)})".lstrip())
+
+
+def _quantity(unit: str) -> str:
+    """Return what a channel of a unit measures, whatever multiple the unit is; nothing where that is not known.
+
+    >>> _quantity("9.80665 m s-2"), _quantity("V"), _quantity("1")
+    ('acceleration', 'voltage', '')
+    """
+    number, _, rest = unit.partition(" ")
+    return _QUANTITIES.get(rest if number[0].isdigit() and rest else unit, "")
 
 
 def _titled(name: str, entries: Sequence[str]) -> str:
-    shown = name if len(name) <= _LONGEST_NAME else name[: _LONGEST_NAME - 1] + "…"
-    return shown + (f": {', '.join(entries)}" if entries else "")
+    return short_name(name) + (f": {', '.join(entries)}" if entries else "")
+
+
+def short_name(name: str) -> str:
+    """Return a name that fits above a panel."""
+    return name if len(name) <= _LONGEST_NAME else name[: _LONGEST_NAME - 1] + "…"
 
 
 def _outline(time: Floats, values: Floats) -> tuple[Floats, Floats]:

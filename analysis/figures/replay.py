@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -17,6 +19,8 @@ from vibroimpact.analysis.figures.page import (
     page_style,
     unit_symbol,
 )
+from vibroimpact.analysis.figures.recordings import short_name
+from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
 
@@ -26,42 +30,39 @@ _ZOOM_PERIODS = 12.0
 """The first part shows so many dominant periods from the onset, and a sixth of that before it."""
 _BEFORE = 1.0 / 6.0
 _LONGEST_NAME = 14
+_MEASURED = "#8FBBDB"
 _NEARLY_ALL = 0.6
 """Without a second look where the first part is more than this share of the record."""
 # Values beyond these are read more easily with a power of ten beside the unit.
 _SMALL, _LARGE = 1e-2, 1e4
 
 
-def draw_replay(dataset: xr.Dataset, comparison: str | None = None) -> Figure:
+def draw_replay(dataset: xr.Dataset, recording: str | None = None, window: Window = ANY) -> Figure:
     """Draw a comparison: the whole record, its first part, and the residual with the scores of running windows.
 
-    Clipped samples, which were not scored, are marked on the measured signal.
+    Clipped samples, which were not scored, are marked on the measured signal. The figure names the recording, and
+    whether the fit has seen it.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         Of `comparison_dataset`.
-    comparison : str, optional
-        Which one, by the name of its channel; default: the first.
+    recording : str, optional
+        Which one, by the file of its recording or the name of the comparison; default: the first.
+    window : Window, optional
+        Drawn in place of the whole record and its first part.
 
     Raises
     ------
     DatasetError
         There is no such comparison.
     """
-    names = [str(name) for name in dataset["comparison"].values] if "comparison" in dataset else []
-    if not names:
-        raise DatasetError(
-            "figure: comparison: expected one at least, got none. Replay a scene with compare."
-        )
-    name = names[0] if comparison is None else comparison
-    if name not in names:
-        raise DatasetError(f'figure: comparison: expected one of {", ".join(names)}, got "{name}".')
-    scores = dataset.isel(comparison=names.index(name))
+    name, words = comparison_of(dataset, recording)
+    scores = dataset.isel(comparison=[str(one) for one in dataset["comparison"].values].index(name))
     measured = dataset[f"{name}_measured"]
     time = measured[str(measured.dims[0])].values
     scale, unit = _time_unit(time)
-    parts = _parts(scores, time)
+    parts = [np.array(window.part(time))] if window.given else _parts(scores, time)
     with page_style():
         figure = canvas(_HEIGHT_MM if len(parts) == 2 else 0.72 * _HEIGHT_MM)
         heights = _HEIGHTS[2 - len(parts) :]
@@ -71,7 +72,7 @@ def draw_replay(dataset: xr.Dataset, comparison: str | None = None) -> Figure:
             _draw_both(axis, dataset, name, (scale * time, scale * part), size)
             _draw_events(axis, dataset, name, scale, scale * part)
             axis.set_ylabel(f"{_short(name)} ({prefix}{unit_symbol(measured)})")
-        _say_scores(axes[0], scores)
+        _say_scores(axes[0], scores, words)
         axes[0].legend(
             frameon=False,
             ncols=3,
@@ -87,6 +88,48 @@ def draw_replay(dataset: xr.Dataset, comparison: str | None = None) -> Figure:
         axes[-1].set_ylabel(f"residual\n({prefix}{unit_symbol(measured)})")
         axes[-1].set_xlabel(f"time ({unit})")
     return figure
+
+
+def comparison_of(dataset: xr.Dataset, recording: str | None) -> tuple[str, str]:
+    """Return the name of a comparison, and what to say of its recording; the first where none is named.
+
+    Raises
+    ------
+    DatasetError
+        There is none, or several have this name.
+    """
+    names = _column(dataset, "comparison")
+    if not names:
+        raise DatasetError(
+            "figure: comparison: expected one at least, got none. Replay a scene with compare."
+        )
+    files, uses = _column(dataset, "recording"), _column(dataset, "use")
+    places = [0] if recording is None else [k for k, name in enumerate(names) if name == recording]
+    places = places or [k for k, file in enumerate(files) if recording in (file, Path(file).stem)]
+    if len(places) != 1:
+        got = "several" if places else "none"
+        raise DatasetError(
+            f"figure: recording: expected one of {recordings_of(dataset)}, got {got} named {recording!r}."
+        )
+    (place,) = places
+    said = {"fitted": "fitted on", "scored": "not fitted on"}.get(uses[place], "")
+    return names[place], ", ".join(part for part in (short_name(files[place]), said) if part)
+
+
+def recordings_of(dataset: xr.Dataset) -> str:
+    """Return the comparisons of a replay, each with its recording and what that was used for."""
+    names, files, uses = (_column(dataset, name) for name in ("comparison", "recording", "use"))
+    return ", ".join(
+        f"{name} ({file}, {use})" if file else name
+        for name, file, use in zip(names, files, uses, strict=True)
+    )
+
+
+def _column(dataset: xr.Dataset, name: str) -> list[str]:
+    """Return one text for each comparison, empty where the dataset has none of this name."""
+    if name not in dataset:
+        return [""] * dataset.sizes.get("comparison", 0)
+    return [str(text) for text in dataset[name].values]
 
 
 def _short(name: str) -> str:
@@ -123,13 +166,13 @@ def _draw_both(axis: Axes, dataset: xr.Dataset, name: str, times: tuple[Floats, 
     rows = (time >= part[0]) & (time <= part[1])
     measured = size * dataset[f"{name}_measured"].values
     clipped = rows & ((dataset[f"{name}_quality"].values & int(Quality.clipped)) != 0)
-    axis.plot(time[rows], measured[rows], color=LINE, linewidth=0.9, label="measured", rasterized=True)
+    # wide and light below narrow and dark: where they agree, both are seen
+    axis.plot(time[rows], measured[rows], color=_MEASURED, linewidth=1.8, label="measured", rasterized=True)
     axis.plot(
         time[rows],
         size * dataset[f"{name}_simulated"].values[rows],
         color=MARK,
-        linewidth=0.6,
-        linestyle=(0, (4, 1.5)),
+        linewidth=0.5,
         label="simulated",
         rasterized=True,
     )
@@ -157,13 +200,15 @@ def _draw_events(axis: Axes, dataset: xr.Dataset, name: str, scale: float, part:
         axis.vlines(shown, bottom, top, transform=height, color=colour, linewidth=0.8)
 
 
-def _say_scores(axis: Axes, scores: xr.Dataset) -> None:
-    """Write the score, and how the signals were aligned, into a panel."""
+def _say_scores(axis: Axes, scores: xr.Dataset, words: str) -> None:
+    """Write the recording, the score, and how the signals were aligned, into a panel."""
     lag, error = 1e3 * float(scores["lag"]), 1e3 * float(scores["lag_error"])
     inverted = ", inverted" if float(scores["polarity"]) < 0.0 else ""
     # one digit more than the error begins with
     digits = 3 if error <= 0.0 or not np.isfinite(error) else max(0, 1 - int(np.floor(np.log10(error))))
     doubt, given = (f" ± {error:.{digits}f}", "") if error > 0.0 else ("", " (given)")
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+    axis.text(0.98, 0.05, words, transform=axis.transAxes, ha="right", va="bottom", fontsize=7, bbox=box)
     axis.text(
         0.98,
         0.95,
@@ -172,7 +217,7 @@ def _say_scores(axis: Axes, scores: xr.Dataset) -> None:
         ha="right",
         va="top",
         fontsize=7,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+        bbox=box,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
 import numpy as np
 import xarray as xr
@@ -11,25 +11,32 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, label
-from vibroimpact.analysis.figures.series import draw_series, sampled_names
-from vibroimpact.analysis.schema import swept_names
-from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.analysis.figures.scene_text import observed_stops, stops
+from vibroimpact.analysis.figures.series import draw_series, sampled_names, time_part
+from vibroimpact.analysis.figures.strobe import draw_section
+from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.fmus.errors import DatasetError, UsageError
+
+#: More impacts than this have small marks.
+_MOST_LARGE_MARKS = 100
 
 
-def draw_run(dataset: xr.Dataset, run: int | None = None) -> Figure:
+def draw_run(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
     """Draw one run: time series with the stop and the impacts, and the phase portrait.
 
     Variables of components, and of a body where more than displacement and velocity was sampled, are drawn as
     time series with the events or impacts. Where no time series was recorded, the extremes of each period and
-    the strobe points stand in for it.
+    the strobe points stand in for it. Of a long record the first forcing periods are drawn, unless a window says
+    otherwise; the phase portrait then shows all of it.
     """
     selection = {} if run is None else {"run_index": run}
     sampled = sampled_names(dataset)
     if set(sampled) == {"displacement", "velocity"}:
-        return _draw_samples(dataset, selection)
+        return _draw_samples(dataset, selection, window)
     if sampled:
-        return draw_series(dataset, selection)
+        return draw_series(dataset, selection, window)
+    if window.given:
+        raise UsageError("figure: window: expected a run with a time series, got none recorded.")
     if "displacement_max" in dataset.variables or "impact_velocity" in dataset.variables:
         return _draw_periods(dataset, selection)
     raise DatasetError(
@@ -39,29 +46,30 @@ def draw_run(dataset: xr.Dataset, run: int | None = None) -> Figure:
     )
 
 
-def _draw_samples(dataset: xr.Dataset, selection: dict[str, int]) -> Figure:
+def _draw_samples(dataset: xr.Dataset, selection: dict[str, int], window: Window) -> Figure:
     """Draw the sampled displacement and velocity of a run."""
     samples = dataset.vibroimpact.samples(**selection)
-    hits = dataset.vibroimpact.impacts(**selection) if "impact" in dataset.dims else None
-    stops = _stops(dataset)
-    marks = _impact_points(hits, stops)
-    time, displacement, velocity = _with_impacts(samples, marks)
+    marks = _impact_points(dataset, selection)
+    part, words = time_part(dataset, samples, window)
     figure = canvas(150)
     above, middle, below = figure.subplots(3, 1, height_ratios=[1, 1, 1.5])
-    above.plot(time, displacement, color=LINE, rasterized=True)
-    middle.plot(time, velocity, color=LINE, rasterized=True)
-    below.plot(displacement, velocity, color=LINE, rasterized=True)
-    dots = {"linestyle": "none", "marker": "o", "markersize": 2.2, "color": MARK, "zorder": 3}
+    dots = {"linestyle": "none", "marker": "o", "color": MARK, "zorder": 3}
     for axis, columns in ((above, (0, 1)), (middle, (0, 2)), (below, (1, 2))):
-        axis.plot(marks[:, columns[0]], marks[:, columns[1]], label="just before impact", **dots)
-    for position, _ in stops:
+        shown = part if axis is not below or window.given else (-math.inf, math.inf)
+        rows, inside = _with_impacts(samples, marks, shown)
+        axis.plot(rows[:, columns[0]], rows[:, columns[1]], color=LINE, rasterized=True)
+        size = 2.2 if len(inside) <= _MOST_LARGE_MARKS else 0.8
+        axis.plot(
+            inside[:, columns[0]], inside[:, columns[1]], markersize=size, label="just before impact", **dots
+        )
+    for position in sorted({stop.position for stop in observed_stops(dataset)}):
         above.axhline(position, color=STOP, linestyle="--", linewidth=0.6, zorder=0)
         below.axvline(position, color=STOP, linestyle="--", linewidth=0.6, zorder=0, label="stop")
     middle.sharex(above)
     above.tick_params(labelbottom=False)
     above.set_ylabel(label(samples["displacement"]))
     middle.set_ylabel(label(samples["velocity"]))
-    middle.set_xlabel(label(samples["time"]))
+    middle.set_xlabel(label(samples["time"]) + words)
     below.xaxis.set_major_locator(MaxNLocator(5))  # long numbers of small displacements would run together
     below.set_xlabel(label(samples["displacement"]))
     below.set_ylabel(label(samples["velocity"]))
@@ -79,60 +87,32 @@ def _legend_above(figure: Figure, axis: Axes, *, has_marks: bool) -> None:
         figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=2, frameon=False)
 
 
-def _stops(dataset: xr.Dataset) -> list[tuple[float, float]]:
-    """Return position and side (+1 upper, -1 lower) of each stop of the scene; none where it is not known.
-
-    Nor where one is at another point than the observed one: there its position says nothing.
-    """
-    if any(name.endswith(("position", "side", "location")) for name in swept_names(dataset)):
-        return []
-    try:
-        scene = parse_toml(str(dataset.attrs.get("scene", "")))
-        stops = scene.get("stop", [])
-        if not _at_observed_point(scene, stops):
-            return []
-        return [(float(s["position"]), -1.0 if s.get("side") == "lower" else 1.0) for s in stops]
-    except (KeyError, TypeError, ValueError, AttributeError):
-        # The scene text is only provenance here: a figure without the line of the stop is still right.
-        return []
-
-
-def _at_observed_point(scene: dict[str, Any], stops: list[dict[str, Any]]) -> bool:
-    """Whether all stops limit the motion of the point whose displacement is recorded."""
-    body = scene.get("body", {})
-    if body.get("kind") == "chain":
-        masses = [stop.get("mass", len(body["masses"])) for stop in stops]
-        return set(masses) <= {body.get("observed_mass", masses[0] if masses else 0)}
-    if body.get("kind") == "beam":
-        tip = body.get("boundary", "clamped-free") == "clamped-free"
-        places = [stop.get("location", 1.0) for stop in stops]
-        default = 1.0 if tip or not places else places[0]
-        return set(places) <= {scene.get("sensor", {}).get("location", default)}
-    return True
-
-
-def _impact_points(hits: xr.Dataset | None, stops: list[tuple[float, float]]) -> Floats:
-    """Return time, displacement and velocity just before each impact, shape (impact, 3)."""
-    if hits is None or hits.sizes["impact"] == 0 or int(hits["impact_contact"].max()) > len(stops):
+def _impact_points(dataset: xr.Dataset, selection: dict[str, int]) -> Floats:
+    """Return time, displacement and velocity of the observed point just before its impacts, shape (impact, 3)."""
+    hits = dataset.vibroimpact.impacts(**selection) if "impact" in dataset.dims else None
+    known, seen = stops(dataset), observed_stops(dataset)
+    if hits is None or hits.sizes["impact"] == 0 or int(hits["impact_contact"].max()) > len(known):
         return np.empty((0, 3))
-    place = np.array(stops)[hits["impact_contact"].values - 1]
+    hits = hits.isel(impact=[known[contact - 1] in seen for contact in hits["impact_contact"].values])
+    place = np.array([(stop.position, stop.side) for stop in known])[hits["impact_contact"].values - 1]
     return np.column_stack(
         [hits["impact_time"].values, place[:, 0], place[:, 1] * hits["impact_velocity"].values]
     )
 
 
-def _with_impacts(samples: xr.Dataset, marks: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the time series with the impacts in it, and a gap in the velocity where it jumps."""
-    names = ("time", "displacement", "velocity")
-    rows = np.column_stack([samples[name].values for name in names])
-    inside = marks[
-        (marks[:, 0] >= rows[:, 0].min(initial=np.inf)) & (marks[:, 0] <= rows[:, 0].max(initial=-np.inf))
-    ]
+def _with_impacts(samples: xr.Dataset, marks: Floats, part: tuple[float, float]) -> tuple[Floats, Floats]:
+    """Return time, displacement and velocity of a part with its impacts in them, and the impacts alone.
+
+    The velocity has a gap where it jumps.
+    """
+    rows = np.column_stack([samples[name].values for name in ("time", "displacement", "velocity")])
+    rows = rows[(rows[:, 0] >= part[0]) & (rows[:, 0] <= part[1])]
+    ends = rows[:, 0].min(initial=np.inf), rows[:, 0].max(initial=-np.inf)
+    inside = marks[(marks[:, 0] >= ends[0]) & (marks[:, 0] <= ends[1])]
     gaps = inside.copy()
     gaps[:, 2] = np.nan
     merged = np.concatenate([rows, inside, gaps])
-    merged = merged[np.argsort(merged[:, 0], kind="stable")]
-    return merged[:, 0], merged[:, 1], merged[:, 2]
+    return merged[np.argsort(merged[:, 0], kind="stable")], inside
 
 
 def _draw_periods(dataset: xr.Dataset, selection: dict[str, int]) -> Figure:
@@ -166,8 +146,8 @@ def _extremes_panel(axis: Axes, dataset: xr.Dataset, run: xr.Dataset, selection:
     period = np.arange(1, run.sizes["period"] + 1)
     axis.plot(period, run["displacement_max"].values, "^", color=MARK, markersize=2.5, label="largest")
     axis.plot(period, run["displacement_min"].values, "v", color=LINE, markersize=2.5, label="smallest")
-    for position, _ in _stops(dataset):
-        axis.axhline(position, color=STOP, linestyle="--", linewidth=0.6, zorder=0, label="stop")
+    for stop in observed_stops(dataset):
+        axis.axhline(stop.position, color=STOP, linestyle="--", linewidth=0.6, zorder=0, label="stop")
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.set_xlabel("recorded forcing period (-)")
     axis.set_ylabel(label(run["final_displacement"].rename("displacement")))
@@ -180,11 +160,9 @@ def _impacts_panel(axis: Axes, dataset: xr.Dataset, run: xr.Dataset, selection: 
     axis.plot(hits["impact_time"].values, hits["impact_velocity"].values, "o", color=MARK, markersize=2)
     axis.set_xlabel(label(dataset["impact_time"].rename("time")))
     axis.set_ylabel(label(hits["impact_velocity"]))
-    axis.set_ylim(bottom=0)
+    axis.set_ylim(0.0, 1.05 * float(hits["impact_velocity"].max()) if hits.sizes["impact"] else 1.0)
 
 
 def _strobe_panel(axis: Axes, dataset: xr.Dataset, run: xr.Dataset, selection: dict[str, int]) -> None:
     """Draw displacement and velocity at forcing phase zero."""
-    axis.plot(run["strobe_displacement"].values, run["strobe_velocity"].values, "o", color=LINE, markersize=2)
-    axis.set_xlabel(label(run["strobe_displacement"]))
-    axis.set_ylabel(label(run["strobe_velocity"]))
+    draw_section(axis, run)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import math
+import re
 from typing import Any
 
+import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import COLOURS, STOP, Floats, canvas, label, title, unit_symbol
+from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order, limits
+from vibroimpact.analysis.figures.window import ANY, SHOWN_PERIODS, Window
 from vibroimpact.analysis.schema import RULES
 
 _STYLES = ("-", "--", ":", "-.")
@@ -17,8 +22,13 @@ _PANEL_MM = 34
 _ROW_MM = 4
 # What fits beside a panel, and in a row above it where each name comes after its line.
 _LONGEST_LABEL = 24
+_LONGEST_QUANTITY = 18
 _ROW_LETTERS = 52
 _LINE_LETTERS = 7
+# More instants than this would cover what is drawn: they are marked from this height of a panel on.
+_MOST_LINES, _TICKS_FROM = 25, 0.94
+# What tells variables of one quantity apart: contact_displacement_1, displacement_2; energy_kinetic, energy_potential.
+_PARTICULARS = re.compile(r"^contact_|_[0-9]+$|(?<=^energy)_.*")
 # What happens at an instant, and the variable with its times.
 _INSTANTS = (("event", "event_time"), ("impact", "impact_time"))
 
@@ -32,10 +42,10 @@ def sampled_names(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-def draw_series(dataset: xr.Dataset, selection: dict[str, Any]) -> Figure:
-    """Draw all sampled variables of one run against time: a panel for each unit, lines at the events.
+def draw_series(dataset: xr.Dataset, selection: dict[str, Any], window: Window = ANY) -> Figure:
+    """Draw the sampled variables of one run against time: a panel for each quantity, its stops, marks at the events.
 
-    Energies of modes have a panel of their own.
+    Panels and lines are in the order of the scene.
 
     Parameters
     ----------
@@ -43,24 +53,66 @@ def draw_series(dataset: xr.Dataset, selection: dict[str, Any]) -> Figure:
         With samples, as `open_dataset` gives it.
     selection : dict
         What names the run, as for `dataset.vibroimpact.samples`.
+    window : Window, optional
+        Default: the first forcing periods of a long record.
     """
     samples = dataset.vibroimpact.samples(**selection)
-    panels: dict[tuple[str, bool], list[xr.DataArray]] = {}
-    for name in sampled_names(samples):
-        place = (unit_symbol(samples[name]), name.startswith("modal_energy_"))
-        panels.setdefault(place, []).append(samples[name])
+    part, words = time_part(dataset, samples, window)
+    time = samples["time"].values
+    samples = samples.isel(time=(time >= part[0]) & (time <= part[1]))
+    panels: dict[tuple[str, str], list[xr.DataArray]] = {}
+    for name in in_scene_order(dataset, sampled_names(samples)):
+        panels.setdefault((unit_symbol(samples[name]), _quantity(samples[name])), []).append(samples[name])
     kind, instants = _instants(dataset, selection)
+    instants = instants[(instants >= part[0]) & (instants <= part[1])]
     rows = sum(-(-len(variables) // _columns(variables)) for variables in panels.values())
     figure = canvas(8 + _PANEL_MM * len(panels) + _ROW_MM * rows)
     axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axis, variables in zip(axes, panels.values(), strict=True):
         lines = _draw_lines(axis, samples["time"].values, variables)
+        _draw_stops(axis, dataset, variables)
         marks = _draw_instants(axis, kind, instants)
         # What the marks are is said once, above the first panel.
         _name_lines(axis, variables, lines, marks if axis is axes[0] else [])
         axis.margins(x=0.0)
-    axes[-1].set_xlabel(label(samples["time"]))
+    axes[-1].set_xlabel(label(samples["time"]) + words)
     return figure
+
+
+def time_part(dataset: xr.Dataset, samples: xr.Dataset, window: Window) -> tuple[tuple[float, float], str]:
+    """Return first and last instant to draw (s), and what the label of the time must say of it."""
+    time, rate = samples["time"].values, forcing_rate(dataset, samples)
+    period = None if rate is None else 2.0 * math.pi / rate
+    part = window.part(time, period)
+    if window.given or period is None or part == window.whole(time):
+        return part, ""
+    return part, f", first {SHOWN_PERIODS} of {np.ptp(time) / period:.4g} periods"
+
+
+def within(dataset: xr.Dataset, samples: xr.Dataset, window: Window) -> xr.Dataset:
+    """Return the samples in a window; all of them where none is given."""
+    if not window.given:
+        return samples
+    (start, stop), _ = time_part(dataset, samples, window)
+    inside = np.flatnonzero((samples["time"].values >= start) & (samples["time"].values <= stop))
+    return samples.isel(time=inside)
+
+
+def impacts_within(dataset: xr.Dataset, run: int | None, window: Window) -> xr.Dataset:
+    """Return the impacts of a run in a window; all of them where none is given."""
+    hits: xr.Dataset = dataset.vibroimpact.impacts(**({} if run is None else {"run_index": run}))
+    if not window.given:
+        return hits
+    time, rate = hits["impact_time"].values, forcing_rate(dataset, hits)
+    start, stop = window.part(time, None if rate is None else 2.0 * math.pi / rate)
+    return hits.isel(impact=np.flatnonzero((time >= start) & (time <= stop)))
+
+
+def _quantity(variable: xr.DataArray) -> str:
+    """Return what variables of one panel have in common: displacement of displacement_2."""
+    if "component_variable" in variable.attrs:
+        return ""
+    return _PARTICULARS.sub("", str(variable.name))
 
 
 def _instants(dataset: xr.Dataset, selection: dict[str, Any]) -> tuple[str, Floats]:
@@ -87,16 +139,28 @@ def _draw_lines(axis: Axes, time: Floats, variables: list[xr.DataArray]) -> list
     return lines
 
 
+def _draw_stops(axis: Axes, dataset: xr.Dataset, variables: list[xr.DataArray]) -> None:
+    """Draw the stops that displacements may meet, each in the colour of its displacement where there are several.
+
+    A stop farther away than the motion is wide would press it flat, and is not drawn.
+    """
+    for place, variable in enumerate(variables):
+        colour = COLOURS[place % len(COLOURS)] if len(variables) > 1 else STOP
+        low, high = float(variable.min()), float(variable.max())
+        for position in limits(dataset, str(variable.name)):
+            if low - (high - low) <= position <= high + (high - low):
+                axis.axhline(position, color=colour, linestyle=(0, (5, 3)), linewidth=0.6, zorder=0)
+
+
 def _draw_instants(axis: Axes, kind: str, instants: Floats) -> list[Artist]:
-    """Draw thin lines where something happened, over the whole height of a panel."""
+    """Draw thin lines where something happened: over the whole panel, or where there are many at its top alone."""
     if not instants.size:
         return []
-    height = axis.get_xaxis_transform()
     marks = axis.vlines(
         instants,
-        0.0,
+        0.0 if instants.size <= _MOST_LINES else _TICKS_FROM,
         1.0,
-        transform=height,
+        transform=axis.get_xaxis_transform(),
         color=STOP,
         linewidth=0.4,
         zorder=0,
@@ -111,7 +175,7 @@ def _name_lines(axis: Axes, variables: list[xr.DataArray], lines: list[Artist], 
     axis_label = label(variables[0])
     entries = marks
     if len(variables) > 1 or len(axis_label) > _LONGEST_LABEL:
-        axis_label = f"({unit_symbol(variables[0])})"
+        axis_label = f"{_common(variables)} ({unit_symbol(variables[0])})".strip()
         entries = [*lines, *marks]
     axis.set_ylabel(axis_label)
     if not entries:
@@ -126,6 +190,13 @@ def _name_lines(axis: Axes, variables: list[xr.DataArray], lines: list[Artist], 
         columnspacing=1.0,
         handlelength=1.5,
     )
+
+
+def _common(variables: list[xr.DataArray]) -> str:
+    """Return the quantity that all variables of a panel are: their common words, or the last part of their names."""
+    quantities = {_quantity(variable) or title(variable).rpartition(".")[2] for variable in variables}
+    words = min(quantities).replace("_", " ") if len(quantities) == 1 else ""
+    return words if len(words) <= _LONGEST_QUANTITY else ""
 
 
 def _columns(variables: list[xr.DataArray]) -> int:

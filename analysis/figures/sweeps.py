@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import re
+import math
 import sys
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label
+from vibroimpact.analysis.figures.scene_text import column_of, scene_of, swept_keys
 from vibroimpact.analysis.schema import swept_names
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.fmus.safe_toml import parse_toml
 
 # Of their size, what runs on one orbit differ by: rounding, and what is left of their transients.
 _NOISE = 1e-9
@@ -33,6 +34,14 @@ _SWEEPS: dict[str, dict[str, Any]] = {
 _CROWD, _DOT, _FAINTEST, _TOLD_APART = 20, 0.7, 0.3, 1e-3
 
 
+# Of the largest value of a map: where its median is below, a linear scale would leave half of it dark.
+_DARK = 0.15
+# Of the values, on a logarithmic scale: the share that lies below it, so that one grazing impact does not stretch it.
+_LOWEST = 0.01
+# Ratio of the ends of a logarithmic scale at most.
+_MOST_DECADES = 1e6
+
+
 def varied(dataset: xr.Dataset) -> list[str]:
     """Return the swept parameters that take more than one value."""
     return [name for name in swept_names(dataset) if dataset[name].size > 1]
@@ -40,18 +49,12 @@ def varied(dataset: xr.Dataset) -> list[str]:
 
 def _in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
     """Return swept parameters as the scene lists them; a displacement before a velocity, as in any phase plane."""
-    try:
-        keys = list(parse_toml(str(dataset.attrs.get("scene", ""))).get("sweep", {}))
-    except ValueError:
-        keys = []
-    written = [re.sub(r"\W+", "_", key).strip("_") for key in keys]
+    listed = [column_of(key, names) for key in swept_keys(scene_of(dataset))]
+    plane = ("displacement_start", "velocity_start")
 
     def rank(name: str) -> tuple[int, int]:
-        plane = ("displacement_start", "velocity_start")
         in_plane = plane.index(name) if set(plane) <= set(names) and name in plane else 0
-        return in_plane, next(
-            (place for place, key in enumerate(written) if key.endswith(name)), len(written)
-        )
+        return in_plane, listed.index(name) if name in listed else len(listed)
 
     return sorted(names, key=rank)
 
@@ -74,35 +77,39 @@ def one_value(values: Any) -> float | None:
 
 def draw_bifurcation(dataset: xr.Dataset) -> Figure:
     """Draw displacement range and impact velocity against the swept parameter, up and down told apart."""
-    (name,) = varied(dataset)
-    runs = dataset.vibroimpact.runs
     panels = [q for q in ("displacement_range", "impact_velocity") if q in dataset.variables]
     if not panels:
         raise DatasetError(
             "figure: expected extrema or impacts in the dataset, got neither. "
             "Set extrema = true or impacts = true in [record]."
         )
+    return draw_diagram(dataset, panels)
+
+
+def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
+    """Draw quantities against the one swept parameter, a panel for each: every run, period or impact is a point.
+
+    Raises
+    ------
+    DatasetError
+        If not exactly one parameter is swept.
+    """
+    if len(varied(dataset)) != 1:
+        raise DatasetError(wrong_sweep("one swept parameter", dataset))
+    (name,) = varied(dataset)
+    runs = dataset.vibroimpact.runs
     figure = canvas(15 + 45 * len(panels))
     axes = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
     directions = [d for d in _SWEEPS if d in np.unique(runs["direction"].values)]
     for axis, quantity in zip(axes, panels, strict=True):
         for direction in directions:
-            x, y = _points(dataset, runs, name, quantity, direction)
-            crowd = crowded(x, y)
-            single, style = crowd <= 1.0, _SWEEPS[direction]
-            axis.plot(
-                x[single], y[single], linestyle="none", rasterized=True, label=f"{direction} sweep", **style
-            )
-            if not single.all():
-                faded = {"color": style["color"], "alpha": _alpha(crowd[~single]), "linewidths": 0.0}
-                axis.scatter(x[~single], y[~single], s=_DOT, rasterized=True, **faded)
+            _draw_branch(axis, *_points(dataset, runs, name, quantity, direction), direction)
         axis.set_ylabel(label(dataset[quantity]))
         drawn = np.concatenate(
             [np.asarray(line.get_ydata()) for line in axis.lines]
             + [np.asarray(dots.get_offsets())[:, 1] for dots in axis.collections]
         )
-        largest = float(np.nanmax(drawn, initial=0.0))
-        axis.set_ylim(0.0, 1.05 * largest if largest > 0.0 else 1.0)
+        _fit_limits(axis, drawn)
         if drawn.size > 1 and one_value(drawn) is not None:
             _note(axis, f"one value, to {_NOISE:g} of it: {one_value(drawn):.9g}")
     axes[-1].set_xlabel(label(dataset[name]))
@@ -114,14 +121,46 @@ def draw_bifurcation(dataset: xr.Dataset) -> Figure:
     return figure
 
 
+def wrong_sweep(expected: str, dataset: xr.Dataset) -> str:
+    """Return the message for a dataset that sweeps another number of parameters."""
+    swept = varied(dataset)
+    return (
+        f"figure: expected {expected}, got {len(swept)} ({', '.join(swept) or 'none'}). "
+        "Select some in Python before drawing, or draw one run."
+    )
+
+
+def _draw_branch(axis: Axes, x: Any, y: Any, direction: str) -> None:
+    """Draw the points of one branch; those of a crowd are small and faint."""
+    crowd, style = crowded(x, y), _SWEEPS[direction]
+    single = crowd <= 1.0
+    axis.plot(x[single], y[single], linestyle="none", rasterized=True, label=f"{direction} sweep", **style)
+    if not single.all():
+        faded = {"color": style["color"], "alpha": _alpha(crowd[~single]), "linewidths": 0.0}
+        axis.scatter(x[~single], y[~single], s=_DOT, rasterized=True, **faded)
+
+
+def _fit_limits(axis: Axes, drawn: Any) -> None:
+    """Fit the vertical axis to its points, from 0 where none is below; rounding does not fill it."""
+    low, high = float(np.nanmin(drawn, initial=np.inf)), float(np.nanmax(drawn, initial=-np.inf))
+    if not low < 0.0:
+        axis.set_ylim(0.0, 1.05 * high if high > 0.0 else 1.0)
+    elif one_value(drawn) is not None:
+        axis.set_ylim(1.5 * low, 0.5 * low)
+    else:
+        axis.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
+
+
 def _points(
     dataset: xr.Dataset, runs: xr.Dataset, name: str, quantity: str, direction: str
 ) -> tuple[Any, Any]:
-    """Return the points of one branch: one for each run, or one for each impact of its runs."""
-    chosen = runs["direction"].values == direction
+    """Return the points of one branch: one for each run, or for each period or impact of its runs."""
     parameter = runs[name].values
+    # one direction alone is a scalar
+    chosen = np.broadcast_to(runs["direction"].values == direction, parameter.shape)
     if quantity != "impact_velocity":
-        return parameter[chosen], runs[quantity].values[chosen]
+        values = runs[quantity].values[chosen]
+        return np.repeat(parameter[chosen], values[:1].size), values.ravel()
     # Positions of the runs in the file lead from each impact to the parameter of its run.
     at = np.full(int(dataset["impact_run"].values.max(initial=-1)) + 1, np.nan)
     ids = runs["run_id"].values
@@ -166,10 +205,36 @@ def draw_map(dataset: xr.Dataset) -> Figure:
     if "impact_velocity" in dataset.variables:
         name = f"largest {label(dataset['impact_velocity'])}"
         quantities.append((largest_impact_velocity(dataset), name, "no impact"))
-    if not quantities or "run" in dataset["run_id"].dims:
+    if not quantities:
         raise DatasetError(
-            "figure: expected extrema or impacts on a grid of two parameters, got none or scattered runs. "
-            "Set extrema = true in [record], and sweep each parameter over its own values."
+            "figure: expected extrema or impacts in the dataset, got neither. "
+            "Set extrema = true or impacts = true in [record]."
+        )
+    return _draw_maps(dataset, quantities)
+
+
+def draw_impacts_per_period(dataset: xr.Dataset) -> Figure:
+    """Draw the mean number of impacts in a forcing period as colours over two swept parameters.
+
+    Motions P(p,q) are flat regions of p / q; chaos is uneven.
+    """
+    if "impacts_per_period" not in dataset.variables:
+        raise DatasetError(
+            "figure: expected the impacts of each period in the dataset, got none recorded. "
+            "Set impacts = true in [record] of a forced scene."
+        )
+    mean = dataset["impacts_per_period"].mean("period")
+    return _draw_maps(dataset, [(mean.where(mean > 0.0), "impacts per forcing period (-)", "no impact")])
+
+
+def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, str]]) -> Figure:
+    """Draw values over two swept parameters: a row for each quantity, a column for each direction."""
+    if len(varied(dataset)) != 2:
+        raise DatasetError(wrong_sweep("two swept parameters", dataset))
+    if "run" in dataset["run_id"].dims:
+        raise DatasetError(
+            "figure: expected a grid of two parameters, got scattered runs. "
+            "Sweep each parameter over its own values."
         )
     directions = np.atleast_1d(dataset["direction"].values).tolist()
     figure = canvas(5 + 60 * len(quantities), COLUMN_WIDTH * len(directions))
@@ -211,23 +276,17 @@ def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[s
         Values of all branches, which share their colours.
     """
     across, along = values.dims
-    same = one_value(of_all)
-    low, high = (
-        (float(np.nanmin(of_all)), float(np.nanmax(of_all))) if np.isfinite(of_all).any() else (0.0, 1.0)
-    )
-    if same is not None:
-        # a range of rounding would be drawn as a pattern
-        room = max(0.5 * abs(same), sys.float_info.min)
-        low, high = same - room, same + room
+    norm, same = _norm(of_all), one_value(of_all)
     axis.set_facecolor("0.88")
+    # a logarithm leaves what is below its scale without a colour
+    lowest = float(norm.vmin or 0.0) if isinstance(norm, LogNorm) else -math.inf
     mesh = axis.pcolormesh(
         values[along].values,
         values[across].values,
-        values.values,
+        np.maximum(values.values, lowest),
         shading="nearest",
         cmap="viridis",
-        vmin=low,
-        vmax=high,
+        norm=norm,
         rasterized=True,
     )
     # Long numbers of small distances would run into each other.
@@ -237,7 +296,28 @@ def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[s
     axis.label_outer()
     bar = axis.figure.colorbar(mesh, ax=axis)
     bar.set_label(text)
+    if isinstance(norm, LogNorm):
+        bar.set_label(f"{text}, log scale")
+        bar.ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        bar.ax.yaxis.set_major_formatter("{x:g}")
+        bar.ax.yaxis.set_minor_locator(NullLocator())
     if same is None:
         return []
     bar.set_ticks([same], labels=[f"{same:.6g}"])
     return [f"one value, to {_NOISE:g} of it"]
+
+
+def _norm(of_all: Any) -> Normalize:
+    """Return the scale of the colours: logarithmic where a linear one would leave half of the map dark."""
+    finite, same = of_all[np.isfinite(of_all)], one_value(of_all)
+    if not finite.size:
+        return Normalize(0.0, 1.0)
+    if same is not None:
+        # a range of rounding would be drawn as a pattern
+        room = max(0.5 * abs(same), sys.float_info.min)
+        return Normalize(same - room, same + room)
+    low, high = float(finite.min()), float(finite.max())
+    positive = finite[finite > 0.0]
+    if low < 0.0 or np.median(finite) > _DARK * high or positive.size < 2:
+        return Normalize(low, high)
+    return LogNorm(max(float(np.quantile(positive, _LOWEST)), high / _MOST_DECADES), high)

@@ -20,7 +20,7 @@ import numpy as np
 import xarray as xr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from compliant_parts import coupled, plain_energy_error
+from compliant_parts import coupled, plain_contact
 
 from vibroimpact.analysis.orders import observed_order
 from vibroimpact.orchestrator.provenance import git_commit, versions
@@ -30,6 +30,7 @@ STIFFNESS = {"kelvin_voigt": 1e4, "hertz": 1e6}
 METHODS = ("jacobi", "gauss_seidel", "force", "slopes")
 """Two plain importers; this one with a stop that answers a force alone, and with one that answers slopes too."""
 DEFAULT_STEPS = 30
+REPETITIONS = 3
 GOAL = 1e-6
 """Energy error that the default may have at 30 steps per contact, kelvin_voigt."""
 ROUNDING = 1e-11
@@ -37,11 +38,19 @@ ROUNDING = 1e-11
 
 
 def measured(law: str, method: str, steps: int) -> tuple[float, float, float, float]:
-    """Return energy error, residual as reported (both relative), seconds of the contact, steps with repetitions."""
-    began = time.perf_counter()
+    """Return energy error, residual as reported (both relative), seconds of the contact, steps with repetitions.
+
+    The seconds are those of the quickest of some repetitions: what else the machine does only adds to them.
+    """
+    runs = [contact(law, method, steps) for _ in range(REPETITIONS)]
+    return min(runs, key=lambda run: run[2])
+
+
+def contact(law: str, method: str, steps: int) -> tuple[float, float, float, float]:
+    """Return what `measured` does, of one contact."""
     if method in ("jacobi", "gauss_seidel"):
-        error = plain_energy_error(method, steps, STIFFNESS[law], law)
-        return error, math.nan, math.nan, math.nan
+        error, seconds = plain_contact(method, steps, STIFFNESS[law], law)
+        return error, math.nan, seconds, 3.0 * steps
     run = coupled(law, {"stiffness": STIFFNESS[law]}, slopes=method == "slopes", contact_steps=float(steps))
     began = time.perf_counter()
     run.importer.advance(2.0)
@@ -103,14 +112,16 @@ def table(law: str, dataset: xr.Dataset) -> None:
 
 
 def draw(dataset: xr.Dataset, figure: Path) -> None:
-    """Leave the figure, where figures can be drawn."""
+    """Leave the figures, where figures can be drawn: errors over the step, and over what they cost."""
     try:
-        from vibroimpact.analysis.figures import convergence, save
+        from vibroimpact.analysis.figures import convergence, save, work_precision
     except ImportError as error:
         print(f"  no figure: {error}")
         return
+    costs = figure.with_name(f"{figure.stem}_work_precision.png")
     save(convergence(dataset), figure)
-    print(f"  figure:  {figure}")
+    save(work_precision(dataset), costs)
+    print(f"  figures: {figure}, {costs}")
 
 
 def main() -> None:

@@ -421,13 +421,14 @@ def exchange_table(folder: Path) -> None:
     dataset.to_netcdf(path)
     print(f"  dataset: {path}")
     try:
-        from vibroimpact.analysis.figures import convergence, save
+        from vibroimpact.analysis.figures import convergence, save, work_precision
     except ImportError as error:
         print(f"  no figure: {error}")
         return
-    figure = folder / "coupled_exchange.png"
+    figure, costs = folder / "coupled_exchange.png", folder / "coupled_exchange_work_precision.png"
     save(convergence(dataset), figure)
-    print(f"  figure:  {figure}")
+    save(work_precision(dataset), costs)
+    print(f"  figures: {figure}, {costs}")
 
 
 def main() -> None:

@@ -102,7 +102,7 @@ def test_energies_are_summed_and_those_of_the_modes_have_their_own_panel() -> No
         ("impact-map", up_down(), "expected one run"),
     ],
 )
-def test_what_a_figure_cannot_show_is_refused(kind: figures.Kind, dataset: xr.Dataset, message: str) -> None:
+def test_what_a_figure_cannot_show_is_refused(kind: str, dataset: xr.Dataset, message: str) -> None:
     with pytest.raises(DatasetError, match=message):
         figures.draw(dataset, kind)
 

@@ -1,0 +1,289 @@
+"""The kinds of figures: what each draws, of which data, and which options it takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from matplotlib.figure import Figure
+
+from vibroimpact.analysis.figures.estimates import draw_estimates
+from vibroimpact.analysis.figures.intervals import draw_intervals
+from vibroimpact.analysis.figures.ladder import convergence, work_precision
+from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
+from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait, draw_return_map
+from vibroimpact.analysis.figures.recordings import draw_recording
+from vibroimpact.analysis.figures.replay import draw_replay, recordings_of
+from vibroimpact.analysis.figures.runs import draw_run
+from vibroimpact.analysis.figures.scores import draw_scores
+from vibroimpact.analysis.figures.series import sampled_names
+from vibroimpact.analysis.figures.spectra import (
+    draw_recording_spectrum,
+    draw_replay_spectrum,
+    draw_run_spectrum,
+)
+from vibroimpact.analysis.figures.strobe import draw_strobe
+from vibroimpact.analysis.figures.sweeps import (
+    draw_bifurcation,
+    draw_impacts_per_period,
+    draw_map,
+    varied,
+    wrong_sweep,
+)
+from vibroimpact.analysis.figures.window import Window
+from vibroimpact.analysis.recording import Recording
+from vibroimpact.fmus.errors import DatasetError, UsageError
+
+Data = xr.Dataset | Recording
+Family = Literal["runs", "recording", "replay", "estimates", "spikes", "ladder"]
+_WORDS: dict[Family, str] = {
+    "runs": "a dataset of runs",
+    "recording": "a recording",
+    "replay": "a replay",
+    "estimates": "estimates",
+    "spikes": "spikes",
+    "ladder": "what a benchmark measured",
+}
+# More values than this are told by their ends.
+_MOST_LISTED = 6
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What of the data is drawn.
+
+    Attributes
+    ----------
+    run : int or None
+        `run_index` of one run.
+    recording : str or None
+        Of a replay.
+    window : Window
+    """
+
+    run: int | None
+    recording: str | None
+    window: Window
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of figure.
+
+    Attributes
+    ----------
+    families : dict
+        For each family of data that it draws, the function that does.
+    fits : callable
+        Whether a dataset of runs holds what the figure shows.
+    takes : tuple of str
+        Options: `run`, `recording`, `window`.
+    """
+
+    families: dict[Family, Callable[[Any, View], Figure]]
+    fits: Callable[[xr.Dataset], bool] = lambda dataset: True
+    takes: tuple[str, ...] = ()
+
+
+def _swept(dataset: xr.Dataset, count: int, *names: str) -> bool:
+    return len(varied(dataset)) == count and any(name in dataset.variables for name in names)
+
+
+def _has_pair(dataset: xr.Dataset) -> bool:
+    names = sampled_names(dataset)
+    return any("displacement" in n and n.replace("displacement", "velocity") in names for n in names)
+
+
+def _has_phases(dataset: xr.Dataset) -> bool:
+    return "impact_phase" in dataset and bool(np.isfinite(dataset["impact_phase"].values).any())
+
+
+_SINGLE = ("run", "window")
+KINDS: dict[str, Kind] = {
+    "bifurcation": Kind(
+        {"runs": lambda data, view: draw_bifurcation(data)},
+        lambda data: _swept(data, 1, "displacement_range", "impact_velocity"),
+    ),
+    "map": Kind(
+        {"runs": lambda data, view: draw_map(data)},
+        lambda data: _swept(data, 2, "displacement_range", "impact_velocity"),
+    ),
+    "impacts-per-period": Kind(
+        {"runs": lambda data, view: draw_impacts_per_period(data)},
+        lambda data: _swept(data, 2, "impacts_per_period"),
+    ),
+    "strobe": Kind(
+        {"runs": lambda data, view: draw_strobe(data, view.run)},
+        lambda data: "strobe_displacement" in data,
+        ("run",),
+    ),
+    "run": Kind(
+        {"runs": lambda data, view: draw_run(data, view.run, view.window)},
+        lambda data: bool(sampled_names(data)) or "displacement_max" in data or "impact_velocity" in data,
+        _SINGLE,
+    ),
+    "portrait": Kind(
+        {"runs": lambda data, view: draw_portrait(data, view.run, view.window)}, _has_pair, _SINGLE
+    ),
+    "impact-map": Kind(
+        {"runs": lambda data, view: draw_impact_map(data, view.run, view.window)}, _has_phases, _SINGLE
+    ),
+    "return-map": Kind(
+        {"runs": lambda data, view: draw_return_map(data, view.run, view.window)},
+        lambda data: data.sizes.get("impact", 0) > 1,
+        _SINGLE,
+    ),
+    "spectrum": Kind(
+        {
+            "runs": lambda data, view: draw_run_spectrum(data, view.run, view.window),
+            "recording": lambda data, view: draw_recording_spectrum(data, view.window),
+            "replay": lambda data, view: draw_replay_spectrum(data, view.recording, view.window),
+        },
+        lambda data: bool(sampled_names(data)),
+        (*_SINGLE, "recording"),
+    ),
+    "energies": Kind(
+        {"runs": lambda data, view: draw_energies(data, view.run, view.window)},
+        lambda data: "modal_energy_1" in data and {"energy_kinetic", "energy_potential"} <= set(data),
+        _SINGLE,
+    ),
+    "shapes": Kind(
+        {"runs": lambda data, view: draw_shapes(data)},
+        lambda data: "location" in varied(data) and "displacement_start_1" in varied(data),
+    ),
+    "scores": Kind(
+        {"runs": lambda data, view: draw_scores(data)},
+        lambda data: "variance_accounted_for" in data and bool(varied(data)),
+    ),
+    "recording": Kind({"recording": lambda data, view: draw_recording(data, view.window)}, takes=("window",)),
+    "replay": Kind(
+        {"replay": lambda data, view: draw_replay(data, view.recording, view.window)},
+        takes=("recording", "window"),
+    ),
+    "estimates": Kind({"estimates": lambda data, view: draw_estimates(data)}),
+    "intervals": Kind({"spikes": lambda data, view: draw_intervals(data)}),
+    "convergence": Kind({"ladder": lambda data, view: convergence(data)}),
+    "work-precision": Kind({"ladder": lambda data, view: work_precision(data)}),
+}
+#: Kinds that draw all runs; a kind that takes a run, and is none of these, draws a single one.
+_OF_ALL = ("strobe",)
+
+
+def draw_view(data: Data, kind: str, view: View) -> Figure:
+    """Draw data as a kind of figure, or refuse it in one line that says what fits.
+
+    Raises
+    ------
+    DatasetError
+        The kind does not fit the data, or there is no such run or recording.
+    UsageError
+        The kind is unknown, or takes no such option.
+    """
+    if kind != "auto" and kind not in KINDS:
+        raise UsageError(f"figure: kind: expected one of auto, {', '.join(KINDS)}, got {kind!r}.")
+    family = _family(data)
+    chosen = _usual(data, family, view) if kind == "auto" else kind
+    drawer = KINDS[chosen].families.get(family)
+    if drawer is None:
+        raise DatasetError(
+            f"figure: kind: expected one that fits {_WORDS[family]} ({', '.join(fitting(data))}), got {chosen!r}."
+        )
+    _refuse_options(data, chosen, family, view)
+    if not isinstance(data, Recording) and family == "runs":
+        _refuse_run(data, chosen, view.run)
+    try:
+        return drawer(data, view)
+    except DatasetError as problem:
+        if family != "runs" or (not isinstance(data, Recording) and KINDS[chosen].fits(data)):
+            raise
+        raise DatasetError(f"{problem} Kinds that fit: {', '.join(fitting(data)) or 'none'}.") from problem
+
+
+def fitting(data: Data) -> list[str]:
+    """Return the kinds that fit data."""
+    family = _family(data)
+    return [
+        name
+        for name, kind in KINDS.items()
+        if family in kind.families and (isinstance(data, Recording) or family != "runs" or kind.fits(data))
+    ]
+
+
+def _family(data: Data) -> Family:
+    """Return what data is: it decides which kinds there are."""
+    if isinstance(data, Recording):
+        return "recording"
+    results: dict[str, Family] = {"replay": "replay", "estimates": "estimates", "spikes": "spikes"}
+    written = str(data.attrs.get("results_kind", ""))
+    if written in results:
+        return results[written]
+    if written:
+        raise DatasetError(
+            f"results: expected a kind that can be drawn ({', '.join(results)}), got {written!r}."
+        )
+    return "runs" if "run_index" in data.variables else "ladder"
+
+
+def _usual(data: Data, family: Family, view: View) -> str:
+    """Return the kind that says most of data."""
+    names: dict[Family, str] = {"spikes": "intervals", "ladder": "convergence"}
+    if isinstance(data, Recording) or family != "runs":
+        return names.get(family, family)
+    swept = varied(data)
+    if view.run is not None or not swept:
+        return "run"
+    if "variance_accounted_for" in data:
+        return "scores"
+    if len(swept) > 2:
+        raise DatasetError(wrong_sweep("one or two swept parameters", data))
+    return "bifurcation" if len(swept) == 1 else "map"
+
+
+def _refuse_options(data: Data, kind: str, family: Family, view: View) -> None:
+    """Refuse options that a kind does not take: what is asked for is never left out."""
+    given = {
+        "run": view.run is not None,
+        "recording": view.recording is not None,
+        "window": view.window.given,
+    }
+    foreign = {"run": family != "runs", "recording": family != "replay", "window": False}
+    for option, is_given in given.items():
+        if not is_given or (option in KINDS[kind].takes and not foreign[option]):
+            continue
+        takers = [name for name, one in KINDS.items() if option in one.takes and family in one.families]
+        advice = "Leave it out."
+        if option == "run" and family == "replay" and isinstance(data, xr.Dataset):
+            advice = f"Name a recording (--recording): {recordings_of(data)}."
+        elif takers and not foreign[option]:
+            advice = f"It goes with {', '.join(takers)}."
+        raise UsageError(
+            f"figure: {option}: expected none for {_WORDS[family]} drawn as {kind}, got one. {advice}"
+        )
+
+
+def _refuse_run(dataset: xr.Dataset, kind: str, run: int | None) -> None:
+    """Refuse a run that is not there, and no run where one of several must be named."""
+    there = np.unique(dataset["run_index"].values)
+    there = there[there >= 0]
+    if there.size <= _MOST_LISTED:
+        listed = ", ".join(str(number) for number in there) or "none"
+    else:
+        listed = f"{there[0]} to {there[-1]}" + (
+            "" if np.ptp(there) + 1 == there.size else ", not all of them"
+        )
+    if run is not None and run not in there:
+        raise DatasetError(
+            f"figure: run: expected one run of those there are ({listed}), got none of run_index {run}."
+        )
+    is_single = "run" in KINDS[kind].takes and kind not in _OF_ALL
+    if is_single and run is None and there.size > 1 and not KINDS[kind].fits(dataset):
+        raise DatasetError(
+            f"figure: kind: expected one that fits this dataset ({', '.join(fitting(dataset))}), got {kind!r}."
+        )
+    if is_single and run is None and there.size > 1:
+        raise DatasetError(
+            f"figure: run: expected one run, got {there.size}. Name one by its run_index (--run): {listed}."
+        )

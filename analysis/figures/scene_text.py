@@ -1,0 +1,128 @@
+"""What the text of the scene says of a figure: its stops, its forcing, the order of its keys.
+
+The text is provenance: it may be missing or of another version, and a figure without what it says is still right.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import xarray as xr
+
+from vibroimpact.fmus.safe_toml import parse_toml
+
+_ELEMENT = re.compile(r"(contact_)?displacement_([0-9]+)")
+
+
+class Stop(NamedTuple):
+    """A stop of a scene: position (m), side (+1 upper, -1 lower), and the point that it limits."""
+
+    position: float
+    side: float
+    point: float | None
+
+
+def scene_of(dataset: xr.Dataset) -> dict[str, Any]:
+    """Return the scene of a dataset, empty where there is none that can be read."""
+    try:
+        return parse_toml(str(dataset.attrs.get("scene", "")))
+    except ValueError:
+        return {}
+
+
+def table(scene: dict[str, Any], name: str) -> dict[str, Any]:
+    """Return a table of a scene, empty where it has none of that name."""
+    found = scene.get(name)
+    return found if isinstance(found, dict) else {}
+
+
+def swept_keys(scene: dict[str, Any]) -> list[str]:
+    """Return the swept keys as the scene lists them."""
+    return list(table(scene, "sweep"))
+
+
+def column_of(key: str, names: Sequence[str]) -> str | None:
+    """Return the coordinate of a swept key: the whole key where its last part is that of another too."""
+    written = re.sub(r"\W+", "_", key).strip("_")
+    return max((name for name in names if f"_{written}".endswith(f"_{name}")), key=len, default=None)
+
+
+def stops(dataset: xr.Dataset) -> list[Stop]:
+    """Return the stops of the scene; none where their places were swept or are not known."""
+    scene = scene_of(dataset)
+    if any(key.endswith((".position", ".side", ".location", ".mass")) for key in swept_keys(scene)):
+        return []
+    try:
+        return [_stop(stop, table(scene, "body")) for stop in scene.get("stop", [])]
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return []
+
+
+def _stop(written: dict[str, Any], body: dict[str, Any]) -> Stop:
+    """Return one stop; points are masses of a chain, places on a beam."""
+    point: float | None = None
+    if body.get("kind") == "chain":
+        point = written.get("mass", len(body["masses"]))
+    elif body.get("kind") == "beam":
+        point = written.get("location", 1.0)
+    return Stop(float(written["position"]), -1.0 if written.get("side") == "lower" else 1.0, point)
+
+
+def observed_stops(dataset: xr.Dataset) -> list[Stop]:
+    """Return the stops that limit the point whose displacement is recorded."""
+    found = stops(dataset)
+    scene = scene_of(dataset)
+    body, first = table(scene, "body"), found[0].point if found else None
+    if body.get("kind") == "chain":
+        observed = body.get("observed_mass", first)
+    elif body.get("kind") == "beam":
+        tip = body.get("boundary", "clamped-free") == "clamped-free"
+        observed = table(scene, "sensor").get("location", 1.0 if tip else first)
+    else:
+        observed = None
+    return [stop for stop in found if stop.point == observed]
+
+
+def limits(dataset: xr.Dataset, name: str) -> list[float]:
+    """Return the positions (m) of the stops that a sampled displacement may meet."""
+    if name == "displacement":
+        return [stop.position for stop in observed_stops(dataset)]
+    element = _ELEMENT.fullmatch(name)
+    if element is None:
+        return []
+    number, found = int(element[2]), stops(dataset)
+    if element[1]:
+        return [stop.position for place, stop in enumerate(found, start=1) if place == number]
+    is_chain = table(scene_of(dataset), "body").get("kind") == "chain"
+    return [stop.position for stop in found if is_chain and stop.point == number]
+
+
+def forcing_rate(dataset: xr.Dataset, run: xr.Dataset) -> float | None:
+    """Return the angular frequency of the forcing of one run, rad/s; None where nothing oscillates.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+    run : xarray.Dataset
+        Rows of the run, with its swept values as coordinates.
+    """
+    scene = scene_of(dataset)
+    for key, factor in (("angular_frequency", 1.0), ("frequency", 2.0 * math.pi)):
+        value = table(scene, "forcing").get(key)
+        if f"forcing.{key}" in swept_keys(scene):
+            column = column_of(f"forcing.{key}", [str(name) for name in run.coords])
+            value = None if column is None else run[column].item()
+        if isinstance(value, int | float) and math.isfinite(value) and value > 0.0:
+            return factor * value
+    return None
+
+
+def in_scene_order(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
+    """Return sampled variables as the scene lists them; those that it does not name come last."""
+    record = table(scene_of(dataset), "record")
+    listed = (table(record, "time_series") or record).get("variables", ())
+    written = [re.sub(r"\W+", "_", name).strip("_") for name in listed if isinstance(name, str)]
+    return sorted(names, key=lambda name: written.index(name) if name in written else len(written))

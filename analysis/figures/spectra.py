@@ -1,0 +1,250 @@
+"""Figures of amplitude spectra: of the time series of a run, of a recording, of both signals of a replay."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, page_style, title
+from vibroimpact.analysis.figures.recordings import MOST_PANELS, short_name
+from vibroimpact.analysis.figures.replay import comparison_of
+from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order
+from vibroimpact.analysis.figures.series import sampled_names, within
+from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.analysis.recording import Recording
+from vibroimpact.analysis.unit_symbols import written_unit
+from vibroimpact.fmus.errors import DatasetError
+
+_PANEL_MM = 38
+_FEWEST = 16
+# Of the mean interval: samples that are farther from an even spacing have no spectrum.
+_UNEVEN = 0.01
+# Frequencies are shown up to the last amplitude above this part of the largest, amplitudes down to the other.
+_LAST, _FLOOR = 1e-2, 1e-5
+# Points of a line: of more the largest of each span is drawn.
+_MOST_POINTS = 600
+_MULTIPLES = "multiples of the forcing frequency"
+_MULTIPLE_LINE: dict[str, Any] = {"color": STOP, "linestyle": ":", "linewidth": 0.5, "zorder": 0}
+_LEAST_MULTIPLES, _MOST_MULTIPLES = 10, 20
+
+
+@dataclass(frozen=True, slots=True)
+class _Signal:
+    """What one line shows."""
+
+    name: str
+    unit: str
+    time: Floats
+    values: Floats
+    colour: str = LINE
+
+
+def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+    """Draw the amplitude spectra of the sampled variables of one run, with the multiples of its forcing frequency.
+
+    A harmonic motion of amplitude A is a peak of height A. Of a forced motion whole periods are taken, so that the
+    multiples lie on the grid of the frequencies. Of a nondimensional scene the axis is the angular frequency.
+
+    Raises
+    ------
+    DatasetError
+        If no time series was recorded, or its samples are too few.
+    """
+    if not sampled_names(dataset):
+        raise DatasetError(
+            "figure: expected a time series of the run, got none recorded. "
+            'Set time_series = { rate = ..., variables = ["displacement"] } in [record].'
+        )
+    samples = dataset.vibroimpact.samples(**({} if run is None else {"run_index": run}))
+    samples = within(dataset, samples, window)
+    names = in_scene_order(dataset, sampled_names(samples))[:MOST_PANELS]
+    time = samples["time"].values
+    signals = [
+        [_Signal(title(samples[name]), str(samples[name].attrs["units"]), time, samples[name].values)]
+        for name in names
+    ]
+    is_angular = dataset.attrs.get("units_system") == "nondimensional"
+    return _draw_panels(signals, forcing_rate(dataset, samples), is_run=True, is_angular=is_angular)
+
+
+def draw_recording_spectrum(recording: Recording, window: Window = ANY) -> Figure:
+    """Draw the amplitude spectrum of each channel of a recording: of its longest stretch without a gap.
+
+    Raises
+    ------
+    DatasetError
+        If no channel has evenly spaced samples.
+    """
+    channels = [channel for channel in recording.channels.values() if channel.axis.interval is not None]
+    if not channels:
+        raise DatasetError(
+            f"{recording.title}: expected a channel of evenly spaced samples, got none. "
+            "Only such samples have a spectrum."
+        )
+    signals = []
+    for channel in channels[:MOST_PANELS]:
+        start, stop = window.part(channel.time)
+        part = channel.between(start, stop)
+        signals.append([_Signal(channel.name, channel.unit, part.time, part.values)])
+    return _draw_panels(signals, None)
+
+
+def draw_replay_spectrum(dataset: xr.Dataset, recording: str | None = None, window: Window = ANY) -> Figure:
+    """Draw the amplitude spectra of a measured signal and of its replay over each other."""
+    name, words = comparison_of(dataset, recording)
+    measured = dataset[f"{name}_measured"]
+    time = measured[str(measured.dims[0])].values
+    start, stop = window.part(time)
+    rows = (time >= start) & (time <= stop)
+    signals = [
+        _Signal(
+            kind, str(measured.attrs["units"]), time[rows], dataset[f"{name}_{kind}"].values[rows], colour
+        )
+        for kind, colour in (("measured", LINE), ("simulated", MARK))
+    ]
+    figure = _draw_panels([signals], None)
+    figure.axes[0].set_title(f"{name}, {words}" if words else name, fontsize=7.5, loc="left")
+    return figure
+
+
+def _draw_panels(
+    panels: Sequence[Sequence[_Signal]], rate: float | None, *, is_run: bool = False, is_angular: bool = False
+) -> Figure:
+    """Draw a panel for each group of signals; those of a run share the frequencies that its first one has.
+
+    Parameters
+    ----------
+    panels : sequence
+    rate : float or None
+        Angular frequency of the forcing, rad/s.
+    is_run, is_angular : bool
+    """
+    factor = 1.0 if is_angular else 0.5 / math.pi
+    with page_style():
+        figure = canvas(10 + _PANEL_MM * len(panels))
+        axes = figure.subplots(len(panels), 1, squeeze=False, sharex=is_run)[:, 0]
+        end = None
+        for axis, signals in zip(axes, panels, strict=True):
+            spectra = [
+                amplitude_spectrum(signal.name, signal.time, signal.values, rate) for signal in signals
+            ]
+            end = _end(spectra, rate) if end is None or not is_run else end
+            _draw_panel(axis, signals, spectra, factor, end)
+            if rate is not None:
+                for multiple in range(1, min(int(end / rate), _MOST_MULTIPLES) + 1):
+                    axis.axvline(factor * rate * multiple, label=_MULTIPLES, **_MULTIPLE_LINE)
+        axes[-1].set_xlabel("angular frequency (-)" if is_angular else "frequency (Hz)")
+        handles, labels = axes[0].get_legend_handles_labels()
+        entries = dict(zip(labels, handles, strict=True))
+        if entries:
+            figure.legend(
+                entries.values(), entries.keys(), loc="outside upper center", ncols=3, frameon=False
+            )
+        figure.align_ylabels(axes)
+    return figure
+
+
+def _end(spectra: Sequence[tuple[Floats, Floats]], rate: float | None) -> float:
+    """Return the angular frequency up to which spectra are shown, rad/s."""
+    end = 0.0 if rate is None else _LEAST_MULTIPLES * rate
+    for frequency, amplitude in spectra:
+        high = np.flatnonzero(amplitude > _LAST * amplitude.max())
+        end = max(end, 1.1 * float(frequency[high[-1]]) if high.size else 0.0)
+    highest = min(float(frequency[-1]) for frequency, _ in spectra)
+    return min(end, highest) or highest
+
+
+def _draw_panel(
+    axis: Axes,
+    signals: Sequence[_Signal],
+    spectra: Sequence[tuple[Floats, Floats]],
+    factor: float,
+    end: float,
+) -> None:
+    """Draw spectra of one unit; `factor` makes of an angular frequency what the axis shows."""
+    for signal, (frequency, amplitude) in zip(signals, spectra, strict=True):
+        inside = frequency <= end
+        # the mean was taken off
+        inside[0] = False
+        places, heights = _upper_edge(frequency[inside], amplitude[inside])
+        words = signal.name if len(signals) > 1 else None
+        axis.plot(factor * places, heights, color=signal.colour, linewidth=0.6, label=words, rasterized=True)
+    largest = max(float(amplitude.max()) for _, amplitude in spectra)
+    axis.set_xlim(0.0, factor * end)
+    if largest > 0.0:
+        axis.set_yscale("log")
+        axis.set_ylim(_FLOOR * largest, 3.0 * largest)
+    axis.set_ylabel(f"amplitude ({written_unit(signals[0].unit)})")
+    axis.set_title(short_name(signals[0].name), fontsize=7.5, loc="left", pad=2)
+
+
+def _upper_edge(frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
+    """Return the largest amplitude of each span of frequencies, so that no peak is lost."""
+    per_span = -(-len(frequency) // _MOST_POINTS) or 1
+    starts = np.arange(0, len(frequency), per_span)
+    if not starts.size:
+        return frequency, amplitude
+    heights: Floats = np.maximum.reduceat(amplitude, starts)
+    return frequency[starts], heights
+
+
+def amplitude_spectrum(
+    name: str, time: Floats, values: Floats, rate: float | None = None
+) -> tuple[Floats, Floats]:
+    """Return the amplitude spectrum of the longest stretch without a gap, its mean taken off (Hann window).
+
+    Parameters
+    ----------
+    name : str
+        Of the signal, for errors.
+    time, values : ndarray of float, shape (sample,)
+        Evenly spaced instants, s; NaN where there is no value.
+    rate : float, optional
+        Angular frequency, rad/s, of which whole periods are taken.
+
+    Returns
+    -------
+    angular_frequency, amplitude : ndarray of float, shape (sample // 2 + 1,)
+        rad/s; a harmonic motion of amplitude A whose frequency is on the grid has the height A.
+
+    Raises
+    ------
+    DatasetError
+        The samples are uneven, or fewer than 16 follow each other.
+
+    Examples
+    --------
+    >>> time = np.arange(1000) / 100.0
+    >>> frequency, amplitude = amplitude_spectrum("x", time, 3.0 + 2.0 * np.cos(8.0 * np.pi * time))
+    >>> place = int(amplitude.argmax())
+    >>> round(float(frequency[place]) / (2.0 * np.pi), 6), round(float(amplitude[place]), 6)
+    (4.0, 2.0)
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.isfinite(values), [False]])))
+    first, stop = max(edges.reshape(-1, 2), key=np.ptp, default=(0, 0))
+    time, values = time[first:stop], values[first:stop]
+    if len(time) < _FEWEST:
+        raise DatasetError(
+            f"figure: {name}: expected {_FEWEST} samples without a gap for a spectrum, got {len(time)}."
+        )
+    interval = float(time[-1] - time[0]) / (len(time) - 1)
+    if np.abs(np.diff(time) - interval).max() > _UNEVEN * interval:
+        raise DatasetError(f"figure: {name}: expected evenly spaced samples for a spectrum, got uneven ones.")
+    count = len(values)
+    if rate is not None:
+        period = 2.0 * math.pi / (rate * interval)
+        # less than a whole period, as all there is
+        count = round(math.floor(count / period + _UNEVEN) * period) or count
+    count = min(count, len(values))
+    weights = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(count) / count)
+    swing = values[:count] - np.mean(values[:count])
+    amplitude = np.asarray(2.0 * np.abs(np.fft.rfft(weights * swing)) / weights.sum(), dtype=np.float64)
+    frequency: Floats = np.arange(len(amplitude), dtype=np.float64) * (2.0 * np.pi / (count * interval))
+    return frequency, amplitude

@@ -1,0 +1,72 @@
+"""Figures of the motion seen once per forcing period: sections of one run, diagrams of a sweep."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from vibroimpact.analysis.figures.page import LINE, STOP, canvas, label
+from vibroimpact.analysis.figures.scene_text import observed_stops
+from vibroimpact.analysis.figures.sweeps import draw_diagram, one_value, varied
+from vibroimpact.fmus.errors import DatasetError
+
+# Points of a section: more are small, so that the layers of an attractor show.
+_MANY = 100
+
+
+def draw_strobe(dataset: xr.Dataset, run: int | None = None) -> Figure:
+    """Draw displacements at forcing phase 0 against the swept parameter, or the Poincare section of one run.
+
+    Raises
+    ------
+    DatasetError
+        If nothing was recorded once per period.
+    """
+    if "strobe_displacement" not in dataset.variables:
+        raise DatasetError(
+            "figure: expected a motion recorded once per period, got none. "
+            "Set strobe = true in [record] of a forced scene."
+        )
+    if run is None and varied(dataset):
+        return draw_diagram(dataset, ["strobe_displacement"])
+    runs = dataset.vibroimpact.runs
+    chosen = runs if run is None else runs.isel(run=runs["run_index"].values == run)
+    figure = canvas(75)
+    axis = figure.subplots()
+    draw_section(axis, chosen.isel(run=0))
+    for stop in observed_stops(dataset):
+        low, high = axis.get_xlim()
+        if low <= stop.position <= high:
+            axis.axvline(stop.position, color=STOP, linestyle="--", linewidth=0.6, zorder=0)
+    return figure
+
+
+def draw_section(axis: Axes, run: xr.Dataset) -> None:
+    """Draw displacement and velocity of one run at forcing phase 0."""
+    planes: tuple[tuple[Any, Any], ...] = (
+        (run["strobe_displacement"], axis.set_xlim),
+        (run["strobe_velocity"], axis.set_ylim),
+    )
+    (x, _), (y, _) = planes
+    few = np.isfinite(x.values).sum() <= _MANY
+    style: dict[str, Any] = {
+        "markersize": 2.5 if few else 1.0,
+        "markeredgewidth": 0.0,
+        "color": LINE,
+        "rasterized": True,
+    }
+    axis.plot(x.values, y.values, "o", **style)
+    for values, limit in planes:
+        same = one_value(values.values)
+        if same is not None:
+            # a single point: numbers around it to nine digits say nothing
+            room = 0.5 * abs(same) or 1.0
+            limit(same - room, same + room)
+    axis.xaxis.set_major_locator(MaxNLocator(5))
+    axis.set_xlabel(label(x))
+    axis.set_ylabel(label(y))

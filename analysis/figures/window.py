@@ -1,0 +1,102 @@
+"""Which part of a motion a figure shows: from an instant to another, or so many forcing periods."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from vibroimpact.analysis.figures.page import Floats
+from vibroimpact.fmus.errors import UsageError
+
+#: Of a longer record so many forcing periods are drawn: more would run together in one column.
+SHOWN_PERIODS = 8
+# Of a period: what rounding may make of whole ones.
+_SLACK = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """What the user wants to see; nothing given: the first periods of a long record.
+
+    Attributes
+    ----------
+    start, stop : float or None
+        s, on the clock of the file.
+    periods : float or None
+        Length in forcing periods, from `start` on, or up to `stop`.
+    """
+
+    start: float | None = None
+    stop: float | None = None
+    periods: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what is no window."""
+        for name, value in (("from", self.start), ("to", self.stop), ("periods", self.periods)):
+            if value is not None and not math.isfinite(value):
+                raise UsageError(f"figure: {name}: expected a number, got {value}.")
+        if self.periods is not None and self.periods <= 0.0:
+            raise UsageError(f"figure: periods: expected a number > 0, got {self.periods:g}.")
+        if None not in (self.start, self.stop, self.periods):
+            raise UsageError("figure: window: expected two of from, to and periods at most, got all three.")
+        if self.start is not None and self.stop is not None and self.start >= self.stop:
+            raise UsageError(
+                f"figure: window: expected from < to, got {self.start:g} and {self.stop:g}. Turn them round."
+            )
+
+    @property
+    def given(self) -> bool:
+        """Whether the user asked for a part."""
+        return (self.start, self.stop, self.periods) != (None, None, None)
+
+    @staticmethod
+    def whole(time: Floats) -> tuple[float, float]:
+        """Return first and last instant there are, s."""
+        return (float(time[0]), float(time[-1])) if len(time) else (math.nan, math.nan)
+
+    def part(self, time: Floats, period: float | None = None) -> tuple[float, float]:
+        """Return first and last instant to draw, s.
+
+        Parameters
+        ----------
+        time : ndarray of float, shape (sample,)
+            All there is, ascending, s.
+        period : float, optional
+            Forcing period, s.
+
+        Raises
+        ------
+        UsageError
+            Nothing, or a single sample, lies in the window; or periods are asked for where there are none.
+        """
+        first, last = self.whole(time)
+        if self.periods is not None and period is None:
+            raise UsageError(
+                f"figure: periods: expected a scene with a forcing period, got none. "
+                f"Give a part of {first:.6g} to {last:.6g} s with from and to."
+            )
+        start, stop = self._ends(first, last, period)
+        if int(((time >= start) & (time <= stop)).sum()) < 2 < len(time):
+            raise UsageError(
+                f"figure: window: expected a part of {first:.6g} to {last:.6g} s with two samples at least, "
+                f"got {start:.6g} to {stop:.6g} s."
+            )
+        return max(start, first), min(stop, last)
+
+    def _ends(self, first: float, last: float, period: float | None) -> tuple[float, float]:
+        length = (self.periods or SHOWN_PERIODS) * period if period is not None else math.inf
+        if not self.given:
+            return first, first + (length if last - first > (1.0 + _SLACK) * length else last - first)
+        if self.periods is None:
+            return (
+                first if self.start is None else self.start,
+                last if self.stop is None else self.stop,
+            )
+        if self.stop is not None:
+            return self.stop - length, self.stop
+        start = first if self.start is None else self.start
+        return start, start + length
+
+
+#: Nothing was asked for.
+ANY = Window()
