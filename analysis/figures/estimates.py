@@ -149,6 +149,30 @@ def _errorbars(axis: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray) -> N
     low, high = float(np.min(y - 2 * error)), float(np.max(y + 2 * error))
     low, high = max(middle - 2 * reach, low), min(middle + 2 * reach, high)
     _limit(axis.set_ylim, low, high)
+    _mark_beyond(axis, x, y)
+
+
+def _mark_beyond(axis: Axes, x: np.ndarray, y: np.ndarray) -> None:
+    """Draw an arrow at the frame for each point that lies beyond it, and write the farthest value."""
+    low, high = axis.get_ylim()
+    height = axis.get_xaxis_transform()
+    for marker, place, beyond, farthest in (
+        ("^", 0.95, y > high, np.argmax(y)),
+        ("v", 0.05, y < low, np.argmin(y)),
+    ):
+        if not beyond.any():
+            continue
+        arrows = np.full(int(beyond.sum()), place)
+        axis.plot(x[beyond], arrows, marker, color=MARK, markersize=3, linestyle="none", transform=height)
+        axis.annotate(
+            f"{y[farthest]:.3g}",
+            (float(x[beyond].max()), place),
+            xycoords=height,
+            xytext=(4, 0),
+            textcoords="offset points",
+            fontsize=7,
+            va="center",
+        )
 
 
 def _draw_response(dataset: xr.Dataset) -> Figure:

@@ -99,23 +99,30 @@ def _draw_slopes(axis: Axes, report: xr.Dataset, scale: str) -> None:
     axis.set_ylabel(r"slope d ln C / d ln $\varepsilon$")
     low, high = report.attrs["slope_window"]
     shades = np.linspace(_LIGHTEST, _DARKEST, report.sizes["embedding"])
-    seen = np.zeros(len(radii), dtype=np.bool_)
+    # below the grid on which the instants were written every slope is that of the grid
+    grid = float(report.attrs.get("resolution", 0.0))
+    above = radii >= (grid if scale == "raw" else grid / float(np.nanmedian(report["interval"].values)))
+    seen, ends = np.zeros(len(radii), dtype=np.bool_), []
     for place, shade in enumerate(shades):
         sums = report[f"correlation_sum_{scale}"].values[place]
-        inside = (sums >= low) & (sums <= high)
+        inside = above & (sums >= low) & (sums <= high)
         seen |= inside
         slopes = report[f"local_slope_{scale}"].values[place]
         shuffled = report[f"surrogate_sum_{scale}"].values[place]
         surrogate = report[f"surrogate_local_slope_{scale}"].values[place]
-        surrogate = np.where((shuffled >= low) & (shuffled <= high), surrogate, np.nan)
+        surrogate = np.where(above & (shuffled >= low) & (shuffled <= high), surrogate, np.nan)
+        drawn = np.where(above & (sums > low / 3.0), slopes, np.nan)
         colour = str(shade)
-        axis.plot(radii, np.where(sums > low / 3.0, slopes, np.nan), color=colour, linewidth=0.4)
+        axis.plot(radii, drawn, color=colour, linewidth=0.4)
         axis.plot(radii, np.where(inside, slopes, np.nan), color=colour, linewidth=1.2)
         axis.plot(radii, surrogate, "--", color=MARK, linewidth=0.7)
-        _name_embedding(axis, radii[inside], slopes[inside], place + 1)
+        ends.append(drawn)
     axis.set_xscale("log")
+    first = float(radii[seen].min()) if seen.any() else 0.0
     if seen.any():
-        axis.set_xlim(radii[seen].min() / 2.0, radii[-1])
+        axis.set_xlim(first / 3.0, radii[-1])
+    for place, drawn in enumerate(ends):
+        _name_embedding(axis, radii, np.where(radii >= first / 1.8, drawn, np.nan), place + 1)
     axis.set_ylim(0.0, report.sizes["embedding"] + 0.5)
     axis.legend(
         handles=[
@@ -135,13 +142,13 @@ def _draw_slopes(axis: Axes, report: xr.Dataset, scale: str) -> None:
 
 
 def _name_embedding(axis: Axes, radii: np.ndarray, slopes: np.ndarray, embedding: int) -> None:
-    """Write m at the small end of a line."""
+    """Write m beside the small end of a line, where no line is."""
     known = np.flatnonzero(np.isfinite(slopes))
     if known.size:
         axis.annotate(
             str(embedding),
             (radii[known[0]], slopes[known[0]]),
-            xytext=(-4, 0),
+            xytext=(-5, 0),
             textcoords="offset points",
             fontsize=6,
             ha="center",

@@ -15,7 +15,9 @@ from typer.testing import CliRunner
 
 from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
+from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.kinds import fitting
+from vibroimpact.analysis.intervals import interval_report
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis
 from vibroimpact.analysis.recording_files import write_recording
 from vibroimpact.analysis.replay import compare, comparison_dataset
@@ -339,3 +341,47 @@ def test_kinds_that_fit_are_those_that_can_be_drawn(tmp_path: Path) -> None:
         "return-map",
         "spectrum",
     ]
+
+
+def decay(damping: list[float]) -> xr.Dataset:
+    """A free decay and its damping ratio in windows of falling amplitude."""
+    time = np.linspace(0.0, 1.0, 200)
+    motion = ("time", np.exp(-time) * np.cos(40.0 * time), {"units": "m"})
+    number = len(damping)
+    windows = {
+        "window_amplitude": np.geomspace(1.0, 0.01, number),
+        "window_frequency": np.full(number, 40.0),
+        "window_frequency_error": np.full(number, 0.1),
+        "window_damping": np.array(damping),
+        "window_damping_error": np.full(number, 1e-4),
+    }
+    return xr.Dataset(
+        {"measured": motion, "exponential_fit": motion}
+        | {name: ("window", values, {"units": "m"}) for name, values in windows.items()},
+        coords={"time": ("time", time, {"units": "s"})},
+        attrs={"results_kind": "estimates", "estimates": "decay", "channel": "arm"},
+    )
+
+
+def test_a_damping_beyond_the_frame_is_an_arrow_with_its_value() -> None:
+    axis = figures.draw(decay([0.010, 0.011, 0.012] * 6 + [0.25, 0.31])).axes[-1]
+    assert axis.get_ylim()[1] < 0.2
+    (arrows,) = [line for line in axis.get_lines() if line.get_marker() == "^"]
+    assert arrows.get_xdata().tolist() == pytest.approx([0.01274, 0.01], abs=1e-4)
+    assert [text.get_text() for text in axis.texts] == ["0.31"]
+    inside = figures.draw(decay([0.010, 0.011, 0.012, 0.013])).axes[-1]
+    assert not inside.texts
+
+
+def test_slopes_of_intervals_end_at_the_grid_on_which_the_instants_were_written() -> None:
+    times = np.round(np.cumsum(np.random.default_rng(6).exponential(size=400)), 2)
+    figure = draw_intervals(interval_report(times, resolution=0.01))
+    raw = figure.axes[2]
+    for axis, grid in ((raw, 0.01), (figure.axes[3], 0.01 / float(np.median(np.diff(times))))):
+        drawn = [line.get_xdata()[np.isfinite(line.get_ydata())] for line in axis.get_lines()]
+        assert min(x.min() for x in drawn if x.size) >= grid
+    # each number stands left of its own line
+    for text, line in zip(raw.texts, raw.get_lines()[::3], strict=True):
+        x = line.get_xdata()[np.isfinite(line.get_ydata())]
+        assert text.xy[0] in x
+        assert (x >= text.xy[0]).sum() >= 0.8 * x.size
