@@ -60,30 +60,43 @@ def laid_out(figure: Figure, title: str | None, width: float | None, height: flo
     Raises
     ------
     UsageError
-        If its panels have no room.
+        If its panels have no room, or the title has a formula that cannot be set.
     """
     if title is not None:
-        figure.suptitle(title, fontsize=8)
-    if width is None and height is None:
-        return figure
-    size = [
-        old if given is None else given * _MM
-        for given, old in zip((width, height), figure.get_size_inches(), strict=True)
-    ]
-    asked = " x ".join(f"{inches / _MM:.4g}" for inches in size)
-    if not all(_SMALLEST <= inches / _MM <= _LARGEST for inches in size):
-        raise UsageError(f"figure: size: expected {_SMALLEST} to {_LARGEST} mm, got {asked} mm.")
-    figure.set_size_inches(size[0], size[1])
+        figure.suptitle(title, fontsize=8, wrap=True)
+    if width is not None or height is not None:
+        size = [
+            old if given is None else given * _MM
+            for given, old in zip((width, height), figure.get_size_inches(), strict=True)
+        ]
+        asked = " x ".join(f"{inches / _MM:.4g}" for inches in size)
+        if not all(_SMALLEST <= inches / _MM <= _LARGEST for inches in size):
+            raise UsageError(f"figure: size: expected {_SMALLEST} to {_LARGEST} mm, got {asked} mm.")
+        figure.set_size_inches(size[0], size[1])
+    if title or width is not None or height is not None:
+        _refuse_undrawable(figure, title)
+    return figure
+
+
+def _refuse_undrawable(figure: Figure, title: str | None) -> None:
+    """Refuse a size without room for the panels and a title whose formula cannot be set: both show only in drawing."""
     with warnings.catch_warnings():
-        # all that the layout warns of is that there is no room
-        warnings.simplefilter("error", UserWarning)
+        warnings.simplefilter("ignore")  # of letters that the font does not have
+        warnings.filterwarnings("error", message="constrained_layout not applied")
         try:
             figure.draw_without_rendering()
         except UserWarning:
+            size = " x ".join(f"{inches / _MM:.4g}" for inches in figure.get_size_inches())
             raise UsageError(
-                f"figure: size: expected room for {len(figure.axes)} panels, got {asked} mm. Give more width or height."
+                f"figure: size: expected room for {len(figure.axes)} panels, got {size} mm. Give more width or height."
             ) from None
-    return figure
+        except ValueError as problem:
+            if not title:
+                raise
+            raise UsageError(
+                f"figure: title: expected text, formulas of matplotlib between dollar signs, got {title[:60]!r}. "
+                "Write a dollar sign as \\$."
+            ) from problem
 
 
 def label(variable: xr.DataArray) -> str:

@@ -70,7 +70,9 @@ def _draw_samples(dataset: xr.Dataset, selection: dict[str, int], window: Window
     above.set_ylabel(label(samples["displacement"]))
     middle.set_ylabel(label(samples["velocity"]))
     middle.set_xlabel(label(samples["time"]) + words)
-    below.xaxis.set_major_locator(MaxNLocator(5))  # long numbers of small displacements would run together
+    # long numbers of late instants and of small displacements would run together
+    middle.xaxis.set_major_locator(MaxNLocator(6))
+    below.xaxis.set_major_locator(MaxNLocator(5))
     below.set_xlabel(label(samples["displacement"]))
     below.set_ylabel(label(samples["velocity"]))
     _legend_above(figure, below, has_marks=len(marks) > 0)

@@ -11,11 +11,13 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from vibroimpact.analysis.figures.page import COLOURS, STOP, Floats, canvas, label, title, unit_symbol
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order, limits
 from vibroimpact.analysis.figures.window import ANY, SHOWN_PERIODS, Window
 from vibroimpact.analysis.schema import RULES
+from vibroimpact.fmus.errors import DatasetError
 
 _STYLES = ("-", "--", ":", "-.")
 _PANEL_MM = 34
@@ -75,6 +77,7 @@ def draw_series(dataset: xr.Dataset, selection: dict[str, Any], window: Window =
         # What the marks are is said once, above the first panel.
         _name_lines(axis, variables, lines, marks if axis is axes[0] else [])
         axis.margins(x=0.0)
+    axes[-1].xaxis.set_major_locator(MaxNLocator(6))
     axes[-1].set_xlabel(label(samples["time"]) + words)
     return figure
 
@@ -82,11 +85,13 @@ def draw_series(dataset: xr.Dataset, selection: dict[str, Any], window: Window =
 def time_part(dataset: xr.Dataset, samples: xr.Dataset, window: Window) -> tuple[tuple[float, float], str]:
     """Return first and last instant to draw (s), and what the label of the time must say of it."""
     time, rate = samples["time"].values, forcing_rate(dataset, samples)
+    if not len(time):
+        raise DatasetError("figure: expected samples of the run, got none. Its outcome and message say why.")
     period = None if rate is None else 2.0 * math.pi / rate
     part = window.part(time, period)
     if window.given or period is None or part == window.whole(time):
         return part, ""
-    return part, f", first {SHOWN_PERIODS} of {np.ptp(time) / period:.4g} periods"
+    return part, f", first {SHOWN_PERIODS} of {round(float(np.ptp(time)) / period, 1):g} periods"
 
 
 def within(dataset: xr.Dataset, samples: xr.Dataset, window: Window) -> xr.Dataset:

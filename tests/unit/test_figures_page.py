@@ -66,3 +66,10 @@ def test_a_figure_has_the_size_and_the_title_that_were_asked_for(tmp_path: Path)
 def test_a_size_without_room_is_refused(size: dict[str, float], message: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=message):
         figures.draw(sweep(tmp_path), **size)
+
+
+def test_a_title_may_have_a_formula_and_one_that_cannot_be_set_is_refused(tmp_path: Path) -> None:
+    dataset = sweep(tmp_path)
+    assert figures.draw(dataset, title=r"$\zeta = .05$, 5 \$").axes
+    with pytest.raises(UsageError, match="title: expected text, formulas of matplotlib between dollar signs"):
+        figures.draw(dataset, title=r"$\nosuch$")

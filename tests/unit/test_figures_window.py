@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import xarray as xr
-from dataset_examples import coupled_dataset, coupled_record, dataset_of
+from dataset_examples import coupled_dataset, coupled_record, dataset_of, failed, record
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis import figures
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.figures.scene_text import forcing_rate, limits
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import DatasetError, UsageError
 
 PERIODS, PERIOD = 40, 0.5
 TIME = 20.0 + np.linspace(0.0, PERIODS * PERIOD, 50 * PERIODS + 1)
@@ -62,6 +62,11 @@ def test_of_a_long_motion_the_first_eight_periods_are_drawn_and_the_label_says_s
     figure = figures.draw(chain())
     assert shown(figure) == pytest.approx((20.0, 24.0))
     assert figure.axes[-1].get_xlabel() == "time (s), first 8 of 40 periods"
+
+
+def test_a_record_that_ends_just_before_its_last_period_does_is_told_in_round_numbers() -> None:
+    short = chain(CHAIN.replace("frequency = 2.0", "frequency = 1.9996"))
+    assert figures.draw(short).axes[-1].get_xlabel() == "time (s), first 8 of 40 periods"
 
 
 def test_what_is_asked_for_is_drawn_and_nothing_needs_to_be_said() -> None:
@@ -184,6 +189,13 @@ def test_a_window_of_the_phase_plane_and_of_the_impacts_is_one_of_time() -> None
     whole = figures.draw(dataset, "portrait").axes[0].get_lines()[0].get_xdata()
     part = figures.draw(dataset, "portrait", periods=2).axes[0].get_lines()[0].get_xdata()
     assert len(part) < len(whole) / 15
+
+
+def test_a_run_that_failed_before_its_first_sample_is_one_line() -> None:
+    runs = [failed("no convergence"), record(1.0, samples=3)]
+    for kind in ("run", "portrait"):
+        with pytest.raises(DatasetError, match=r"expected samples of the run, got none\."):
+            figures.draw(dataset_of(runs), kind, 0, start=0.5)
 
 
 def recording(rate: float = 100.0) -> Recording:
