@@ -12,10 +12,10 @@ from vibroimpact.analysis.recording import Recording
 from vibroimpact.analysis.recording_files import open_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.hardware.building import Parts
+from vibroimpact.hardware.gaps import AGREEMENT
 from vibroimpact.hardware.import_settings import ImportSettings
 from vibroimpact.hardware.importers.choosing import check_file, holds_recording
 from vibroimpact.hardware.sources import Source, named, read_source, spread
-from vibroimpact.hardware.time_axis import AGREEMENT
 
 
 def import_recording(

@@ -9,6 +9,8 @@ from vibroimpact.hardware.importers.table import Floats
 _MOST_DIGITS = 12
 _MOST_READ = 20_000
 _NEARLY_ALL = 0.9
+_DIGIT_LOST = 0.2
+"""Of the last digit, what may be lost in binary; of arbitrary numbers 40 % are as near to their digits."""
 
 
 def decimal_step(values: Floats) -> float:
@@ -32,15 +34,26 @@ def decimal_step(values: Floats) -> float:
     read = finite[:: max(1, len(finite) // _MOST_READ)]
     if not len(read):
         return 0.0
-    largest = float(np.abs(read).max())
+    # a clock's seconds since 1970 have lost some of their last digit in binary; whole numbers are on every grid
+    lost = float(np.spacing(np.abs(read).max())) / 2.0
+    if lost > _DIGIT_LOST:
+        return 0.0
+    beyond = read - np.rint(read[0])
     for digits in range(_MOST_DIGITS + 1):
-        scaled = read * 10.0**digits
-        allowed = max(1e-6, 4.0 * np.finfo(float).eps * largest * 10.0**digits)
-        if allowed > 0.01:
+        scaled = beyond * 10.0**digits
+        allowed = max(
+            1e-6, 1.01 * (lost + float(np.spacing(np.abs(scaled).max())) * 10.0**-digits) * 10.0**digits
+        )
+        if allowed > _DIGIT_LOST:
             return 0.0
         if float(np.mean(np.abs(scaled - np.rint(scaled)) <= allowed)) >= _NEARLY_ALL:
             return 10.0**-digits
     return 0.0
+
+
+def digits_of(instants: Floats) -> float:
+    """Return how coarsely instants are written, s: the weight of their last digit, and what binary takes of it."""
+    return decimal_step(instants) + float(np.spacing(np.abs(instants).max(initial=0.0)))
 
 
 def common_step(intervals: Floats, digits: float) -> float:

@@ -12,6 +12,8 @@ from vibroimpact.hardware.importers.table import Column, Floats, Table
 
 _MOST_RESTARTS = 100
 _FEWEST_ROWS = 3
+_LATE = 1.5
+"""Intervals after the end of a part from which on the next one does not follow at once."""
 _BACK_BY = 3.0
 """Intervals that a clock goes back by when it begins again, at least; less is disorder."""
 
@@ -30,10 +32,21 @@ def joined(tables: Sequence[Table]) -> tuple[list[Table], list[str]]:
         together = _continued(result[-1], table) if result else None
         if together is None:
             result.append(table)
-        else:
-            result[-1] = together
-            remarks.append(f"{table.title or 'a later part'} continues the one before: they are joined")
+            continue
+        remarks.append(_told(result[-1], together, table.title or "a later part"))
+        result[-1] = together
     return result, remarks
+
+
+def _told(before: Table, together: Table, title: str) -> str:
+    """Say how the later of two parts goes on."""
+    assert together.time is not None
+    rows = len(before.columns[0].values)
+    ends, begins = together.time.values[rows - 1 : rows + 1]
+    usual = float(np.median(np.diff(together.time.values)))
+    if begins - ends > _LATE * usual:
+        return f"{title} begins {begins - ends:.6g} s after the last sample of the one before: they share one time axis"
+    return f"{title} continues the one before: they are joined"
 
 
 def _continued(before: Table, after: Table) -> Table | None:

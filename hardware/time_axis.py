@@ -14,15 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.gaps import AGREEMENT, EVEN, Gaps, are_whole, gaps_in
 from vibroimpact.hardware.importers.table import MOST_SAMPLES, Column, Flags, Floats, Table
-from vibroimpact.hardware.printed_grid import decimal_step
+from vibroimpact.hardware.printed_grid import digits_of
 
-AGREEMENT = 1e-4
-"""Relative difference of two intervals that is no contradiction."""
 _ROUNDED = 0.7
 """Of the last digit: rounding moves an instant by half of it, and a line through such instants by a little more."""
-_EVEN = 1e-3
-"""Of the interval: what an evenly sampled instant may be off, where no digits explain it."""
 _FEW_HOLES = 0.1
 _MOST_DOUBTFUL = 0.1
 _MOST_FILLED = 10
@@ -85,7 +82,7 @@ def place(table: Table, column: Column, rate: float | None = None, start: float 
     length = len(column.values)
     instants = table.clock_of(column)
     if rate is not None:
-        return _moved(_by_rate(rate, column, instants, length), start)
+        return _moved(_by_rate(rate, column, instants), start)
     if instants is not None and length > 1:
         return _moved(_by_instants(instants, column, _comparable(table, column), length), start)
     if column.interval is not None and np.isfinite(column.interval):
@@ -123,19 +120,55 @@ def _moved(placement: Placement, start: float | None) -> Placement:
     return replace(placement, time=placement.time - placement.time[0] + start)
 
 
-def _by_rate(rate: float, column: Column, instants: Floats | None, length: int) -> Placement:
-    interval, remarks = 1.0 / rate, []
-    begin = column.start
-    if instants is not None and np.isfinite(instants[0]):
-        begin = float(instants[0])
-        printed = float(np.nanmedian(np.diff(instants))) if length > 1 else interval
-        if abs(printed - interval) > AGREEMENT * interval:
-            remarks.append(
-                f"the instants of the file are {printed:.6g} s apart; the rate given is used instead"
-            )
+def _by_rate(rate: float, column: Column, instants: Floats | None) -> Placement:
+    """Place the rows by the rate of the user; gaps in the instants of the file stay gaps."""
+    interval, length = 1.0 / rate, len(column.values)
+    begin, remarks = column.start, []
+    gaps, count = None, np.arange(length)
+    if instants is not None and np.any(np.isfinite(instants)):
+        known = np.flatnonzero(np.isfinite(instants))
+        begin = float(instants[known[0]]) - interval * int(known[0])
+        remarks += _told_pace(known, instants[known], interval)
+        gaps = gaps_in(known, instants[known], interval)
     if column.interval is not None and abs(column.interval - interval) > AGREEMENT * interval:
         remarks.append(f"the header says {column.interval:.6g} s an interval; the rate given is used instead")
-    return _even(begin, interval, length, "the rate given by the user", 0.0, tuple(remarks))
+    if gaps is not None and gaps.on_grid and _is_bearable(length + gaps.missing, length):
+        count = count + gaps.before(count)
+        remarks.append(gaps.told())
+    elif gaps is not None:
+        remarks.append(
+            f"the rate given counts the rows one after the other, and closes {gaps.said()} in the instants of the file"
+        )
+    return _on_grid(begin, interval, count, "the rate given by the user", remarks)
+
+
+def _told_pace(row: NDArray[np.intp], instants: Floats, interval: float) -> list[str]:
+    """Say where the instants of rows contradict an interval by more than their digits."""
+    steps, rows = np.diff(instants), np.diff(row)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    inner = steps <= 1.5 * usual if usual > 0.0 else np.ones(len(steps), dtype=bool)
+    if not np.any(inner):
+        return []
+    pace = float(steps[inner].sum()) / int(rows[inner].sum())
+    doubt = digits_of(instants) / int(rows[inner].sum())
+    if abs(pace - interval) <= AGREEMENT * interval + doubt:
+        return []
+    return [f"the instants of the file are {pace:.6g} s apart; the rate given is used instead"]
+
+
+def _is_bearable(samples: int, rows: int) -> bool:
+    """Whether rows may be filled up to so many samples."""
+    return samples <= min(MOST_SAMPLES, _MOST_FILLED * rows + 1000)
+
+
+def _on_grid(
+    start: float, interval: float, count: NDArray[np.intp], source: str, remarks: Sequence[str]
+) -> Placement:
+    """Place rows on an even grid, each at its count; what no row has is missing."""
+    placed = _even(start, interval, int(count[-1]) + 1 if len(count) else 0, source, 0.0, tuple(remarks))
+    row = np.full(len(placed.time), -1, dtype=np.intp)
+    row[count] = np.arange(len(count))
+    return replace(placed, row=row)
 
 
 def _comparable(table: Table, column: Column) -> list[float]:
@@ -169,8 +202,7 @@ def _has_few_holes(instants: Floats) -> bool:
     if usual <= 0.0:
         return False
     jumps = steps / usual
-    exact = np.all(np.abs(jumps - np.rint(jumps)) <= _EVEN) and np.all(jumps > 0.5)
-    return bool(exact) and 0.0 < float(np.sum(np.rint(jumps) - 1.0)) <= _FEW_HOLES * len(instants)
+    return are_whole(jumps) and 0.0 < float(np.sum(np.rint(jumps) - 1.0)) <= _FEW_HOLES * len(instants)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,17 +222,18 @@ def _straight(count: NDArray[np.intp], instants: Floats) -> _Line | None:
     span = int(count[-1] - count[0])
     interval = float(instants[-1] - instants[0]) / span
     centred = count - count.mean()
-    slope = float(np.sum(centred * instants) / np.sum(centred * centred))
-    residual = instants - instants.mean() - slope * centred
-    digits = decimal_step(instants)
-    allowed = max(_EVEN * interval, _ROUNDED * digits)
+    beyond = instants - instants[0]  # seconds since 1970 would leave a sum few digits
+    slope = float(np.sum(centred * beyond) / np.sum(centred * centred))
+    residual = beyond - beyond.mean() - slope * centred
+    digits = digits_of(instants)
+    allowed = max(EVEN * interval, _ROUNDED * digits)
     # a straight line says nothing of two samples, or of instants coarser than all that they cover
     if slope <= 0.0 or float(np.abs(residual).max()) > allowed or digits * 4.0 > span * interval:
         return None
-    start = float(instants.mean() - slope * count.mean())
+    start = float(instants[0] + beyond.mean() - slope * count.mean())
     if float(np.abs(residual).max()) <= 1e-6 * interval:
         return _Line(float(instants[0] - count[0] * interval), interval, digits)
-    return _Line(start, slope, digits, digits > _EVEN * interval)
+    return _Line(start, slope, digits, digits > EVEN * interval)
 
 
 def _by_line(
@@ -265,20 +298,12 @@ def _uneven(instants: Floats) -> Placement:
             "their instants are kept"
         )
         return Placement(time, None, 0.0, "the column of instants, uneven", row, suspect, tuple(remarks))
-    count, line = filled
-    total = int(count[-1]) + 1
-    everywhere = np.full(total, -1, dtype=np.intp)
-    everywhere[count] = row
-    doubtful = np.zeros(total, dtype=bool)
-    doubtful[count] = suspect
-    widest, gaps = int(np.argmax(np.diff(count))), int(np.sum(np.diff(count) > 1))
-    if total > len(row):
-        remarks.append(
-            f"{total - len(row)} samples are missing in {gaps} gap{'s' if gaps > 1 else ''}, the longest of "
-            f"{time[widest + 1] - time[widest]:.6g} s at {time[widest]:.6g} s: they are there as NaN"
-        )
-    placed = _even(line.start, line.interval, total, "the column of instants, its gaps filled")
-    return Placement(placed.time, line.interval, 0.0, placed.source, everywhere, doubtful, tuple(remarks))
+    gaps, line = filled
+    count = np.arange(len(row)) + gaps.before(np.arange(len(row)))
+    source = "the column of instants, its gaps filled"
+    placed = _on_grid(line.start, line.interval, count, source, [*remarks, gaps.told()])
+    placed.suspect[count] = suspect
+    return replace(placed, row=np.where(placed.row < 0, -1, row[placed.row]))
 
 
 def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
@@ -312,14 +337,11 @@ def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
     return order[~again], (moved | repeated)[~again], remarks
 
 
-def _with_gaps(time: Floats) -> tuple[NDArray[np.intp], _Line] | None:
-    """Return the count of each sample on an even grid that some samples of are missing; None: no such grid."""
-    steps = np.diff(time)
-    usual = float(np.median(steps))
-    jumps = np.maximum(np.rint(steps / usual), 1.0)
-    total = float(jumps.sum()) + 1.0
-    if total > min(MOST_SAMPLES, _MOST_FILLED * len(time) + 1000):
+def _with_gaps(time: Floats) -> tuple[Gaps, _Line] | None:
+    """Return the gaps in instants that lie on an even grid otherwise, and that grid; None where they do not."""
+    count = np.arange(len(time))
+    gaps = gaps_in(count, time)
+    if gaps is None or not gaps.on_grid or not _is_bearable(len(time) + gaps.missing, len(time)):
         return None
-    count = np.append(0, np.cumsum(jumps)).astype(np.intp)
-    line = _straight(count, time)
-    return None if line is None else (count, line)
+    line = _straight(count + gaps.before(count), time)
+    return None if line is None else (gaps, line)

@@ -103,7 +103,9 @@ def test_a_segment_that_goes_on_later_is_joined_and_its_gap_is_missing(tmp_path:
     assert (base.quality[20:30] == int(Quality.missing)).all()
     assert base.quality.sum() == 10 * int(Quality.missing)
     np.testing.assert_array_equal(base.values[30:], np.arange(20) + first + 0.5)
-    assert "10 samples are missing in 1 gap," in "\n".join(recording.remarks)
+    told = "\n".join(recording.remarks)
+    assert "segment 2 begins 0.11 s after the last sample of the one before" in told
+    assert "10 samples are missing in 1 gap of 0.11 s at 0.19 s" in told
 
 
 def test_segments_of_other_channels_stay_apart(tmp_path: Path) -> None:

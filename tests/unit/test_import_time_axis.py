@@ -106,6 +106,68 @@ def test_the_rate_of_the_user_is_used_and_what_contradicts_it_is_told() -> None:
     assert len(placement.remarks) == 2
 
 
+@pytest.mark.parametrize("lost", [1, 200])
+@pytest.mark.parametrize("digits", [4, 6, 12])
+def test_a_gap_stays_a_gap_under_the_rate_of_the_user(digits: int, lost: int) -> None:
+    """With four digits at 5120 Hz an instant is rounded to half an interval."""
+    whole = 2.0 + np.arange(3000) / 5120.0
+    kept = np.delete(np.arange(3000), np.arange(900, 900 + lost))
+    placement = placed(np.round(whole[kept], digits), rate=5120.0)
+    np.testing.assert_array_equal(np.flatnonzero(placement.row >= 0), kept)
+    np.testing.assert_allclose(placement.time, whole, rtol=0.0, atol=0.6 * 10.0**-digits)
+    (told,) = placement.remarks
+    assert told.startswith(f"{lost} sample")
+    assert "missing in 1 gap" in told
+
+
+def test_a_gap_in_instants_that_a_rate_contradicts_stays_a_gap_too() -> None:
+    kept = np.delete(np.arange(60), [20, 21, 22])
+    placement = placed(kept * 0.01, rate=1000.0)
+    np.testing.assert_array_equal(np.flatnonzero(placement.row < 0), [20, 21, 22])
+    assert placement.interval == 0.001
+    assert ["0.01 s apart" in placement.remarks[0], "3 samples are missing" in placement.remarks[1]] == [
+        True
+    ] * 2
+
+
+def test_a_gap_of_thousands_of_samples_between_rounded_instants_is_counted_exactly() -> None:
+    """1.8 s at 5120 Hz with six digits: one step of .000195 s tells the count to 15 samples only."""
+    kept = np.append(np.arange(1000), np.arange(10240, 11240))
+    for rate in (None, 5120.0):
+        placement = placed(np.round(kept / 5120.0, 6), rate=rate)
+        np.testing.assert_array_equal(np.flatnonzero(placement.row >= 0), kept)
+        assert placement.interval == pytest.approx(1.0 / 5120.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "instants",
+    [
+        np.cumsum(np.append(RANDOM.uniform(0.02, 0.06, 300), 9.0)),
+        np.concatenate([np.arange(50) * 1e-3, [1e6, 1e6 + 1e-3]]),
+    ],
+    ids=["jitter", "too long"],
+)
+def test_a_gap_that_the_rate_of_the_user_closes_is_said(instants: Floats) -> None:
+    placement = placed(instants, rate=1000.0)
+    assert len(placement.time) == len(instants)
+    assert "one after the other, and closes" in placement.remarks[-1]
+
+
+@pytest.mark.parametrize("step", [0.01, 1 / 3, 5e-5])
+def test_a_clock_without_gaps_says_nothing_of_gaps_under_its_own_rate(step: float) -> None:
+    for digits in (2, 3, 5, 12):
+        instants = np.round(np.arange(2000) * step + RANDOM.normal(0.0, 1e-3 * step, 2000), digits)
+        placement = placed(instants, rate=1.0 / step)
+        assert placement.missing == 0
+        assert placement.remarks == ()
+
+
+def test_instants_since_1970_are_even_within_their_digits() -> None:
+    """Six decimals of some 1.8e9 s at 5120 Hz; in binary a quarter of the last one is lost."""
+    placement = placed(np.round(1795255200.0 + np.arange(4000) / 5120.0, 6))
+    assert placement.interval == pytest.approx(1.0 / 5120.0, rel=1e-6)
+
+
 def test_a_record_far_longer_than_its_rows_is_not_filled() -> None:
     instants = np.concatenate([np.arange(50) * 1e-3, [1e6, 1e6 + 1e-3]])
     placement = placed(instants)
@@ -127,6 +189,7 @@ def test_a_clock_that_begins_again_makes_two_records() -> None:
 def test_the_weight_of_the_last_printed_digit_is_found(digits: int, seed: int) -> None:
     values = np.round(np.random.default_rng(seed).uniform(1.0, 1000.0, 400), digits)
     assert decimal_step(values) == pytest.approx(10.0**-digits, rel=1e-12)
+    assert decimal_step(np.round(1.7e9 + values, digits)) == pytest.approx(10.0**-digits, rel=1e-12)
 
 
 @pytest.mark.parametrize("step", [1024 / 44100, 1 / 50, 1 / 29.97])
