@@ -66,7 +66,8 @@ class Parts:
             try:
                 self.remark(self._add_column(number, at, table, column, source, axes), title)
             except DatasetError as problem:
-                raise named(problem, source.path) from problem
+                besides = f" Besides, {source.damage}." if source.damage else ""
+                raise named(DatasetError(f"{problem}{besides}"), source.path) from problem
 
     def remark(self, lines: Sequence[str], title: str = "") -> None:
         """Add what was noticed, each line once."""

@@ -38,6 +38,8 @@ class Source:
         Provenance that the file gives.
     rate : float or None
         Samples per second of all columns, where the file says so.
+    damage : str
+        What is wrong with the file as a whole.
     """
 
     path: Path
@@ -47,6 +49,7 @@ class Source:
     remarks: list[str]
     attrs: dict[str, Any]
     rate: float | None
+    damage: str = ""
 
     @property
     def columns(self) -> int:
@@ -82,8 +85,13 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     except MemoryError as problem:
         raise DatasetError(f"{path}: expected a file that fits into memory, got a larger one.") from problem
     found = [table for split, _ in pieces for table in split]
-    told = [*raw.remarks, *remarks, *(line for _, lines in pieces for line in lines)]
-    return Source(path, own, raw.source_format, found, told, dict(raw.attrs), raw.rate)
+    told = [
+        *([raw.damage] if raw.damage else []),
+        *raw.remarks,
+        *remarks,
+        *(line for _, lines in pieces for line in lines),
+    ]
+    return Source(path, own, raw.source_format, found, told, dict(raw.attrs), raw.rate, raw.damage)
 
 
 def shortened(line: str) -> str:

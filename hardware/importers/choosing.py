@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import stat
+from dataclasses import replace
 from pathlib import Path
 
 from vibroimpact.analysis.recording_files import is_recording
@@ -95,7 +96,7 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFi
             raise DatasetError(f"expected a recording, got {kind}. Unpack it, or save it as text first.")
     content, remarks = _decoded(path.read_bytes())
     raw = read_labview(content) if content.startswith(SIGNATURE) else read_text(content, delimiter, decimal)
-    return RawFile(raw.source_format, raw.tables, [*remarks, *raw.remarks], raw.attrs, raw.rate)
+    return replace(raw, remarks=[*remarks, *raw.remarks])
 
 
 def _decoded(content: bytes) -> tuple[str, list[str]]:

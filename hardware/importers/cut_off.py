@@ -26,8 +26,8 @@ def without_cut_cells(
     """Return the rows of a table without what was cut off, and what is to be said of it.
 
     Where the text has no final line break, its last cell counts as missing if it is not written as all cells
-    above it, or, where those differ from each other, if it is shorter than all of them; so do the cells that the
-    row has less than the one before. A row of which nothing else is left is dropped.
+    above it, or, where those differ from each other, if it is shorter than all of them or in a row that lacks cells; so
+    do the cells that the row has less than the one before. A row of which nothing else is left is dropped.
 
     Parameters
     ----------
@@ -55,7 +55,9 @@ def without_cut_cells(
     if not _ends_after_cell(kept[-1], delimiter):
         found = _like_all(cells[-1], column, decimal)
         alike = not _lacks_something(cells[-1], column) if found is None else found
-        if found is None:
+        if found is None and len(cells) < len(before):  # certainly cut off, and maybe in this cell
+            alike = False
+        elif found is None:
             told = [
                 f"the text ends without a line break: its last value, {_quote(cells[-1])}, may be cut off"
             ]

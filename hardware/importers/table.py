@@ -113,6 +113,8 @@ class RawFile:
         Provenance that the file itself gives: `source_date`, `operator`, ...
     rate : float or None
         Samples per second, where the file says so for all of it.
+    damage : str
+        What is wrong with the file as a whole; a remark, and part of a refusal for another reason.
     """
 
     source_format: str
@@ -120,3 +122,4 @@ class RawFile:
     remarks: Sequence[str] = ()
     attrs: dict[str, Any] = field(default_factory=dict)
     rate: float | None = None
+    damage: str = ""

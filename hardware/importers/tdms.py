@@ -23,6 +23,12 @@ from vibroimpact.hardware.importers.table import MOST_COLUMNS, Column, Floats, R
 
 _MOST_HEARD = 20
 _LONGEST_HEARD = 120
+_SAYS_CUT_OFF = re.compile(
+    r"Last segment (of file has less data than expected|metadata is incomplete)"
+    r"|Data size \d+ is not a multiple|Cropping data from"
+)
+_CUT_OFF = re.compile(r"Last segment of file has less data than expected|Data size \d+ is not a multiple")
+_CUT_OFF = "the file is cut off: its last segment holds less data than it declares, and what is there is read"
 _SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
 _EPOCH_ENDS = np.datetime64("1904-01-02")
 
@@ -42,7 +48,9 @@ def read_tdms(path: os.PathLike[str] | str) -> RawFile:
         # opened here, so that it is closed too where the reader gives up
         with _heard() as heard, open(path, "rb") as stream, TdmsFile.open(stream) as file:
             raw = _read(file, size)
-            return replace(raw, remarks=[*raw.remarks, *dict.fromkeys(heard)][:_MOST_HEARD])
+            damage = _CUT_OFF if any(_SAYS_CUT_OFF.match(line) for line in heard) else ""
+            others = dict.fromkeys(f"npTDMS says: {line}" for line in heard if not _SAYS_CUT_OFF.match(line))
+            return replace(raw, remarks=[*raw.remarks, *others][:_MOST_HEARD], damage=damage)
     except DatasetError:
         raise
     # the reader gives up on damaged bytes with whatever error they lead to
@@ -60,7 +68,7 @@ def _heard() -> Iterator[list[str]]:
     heard: list[str] = []
 
     def keep(record: logging.LogRecord) -> bool:
-        heard.append(f"npTDMS says: {record.getMessage()[:_LONGEST_HEARD]}")
+        heard.append(record.getMessage()[:_LONGEST_HEARD])
         return False
 
     log_manager.console_handler.addFilter(keep)

@@ -9,6 +9,7 @@ import pytest
 from nptdms import ChannelObject, TdmsWriter
 
 from vibroimpact.analysis.recording import Quality, Recording
+from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.importing import import_recording
 
 ROWS = 40
@@ -100,6 +101,23 @@ def test_a_row_cut_within_its_instant_is_left_out(tmp_path: Path) -> None:
     assert "the text ends within a row: what is left of it, '0.03', is left out" in recording.remarks
 
 
+def test_a_row_cut_within_an_instant_of_all_digits_is_no_row_in_the_wrong_place(tmp_path: Path) -> None:
+    """`0.58` is left of `0.5861328125`: earlier than the rows above, and shorter than none of all their instants."""
+    instants = [f"{place / 512.0!r},{value:.6f},{value:.6f}\n" for place, value in enumerate(BASE)]
+    recording = imported(tmp_path, ("t,base,board\n" + "".join(instants) + "0.07").encode())
+    assert len(recording.channels["base"].values) == ROWS
+    assert recording.remarks[0] == "the text ends within a row: what is left of it, '0.07', is left out"
+    assert recording.channels["base"].axis.interval == 1.0 / 512.0
+
+
+def test_a_cell_of_any_digits_in_a_row_that_lacks_others_is_missing(tmp_path: Path) -> None:
+    rows_of_all_digits = WRITERS["all digits"].splitlines()
+    cut = "\n".join([*rows_of_all_digits, "0.04,0.7212"]).encode()
+    recording = imported(tmp_path, cut)
+    assert recording.channels["base"].quality[-1] == Quality.missing
+    assert "the text ends within a row: its last value, '0.7212', counts as missing" in recording.remarks
+
+
 def test_channels_of_unequal_lengths_are_said(tmp_path: Path) -> None:
     lines = WRITERS["fixed decimals"].splitlines()
     short = [line if place < 30 else line[: line.rindex(",") + 1] for place, line in enumerate(lines)]
@@ -120,8 +138,18 @@ def test_a_labview_binary_file_that_was_cut_off_is_said(tmp_path: Path) -> None:
         path.write_bytes(content[:-cut])
         recording = import_recording([path])
         told = "\n".join(recording.remarks)
-        assert "less data than expected" in told
+        assert recording.remarks[0].startswith("the file is cut off: its last segment")
+        assert "npTDMS" not in told
         assert "channels of unequal lengths" in told
         for name, values in (("base", BASE), ("board", BOARD)):
             found = recording.channels[name].values
             np.testing.assert_array_equal(found, values[: len(found)])
+
+
+def test_a_refusal_of_a_binary_file_that_was_cut_off_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "record.tdms"
+    with TdmsWriter(path) as writer:
+        writer.write_segment([ChannelObject("run", "base", BASE)])
+    path.write_bytes(path.read_bytes()[:-9])
+    with pytest.raises(DatasetError, match=r"Give --rate .*Besides, the file is cut off"):
+        import_recording([path])
