@@ -14,11 +14,22 @@ from vibroimpact.hardware.importers.mat import read_mat
 from vibroimpact.hardware.importers.table import LARGEST_FILE, RawFile
 from vibroimpact.hardware.importers.tdms import read_tdms
 from vibroimpact.hardware.importers.text import read_text
+from vibroimpact.hardware.importers.uff import is_uff, read_uff
+from vibroimpact.hardware.importers.wav import SIGNATURES as WAV
+from vibroimpact.hardware.importers.wav import read_wav
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _NETCDF3 = (b"CDF\x01", b"CDF\x02")
 _NETCDF_64_BIT = b"CDF\x05"
-_PACKED = {b"PK": "a zip archive or a spreadsheet", b"\x1f\x8b": "a gzip archive", b"%PDF": "a PDF"}
+_OTHERS = {
+    b"PK": "a zip archive or a spreadsheet (.xlsx, .ods)",
+    b"\xd0\xcf\x11\xe0": "an old spreadsheet (.xls)",
+    b"\x1f\x8b": "a gzip archive",
+    b"%PDF": "a PDF",
+    b"fLaC": "compressed audio (FLAC)",
+    b"OggS": "compressed audio (Ogg)",
+    b"\x93NUMPY": "an array of numpy (.npy)",
+}
 
 
 def check_file(path: Path) -> None:
@@ -91,7 +102,11 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFi
         )
     if start.startswith((HDF5, *_NETCDF3)):
         return read_foreign_netcdf(path)
-    for magic, kind in _PACKED.items():
+    if is_uff(start):
+        return read_uff(path)
+    if start.startswith(WAV) and start[8:12] == b"WAVE":
+        return read_wav(path.read_bytes())
+    for magic, kind in _OTHERS.items():
         if start.startswith(magic):
             raise DatasetError(f"expected a recording, got {kind}. Unpack it, or save it as text first.")
     content, remarks = _decoded(path.read_bytes())
@@ -108,7 +123,8 @@ def _decoded(content: bytes) -> tuple[str, list[str]]:
             raise DatasetError("expected UTF-16 text as its first bytes say, got others.") from problem
     if b"\x00" in content:
         raise DatasetError(
-            "expected TDMS, LabVIEW, MATLAB, NetCDF or a table of text, got other binary contents."
+            "expected TDMS, LabVIEW, MATLAB, NetCDF, HDF5, UFF, WAV, Parquet, Feather or a table of text, got other "
+            "binary contents."
         )
     try:
         return content.decode("utf-8-sig"), []

@@ -27,7 +27,6 @@ _SAYS_CUT_OFF = re.compile(
     r"Last segment (of file has less data than expected|metadata is incomplete)"
     r"|Data size \d+ is not a multiple|Cropping data from"
 )
-_CUT_OFF = re.compile(r"Last segment of file has less data than expected|Data size \d+ is not a multiple")
 _CUT_OFF = "the file is cut off: its last segment holds less data than it declares, and what is there is read"
 _SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
 _EPOCH_ENDS = np.datetime64("1904-01-02")
