@@ -41,6 +41,8 @@ STOP_SECONDS = 3.0
 #: whatever its size, since what a program never wrote takes no space.
 MOST_EXPANSION = 1100
 SPARSE_BYTES = 400_000_000
+#: Number of the way in which contents are looked at; what an older one found sound is looked at again.
+LOOK = 2
 #: Contents that are remembered as sound, at most.
 MOST_REMEMBERED = 4096
 _CHILD = Path(__file__).with_name("probe_child.py")
@@ -67,13 +69,13 @@ class Reading:
     Attributes
     ----------
     library : str
-        `NetCDF` or `MATLAB`.
-    classes : tuple of str
-        MATLAB classes that are read.
+        `NetCDF`, `MATLAB` or `HDF5`.
+    names : tuple of str
+        MATLAB classes, or attributes of HDF5 in lower case, that are read.
     """
 
     library: str = "NetCDF"
-    classes: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
 
 
 NETCDF = Reading()
@@ -133,7 +135,7 @@ def _verdict(path: str, size: int, reading: Reading) -> UnsoundFileError | None:
     if matches_recorded_hash(path):
         return None
     with open(path, "rb") as file:
-        content = f"{reading.library} {hashlib.file_digest(file, 'sha256').hexdigest()}"
+        content = f"{reading.library}-{LOOK} {hashlib.file_digest(file, 'sha256').hexdigest()}"
     if content not in _of_contents:
         _of_contents[content] = None if content in _remembered() else _probed(path, size, reading)
         if _of_contents[content] is None:
@@ -144,7 +146,7 @@ def _verdict(path: str, size: int, reading: Reading) -> UnsoundFileError | None:
 def _probed(path: str, size: int, reading: Reading) -> UnsoundFileError | None:
     """Let a process of its own read a file."""
     seconds = PROBE_SECONDS + size / PROBE_RATE
-    options = {"classes": reading.classes, "most_bytes": max(SPARSE_BYTES, MOST_EXPANSION * size)}
+    options = {"names": reading.names, "most_bytes": max(SPARSE_BYTES, MOST_EXPANSION * size)}
     order = {"kind": reading.library, "path": path, "seconds": seconds, "options": options}
     found = _server.ask(order, seconds + START_SECONDS)
     if found["verdict"] == "sound":

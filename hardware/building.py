@@ -105,8 +105,7 @@ class Parts:
             return [*told, f"{name}: one value only, {value:g}: kept beside the channels"]
         key = (at, len(column.values), column.interval, column.start, column.group)
         if key not in axes:
-            rate = settings.rate if settings.rate is not None else source.rate
-            placement = place(table, column, rate, settings.start)
+            placement = place(table, column, settings.rate, settings.start)
             axes[key] = placement, _axis(placement, column, table, source)
             told += placement.remarks
         self.channels[name], more = channel_of(name, changed, *axes[key], settings.masked)

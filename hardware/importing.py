@@ -53,8 +53,10 @@ def import_recording(
     for source in sources:
         parts.add(source, titled=len(sources) > 1)
     if not parts.channels and not parts.events:
+        left_out = [line for line in parts.remarks if "left out" in line]
+        besides = f" Besides, {'; '.join(left_out[:3])}." if left_out else ""
         raise DatasetError(
-            f"{files[0]}: expected channels of two samples or more, or instants of events, got none."
+            f"{files[0]}: expected channels of two samples or more, or instants of events, got none.{besides}"
         )
     parts.remark(_of_the_whole(parts))
     return Recording(parts.channels, parts.events, parts.scalars, _provenance(sources, parts))

@@ -36,8 +36,6 @@ class Source:
     remarks : list of str
     attrs : dict
         Provenance that the file gives.
-    rate : float or None
-        Samples per second of all columns, where the file says so.
     damage : str
         What is wrong with the file as a whole.
     """
@@ -48,7 +46,6 @@ class Source:
     tables: list[Table]
     remarks: list[str]
     attrs: dict[str, Any]
-    rate: float | None
     damage: str = ""
 
     @property
@@ -91,7 +88,7 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
         *remarks,
         *(line for _, lines in pieces for line in lines),
     ]
-    return Source(path, own, raw.source_format, found, told, dict(raw.attrs), raw.rate, raw.damage)
+    return Source(path, own, raw.source_format, found, told, dict(raw.attrs), raw.damage)
 
 
 def shortened(line: str) -> str:

@@ -81,6 +81,8 @@ def place(table: Table, column: Column, rate: float | None = None, start: float 
     """
     length = len(column.values)
     instants = table.clock_of(column)
+    if column.interval is None and table.rate is not None:
+        column = replace(column, interval=1.0 / table.rate)
     if rate is not None:
         return _moved(_by_rate(rate, column, instants), start)
     if instants is not None and length > 1:
@@ -179,6 +181,8 @@ def _comparable(table: Table, column: Column) -> list[float]:
         for other in table.columns
         if other.interval is not None and other.group == column.group and 2 * len(other.values) > length
     ]
+    if table.rate is not None:
+        beside.append(1.0 / table.rate)
     return [interval for interval in beside if np.isfinite(interval)]
 
 

@@ -8,9 +8,13 @@ from pathlib import Path
 
 from vibroimpact.analysis.recording_files import is_recording
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.importers.extras import missing_extra
 from vibroimpact.hardware.importers.foreign_netcdf import check_netcdf4, read_foreign_netcdf
+from vibroimpact.hardware.importers.hdf5 import SIGNATURE as HDF5
+from vibroimpact.hardware.importers.hdf5 import is_h5py_there, is_netcdf4, read_hdf5
 from vibroimpact.hardware.importers.labview import SIGNATURE, read_labview
 from vibroimpact.hardware.importers.mat import read_mat
+from vibroimpact.hardware.importers.probe import UnreadableError
 from vibroimpact.hardware.importers.table import LARGEST_FILE, RawFile
 from vibroimpact.hardware.importers.tdms import read_tdms
 from vibroimpact.hardware.importers.text import read_text
@@ -18,7 +22,6 @@ from vibroimpact.hardware.importers.uff import is_uff, read_uff
 from vibroimpact.hardware.importers.wav import SIGNATURES as WAV
 from vibroimpact.hardware.importers.wav import read_wav
 
-HDF5 = b"\x89HDF\r\n\x1a\n"
 _NETCDF3 = (b"CDF\x01", b"CDF\x02")
 _NETCDF_64_BIT = b"CDF\x05"
 _OTHERS = {
@@ -66,7 +69,12 @@ def holds_recording(path: Path) -> bool:
     with path.open("rb") as file:
         if file.read(len(HDF5)) != HDF5:
             return False
-    check_netcdf4(path)
+    try:
+        check_netcdf4(path)
+    except UnreadableError as problem:
+        if problem.raised and is_h5py_there():
+            return False  # HDF5 that is no NetCDF
+        raise
     return is_recording(path)
 
 
@@ -92,16 +100,21 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFi
         raise DatasetError(f"expected a readable file, got an error: {problem.strerror}.") from problem
     if start.startswith((b"TDSm", b"TDSh")):
         return read_tdms(path)
-    if start.startswith(b"MATLAB 5.0") or path.suffix.lower() == ".mat":
+    if start.startswith(b"MATLAB 7.3"):
+        return read_hdf5(path, matlab=True)
+    if start.startswith(b"MATLAB 5.0") or (path.suffix.lower() == ".mat" and not start.startswith(HDF5)):
         return read_mat(path)
-    if start.startswith(b"MATLAB 7.3") or (HDF5 in start and not start.startswith(HDF5)):
-        return read_mat(path)  # which refuses it in its own words
+    if start.startswith(HDF5) and is_h5py_there() and not is_netcdf4(path):
+        return read_hdf5(path)
     if start.startswith(_NETCDF_64_BIT):
         raise DatasetError(
             "expected a NetCDF file of version 3 or 4, got CDF-5. Convert it: nccopy -k nc4 OLD NEW."
         )
     if start.startswith((HDF5, *_NETCDF3)):
-        return read_foreign_netcdf(path)
+        raw = read_foreign_netcdf(path)
+        if start.startswith(HDF5) and not raw.tables and not is_h5py_there():
+            raise missing_extra("an HDF5 file with groups", "h5py", "hdf5")
+        return raw
     if is_uff(start):
         return read_uff(path)
     if start.startswith(WAV) and start[8:12] == b"WAVE":

@@ -94,6 +94,8 @@ def _hdf5(path: os.PathLike[str] | str) -> Iterable[_Variable]:
 
     with netCDF4.Dataset(os.fspath(path), "r") as file:
         _check_sizes([int(variable.size) for variable in file.variables.values()])
+        for name in file.groups:
+            yield _Variable(name, "", None, "", "", "a group is left out; variables outside groups are read")
         for name, variable in file.variables.items():
             numeric = getattr(variable.dtype, "kind", "O") in "fiu" and len(variable.dimensions) == 1
             # the library warns of a scale or a fill value that means nothing, and goes on without it
@@ -126,9 +128,9 @@ def _sorted_out(variables: list[_Variable]) -> RawFile:
     for variable in variables:
         if variable.remark:
             remarks.append(f"{variable.name}: {variable.remark[:200]}")
-        if variable.values is None:
+        if variable.values is None and not variable.remark:
             remarks.append(f"{variable.name}: is left out; numeric variables of one dimension are read")
-        elif len(variable.values):
+        elif variable.values is not None and len(variable.values):
             by_dimension.setdefault(variable.dimension, []).append(variable)
     tables: list[Table] = []
     attrs: dict[str, Any] = {}

@@ -75,6 +75,8 @@ class Table:
         The columns are arrays of their own, not rows of one table: lengths and meanings need not agree.
     time_place : int
         How many columns stand before that of the instants in the file.
+    rate : float or None
+        Samples per second, where the file says so for all columns.
     """
 
     columns: Sequence[Column]
@@ -82,6 +84,7 @@ class Table:
     title: str = ""
     vectors: bool = False
     time_place: int = 0
+    rate: float | None = None
 
     def clock_of(self, column: Column) -> Floats | None:
         """Return the instants that hold for the rows of a column, s; None where no column has them.
@@ -111,8 +114,6 @@ class RawFile:
         What was noticed on the way, one sentence each.
     attrs : dict
         Provenance that the file itself gives: `source_date`, `operator`, ...
-    rate : float or None
-        Samples per second, where the file says so for all of it.
     damage : str
         What is wrong with the file as a whole; a remark, and part of a refusal for another reason.
     """
@@ -121,5 +122,4 @@ class RawFile:
     tables: Sequence[Table]
     remarks: Sequence[str] = ()
     attrs: dict[str, Any] = field(default_factory=dict)
-    rate: float | None = None
     damage: str = ""

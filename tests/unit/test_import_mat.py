@@ -49,23 +49,41 @@ def test_vectors_that_ascend_unevenly_are_events(tmp_path: Path) -> None:
 
 
 def test_what_is_no_vector_of_numbers_is_left_out_and_told(tmp_path: Path) -> None:
+    many = np.array([(1.0,), (2.0,)], dtype=[("a", object)])
     path = matlab(
-        tmp_path, base=RANDOM.normal(size=40), fs=10.0, note="hello", box={"a": 1}, cube=np.zeros((3, 3, 3))
+        tmp_path, base=RANDOM.normal(size=40), fs=10.0, note="hello", box=many, cube=np.zeros((3, 3, 3))
     )
     told = "\n".join(import_recording([path]).remarks)
     assert all(f"{name}: " in told for name in ("note", "box", "cube"))
 
 
-def test_version_7_3_is_refused_with_what_to_do(tmp_path: Path) -> None:
-    path = tmp_path / "new.mat"
-    path.write_bytes(
-        b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124)
-        + b"\x00\x02IM"
-        + b"\x00" * 384
-        + b"\x89HDF\r\n\x1a\n"
-    )
-    with pytest.raises(DatasetError, match=r"version 7\.3.*-v7"):
+def test_fields_of_structures_are_channels_by_dotted_names(tmp_path: Path) -> None:
+    time = np.arange(40) * 0.25
+    run = {"t": time, "acc": np.sin(time), "gauge": {"force": np.cos(time), "name": "load cell"}}
+    recording = import_recording([matlab(tmp_path, run=run, rest={"acc": np.sin(time), "fs": 8.0})])
+    assert [channel.label for channel in recording.channels.values()] == [
+        "run.acc",
+        "run.gauge.force",
+        "rest.acc",
+    ]
+    np.testing.assert_allclose(recording.channels["run_gauge_force"].axis.time, time, rtol=1e-12)
+    assert recording.channels["rest_acc"].axis.rate == pytest.approx(8.0)
+    assert "run.gauge.name: holds no real numbers and is left out" in recording.remarks
+
+
+def test_a_file_of_which_all_is_left_out_is_refused_with_what_that_was(tmp_path: Path) -> None:
+    path = matlab(tmp_path, note="hello", runs=np.array([(1.0,), (2.0,)], dtype=[("a", object)]))
+    with pytest.raises(
+        DatasetError, match=r"got none. Besides, note: a char array is left out.*runs: a structure"
+    ):
         import_recording([path])
+
+
+def test_a_rate_that_the_instants_contradict_is_told(tmp_path: Path) -> None:
+    path = matlab(tmp_path, t=np.arange(40) * 0.25, acc=RANDOM.normal(size=40), fs=8.0)
+    recording = import_recording([path])
+    assert recording.channels["acc"].axis.interval == pytest.approx(0.25)
+    assert "the time axes conflict" in recording.remarks[0]
 
 
 def foreign(path: Path, unit: str = "s", count: int = 40) -> Path:
@@ -90,6 +108,10 @@ def test_a_foreign_netcdf_file_gives_its_variables_of_one_dimension(tmp_path: Pa
     assert base.quality[5] == int(Quality.missing)
     assert base.quality.sum() == int(Quality.missing)
     assert "name: is left out" in "\n".join(recording.remarks)
+    with netCDF4.Dataset(tmp_path / "foreign.nc", "a") as file:
+        file.createGroup("calibration")
+    told = import_recording([tmp_path / "foreign.nc"]).remarks
+    assert "calibration: a group is left out; variables outside groups are read" in told
 
 
 def test_a_recording_is_passed_on_as_it_is_and_takes_no_options(tmp_path: Path) -> None:
