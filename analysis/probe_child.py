@@ -132,12 +132,42 @@ def _read_dataset(item: Any, most: int) -> int:
     return int(item.nbytes)
 
 
+def read_parquet(path: str, options: dict[str, Any]) -> None:
+    """Read a Parquet file, a group of rows at a time; no more than `most_bytes` of values."""
+    import pyarrow.parquet
+
+    with pyarrow.parquet.ParquetFile(path) as file:
+        if 8 * file.metadata.num_rows * file.metadata.num_columns > options["most_bytes"]:
+            raise ValueError(
+                f"it promises {file.metadata.num_rows} rows of {file.metadata.num_columns} columns"
+            )
+        for group in range(file.metadata.num_row_groups):
+            file.read_row_group(group, use_threads=False).validate(full=True)
+
+
+def read_feather(path: str, options: dict[str, Any]) -> None:
+    """Read a Feather file, a batch of rows at a time."""
+    import pyarrow.ipc
+
+    with pyarrow.ipc.open_file(pyarrow.OSFile(path)) as file:
+        for batch in range(file.num_record_batches):
+            file.get_batch(batch).validate(full=True)
+
+
 READERS: dict[str, Callable[[str, dict[str, Any]], None]] = {
     "NetCDF": read_netcdf,
     "MATLAB": read_matlab,
     "HDF5": read_hdf5,
+    "Parquet": read_parquet,
+    "Feather": read_feather,
 }
-LIBRARIES = {"NetCDF": "netCDF4", "MATLAB": "scipy.io", "HDF5": "h5py"}
+LIBRARIES = {
+    "NetCDF": "netCDF4",
+    "MATLAB": "scipy.io",
+    "HDF5": "h5py",
+    "Parquet": "pyarrow.parquet",
+    "Feather": "pyarrow.ipc",
+}
 
 
 def read_here(order: dict[str, Any]) -> dict[str, str]:

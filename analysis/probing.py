@@ -69,7 +69,7 @@ class Reading:
     Attributes
     ----------
     library : str
-        `NetCDF`, `MATLAB` or `HDF5`.
+        `NetCDF`, `MATLAB`, `HDF5`, `Parquet` or `Feather`.
     names : tuple of str
         MATLAB classes, or attributes of HDF5 in lower case, that are read.
     """

@@ -24,7 +24,9 @@ def register(app: typer.Typer) -> None:
 def import_files(
     files: Annotated[
         list[Path],
-        typer.Argument(help="Files of one measurement: TDMS, .lvm, text, .mat, NetCDF, HDF5, UFF, WAV."),
+        typer.Argument(
+            help="Files of one measurement: TDMS, .lvm, text, .mat, NetCDF, HDF5, Parquet, UFF, WAV."
+        ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.nc).")],
     name: Annotated[

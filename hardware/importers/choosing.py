@@ -8,6 +8,8 @@ from pathlib import Path
 
 from vibroimpact.analysis.recording_files import is_recording
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.importers.arrow import SIGNATURES as ARROW
+from vibroimpact.hardware.importers.arrow import read_arrow
 from vibroimpact.hardware.importers.extras import missing_extra
 from vibroimpact.hardware.importers.foreign_netcdf import check_netcdf4, read_foreign_netcdf
 from vibroimpact.hardware.importers.hdf5 import SIGNATURE as HDF5
@@ -119,6 +121,8 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFi
         return read_uff(path)
     if start.startswith(WAV) and start[8:12] == b"WAVE":
         return read_wav(path.read_bytes())
+    if start.startswith(ARROW):
+        return read_arrow(path)
     for magic, kind in _OTHERS.items():
         if start.startswith(magic):
             raise DatasetError(f"expected a recording, got {kind}. Unpack it, or save it as text first.")

@@ -8,10 +8,13 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
+import h5py
 import netCDF4
 import numpy as np
+import pyarrow as pa
 from nptdms import ChannelObject, TdmsWriter
-from scipy.io import savemat
+from pyarrow import feather, parquet
+from scipy.io import savemat, wavfile
 
 from soak.scenes import wrong_message
 from vibroimpact.analysis.recording import Recording
@@ -76,6 +79,48 @@ def netcdf() -> bytes:
     return bytes(file.close())
 
 
+def hdf5() -> bytes:
+    """Return an HDF5 file with a group."""
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        file["run/t"], file["run/base"], file["run/board"] = TIME, BASE, BOARD
+        file["run/base"].attrs["units"] = "g"
+    return content.getvalue()
+
+
+def wav() -> bytes:
+    """Return a WAV file of floats."""
+    content = io.BytesIO()
+    wavfile.write(content, 100, np.stack([BASE, BOARD], axis=1))
+    return content.getvalue()
+
+
+def uff() -> bytes:
+    """Return a universal file of text, as pyuff writes it."""
+    head = (
+        "{:<80}\n" * 5 + "    1         0    0         0       NONE         1   3       NONE         0   0\n"
+    )
+    form = "         4        80         1  0.00000e+00  1.00000e-02  0.00000e+00\n"
+    axes = (
+        "        17    0    0    0 NONE                 s\n        12    0    0    0 NONE                 g\n"
+    )
+    rest = "         0    0    0    0 NONE                 NONE\n" * 2
+    functions = []
+    for name, values in (("base", BASE), ("board", BOARD)):
+        rows = "".join("".join(f"{one:20.11e}" for one in row) + "\n" for row in values.reshape(-1, 4))
+        functions.append(
+            f"    -1\n    58\n{head.format(name, *['NONE'] * 4)}{form}{axes}{rest}{rows}    -1\n"
+        )
+    return "".join(functions).encode()
+
+
+def arrow(feathered: bool) -> bytes:
+    """Return a Parquet or Feather file."""
+    content, table = io.BytesIO(), pa.table({"time": TIME, "base [g]": BASE, "board [g]": BOARD})
+    (feather.write_feather if feathered else parquet.write_table)(table, content)
+    return content.getvalue()
+
+
 TEXTS: dict[str, str] = {
     "comma.csv": "time (s),base (g),board (g)\n" + rows("{:.2f},{:.5f},{:.5f}\n"),
     "semicolon.csv": "Zeit;base;board\n" + rows("{:.2f};{:.5f};{:.5f}\r\n").replace(".", ","),
@@ -83,7 +128,16 @@ TEXTS: dict[str, str] = {
     "shortest.txt": "# a comment\nt base board\n" + rows("{:g} {:g} {:g}\n"),
     "record.lvm": LABVIEW + rows("{:.6f},{:.6f},{:.6f}\n"),
 }
-MAKERS: dict[str, Callable[[], bytes]] = {"record.tdms": tdms, "record.mat": matlab, "record.nc": netcdf}
+MAKERS: dict[str, Callable[[], bytes]] = {
+    "record.tdms": tdms,
+    "record.mat": matlab,
+    "record.nc": netcdf,
+    "record.h5": hdf5,
+    "record.wav": wav,
+    "record.uff": uff,
+    "record.parquet": lambda: arrow(False),
+    "record.feather": lambda: arrow(True),
+}
 
 
 @lru_cache(maxsize=1)
