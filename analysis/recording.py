@@ -155,11 +155,12 @@ class EventTrain:
 
 @dataclass(frozen=True, slots=True)
 class SingleValue:
-    """A number that a recording carries beside its channels: value and CF unit."""
+    """A number that a recording carries beside its channels: value and CF unit; NaN where it was beyond the range."""
 
     value: float
     unit: str = "1"
     label: str = ""
+    overrange: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,6 +75,8 @@ def write_recording(recording: Recording, path: str | os.PathLike[str]) -> None:
     for name, scalar in recording.scalars.items():
         variable = file.createVariable(name, "f8", ())
         variable.setncatts({"units": scalar.unit, "long_name": scalar.label or name})
+        if scalar.overrange:
+            variable.setncattr("overrange", 1)
         variable[...] = scalar.value
     write_atomically(path, *sealed(file.close()))
 
@@ -197,7 +199,10 @@ def _read(file: netCDF4.Dataset, path: str | os.PathLike[str]) -> Recording:
             _check_attributes(variable)
             if variable.dimensions == ():
                 scalars[name] = SingleValue(
-                    float(variable[...]), str(variable.units), str(variable.long_name)
+                    float(np.ma.filled(variable[...], np.nan)),
+                    str(variable.units),
+                    str(variable.long_name),
+                    "overrange" in variable.ncattrs(),
                 )
             elif "event_train" in variable.ncattrs():
                 events[name] = _read_events(name, variable)

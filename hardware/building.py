@@ -13,7 +13,13 @@ from vibroimpact.analysis.recording import Channel, EventTrain, SingleValue, Tim
 from vibroimpact.analysis.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.channel_of import channel_of
-from vibroimpact.hardware.event_trains import event_train, looks_like_events
+from vibroimpact.hardware.event_trains import (
+    AS_RASTER,
+    event_train,
+    is_raster,
+    looks_like_events,
+    raster_train,
+)
 from vibroimpact.hardware.import_settings import ImportSettings
 from vibroimpact.hardware.importers.labels import is_known_unit, seconds_in
 from vibroimpact.hardware.importers.table import MOST_SAMPLES, Column, Table
@@ -59,12 +65,13 @@ class Parts:
         self.remark(source.remarks, title)
         self.remark([line for table in source.tables for line in _told_lengths(table)], title)
         axes: dict[Any, tuple[Placement, TimeAxis]] = {}
-        columns = [(at, table, column) for at, table in enumerate(source.tables) for column in table.columns]
-        if sum(len(column.values) for _, _, column in columns) > MOST_SAMPLES:
+        rasters = [is_raster(table, source.settings.events) for table in source.tables]
+        columns = [(at, column) for at, table in enumerate(source.tables) for column in table.columns]
+        if sum(len(column.values) for _, column in columns) > MOST_SAMPLES:
             raise DatasetError(f"{source.path}: expected at most {MOST_SAMPLES} samples, got more.")
-        for number, (at, table, column) in enumerate(columns):
+        for number, (at, column) in enumerate(columns):
             try:
-                self.remark(self._add_column(number, at, table, column, source, axes), title)
+                self.remark(self._add_column(number, at, column, source, axes, rasters[at]), title)
             except DatasetError as problem:
                 besides = f" Besides, {source.damage}." if source.damage else ""
                 raise named(DatasetError(f"{problem}{besides}"), source.path) from problem
@@ -80,14 +87,15 @@ class Parts:
         self,
         number: int,
         at: int,
-        table: Table,
         column: Column,
         source: Source,
         axes: dict[Any, tuple[Placement, TimeAxis]],
+        in_raster: bool,
     ) -> list[str]:
         """Add one column as what it is; return what is to be said of it."""
-        settings = source.settings
-        as_events = _is_event_train(column, table, settings)
+        settings, table = source.settings, source.tables[at]
+        in_raster = in_raster and _has_clock(column, table, settings)
+        as_events = not in_raster and _is_event_train(column, table, settings)
         name = self._name(column, number, settings, as_events)
         changed, told = described(name, column, settings, number)
         if as_events:
@@ -100,14 +108,24 @@ class Parts:
                 )
             return told + more
         if len(column.values) == 1:
-            value = float(changed.values[0])
-            self.scalars[name] = SingleValue(value, measured_unit(changed.unit).cf, column.label)
-            return [*told, f"{name}: one value only, {value:g}: kept beside the channels"]
+            value, beyond = (
+                float(changed.values[0]),
+                column.overrange is not None and bool(column.overrange[0]),
+            )
+            self.scalars[name] = SingleValue(value, measured_unit(changed.unit).cf, column.label, beyond)
+            said = "which the file marks as overrange" if beyond else f"{value:g}"
+            return [*told, f"{name}: one value only, {said}: kept beside the channels"]
         key = (at, len(column.values), column.interval, column.start, column.group)
         if key not in axes:
             placement = place(table, column, settings.rate, settings.start)
             axes[key] = placement, _axis(placement, column, table, source)
             told += placement.remarks
+        if in_raster:
+            train = raster_train(name, column, *axes[key], settings.window, settings.masked)
+            if train is None:
+                return [*told, f"{name}: has no event, and is left out"]
+            self.events[name] = train
+            return [*told, AS_RASTER]
         self.channels[name], more = channel_of(name, changed, *axes[key], settings.masked)
         return told + more
 
@@ -170,6 +188,12 @@ def _picked(values: Sequence[Any], number: int) -> Any:
     if len(values) == 1:
         return values[0]
     return values[number] if number < len(values) else None
+
+
+def _has_clock(column: Column, table: Table, settings: ImportSettings) -> bool:
+    """Whether something says when the rows of a column were sampled."""
+    stated = (settings.rate, table.rate, column.interval, table.clock_of(column))
+    return any(one is not None for one in stated)
 
 
 def _is_event_train(column: Column, table: Table, settings: ImportSettings) -> bool:

@@ -6,13 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.recording import EventTrain
+from vibroimpact.analysis.recording import EventTrain, TimeAxis
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.importers.labels import is_time_name, seconds_in
-from vibroimpact.hardware.importers.table import Column, Floats
+from vibroimpact.hardware.importers.table import Column, Floats, Table
 from vibroimpact.hardware.printed_grid import common_step, decimal_step
+from vibroimpact.hardware.time_axis import Placement
 
 _FEWEST = 3
+_FEW_ONES = 0.2
+"""Share of ones up to which a column of 0 and 1 is one of events."""
+AS_RASTER = "the columns hold 0 and 1 only: an event train each, with an event where it becomes 1 (--no-events if not)"
 _UNEVEN = 0.01
 """Of the mean interval: the spread from which on ascending numbers are no clock."""
 
@@ -31,6 +35,70 @@ def looks_like_events(column: Column) -> bool:
     if np.all(values == np.rint(values)) and not is_time_name(column.label) and not column.unit:
         return False
     return float(steps.std()) > max(_UNEVEN * float(steps.mean()), decimal_step(values))
+
+
+def is_raster(table: Table, asked: bool | None = None) -> bool:
+    """Whether the columns of a table hold only 0 and 1, as trials of a raster do, so that each 1 is an event.
+
+    Parameters
+    ----------
+    table : Table
+    asked : bool or None
+        The user says that the columns are events, or that none is. Otherwise the ones must be few and stand alone: what
+        stays at 1 is the level of a switch.
+    """
+    if asked is False or not table.columns:
+        return False
+    ones = [column.values == 1.0 for column in table.columns]
+    known = all(
+        bool(np.all(one | (column.values == 0.0))) for one, column in zip(ones, table.columns, strict=True)
+    )
+    if not known or not any(one.any() for one in ones):
+        return False
+    return bool(asked) or all(
+        float(np.mean(one)) <= _FEW_ONES and not np.any(one[1:] & one[:-1]) for one in ones if len(one)
+    )
+
+
+def raster_train(
+    name: str,
+    column: Column,
+    placement: Placement,
+    axis: TimeAxis,
+    window: tuple[float, float] | None,
+    masked: tuple[tuple[float, float], ...],
+) -> EventTrain | None:
+    """Return the instants at which a column of 0 and 1 becomes 1; None where it never does.
+
+    Parameters
+    ----------
+    name : str
+    column : Column
+    placement : Placement
+        Which row each sample has.
+    axis : TimeAxis
+        Of the placement; without a window, the observation is as long.
+    window : tuple of float or None
+        Observed from, to, s.
+    masked : tuple of tuple of float
+        Parts of it in which nothing could be seen, s.
+    """
+    on = (placement.row >= 0) & (column.values[placement.row] == 1.0)
+    times = axis.time[on & ~np.append(False, on[:-1])]
+    if not len(times):
+        return None
+    observed = window or (float(axis.time[0]), float(axis.time[-1]))
+    _check_window(name, times, observed)
+    attrs = {"masked": np.array(masked, dtype=np.float64).ravel()} if masked else {}
+    return EventTrain(name, times, observed, axis.interval or 0.0, column.label, attrs)
+
+
+def _check_window(name: str, times: Floats, window: tuple[float, float]) -> None:
+    if times[0] < window[0] or times[-1] > window[1]:
+        raise DatasetError(
+            f"{name}: expected events from {window[0]:g} to {window[1]:g} s (the window), got some from "
+            f"{times[0]:g} to {times[-1]:g} s."
+        )
 
 
 def event_train(
@@ -57,11 +125,8 @@ def event_train(
         There are no instants, or they lie outside the window.
     """
     times, remarks = _ascending(name, column)
-    if window is not None and (times[0] < window[0] or times[-1] > window[1]):
-        raise DatasetError(
-            f"{name}: expected events from {window[0]:g} to {window[1]:g} s (the window), got some from "
-            f"{times[0]:g} to {times[-1]:g} s."
-        )
+    if window is not None:
+        _check_window(name, times, window)
     digits = decimal_step(times)
     intervals = np.diff(times)
     resolution = common_step(intervals[intervals > 0.0], digits) or digits

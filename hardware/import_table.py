@@ -24,7 +24,8 @@ def show_recording(recording: Recording, output: Path, figure: Path | None = Non
     if recording.events:
         console.print(_event_table(recording))
     for name, scalar in recording.scalars.items():
-        console.print(f"{name} = {scalar.value:.6g} {written_unit(scalar.unit)}")
+        shown = "overrange" if scalar.overrange else f"{scalar.value:.6g} {written_unit(scalar.unit)}"
+        console.print(f"{name} = {shown}")
     for line in recording.remarks:
         console.print(f"- {line}", soft_wrap=True)
     console.print(

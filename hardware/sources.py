@@ -16,6 +16,7 @@ from vibroimpact.hardware.importers.choosing import read_raw
 from vibroimpact.hardware.importers.table import Table
 from vibroimpact.hardware.importers.text import WORDS_FOR_DELIMITERS
 from vibroimpact.hardware.segments import joined, split_at_restarts
+from vibroimpact.hardware.unix_time import counted_from_start
 
 _LONGEST_LINE = 500
 _PER_COLUMN = frozenset({"name", "unit", "scale", "offset"})
@@ -75,7 +76,8 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     try:
         delimiter = "" if own.delimiter is None else WORDS_FOR_DELIMITERS[own.delimiter]
         raw = read_raw(path, delimiter, own.decimal or "")
-        tables, remarks = joined(chosen_tables(raw, own))
+        chosen, counted, date = counted_from_start(chosen_tables(raw, own))
+        tables, remarks = joined(chosen)
         pieces = [split_at_restarts(table) for table in tables]
     except DatasetError as problem:
         raise named(problem, path) from problem
@@ -85,10 +87,11 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     told = [
         *([raw.damage] if raw.damage else []),
         *raw.remarks,
+        *counted,
         *remarks,
         *(line for _, lines in pieces for line in lines),
     ]
-    return Source(path, own, raw.source_format, found, told, dict(raw.attrs), raw.damage)
+    return Source(path, own, raw.source_format, found, told, {**date, **raw.attrs}, raw.damage)
 
 
 def shortened(line: str) -> str:

@@ -34,6 +34,8 @@ _NUMBER = re.compile(r"[-+]?(?:\d++\.?\d*+|\.\d++)(?:[eEdD][-+]?\d{1,4})?", re.A
 _DATE = re.compile(r"\d{4}[-/]\d{2}[-/]\d{2}[T ]\d{2}:\d{2}(?::\d{2}(?:\.\d{1,18})?)?Z?", re.ASCII)
 _TIME_OF_DAY = re.compile(r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d{1,18})?", re.ASCII)
 _DAY = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}", re.ASCII)
+# 29.990,96 and 29,990.96: both signs in one number.
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?:\.\d{3})++,\d++|(?:,\d{3})++\.\d++)", re.ASCII)
 _LONGEST_QUOTE = 40
 
 
@@ -71,6 +73,15 @@ def is_number(text: str, decimal: str = ".") -> bool:
     (True, True, False, False)
     """
     return _NUMBER.fullmatch(_with_point(text.strip(), decimal)) is not None
+
+
+def has_thousands(text: str) -> bool:
+    """Whether a cell is a number with separators of thousands.
+
+    >>> has_thousands("29.990,96"), has_thousands("1,234,567.5"), has_thousands("29.990"), has_thousands("0.100,5")
+    (True, True, False, False)
+    """
+    return _THOUSANDS.fullmatch(text.strip()) is not None
 
 
 def is_marker(text: str) -> bool:

@@ -62,7 +62,9 @@ def read_labview(content: str) -> RawFile:
             else float((begins - origin) / np.timedelta64(1, "ns")) * 1e-9
         )
         title = "" if number == 1 else f"segment {number}"
-        found, told = _tables(replace(segment, rows=rows), header, separator, decimal, late, title)
+        # what began at the same instant has one trigger, whatever its segment
+        own = "" if begins is not None and not late else title
+        found, told = _tables(replace(segment, rows=rows), header, separator, decimal, late, own)
         tables += found
         remarks += [f"{title}: {line}" if title else line for line in (*told, *cut)]
     if not tables:

@@ -78,7 +78,7 @@ def _heard() -> Iterator[list[str]]:
 
 
 def _read(file: Any, size: int) -> RawFile:
-    groups = file.groups()
+    groups, remarks = _without_copies(file.groups())
     channels = [channel for group in groups for channel in group.channels()]
     if len(channels) > MOST_COLUMNS:
         raise DatasetError(f"expected at most {MOST_COLUMNS} channels, got {len(channels)}.")
@@ -87,11 +87,14 @@ def _read(file: Any, size: int) -> RawFile:
         raise DatasetError(
             f"expected at most {size} samples in as many bytes, got {declared}. It is damaged."
         )
-    remarks: list[str] = []
     starts = [_start(channel) for channel in channels]
     known = [stamp for stamp in starts if stamp is not None]
     origin = min(known) if known else None
-    tables = [_table(group, origin, remarks, len(groups) > 1) for group in groups]
+    # what began at the same instant has one trigger, whatever its group
+    tables = [
+        _table(group, origin, remarks, len(groups) > 1 and None in [_start(one) for one in group.channels()])
+        for group in groups
+    ]
     if any(
         stamp is None and "wf_start_time" in channel.properties
         for stamp, channel in zip(starts, channels, strict=True)
@@ -103,6 +106,16 @@ def _read(file: Any, size: int) -> RawFile:
     if origin is not None:
         attrs["source_date"] = str(np.datetime_as_string(origin, unit="us"))
     return RawFile("TDMS", [table for table in tables if table.columns or table.time], remarks, attrs)
+
+
+def _without_copies(groups: list[Any]) -> tuple[list[Any], list[str]]:
+    """Leave out the decimated copies that SignalExpress keeps beside its samples, to draw them."""
+    levels = [_number(group.properties.get("DecimationLevel")) or 0.0 for group in groups]
+    if not any(levels) or all(levels):
+        return groups, []
+    copies = [group.name for group, level in zip(groups, levels, strict=True) if level]
+    told = f"decimated copies of the samples are left out: {', '.join(copies)}"
+    return [group for group, level in zip(groups, levels, strict=True) if not level], [told]
 
 
 def _start(channel: Any) -> np.datetime64 | None:

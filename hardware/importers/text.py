@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +12,7 @@ import numpy as np
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.importers.cells import (
     Cells,
+    has_thousands,
     is_date,
     is_day,
     is_marker,
@@ -24,6 +26,7 @@ from vibroimpact.hardware.importers.table import MOST_COLUMNS, Column, RawFile, 
 
 _COMMENTS = ("#", "%", "//", "!")
 _DELIMITERS: tuple[str | None, ...] = ("\t", ";", ",", "|", None)
+_QUOTED = re.compile(r'"([^"]{1,60})"')
 FIRST = "column_1"
 _LINES_TRIED = 60
 _LONGEST_HEADER = 1000
@@ -85,8 +88,9 @@ def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> Ra
     cells = read_cells(rows, dialect.delimiter, dialect.decimal)
     if len(cells) > MOST_COLUMNS:
         raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got {len(cells)}. Is it turned over?")
-    labels, units = headings(lines[:first], len(cells), dialect.delimiter)
+    labels, units, late = _all_headings(lines[:first], rows, len(cells), dialect.delimiter)
     columns, told = columns_of(cells, labels, units)
+    told = late + told
     written = f"text, cells between {_NAMES.get(dialect.delimiter, repr(dialect.delimiter))}"
     comma = ", decimal comma" if dialect.decimal == "," else ""
     table = with_time(Table([column for column in columns if len(column.values)]))
@@ -110,6 +114,7 @@ def find_dialect(
     That dialect is chosen in which most lines are rows of one width; of equals the one with more columns.
     """
     tried = _tried_lines(lines)
+    _refuse_thousands(tried)
     delimiters = _DELIMITERS if delimiter == "" else (delimiter,)
     signs = (".", ",") if not decimal else (decimal,)
     tries = [Dialect(mark, sign) for sign in signs for mark in delimiters if mark != sign]
@@ -126,6 +131,22 @@ def find_dialect(
     if doubtful and not decimal and not delimiter:
         return best, ["one comma in each row is read as between two columns; if it is decimal, --decimal ,"]
     return best, []
+
+
+def _refuse_thousands(lines: Sequence[str]) -> None:
+    """Refuse numbers with separators of thousands, where a delimiter that is no such separator shows them."""
+    for line in lines:
+        marks = [mark for mark in ("\t", ";", "|") if mark in line]
+        cells = [cell for mark in marks for cell in split_line(line, mark)] + _QUOTED.findall(line)
+        found = next((cell for cell in cells if has_thousands(cell)), None)
+        if found is not None:
+            raise _thousands(f"the row {line.strip()[:40]!r}", found)
+
+
+def _thousands(where: str, cell: str) -> DatasetError:
+    return DatasetError(
+        f"{where}: expected numbers without separators of thousands, got {cell[:40]!r}. Save the table without them."
+    )
 
 
 def _best_of(dialects: Sequence[Dialect], lines: Sequence[str]) -> tuple[Dialect | None, tuple[int, int]]:
@@ -202,6 +223,23 @@ def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[
     return [name for name, _ in pairs], [own or below for (_, own), below in zip(pairs, units, strict=True)]
 
 
+def _all_headings(
+    header: Sequence[str], rows: Sequence[str], width: int, delimiter: str | None
+) -> tuple[list[str], list[str], list[str]]:
+    """Return names and units of all columns, also where some begin below the headings; and what to say of these."""
+    labels, units = headings(header, width, delimiter)
+    narrow = len(split_line(rows[0], delimiter)) if rows else width
+    if any(labels) or narrow >= width:
+        return labels, units, []
+    begun = next(place for place, row in enumerate(rows, 1) if len(split_line(row, delimiter)) > narrow)
+    labels, units = headings(header, narrow, delimiter)
+    several = f"columns {narrow + 1} to {width} begin" if width > narrow + 1 else f"column {width} begins"
+    verb = "have" if width > narrow + 1 else "has"
+    told = [f"{several} in row {begun} of the table, and {verb} no heading (--name)"] if any(labels) else []
+    more = [""] * (width - narrow)
+    return labels + more, units + more, told
+
+
 def _uncommented(line: str) -> str:
     text = line.strip()
     for mark in _COMMENTS:
@@ -238,6 +276,9 @@ def columns_of(
     columns, told = [], []
     for place, (column, label, unit) in enumerate(zip(cells, labels, units, strict=True), 1):
         name = label or f"column_{place}"
+        grouped = next((text for _, text in column.strange if has_thousands(text)), None)
+        if grouped is not None:
+            raise _thousands(name, grouped)
         if len(column.values) and column.is_text:
             words = [text for _, text in column.strange][:3]
             told.append(f"{name}: a column of words is left out: {'; '.join(words)}")

@@ -111,3 +111,34 @@ def test_a_file_that_is_cut_off_is_told_or_refused(tmp_path: Path) -> None:
     path.write_bytes(whole[:60])
     with pytest.raises(DatasetError, match=r"record\.tdms: expected"):
         import_recording([path])
+
+
+def test_decimated_copies_of_signal_express_are_left_out_and_named(tmp_path: Path) -> None:
+    path = tmp_path / "record.tdms"
+    groups = []
+    for level, samples in ((0, 200), (1, 20), (2, 4)):
+        name = f"Voltage - level {level}"
+        groups += [
+            GroupObject(name, {"DecimationLevel": level}),
+            channel("ai0", np.arange(float(samples)), name),
+        ]
+    with TdmsWriter(path) as writer:
+        writer.write_segment(groups)
+    recording = import_recording([path])
+    assert [len(one.values) for one in recording.channels.values()] == [200]
+    told = "decimated copies of the samples are left out: Voltage - level 1, Voltage - level 2"
+    assert told in recording.remarks
+
+
+@pytest.mark.parametrize("late", [0, 250])
+def test_groups_that_began_at_the_same_instant_have_one_trigger(tmp_path: Path, late: int) -> None:
+    begins = np.datetime64("2026-07-30T10:00:00.000000")
+    starts = [begins, begins + np.timedelta64(late, "ms"), begins + np.timedelta64(late, "ms")]
+    channels = [
+        channel("a", np.arange(9.0), group, wf_start_time=start)
+        for group, start in zip(("one", "two", "three"), starts, strict=True)
+    ]
+    recording = import_recording([written(tmp_path, channels)])
+    triggers = {one.axis.trigger for one in recording.channels.values()}
+    assert len(triggers) == (2 if late else 1)
+    assert ("triggers: the lag" in "\n".join(recording.remarks)) == bool(late)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vibroimpact.analysis.recording import Quality
+from vibroimpact.analysis.recording_files import open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.import_settings import ImportSettings
 from vibroimpact.hardware.importers.text import find_dialect, headings, read_text
@@ -220,3 +221,88 @@ def test_a_heading_of_a_million_letters_makes_no_long_remark(tmp_path: Path) -> 
     assert recording.remarks
     assert max(map(len, recording.remarks)) <= 500
     assert max(map(len, recording.channels)) < 200
+
+
+def test_columns_that_begin_later_leave_the_others_their_headings_and_units(tmp_path: Path) -> None:
+    rows = [f"{k / 100:.2f},{k % 7},{-k}" + (",8,9" if k > 19 else "") for k in range(40)]
+    path = tmp_path / "ragged.csv"
+    path.write_text("time [s],acc [m/s^2],force [N]\n" + "\n".join(rows) + "\n")
+    recording = import_recording([path])
+    assert list(recording.channels) == ["acc", "force", "column_4", "column_5"]
+    assert (recording.channels["acc"].unit, recording.channels["force"].unit) == ("m s-2", "N")
+    assert recording.channels["acc"].axis.rate == pytest.approx(100.0)
+    assert np.isnan(recording.channels["column_5"].values[:20]).all()
+    assert "columns 4 to 5 begin in row 21 of the table, and have no heading (--name)" in recording.remarks
+
+
+@pytest.mark.parametrize(
+    ("rows", "cell"),
+    [
+        (["Zeit;Kraft", "0,0;30.000,00", "0,1;29.990,96", "0,2;850,25"], "30.000,00"),
+        (["t\tF", "0.0\t1,234.5", "0.1\t2,345.5", "0.2\t3.5"], "1,234.5"),
+        (['t,F,"a"', '0.0,"1,234.5",3', '0.1,"2,345.5",3', '0.2,"7.5",3'], "1,234.5"),
+        (["t;F", *[f"{k},5;{k}" for k in range(300)], "300,5;1.234,5"], "1.234,5"),
+    ],
+)
+def test_separators_of_thousands_are_named_in_the_refusal(tmp_path: Path, rows: list[str], cell: str) -> None:
+    path = tmp_path / "thousands.csv"
+    path.write_text("\n".join(rows) + "\n")
+    with pytest.raises(DatasetError, match=f"without separators of thousands, got '{cell}'"):
+        import_recording([path])
+
+
+def test_numbers_that_only_look_like_thousands_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "plain.csv"
+    path.write_text("t,a,b\n" + "".join(f"{k}.125,{k}.250,{k}\n" for k in range(30)))
+    np.testing.assert_array_equal(import_recording([path]).channels["a"].values, np.arange(30) + 0.25)
+
+
+@pytest.mark.parametrize(
+    ("heading", "form", "parts"),
+    [
+        ("timestamp", "{:.6f}", 1.0),
+        ("time (s)", "{:.9f}", 1.0),
+        ("timestamp", "{:.0f}", 1e3),
+        ("timestamp", "{:.0f}", 1e6),
+        ("t (ms)", "{:.3f}", 1e3),
+    ],
+)
+def test_instants_since_1970_count_from_the_first(
+    tmp_path: Path, heading: str, form: str, parts: float
+) -> None:
+    path, step = tmp_path / "unix.csv", 2e-3 if form == "{:.0f}" else 1.0 / 5120.0
+    rows = [f"{form.format((1795255200.0 + k * step) * parts)},{k % 5}\n" for k in range(500)]
+    path.write_text(f"{heading},acc\n" + "".join(rows))
+    recording = import_recording([path])
+    axis = recording.channels["acc"].axis
+    assert axis.time[0] == pytest.approx(0.0, abs=1e-6)
+    assert axis.interval == pytest.approx(step, rel=1e-5)
+    assert recording.attrs["source_date"] == "2026-11-21T10:00:00.000000"
+    assert "since 1970: they are counted from 2026-11-21T10:00:00.000000 (UTC)" in "\n".join(
+        recording.remarks
+    )
+
+
+def test_a_gap_in_instants_since_1970_is_told_from_the_start(tmp_path: Path) -> None:
+    path = tmp_path / "unix.csv"
+    kept = [k for k in range(400) if not 100 <= k < 140]
+    path.write_text("timestamp,acc\n" + "".join(f"{1795255200.0 + k / 5120.0:.6f},{k % 5}\n" for k in kept))
+    recording = import_recording([path])
+    assert len(recording.channels["acc"].values) == 400
+    assert (
+        "40 samples are missing in 1 gap of 0.008008 s at 0.019336 s: they are there as NaN"
+        in recording.remarks
+    )
+
+
+def test_one_value_beyond_the_range_is_kept_as_such(tmp_path: Path) -> None:
+    path = tmp_path / "one.csv"
+    rows = ["0.0,1.5,9.900000E+37", *[f"{k / 10},{k % 3}," for k in range(1, 30)]]
+    path.write_text("t,acc,trigger\n" + "\n".join(rows) + "\n")
+    recording = import_recording([path])
+    write_recording(recording, tmp_path / "one.nc")
+    for found in (recording, open_recording(tmp_path / "one.nc")):
+        assert found.scalars["trigger"].overrange
+        assert np.isnan(found.scalars["trigger"].value)
+    told = "trigger: one value only, which the file marks as overrange: kept beside the channels"
+    assert told in recording.remarks
