@@ -223,7 +223,7 @@ def _response(
     )
     resonance = fit_resonance(curve_of(response, form, band, estimator))
     title = f"Response of {answer.name} to {drive}"
-    remarks = (*recording.remarks, *response.remarks, *resolution_remark(response, resonance))
+    remarks = (*recording.remarks_counted, *response.remarks, *resolution_remark(response, resonance))
     return _sourced(
         _shown_response(console, ResponseEstimates(resonance, response, title, response.unit, remarks)),
         data,

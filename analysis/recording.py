@@ -10,6 +10,7 @@ that one analysis serves all three.
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntFlag
@@ -184,6 +185,17 @@ class Recording:
     def remarks(self) -> tuple[str, ...]:
         """What a reader must know, line by line."""
         return tuple(line for line in str(self.attrs.get("remarks", "")).splitlines() if line)
+
+    @property
+    def remarks_counted(self) -> tuple[str, ...]:
+        """How many remarks there are and where, in one line, for reports of what was imported before; none for none."""
+        if not self.remarks:
+            return ()
+        name, many = os.path.basename(self.title), len(self.remarks)
+        said = "1 remark of its import is" if many == 1 else f"{many} remarks of its import are"
+        return (
+            f"{name}: {said} in its attribute `remarks` (`vibroimpact import {name} -o COPY.nc` shows them)",
+        )
 
     @property
     def title(self) -> str:

@@ -125,7 +125,7 @@ def spikes(
     mechanics = Mechanics(mass, restitution, sensitivity, _numbers(known_impulses), waveform=waveform)
     recording = open_signals(data, run)
     console = Terminal()
-    for remark in recording.remarks:
+    for remark in recording.remarks_counted:
         console.print(remark, style="yellow")
     report = None
     try:

@@ -13,6 +13,7 @@ from typing import Any
 
 import pint
 
+from vibroimpact.analysis.unit_symbols import written_unit
 from vibroimpact.fmus.errors import DatasetError
 
 STANDARD_GRAVITY = 9.80665
@@ -67,12 +68,12 @@ class MeasuredUnit:
 
 
 def unit_label(cf: str) -> str:
-    """Return a unit as people read it: `g` for units of gravity, else as CF writes it.
+    """Return a unit as people write it behind a number, see `unit_symbols.written_unit`.
 
-    >>> unit_label("9.80665 m s-2"), unit_label("m s-2")
-    ('g', 'm s-2')
+    >>> unit_label("9.80665 m s-2"), unit_label("0.001 m"), unit_label("1")
+    ('g', 'mm', '1')
     """
-    return "g" if cf == f"{STANDARD_GRAVITY:.15g} m s-2" else cf
+    return cf if cf == "1" else written_unit(cf)
 
 
 @lru_cache(maxsize=1)

@@ -179,7 +179,7 @@ class Replayer:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What a reader must know of the recording and of the drive."""
-        return (*self.recording.remarks, *(self.drive.remarks if self.drive is not None else ()))
+        return (*self.recording.remarks_counted, *(self.drive.remarks if self.drive is not None else ()))
 
     @cached_property
     def drive_noise(self) -> Floats | None:

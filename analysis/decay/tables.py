@@ -11,6 +11,7 @@ import xarray as xr
 from vibroimpact.analysis.decay.estimate import CONFIDENCE, Estimate
 from vibroimpact.analysis.decay.laws import spoken
 from vibroimpact.analysis.estimate_table import estimate_table
+from vibroimpact.analysis.units import unit_label
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -97,7 +98,7 @@ def print_estimates(
                     low, high = (shown(end, estimate.standard_error)[0] for end in estimate.interval)
                     interval = f"{low} .. {high}"
                 row = quantity.replace("_", " "), names.get(method, method), value, error, interval
-                table.add_row(*row, estimate.unit)
+                table.add_row(*row, unit_label(estimate.unit))
     console.print(table)
 
 
@@ -109,7 +110,7 @@ def print_remarks(console: Terminal, remarks: tuple[str, ...]) -> None:
 
 def print_decay(console: Terminal, decay: FreeDecay) -> None:
     """Print the estimates of a free decay, its damping laws, its backbone, and the remarks."""
-    unit = "" if decay.samples.unit == "1" else f" ({decay.samples.unit})"
+    unit = "" if decay.samples.unit == "1" else f" ({unit_label(decay.samples.unit)})"
     title = (
         f"Free decay of {decay.samples.name}{unit}, amplitude and phase at {decay.samples.reference_time:g} s"
     )

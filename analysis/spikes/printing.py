@@ -8,6 +8,7 @@ from rich.table import Table
 
 from vibroimpact.analysis.spikes.contact import SHORT_CONTACT
 from vibroimpact.analysis.spikes.report import SpikeReport
+from vibroimpact.analysis.unit_symbols import written_unit
 from vibroimpact.fmus.terminal import Terminal
 
 #: A longer list of spikes is cut; all of them are in the dataset.
@@ -59,8 +60,8 @@ def _settings(report: SpikeReport) -> Table:
     """Return the method and its parameters."""
     found, data = report.found, report.dataset
     unit = str(data["threshold"].attrs["units"])
-    shown = "" if unit == "1" else f" {unit}"
-    own = "" if found.unit == "1" else f" {found.unit}"
+    shown = "" if unit == "1" else f" {written_unit(unit)}"
+    own = "" if found.unit == "1" else f" {written_unit(found.unit)}"
     chosen = found.settings
     asked = chosen.threshold is not None or chosen.threshold_part is not None
     why = "asked for" if asked else f"noise passes it {chosen.false_alarms:g} times in such a record"

@@ -70,6 +70,20 @@ def test_two_files_become_one_recording_with_two_triggers_and_a_table_tells_what
     assert str(tmp_path) not in "".join(map(str, recording.attrs.values())).replace(str(output), "")
 
 
+def test_the_table_shows_units_as_the_file_gives_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bench.csv"
+    path.write_text(
+        "t [s],deflection [mm],force [mN]\n" + "".join(f"{k / 10},{k % 7},{k % 5}\n" for k in range(40))
+    )
+    assert command(path, "-o", tmp_path / "bench.nc") == 0
+    told = capsys.readouterr().out
+    assert " mm " in told
+    assert " mN " in told
+    assert "0.001" not in told
+
+
 def test_settings_in_a_file_beside_the_recording_do_the_same_as_options(
     pair: tuple[Path, Path], tmp_path: Path
 ) -> None:

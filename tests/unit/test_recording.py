@@ -263,3 +263,42 @@ def test_what_is_no_unit_is_refused_and_never_evaluated(label: str) -> None:
 def test_people_read_g() -> None:
     assert unit_label("9.80665 m s-2") == "g"
     assert unit_label("V") == "V"
+
+
+@pytest.mark.parametrize(
+    "label",
+    [
+        "mm",
+        "mN",
+        "mV",
+        "µm",
+        "kN",
+        "cm",
+        "mm/s",
+        "mm/s²",
+        "lbf",
+        "in",
+        "psi",
+        "bar",
+        "deg",
+        "deg/s",
+        "ms",
+        "kHz",
+    ],
+)
+def test_a_unit_is_shown_as_the_user_gave_it(label: str) -> None:
+    assert unit_label(measured_unit(label).cf) == label
+
+
+@pytest.mark.parametrize(
+    "cf", ["0.37 m", "0.001 kg", "0.01 N", "(m s-2) (N)-1", "0.001 m2", "", "3", "x y z w!"]
+)
+def test_a_unit_that_nobody_has_a_name_for_is_shown_as_it_is_stored(cf: str) -> None:
+    assert unit_label(cf) == cf
+
+
+def test_remarks_of_an_import_are_counted_in_one_line(tmp_path: Path) -> None:
+    one = Recording({}, attrs={"source_file": "a.csv", "remarks": "a gap\nclipped"})
+    (line,) = one.remarks_counted
+    assert line.startswith("a.csv: 2 remarks of its import are in its attribute `remarks`")
+    assert Recording({}, attrs={"source_file": "a.csv"}).remarks_counted == ()

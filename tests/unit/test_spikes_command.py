@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from typer.testing import CliRunner
 from vibroimpact.analysis import spikes_command
 from vibroimpact.analysis.intervals import dimension
 from vibroimpact.analysis.recording import EventTrain, Recording
-from vibroimpact.analysis.recording_files import write_recording
+from vibroimpact.analysis.recording_files import open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError, EstimationError, UsageError
 
 RATE = 20_000.0
@@ -42,6 +43,17 @@ def spikes(*arguments: str | Path) -> str:
         raise done.exception
     assert done.exit_code == 0, done.output
     return str(done.output)
+
+
+def test_remarks_of_the_import_are_counted_not_repeated(record: Path, tmp_path: Path) -> None:
+    whole = open_recording(record)
+    remarks = [f"cell: remark number {place}" for place in range(40)]
+    told = replace(whole, attrs={**whole.attrs, "remarks": "\n".join(remarks)})
+    write_recording(told, tmp_path / "told.nc")
+    said = spikes(tmp_path / "told.nc", "--events", "neuron").replace("\n", " ")
+    assert "told.nc: 40 remarks of its import" in said
+    assert "remark number" not in said
+    assert open_recording(tmp_path / "told.nc").remarks == tuple(remarks)
 
 
 def test_masked_parts_of_an_observation_are_not_looked_at(tmp_path: Path) -> None:
