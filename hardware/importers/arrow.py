@@ -45,7 +45,7 @@ def read_arrow(path: os.PathLike[str] | str) -> RawFile:
         raise missing_extra(f"a {kind} file", "pyarrow", "parquet") from problem
     check_reads(path, Reading(kind))
     try:
-        table = _table_of(path, kind)
+        table, remarks = _table_of(path, kind)
     except DatasetError:
         raise
     # the library reports damage as errors of every kind, MemoryError too
@@ -53,30 +53,53 @@ def read_arrow(path: os.PathLike[str] | str) -> RawFile:
         raise DatasetError(
             f"expected a whole {kind} file, got one that cannot be read ({type(problem).__name__}: {problem})."
         ) from problem
-    columns, remarks = [], []
-    for name, values in zip(table.column_names, table.columns, strict=True):
-        column = _column(str(name), values)
-        if isinstance(column, Column):
-            columns.append(column)
-        else:
-            remarks.append(column)
+    columns = [
+        _column(str(name), values) for name, values in zip(table.column_names, table.columns, strict=True)
+    ]
     return RawFile(kind, [with_time(Table(columns))] if columns else [], remarks)
 
 
-def _table_of(path: os.PathLike[str] | str, kind: str) -> Any:
-    """Return the table of a file that is not too large for a recording."""
+def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
+    """Return the columns of numbers and dates, where they are not too many, and what is said of the others."""
     import pyarrow.ipc
     import pyarrow.parquet
 
     if kind == "Parquet":
         with pyarrow.parquet.ParquetFile(path, memory_map=False) as file:
-            _check_size(file.metadata.num_rows, file.metadata.num_columns)
-            return file.read(use_threads=False)
+            names, remarks = _chosen(file.schema_arrow)
+            _check_size(file.metadata.num_rows, len(names))
+            return file.read(columns=names, use_threads=False), remarks
     with pyarrow.ipc.open_file(pyarrow.OSFile(os.fspath(path))) as file:
-        _check_size(
-            sum(file.get_batch(at).num_rows for at in range(file.num_record_batches)), len(file.schema)
-        )
-        return file.read_all()
+        schema = file.schema
+    names, remarks = _chosen(schema)
+    if not names:  # no field would mean all of them
+        return pyarrow.table({}), remarks
+    wanted = pyarrow.ipc.IpcReadOptions(included_fields=[schema.get_field_index(name) for name in names])
+    with pyarrow.ipc.open_file(pyarrow.OSFile(os.fspath(path)), options=wanted) as file:
+        rows, batches = 0, []
+        for at in range(file.num_record_batches):
+            batches.append(file.get_batch(at))
+            rows += batches[-1].num_rows
+            _check_size(rows, len(names))
+        return pyarrow.Table.from_batches(batches, file.schema), remarks
+
+
+def _chosen(schema: Any) -> tuple[list[str], list[str]]:
+    """Return the columns of numbers and dates by name, and what is said of the others."""
+    from pyarrow import types
+
+    names, remarks = [], []
+    for name in dict.fromkeys(schema.names):
+        at = schema.get_all_field_indices(name)
+        kind = schema.field(at[0]).type
+        tests = (types.is_integer, types.is_floating, types.is_boolean, types.is_timestamp)
+        if len(at) > 1:
+            remarks.append(f"{name}: {len(at)} columns have this name, they are left out")
+        elif any(test(kind) for test in tests):
+            names.append(name)
+        else:
+            remarks.append(f"{name}: its values are {kind}, it is left out; numbers are read")
+    return names, remarks
 
 
 def _check_size(rows: int, columns: int) -> None:
@@ -86,20 +109,19 @@ def _check_size(rows: int, columns: int) -> None:
         )
 
 
-def _column(name: str, values: Any) -> Column | str:
-    """Return a column of numbers or dates; of another kind, what is to be said of it."""
+def _column(name: str, values: Any) -> Column:
+    """Return a column of numbers, or of dates as seconds after the first."""
     import pyarrow as pa
+    import pyarrow.compute
 
     label, unit = split_label(name)
     if pa.types.is_timestamp(values.type):
-        stamps = values.cast(pa.int64()).to_numpy()
         per_second = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[values.type.unit]
-        known = np.isfinite(stamps) if stamps.dtype.kind == "f" else np.ones(len(stamps), dtype=bool)
-        first = stamps[known][0] if np.any(known) else 0
-        return Column(label or name, (stamps - first) / per_second, "s", attrs={"time": 1})
+        stamps = values.cast(pa.int64())
+        first = next((one for one in stamps.drop_null()[:1].to_pylist()), 0)
+        later = pyarrow.compute.subtract(stamps, first).to_numpy()
+        return Column(label or name, later / per_second, "s", attrs={"time": 1})
     if pa.types.is_boolean(values.type):
         values = values.cast(pa.uint8())
-    if not (pa.types.is_integer(values.type) or pa.types.is_floating(values.type)):
-        return f"{name}: its values are {values.type}, it is left out; numbers are read"
     numbers = sorted_out(np.array(values.to_numpy(), dtype=np.float64))
     return Column(label or name, numbers.values, unit, numbers.overrange)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -44,11 +45,23 @@ def is_netcdf4(path: os.PathLike[str] | str) -> bool:
     import h5py
 
     check_reads(path, _READING)
-    with h5py.File(path, "r") as file:
+    with _one_refusal("an HDF5 file"), h5py.File(path, "r") as file:
         return "_NCProperties" in file.attrs or any(
-            "CLASS" in item.attrs and item.attrs["CLASS"] == b"DIMENSION_SCALE"
-            for _, item in _items(file, [])
+            _text(item.attrs.get("CLASS")) == "DIMENSION_SCALE" for _, item in _items(file, [])
         )
+
+
+@contextmanager
+def _one_refusal(what: str) -> Iterator[None]:
+    """Turn what the library raises into one refusal: it reports damage as errors of every kind, MemoryError too."""
+    try:
+        yield
+    except DatasetError:
+        raise
+    except Exception as problem:
+        raise DatasetError(
+            f"expected {what} that is whole, got one that cannot be read ({type(problem).__name__}: {problem})."
+        ) from problem
 
 
 def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
@@ -73,17 +86,8 @@ def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
     check_reads(path, _READING)
     remarks: list[str] = []
     scopes = [Scope()]
-    try:
-        with h5py.File(path, "r") as file:
-            _read_group(file, scopes[0], scopes, remarks, matlab)
-    except DatasetError:
-        raise
-    # the library reports damage as errors of every kind, MemoryError too
-    except Exception as problem:
-        raise DatasetError(
-            f"expected {what.replace('a ', 'a whole ').replace('an ', 'a whole ')}, got one that cannot be read "
-            f"({type(problem).__name__}: {problem})."
-        ) from problem
+    with _one_refusal(what), h5py.File(path, "r") as file:
+        _read_group(file, scopes[0], scopes, remarks, matlab)
     tables, told = tables_of(scopes)
     return RawFile("MATLAB 7.3" if matlab else "HDF5", tables, remarks + told)
 

@@ -17,6 +17,7 @@ from vibroimpact.hardware.importers.table import MOST_COLUMNS, MOST_SAMPLES, Col
 SIGNATURES = (b"RIFF", b"RIFX", b"RF64")
 # What scipy says of parts of a file that hold no samples (names, comments), and of one that is cut off.
 _KNOWN_WORDS = ("Chunk (non-data) not understood", "Reached EOF prematurely", "Incomplete chunk ID")
+_MOST_PARTS = 10_000
 _CUT_OFF = "the file is cut off: it holds less samples than it declares, and what is there is read"
 
 
@@ -78,20 +79,29 @@ class _Samples:
 
 
 def _samples_of(content: bytes) -> _Samples:
-    """Return where the samples are; scipy says what is wrong where they cannot be found."""
+    """Return where the samples are; scipy says what is wrong where they cannot be found.
+
+    Raises
+    ------
+    DatasetError
+        The file has more parts than any program writes.
+    """
     order, place, frame, bits = (">" if content.startswith(b"RIFX") else "<"), 12, 0, 0
-    while place + 8 <= len(content):
+    found: _Samples | None = None
+    for _ in range(_MOST_PARTS):
+        if place + 8 > len(content):
+            return found or _Samples(len(content), bits, False)
         name, size = struct.unpack_from(f"{order}4sI", content, place)
         place += 8
         if name == b"fmt " and place + 16 <= len(content):
             frame, bits = struct.unpack_from(f"{order}HH", content, place + 12)
-        if name == b"data" and frame:
+        if name == b"data" and frame and found is None:
             if content.startswith(b"RF64"):
                 (size,) = struct.unpack_from("<Q", content, 28)
             there = len(content) - place
-            return _Samples(place + there // frame * frame, bits, there < size)
+            found = _Samples(place + there // frame * frame, bits, there < size)
         place += size + size % 2
-    return _Samples(len(content), bits, False)
+    raise DatasetError(f"expected a WAV file of at most {_MOST_PARTS} parts, got more. It is damaged.")
 
 
 def _column(samples: Any, label: str, interval: float, data: _Samples) -> Column:

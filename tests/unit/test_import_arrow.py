@@ -13,6 +13,7 @@ from pyarrow import feather, parquet
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.import_settings import ImportSettings
 from vibroimpact.hardware.importing import import_recording
 
 TIME = np.arange(80) / 512.0
@@ -81,4 +82,15 @@ def test_a_package_that_is_missing_is_named(
     path = written(tmp_path, kind, time=TIME, acc=ACC)
     monkeypatch.setitem(sys.modules, "pyarrow", None)
     with pytest.raises(DatasetError, match=r"pip install 'vibroimpact\[parquet\]'"):
+        import_recording([path])
+
+
+def test_columns_of_one_name_and_tables_of_nothing_are_said(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / f"record.{kind}"
+    write = parquet.write_table if kind == "parquet" else feather.write_feather
+    write(pa.Table.from_arrays([pa.array(ACC)] * 3, names=["a", "a", "b"]), path)
+    told = "\n".join(import_recording([path], ImportSettings(rate=10.0)).remarks)
+    assert "a: 2 columns have this name, they are left out" in told
+    write(pa.table({"word": ["x", "y"]}), path)
+    with pytest.raises(DatasetError, match=r"got none\. Besides, word: its values are string"):
         import_recording([path])

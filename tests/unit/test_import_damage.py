@@ -189,7 +189,5 @@ def test_a_damaged_matlab_file_cannot_take_the_program_with_it(place: int) -> No
 def test_a_file_that_kills_its_reader_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "record.nc"
     path.write_bytes(b"\x89HDF\r\n\x1a\n" + b"\x00" * 200)
-    with pytest.raises(
-        DatasetError, match=r"record\.nc: expected a whole NetCDF file, got OSError: .*HDF error"
-    ):
+    with pytest.raises(DatasetError, match=r"record\.nc: expected a whole HDF5 file, got OSError: "):
         import_recording([path])

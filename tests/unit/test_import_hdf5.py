@@ -11,6 +11,7 @@ import pytest
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.import_settings import ImportSettings
 from vibroimpact.hardware.importing import import_recording
 
 TIME = np.arange(60) / 128.0
@@ -142,3 +143,19 @@ def test_without_the_extra_datasets_outside_groups_are_read_and_those_within_are
     for path in (grouped, mat):
         with pytest.raises(DatasetError, match=r"pip install 'vibroimpact\[hdf5\]'"):
             import_recording([path])
+
+
+def test_attributes_of_unusual_kinds_and_circles_of_groups_do_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "odd.h5"
+    with h5py.File(path, "w") as file:
+        file["run/acc"] = ACC
+        file["run"].attrs["fs"] = [128.0, 256.0]
+        file["run/acc"].attrs["CLASS"] = ["DIMENSION_SCALE", "x"]
+        file["run/acc"].attrs["units"] = np.array([1, 2])
+        file["run/acc"].attrs["dt"] = "soon"
+        file["nothing"] = h5py.Empty("f8")
+        file["whole"] = np.float16(2.0)
+    recording = import_recording([path], ImportSettings(rate=128.0))
+    assert list(recording.channels) == ["run_acc"]
+    assert recording.scalars["whole"].value == 2.0
+    assert "nothing: holds no numbers and is left out" in recording.remarks

@@ -120,3 +120,10 @@ def test_a_file_that_promises_4_gigabytes_is_cut_off(tmp_path: Path) -> None:
     recording = import_recording([path])
     assert len(recording.channels["channel_1"].values) == 300
     assert recording.remarks[0].startswith("the file is cut off")
+
+
+def test_a_file_of_a_million_empty_parts_is_refused_at_once(tmp_path: Path) -> None:
+    path = by_scipy(tmp_path, np.int16(SIGNAL * 2**15))
+    path.write_bytes(path.read_bytes() + b"junk\x00\x00\x00\x00" * 1_000_000)
+    with pytest.raises(DatasetError, match="at most 10000 parts"):
+        import_recording([path])
