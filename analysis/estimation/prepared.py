@@ -15,6 +15,7 @@ from vibroimpact.analysis.estimation.trajectory import Trajectory
 from vibroimpact.analysis.estimation.weak_form import (
     WeakForm,
     robust_weak_form,
+    weak_form,
     weighted_flights,
     with_own_clock,
 )
@@ -24,6 +25,10 @@ from vibroimpact.fmus.errors import EstimationError
 # Correlation of neighbouring rests beyond so many standard errors widens the intervals.
 _CORRELATED = 3.0
 _LEAST_DAMPING = 1e-6
+# Rests of a flight larger or more alike than those of noise by so many standard errors show that it has an impact.
+_BEYOND_CHANCE = 4.5
+# A natural frequency over that for which a record was cut by such a factor is cut for; beyond, it is no oscillator's.
+_FASTER, _MUCH_FASTER = 1.05, 4.0
 
 
 @dataclass(slots=True)
@@ -78,12 +83,29 @@ class Prepared:
 def prepare(channel: Channel, forcing: Forcing, held: Known, window: float | None) -> Prepared:
     """Cut a record, find what the weak form says and fit the exact flow to each flight.
 
+    A natural frequency above that of the force makes the motion faster than the record was cut for: it is cut again.
+
     Raises
     ------
     EstimationError
         No impacts were found, or no flight between them follows a forced oscillator.
     """
     fastest = max(forcing.angular_frequency, held.natural_frequency or 0.0)
+    found = _prepared(channel, forcing, held, window, fastest)
+    natural = found.parameters.natural_frequency
+    if not _FASTER * fastest < natural < _MUCH_FASTER * fastest:
+        return found
+    try:
+        again = _prepared(channel, forcing, held, window, natural)
+    except EstimationError:
+        return found
+    return again if len(again.flights) >= len(found.flights) else found
+
+
+def _prepared(
+    channel: Channel, forcing: Forcing, held: Known, window: float | None, fastest: float
+) -> Prepared:
+    """Return a record cut for motion of this fastest angular frequency, rad/s."""
     segmentation = segment(
         channel.time,
         np.where(channel.good, channel.values, 0.0),
@@ -102,27 +124,53 @@ def prepare(channel: Channel, forcing: Forcing, held: Known, window: float | Non
             f"estimate: expected flights of at least 10 samples between impacts, got none between "
             f"{len(segmentation.impacts)} impacts. Use a higher sampling rate."
         )
-    weak, flights, left_out = _weak(segmentation, flights, start, free, fastest)
-    parameters = weak.parameters if weak else start
-    # noise may put weak damping below zero, where there is no flow
-    parameters = replace(parameters, damping_ratio=max(parameters.damping_ratio, _LEAST_DAMPING))
-    fit = fit_flights(
-        segmentation.signal,
-        flights,
-        parameters,
-        stop,
-        weak.names if weak else (),
-        weak.influence if weak else (),
-    )
+    weak, flights = _weak(segmentation, flights, start, free, fastest)
+    parameters, fit = _fitted(segmentation, flights, start, weak, stop)
+    followed = _followed(fit)
+    if weak is not None and len(followed) < len(flights):
+        # rests of all samples show a weak impact that the few integrals of the weak form do not
+        flights = [flights[k] for k in followed]
+        whole = weighted_flights(segmentation.signal, flights, fastest)
+        weak = weak_form(whole, weak.parameters, free)
+        parameters, fit = _fitted(segmentation, flights, start, weak, stop)
     parameters = replace(
         parameters,
         restitution=min(max(fit.reading.restitution, 0.0), 1.0),
         stop_position=fit.reading.stop_position,
     )
     correlation, inflation = _coloured(fit)
+    left_out = sum(flight.usable for flight in segmentation.flights) - len(flights)
     return Prepared(
         segmentation, flights, weak, fit, parameters, stop, free, left_out, correlation, inflation
     )
+
+
+def _fitted(
+    segmentation: Segmentation,
+    flights: list[Flight],
+    start: Parameters,
+    weak: WeakForm | None,
+    stop: float | None,
+) -> tuple[Parameters, FlightFit]:
+    """Return the parameters that the weak form found or were held, and the exact flow with them on each flight."""
+    parameters = weak.parameters if weak else start
+    # noise may put weak damping below zero, where there is no flow
+    parameters = replace(parameters, damping_ratio=max(parameters.damping_ratio, _LEAST_DAMPING))
+    names, influence = (weak.names, weak.influence) if weak else ((), ())
+    return parameters, fit_flights(segmentation.signal, flights, parameters, stop, names, influence)
+
+
+def _followed(fit: FlightFit) -> list[int]:
+    """Return the flights whose rests are no larger and no more alike than noise; all where most are not."""
+    found = []
+    for k, one in enumerate(fit.fitted):
+        count = len(one.rests)
+        square = float(one.rests @ one.rests)
+        excess = (square / fit.noise**2 - count) / math.sqrt(2.0 * count) if fit.noise > 0.0 else 0.0
+        alike = float(one.rests[1:] @ one.rests[:-1]) / square * math.sqrt(count) if square > 0.0 else 0.0
+        if max(excess, alike) < _BEYOND_CHANCE:
+            found.append(k)
+    return found if len(found) > 0.5 * len(fit.fitted) else list(range(len(fit.fitted)))
 
 
 def _start(
@@ -158,15 +206,15 @@ def _weak(
     start: Parameters,
     free: tuple[str, ...],
     fastest: float,
-) -> tuple[WeakForm | None, list[Flight], int]:
-    """Return the weak form over the flights that follow the model, those flights, and how many do not."""
+) -> tuple[WeakForm | None, list[Flight]]:
+    """Return the weak form over the flights that follow the model, and those flights."""
     if not free:
-        return None, flights, 0
+        return None, flights
     whole = weighted_flights(segmentation.signal, flights, fastest)
     if "angular_frequency" in free:
         start = with_own_clock(whole, start, [name for name in free if name != "angular_frequency"])
     found, kept = robust_weak_form(whole, start, free, segmentation.signal.noise)
-    return found, [flights[k] for k in kept], len(flights) - len(kept)
+    return found, [flights[k] for k in kept]
 
 
 def _coloured(fit: FlightFit) -> tuple[float, float]:

@@ -2,16 +2,18 @@
 
 Symbols: V speed of approach, r restitution. At an impact the velocity jumps by -(1 + r) V; on both sides the motion is
 smooth. Each side has its own one-sided cubic over a window fixed in time; the instant is where the two meet, or, with
-the stop known, where each meets the stop (weights by their speeds).
+the stop known, where each meets the stop (weights by their speeds). The window balances noise against the motion's
+curvature; where flights are shorter than it, a shorter one shows more impacts and is taken.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import oaconvolve
 
 from vibroimpact.analysis.estimation.noise import Floats, Mask, noise_level, one_sided_window
 from vibroimpact.analysis.robust import robust_sigma
@@ -29,6 +31,13 @@ _REFINEMENTS = 4
 _LEVEL_BEYOND = 8.0
 # ... and by more than this part of the motion's size.
 _LEVEL_OF_SIZE = 0.02
+# Each shorter window is this part of the one before it, down to as many samples ...
+_SHORTER = 0.6
+_FEWEST_IN_WINDOW = 6
+# ... and is taken where it shows more than so many times as many impacts ...
+_MORE = 1.1
+# ... which is not tried where impacts lie so many windows apart.
+_APART = 2.5
 # Samples within so many standard errors of an impact's instant are in no flight.
 _DOUBTFUL = 2.5
 
@@ -110,12 +119,28 @@ class Flight:
 
 @dataclass(frozen=True, slots=True)
 class Segmentation:
-    """A signal cut at its impacts; the flights are those between impacts, first to last."""
+    """A signal cut at its impacts.
+
+    Attributes
+    ----------
+    signal : Signal
+    impacts : tuple of Impact
+    flights : tuple of Flight
+        Those between impacts, first to last.
+    window : float
+        Of the one-sided cubics, s.
+    stray : int
+        Kinks that are at no stop: their level is not that of the others.
+    opposite : int
+        Kinks the other way, far from all others: those of a stop on the other side.
+    """
 
     signal: Signal
     impacts: tuple[Impact, ...]
     flights: tuple[Flight, ...]
     window: float
+    stray: int = 0
+    opposite: int = 0
 
     @property
     def stop_position(self) -> float:
@@ -155,25 +180,83 @@ def segment(
         Too few samples, or fewer than two impacts.
     """
     noise = noise_level(values, good)
-    steps = np.diff(time)
-    interval = float(np.median(steps))
+    interval = float(np.median(np.diff(time)))
     size = 0.5 * float(np.ptp(values[good]))
-    longest = 0.25 * 2.0 * math.pi / fastest
-    width = window if window is not None else one_sided_window(noise, interval, size, fastest, longest)
-    count = max(6, round(width / interval))
-    jump = _jumps(values, good, np.abs(steps - interval) < _UNEVEN * interval, count, interval)
-    sign = _side_sign(jump, side)
-    signal = Signal(time, sign * values, good, interval, sign, noise)
-    error, bias = _hinge_errors(noise, size, fastest, count, interval)
-    places = _kinks(-sign * jump, max(_JUMPS_BEYOND * error, _BIAS_BEYOND * bias), count)
-    stop = None if stop_position is None else sign * stop_position
-    impacts = _consistent(_located(signal, places, count, stop), noise, count, size)
-    if len(impacts) < 2:
+    if window is None:
+        longest = 0.25 * 2.0 * math.pi / fastest
+        window = one_sided_window(noise, interval, size, fastest, longest)
+        counts = _counts(window / interval)
+    else:
+        counts = [max(_FEWEST_IN_WINDOW, round(window / interval))]
+    scales = _Scales(noise, interval, size, fastest)
+    signal = Signal(time, values, good, interval, 1.0, noise)
+    found: Segmentation | None = None
+    for count in counts:
+        trial = _cut(signal, scales, count, side, stop_position)
+        if found is None or len(trial.impacts) > _MORE * len(found.impacts):
+            found = trial
+        if _uncrowded(trial, count):
+            break
+    if found is None or len(found.impacts) < 2:
         raise EstimationError(
             f"segmentation: expected at least two impacts with a jump of the velocity above the noise "
-            f"({noise:.3g}), got {len(impacts)}. Give a longer recording of impacting motion, or one with less noise."
+            f"({noise:.3g}), got {0 if found is None else len(found.impacts)}. Give a longer recording of impacting "
+            "motion, or one with less noise or more samples between impacts."
         )
-    return Segmentation(signal, tuple(impacts), _flights(signal, impacts), count * interval)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class _Scales:
+    """Noise, sampling interval (s), amplitude and fastest smooth rate (rad/s) of a signal."""
+
+    noise: float
+    interval: float
+    size: float
+    fastest: float
+
+
+def _counts(most: float) -> list[int]:
+    """Return the samples in a one-sided window, longest first."""
+    counts = [max(_FEWEST_IN_WINDOW, round(most))]
+    while counts[-1] > _FEWEST_IN_WINDOW:
+        counts.append(max(_FEWEST_IN_WINDOW, round(_SHORTER * counts[-1])))
+    return counts
+
+
+def _uncrowded(cut: Segmentation, count: int) -> bool:
+    """Tell whether no impact has another so near that a shorter window would show more."""
+    apart = np.diff([impact.time for impact in cut.impacts])
+    return bool(len(apart) and not cut.stray and np.min(apart) > _APART * count * cut.signal.interval)
+
+
+def _cut(
+    raw: Signal, scales: _Scales, count: int, side: str | None, stop_position: float | None
+) -> Segmentation:
+    """Return a signal cut at the impacts that windows of `count` samples on each side show."""
+    noise, interval, size = scales.noise, scales.interval, scales.size
+    even = np.abs(np.diff(raw.time) - interval) < _UNEVEN * interval
+    jump = _jumps(raw.values, raw.good, even, count, interval)
+    sign = _side_sign(jump, side)
+    signal = replace(raw, values=sign * raw.values, sign=sign)
+    error, bias = _hinge_errors(scales, count)
+    least = max(_JUMPS_BEYOND * error, _BIAS_BEYOND * bias)
+    places = _kinks(-sign * jump, least, count)
+    stop = None if stop_position is None else sign * stop_position
+    located = _located(signal, places, count, stop)
+    impacts = _consistent(located, noise, count, size)
+    opposite = sum(
+        all(abs(place - other) > _APART * count for other in places)
+        for place in _kinks(sign * jump, least, count)
+    )
+    return Segmentation(
+        signal,
+        tuple(impacts),
+        _flights(signal, impacts),
+        count * interval,
+        len(located) - len(impacts),
+        opposite,
+    )
 
 
 def _hinge(count: int) -> Floats:
@@ -191,12 +274,20 @@ def _hinge(count: int) -> Floats:
 
 def _jumps(values: Floats, good: Mask, even: Mask, count: int, interval: float) -> Floats:
     """Return the jump of the velocity in the middle of each sampling interval; NaN where it is not known."""
-    windows = np.lib.stride_tricks.sliding_window_view(np.where(good, values, 0.0), 2 * count)
-    whole = np.lib.stride_tricks.sliding_window_view(good, 2 * count).all(axis=1)
-    whole &= np.lib.stride_tricks.sliding_window_view(even, 2 * count - 1).all(axis=1)
     jump = np.full(len(values) - 1, np.nan)
-    jump[count - 1 : len(values) - count] = np.where(whole, windows @ _hinge(count), np.nan) / interval
+    if len(values) < 2 * count:
+        return jump
+    kinks = oaconvolve(np.where(good, values - np.mean(values), 0.0), _hinge(count)[::-1], mode="valid")
+    whole = _all_of(good, 2 * count) & _all_of(even, 2 * count - 1)
+    jump[count - 1 : len(values) - count] = np.where(whole, kinks, np.nan) / interval
     return jump
+
+
+def _all_of(mask: Mask, count: int) -> Mask:
+    """Return whether `count` neighbours from each one on are all true."""
+    missing = np.concatenate([[0], np.cumsum(~mask)])
+    found: Mask = missing[count:] == missing[:-count]
+    return found
 
 
 def _side_sign(jump: Floats, side: str | None) -> float:
@@ -207,14 +298,13 @@ def _side_sign(jump: Floats, side: str | None) -> float:
     return 1.0 if known.size == 0 or -np.min(known) >= np.max(known) else -1.0
 
 
-def _hinge_errors(
-    noise: float, size: float, fastest: float, count: int, interval: float
-) -> tuple[float, float]:
+def _hinge_errors(scales: _Scales, count: int) -> tuple[float, float]:
     """Return what noise, and what the fourth derivative of smooth motion, make of a jump where there is none."""
     weights = _hinge(count)
     fourth = (np.arange(2 * count) - (count - 0.5)) ** 4 / 24.0
-    error = noise * float(np.linalg.norm(weights)) / interval
-    return error, size * fastest**4 * interval**3 * abs(float(weights @ fourth))
+    error = scales.noise * float(np.linalg.norm(weights)) / scales.interval
+    bend = scales.size * scales.fastest**4 * scales.interval**3
+    return error, bend * abs(float(weights @ fourth))
 
 
 def _kinks(drop: Floats, least: float, count: int) -> list[int]:

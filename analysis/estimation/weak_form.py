@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.polynomial.legendre import legder, legval
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
+from scipy.stats import chi2
 
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.physics import Parameters
@@ -35,12 +37,16 @@ _FEWEST_FUNCTIONS, _FUNCTIONS_PER_RADIAN = 3, 1.0
 _SAMPLES_PER_FUNCTION = 4
 # Eigenvalues of G below this part of the largest are left out: those functions are the sum of others.
 _DEPENDENT = 1e-8
-# A flight follows the model while the mean square of its whitened rests is below this many times that of the noise.
-_MISFIT = 4.0
+# A flight follows the model while the sum of squares of its whitened rests is one that noise exceeds so seldom ...
+_SELDOM = 1e-4
+# ... where the size of the noise is known to so much.
+_NOISE_DOUBT = 1.2
 # While some do not, this part of the flights, the worst, is left out at a time.
 _LEFT_OUT = 0.25
 _FEWEST_KEPT = 0.2
 _FUNCTIONS_OF_START = 3
+# Natural frequencies over that of the force from which the search starts.
+_RATIOS_OF_START = tuple(np.geomspace(0.1, 2.5, 24).tolist())
 _MOST_CLOCKS = 500
 # Sums of samples are integrals to about this part of the motion's size.
 _EXACT = 1e-4
@@ -306,30 +312,69 @@ def robust_weak_form(
     noise : float
         Standard deviation, from the samples alone.
     """
-    linear = [name for name in free if name != "angular_frequency"]
     kept = list(range(len(flights)))
     fewest = max(1, math.ceil(_FEWEST_KEPT * len(flights)))
-
-    def fit() -> WeakForm:
-        chosen = [flights[k] for k in kept]
-        first = linear_estimate(chosen, start.angular_frequency, start, linear) if linear else start
-        return weak_form(chosen, first, free)
-
-    found = fit()
     smallest = max(noise, _EXACT * float(np.max(np.abs(flights[0].values)))) ** 2
-    while len(kept) > fewest and float(np.max(found.misfit)) > _MISFIT * smallest:
-        order = np.argsort(found.misfit)
+    limits = _misfit_limits(flights)
+
+    def better(misfit: Floats) -> list[int]:
+        """Return the flights that are kept: those within the limits, and at least the better part."""
         count = max(fewest, min(len(kept) - 1, math.ceil((1.0 - _LEFT_OUT) * len(kept))))
-        good = set(order[:count].tolist()) | set(np.flatnonzero(found.misfit <= _MISFIT * smallest).tolist())
-        kept = [k for place, k in enumerate(kept) if place in good]
-        found = fit()
-    limit = _MISFIT * max(smallest, float(np.median(found.misfit)))
+        good = set(np.argsort(misfit)[:count].tolist())
+        good |= set(np.flatnonzero(misfit <= smallest * limits[kept]).tolist())
+        return [k for place, k in enumerate(kept) if place in good]
+
+    def fit(best: Parameters) -> WeakForm:
+        chosen = [flights[k] for k in kept]
+        return weak_form(chosen, _nearest_start(chosen, best, free), free)
+
+    best = _nearest_start(flights, start, free, _RATIOS_OF_START)
+    kept = better(_Stacked(flights).misfit(best))
+    found = fit(best)
+    while len(kept) > fewest and np.any(found.misfit > smallest * limits[kept]):
+        kept = better(found.misfit)
+        found = fit(found.parameters)
+    typical = max(smallest, float(np.median(found.misfit)))
     misfit = _Stacked(flights).misfit(found.parameters)
-    again = np.flatnonzero(misfit <= limit).tolist()
+    again = np.flatnonzero(misfit <= typical * limits).tolist()
     if again and again != kept:
         kept = again
-        found = fit()
+        found = fit(found.parameters)
     return found, kept
+
+
+def _misfit_limits(flights: Sequence[WeightedFlight]) -> Floats:
+    """Return the largest mean square of whitened rests that noise of unit variance gives, for each flight."""
+    ranks = np.array([flight.weights.shape[1] for flight in flights])
+    limits: Floats = _NOISE_DOUBT * chi2.isf(_SELDOM, ranks) / ranks
+    return limits
+
+
+def _nearest_start(
+    flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str], ratios: Sequence[float] = ()
+) -> Parameters:
+    """Return the start that most flights are nearest to: as given, linear, or linear at a held natural frequency.
+
+    Noise biases the plain linear stiffness, at many samples in a period down to below zero.
+
+    Parameters
+    ----------
+    ratios : sequence of float
+        Natural frequencies to try, over that of the force.
+    """
+    linear = [name for name in free if name != "angular_frequency"]
+    if not linear:
+        return start
+    forcing = start.angular_frequency
+    trials = [start]
+    with suppress(EstimationError):
+        trials.append(linear_estimate(flights, forcing, start, linear))
+    others = [name for name in linear if name != "natural_frequency"]
+    if len(others) < len(linear):
+        held = [replace(start, natural_frequency=ratio * forcing) for ratio in ratios]
+        trials += [linear_estimate(flights, forcing, one, others) if others else one for one in held]
+    stacked = _Stacked(flights)
+    return min(trials, key=lambda one: float(np.median(stacked.misfit(one))))
 
 
 def _scales(start: Parameters, free: Sequence[str]) -> Floats:

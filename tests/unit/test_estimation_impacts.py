@@ -240,3 +240,29 @@ def test_a_clock_that_drifts_is_hinted_at_and_found_when_asked_for():
     values = estimate_impacts(channel, asked, methods=["trajectory"]).values["trajectory"]
     assert values["angular_frequency"].value == pytest.approx(64.32, rel=1e-5)
     assert values["restitution"].value == pytest.approx(0.89, abs=0.004)
+
+
+@pytest.mark.parametrize(("ratio", "stop", "restitution"), [(0.69, -0.2, 0.66), (0.72, 0.0, 0.8)])
+def test_forcing_below_resonance_is_estimated(ratio, stop, restitution):
+    # several flights in a period of the force: what suits that period is longer than they are
+    parameters = replace(
+        WORKED,
+        damping_ratio=0.13,
+        angular_frequency=ratio * 20.0,
+        stop_position=stop * 1.5,
+        restitution=restitution,
+    )
+    record = record_of(parameters, periods=20, per_period=500)
+    found = estimate_impacts(
+        record.channel(5e-3),
+        Forcing(parameters.angular_frequency),
+        Known(offset=None),
+        methods=["weak_form", "trajectory"],
+    )
+    assert len(found.impact_times) > 40
+    for method in ("weak_form", "trajectory"):
+        values = found.values[method]
+        for name in ("restitution", "damping_ratio", "natural_frequency", "stop_position"):
+            truth = getattr(parameters, name)
+            assert values[name].value == pytest.approx(truth, abs=4.0 * values[name].standard_error)
+            assert values[name].standard_error < 0.05 * (abs(truth) + 0.1)
