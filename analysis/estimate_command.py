@@ -61,7 +61,9 @@ def estimate(
         str, typer.Option(help="Window of the spectra: bartlett, hann or boxcar.")
     ] = "bartlett",
     estimator: Annotated[str, typer.Option(help="h1 (noisy response) or h2 (noisy drive).")] = "h1",
-    forcing_frequency: Annotated[float | None, typer.Option(help="Frequency of the force, Hz.")] = None,
+    forcing_frequency: Annotated[
+        float | None, typer.Option(help="Frequency of the force, Hz; 0: no force oscillates.")
+    ] = None,
     angular_frequency: Annotated[float | None, typer.Option(help="The same, rad/s.")] = None,
     amplitude: Annotated[
         float | None, typer.Option(help="Amplitude of the force, N; needs --mass and a natural frequency.")
@@ -181,13 +183,17 @@ def _impacts(
     options: ImpactOptions,
 ) -> xr.Dataset:
     from vibroimpact.analysis.estimate_scene import cut, forcing_and_known
+    from vibroimpact.analysis.estimation.bounces import estimate_bounces
     from vibroimpact.analysis.estimation.impacts import estimate_impacts
     from vibroimpact.analysis.estimation.report import print_impacts
     from vibroimpact.analysis.recording_files import open_signals
 
     recording = open_signals(data, run)
     forcing, known = forcing_and_known(data, run, recording, options)
-    found = estimate_impacts(cut(_channel(recording, channel), start, stop), forcing, known)
+    part = cut(_channel(recording, channel), start, stop)
+    found = (
+        estimate_bounces(part, side=known.side) if forcing is None else estimate_impacts(part, forcing, known)
+    )
     print_impacts(console, found)
     return _sourced(found.dataset().assign_attrs(estimates="impacts"), data, recording)
 

@@ -25,8 +25,8 @@ _NUMBERED = re.compile(r"(\w+)\[(\d+)\]")
 
 _ABOVE_0 = "a number > 0"
 _OPTION_RULES = {
-    **dict.fromkeys(("forcing_frequency", "angular_frequency", "natural_frequency", "mass"), _ABOVE_0),
-    "damping_ratio": "a number >= 0",
+    **dict.fromkeys(("natural_frequency", "mass"), _ABOVE_0),
+    **dict.fromkeys(("forcing_frequency", "angular_frequency", "damping_ratio"), "a number >= 0"),
 }
 
 
@@ -37,9 +37,9 @@ class ImpactOptions:
     Attributes
     ----------
     forcing_frequency, natural_frequency : float or None
-        Hz.
+        Hz; a forcing frequency of 0 says that no force oscillates.
     angular_frequency : float or None
-        Of the force, rad/s.
+        Of the force, rad/s; 0 likewise.
     amplitude, static_deflection : float or None
         Force, N, and force over stiffness, unit of the channel.
     phase : float or None
@@ -171,11 +171,12 @@ def _table_of(scene: dict[str, Any], owner: str) -> dict[str, Any] | None:
 
 def forcing_and_known(
     data: Path, run: int | None, recording: Recording, options: ImpactOptions
-) -> tuple[Forcing, Known]:
+) -> tuple[Forcing | None, Known]:
     """Return the force, and what is known of oscillator and stop: from the options, else from the scene.
 
-    Of the scene only forcing and stop are taken: what an experiment would know too. Stiffness and damping are left to
-    be estimated, unless options say them.
+    No force where its frequency or amplitude is 0: a body that bounces under its weight. Of the scene only forcing and
+    stop are taken: what an experiment would know too. Stiffness and damping are left to be estimated, unless options
+    say them.
 
     Raises
     ------
@@ -184,8 +185,9 @@ def forcing_and_known(
     """
     scene = run_scene(data, run, recording)
     natural = None if options.natural_frequency is None else 2.0 * math.pi * options.natural_frequency
+    frequency = _angular_frequency(scene, options)
     forcing = Forcing(
-        _angular_frequency(scene, options),
+        frequency,
         _static_deflection(scene, options, natural),
         options.phase if options.phase is not None else _scene_phase(scene),
         options.clock_drifts,
@@ -202,7 +204,7 @@ def forcing_and_known(
         # An option about another stop leaves the side to the signal.
         side=str(stop.get("side", "upper")) if stop and options.stop is None else None,
     )
-    return forcing, known
+    return forcing if frequency > 0.0 else None, known
 
 
 def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> float:
@@ -211,6 +213,9 @@ def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> floa
             "--forcing-frequency: expected it without --angular-frequency, got both. Leave one out."
         )
     table = scene.get("forcing", {})
+    given = options.forcing_frequency is not None or options.angular_frequency is not None
+    if not given and "body" in scene and table.get("amplitude", 0.0) == 0.0:
+        return 0.0
     for value, factor in (
         (options.angular_frequency, 1.0),
         (options.forcing_frequency, 2.0 * math.pi),
@@ -218,12 +223,10 @@ def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> floa
         (table.get("frequency"), 2.0 * math.pi),
     ):
         if value is not None:
-            if not value > 0.0:
-                raise UsageError(f"forcing frequency: expected a positive number, got {value:g}.")
             return float(value) * factor
     raise UsageError(
-        "--kind impacts: expected the frequency of the force, got none. Give --forcing-frequency (Hz) or "
-        "--angular-frequency (rad/s)."
+        "--kind impacts: expected the frequency of the force, got none. Give --forcing-frequency (Hz; 0 for bounces "
+        "without a force that oscillates) or --angular-frequency (rad/s)."
     )
 
 

@@ -149,7 +149,13 @@ def _turning_point(samples: DecaySamples, start: ExponentialDecay) -> tuple[floa
     phase = start.phase.value + omega * (samples.time[0] - start.reference_time)
     turns = np.floor(phase / np.pi)
     time = samples.time[0] - (phase - turns * np.pi) / omega
-    height = start.amplitude.value * np.exp(-rate * (time - start.reference_time))
+    with np.errstate(over="ignore"):
+        height = start.amplitude.value * np.exp(-rate * (time - start.reference_time))
+    if not np.isfinite(height):
+        raise EstimationError(
+            f"{samples.name}: expected a free decay, got motion that no decaying cosine is near to (decay rate "
+            f"{rate:.3g} 1/s). Narrow the window, or use --kind impacts for motion against a stop."
+        )
     return float(time), float(height), -1.0 if turns % 2 else 1.0
 
 

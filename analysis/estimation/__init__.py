@@ -2,7 +2,8 @@
 
 A displacement that hits a stop is cut at its impacts, found from the signal alone; then energy balance, weak form and
 a fit of whole trajectories each say what restitution, damping, natural frequency and forcing are, side by side with
-95 % intervals. docs/estimation.md says how to read them. For bodies of several modes: `estimate_modes`.
+95 % intervals. docs/estimation.md says how to read them. For bounces without a force: `estimate_bounces`; for bodies
+of several modes: `estimate_modes`.
 
 Examples
 --------
@@ -18,9 +19,11 @@ Examples
 0.8
 """
 
+from vibroimpact.analysis.estimation.bounces import estimate_bounces
 from vibroimpact.analysis.estimation.estimates import (
     METHODS,
     QUANTITIES,
+    Doubt,
     Estimate,
     ImpactEstimates,
     Refusal,
@@ -38,12 +41,14 @@ from vibroimpact.analysis.estimation.report import print_impacts
 __all__ = [
     "METHODS",
     "QUANTITIES",
+    "Doubt",
     "Estimate",
     "Forcing",
     "ImpactEstimates",
     "Known",
     "ModalEstimates",
     "Refusal",
+    "estimate_bounces",
     "estimate_impacts",
     "estimate_modes",
     "modal_coordinates",

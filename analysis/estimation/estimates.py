@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.estimate_table import estimate_table
+
+Floats = NDArray[np.float64]
 
 METHODS = (
     "energy_known_damping",
@@ -19,6 +22,12 @@ METHODS = (
     "period_one",
 )
 """In the order in which they are shown; `period_one` gives start values only, without an interval."""
+
+ANSWERING = (*METHODS[:-1], "flight_times")
+"""Those that give intervals; `flight_times` is that of bounces without a force."""
+
+SHOWN = (*METHODS, "flight_times")
+"""In the order of tables."""
 
 QUANTITIES: Mapping[str, tuple[str, str]] = {
     "restitution": ("1", "coefficient of restitution"),
@@ -33,6 +42,9 @@ QUANTITIES: Mapping[str, tuple[str, str]] = {
     "impact_velocity": ("channel s-1", "root mean square speed of approach"),
 }
 """Unit (`channel`: that of the displacement) and meaning."""
+
+
+_REASONS_IN_LINE = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +76,40 @@ class Refusal:
     reason: str
 
 
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """Why estimates are not to be relied on.
+
+    Attributes
+    ----------
+    reason : str
+        Part of a sentence.
+    methods : tuple of str
+        Whose estimates; empty: all.
+    """
+
+    reason: str
+    methods: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FittedMotion:
+    """What was measured, and the motion that fits it best.
+
+    Attributes
+    ----------
+    time, measured, fitted : ndarray, shape (sample,)
+        s, unit of the channel; NaN where nothing was fitted.
+    method : str
+        Whose motion it is.
+    """
+
+    time: Floats
+    measured: Floats
+    fitted: Floats
+    method: str
+
+
 @dataclass(frozen=True)
 class ImpactEstimates:
     """Estimates of all methods from one record of impacting motion.
@@ -81,12 +127,15 @@ class ImpactEstimates:
     facts : dict
         Impacts, flights, window, noise, side, ...: name to number or word.
     refusals : tuple of Refusal
+    doubts : tuple of Doubt
+        What makes the estimates of all or of some methods unsure.
     remarks : tuple of str
         What a reader must know.
     confidence : float
         Of the intervals.
     impact_times : ndarray, shape (impact,)
         s.
+    motion : FittedMotion or None
     """
 
     channel: str
@@ -95,9 +144,31 @@ class ImpactEstimates:
     conditioning: Mapping[str, float] = field(default_factory=dict)
     facts: Mapping[str, float | str] = field(default_factory=dict)
     refusals: tuple[Refusal, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
     remarks: tuple[str, ...] = ()
     confidence: float = 0.95
-    impact_times: np.ndarray[tuple[int], np.dtype[np.float64]] = field(default_factory=lambda: np.empty(0))
+    impact_times: Floats = field(default_factory=lambda: np.empty(0))
+    motion: FittedMotion | None = None
+
+    def reasons(self, method: str) -> list[str]:
+        """Return what makes the estimates of a method unsure."""
+        return [doubt.reason for doubt in self.doubts if method in doubt.methods or not doubt.methods]
+
+    @property
+    def verdict(self) -> str:
+        """Whether the estimates are to be relied on, in one line: sure of which methods, not sure of which, and why."""
+        answered = [name for name in ANSWERING if name in self.values]
+        sure = [name for name in answered if not self.reasons(name)]
+        unsure = [name for name in answered if name not in sure]
+        if not answered:
+            why = ["no method has an answer", *(doubt.reason for doubt in self.doubts)]
+            return f"not sure, because {_listed(why)}."
+        if not sure:
+            return f"not sure, because {_listed([doubt.reason for doubt in self.doubts])}."
+        if not unsure:
+            return f"sure of {_named(sure)}."
+        why = [reason for name in unsure for reason in self.reasons(name)]
+        return f"sure of {_named(sure)}; not sure of {_named(unsure)}, because {_listed(why)}."
 
     def unit_of(self, quantity: str) -> str:
         """Return the unit of a quantity, the channel's filled in."""
@@ -105,29 +176,56 @@ class ImpactEstimates:
         return unit.replace("channel", self.unit if self.unit != "1" else "").strip() or "1"
 
     def dataset(self) -> xr.Dataset:
-        """Return dims method and quantity; estimate, standard_error, interval_low, interval_high.
+        """Return dims estimator and quantity: estimate, standard_error, interval_low, interval_high; measured, fitted.
 
         Units differ by quantity, so the variables carry `1` and the coordinate `unit` says each quantity's own.
         Conditioning, facts, refusals and remarks are attributes.
         """
-        methods = [name for name in METHODS if name in self.values]
+        methods = [name for name in SHOWN if name in self.values]
         quantities = [name for name in QUANTITIES if any(name in self.values[method] for method in methods)]
         cells = {
             method: {name: astuple(one) for name, one in self.values[method].items()} for method in methods
         }
         table = estimate_table(cells, {name: self.unit_of(name) for name in quantities}, self.confidence)
         attrs = {"units": "s", "long_name": "instants of impact"}
-        return table.assign_coords(impact_time=("impact", self.impact_times, attrs)).assign_attrs(
-            self._attributes()
-        )
+        table = table.assign_coords(impact_time=("impact", self.impact_times, attrs))
+        if self.motion is not None:
+            table = table.assign(_drawn(self.motion, self.unit)).assign_coords(
+                time=("time", self.motion.time, {"units": "s", "long_name": "time"})
+            )
+        return table.assign_attrs(self._attributes())
 
     def _attributes(self) -> dict[str, str | float]:
         """Return what belongs to the whole table."""
         return {
             "channel": self.channel,
             "confidence": self.confidence,
+            "verdict": self.verdict,
+            "doubts": "\n".join(
+                f"{', '.join(doubt.methods) or 'all'}: {doubt.reason}" for doubt in self.doubts
+            ),
             "remarks": "\n".join(self.remarks),
             "refusals": "\n".join(f"{refusal.method}: {refusal.reason}" for refusal in self.refusals),
             **{f"conditioning_{name}": value for name, value in self.conditioning.items()},
             **dict(self.facts),
         }
+
+
+def _drawn(motion: FittedMotion, unit: str) -> dict[str, tuple[str, Floats, dict[str, str]]]:
+    """Return the variables of the motion."""
+    said = {"measured": "measured displacement", "fitted": f"displacement fitted by {motion.method}"}
+    return {
+        name: ("time", getattr(motion, name), {"units": unit, "long_name": words})
+        for name, words in said.items()
+    }
+
+
+def _listed(reasons: Sequence[str]) -> str:
+    """Return the gravest reasons in one line."""
+    different = list(dict.fromkeys(reasons))
+    more = len(different) - _REASONS_IN_LINE
+    return "; ".join(different[:_REASONS_IN_LINE]) + (f"; and {more} more" if more > 0 else "")
+
+
+def _named(methods: Sequence[str]) -> str:
+    return ", ".join(name.replace("_", " ") for name in methods)

@@ -10,16 +10,27 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 
+from vibroimpact.analysis.estimation.coordinates import Coordinates
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.physics import Parameters
 from vibroimpact.analysis.estimation.segments import Flight, Signal
 from vibroimpact.fmus.core import motion
+from vibroimpact.fmus.errors import EstimationError
 
 # Steps of the numerical derivatives, relative to the size of what is varied.
 _STEP = 1e-5
+# Steps of the search over flights are counted in this part of a coordinate; so many are tried for each of them.
+_STEP_OF_SEARCH = 0.1
+_MOST_TRIALS = 30
+# A trial that is no oscillator fits this many times the range of the signal badly.
+_FAR = 1e3
+# Instants on motion of constant acceleration are found in so many Newton steps.
+_NEWTON_STEPS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +70,68 @@ def fit_flight(signal: Signal, flight: Flight, parameters: Parameters) -> Fitted
     gain = np.asarray(np.linalg.pinv(basis), dtype=np.float64)
     state: Floats = gain @ (samples - forced)
     return FittedFlight(flight, state, gain, to_end, samples - forced - basis @ state)
+
+
+@dataclass(frozen=True, slots=True)
+class FlightSearch:
+    """Parameters with which the exact flow is nearest to all flights, each from a free start state.
+
+    Attributes
+    ----------
+    parameters : Parameters
+    covariance : ndarray, shape (name, name)
+    influence : list of ndarray, shape (name, sample)
+        Change of the parameters for a change of the samples of each flight, to first order.
+    """
+
+    parameters: Parameters
+    covariance: Floats
+    influence: list[Floats]
+
+
+def search_flights(
+    signal: Signal, flights: Sequence[Flight], start: Parameters, names: Sequence[str]
+) -> FlightSearch:
+    """Return the least squares of all samples of the flights, near a start: maximum likelihood for white noise.
+
+    Parameters
+    ----------
+    start : Parameters
+        Near the answer, as the weak form gives it.
+    names : sequence of str
+        What is free.
+    """
+    coordinates = Coordinates(tuple(names), start)
+    origin = coordinates.of(start)
+    scale = _STEP_OF_SEARCH * (np.abs(origin) + 1e-3 * float(np.max(np.abs(origin))) + 1e-300)
+    size = float(np.ptp(signal.values[signal.good]))
+    counts = [len(flight.index) for flight in flights]
+
+    def rests(x: Floats) -> Floats:
+        trial = coordinates.parameters(origin + scale * x)
+        if trial is None or trial.damping_ratio < 0.0:
+            # no oscillator; so bad a trial makes the search take a shorter step
+            return np.full(sum(counts), _FAR * size)
+        return np.concatenate([fit_flight(signal, flight, trial).rests for flight in flights])
+
+    unit = max(float(np.sqrt(np.mean(rests(np.zeros(len(names))) ** 2))), 1e-300)
+    found: Any = least_squares(
+        lambda x: rests(x) / unit,
+        np.zeros(len(names)),
+        method="lm",
+        diff_step=1e-4,
+        x_scale=1.0,
+        max_nfev=_MOST_TRIALS * (len(names) + 1),
+    )
+    best = coordinates.parameters(origin + scale * found.x)
+    if best is None:
+        raise EstimationError("weak form: expected an oscillator that fits the flights, got none.")
+    freedom = max(sum(counts) - 2 * len(flights) - len(names), 1)
+    noise = unit * math.sqrt(2.0 * found.cost / freedom)
+    columns = found.jac * unit / scale
+    gain = np.linalg.inv(coordinates.derivative(best)) @ np.linalg.pinv(columns)
+    parts = np.split(-gain, np.cumsum(counts)[:-1], axis=1)
+    return FlightSearch(best, noise**2 * gain @ gain.T, parts)
 
 
 def flow_of(time: Floats, flight: Flight, parameters: Parameters) -> tuple[Floats, Floats, Floats]:
@@ -109,6 +182,7 @@ def read_impacts(
     parameters: Parameters,
     stop_position: float | None,
     interval: float,
+    speed_noise: Floats | None = None,
 ) -> ImpactReading:
     """Return restitution, speed and stop from the states at both ends of the flights.
 
@@ -120,41 +194,76 @@ def read_impacts(
         None: where the flights meet.
     interval : float
         An impact is within this time of where the flights were cut, s.
+    speed_noise : ndarray or None, shape (flight,)
+        Variance of the speed at the end of each flight: the squares of speeds have it in them, products do not.
     """
     pairs = pairs_of(flights)
     periodic = pairs[0][0] == pairs[0][1]
+    one, other = np.array(pairs).T
+    cut = np.array([flight.end for flight in flights])[one]
+    begin = np.array([flight.start for flight in flights])[other]
+    earlier = with_acceleration(ends[one], cut, parameters)
+    later = with_acceleration(states[other], begin, parameters)
     stop = stop_position
     if stop is None:
-        # lines through both ends: where they meet
-        levels = [_meeting_level(ends[one], states[other]) for one, other in pairs]
-        if periodic:
-            levels = [_level_one_period_on(ends[k], states[k], flights[k], parameters) for k, _ in pairs]
-        stop = float(np.mean(levels)) + parameters.offset
-    before = np.array([_at_level(ends[k], flights[k].end, stop, parameters, interval) for k, _ in pairs])
-    after = np.array([_at_level(states[k], flights[k].start, stop, parameters, interval) for _, k in pairs])
-    restitution = -float(before @ after) / float(before @ before)
-    return ImpactReading(restitution, math.sqrt(float(np.mean(before**2))), stop, periodic)
+        late = np.array([_short_by(flights[k], parameters) for k in one]) if periodic else np.zeros(len(one))
+        stop = float(np.mean(_meeting_levels(earlier, later, late))) + parameters.offset
+    before, after = (_speeds_at(side, stop - parameters.offset, interval) for side in (earlier, later))
+    square = float(before @ before)
+    excess = 0.0 if speed_noise is None else float(np.sum(speed_noise[one]))
+    # noise that is as large as the speeds leaves nothing to correct by
+    square -= excess if excess < 0.5 * square else 0.0
+    return ImpactReading(-float(before @ after) / square, math.sqrt(square / len(before)), stop, periodic)
 
 
-def _meeting_level(end: Floats, start: Floats) -> float:
-    shift = (end[0] - start[0]) / (start[1] - end[1])
-    return float(end[0] + shift * end[1])
-
-
-def _level_one_period_on(end: Floats, start: Floats, flight: Flight, p: Parameters) -> float:
-    """Return where a P(1,q) flight meets its own start: q periods later, not where it was cut."""
-    period = 2.0 * math.pi / p.angular_frequency
-    whole = max(1, round(flight.duration / period)) * period
-    return _meeting_level(end + (whole - flight.duration) * np.array([end[1], 0.0]), start)
-
-
-def _at_level(state: Floats, time: float, stop: float, p: Parameters, interval: float) -> float:
-    """Return the velocity where the motion through `state` meets the stop."""
-    shift = float(np.clip((stop - p.offset - state[0]) / state[1], -interval, interval))
+def with_acceleration(states: Floats, times: Floats, p: Parameters) -> Floats:
+    """Return displacement, velocity and acceleration of states at times, shape (state, 3)."""
     square = p.natural_frequency**2
-    load = square * p.static_deflection * math.cos(p.phase_at(time))
-    acceleration = load - 2.0 * p.damping_ratio * p.natural_frequency * state[1] - square * state[0]
-    return float(state[1] + shift * acceleration)
+    load = square * p.static_deflection * np.cos(p.angular_frequency * times + p.phase)
+    drag = 2.0 * p.damping_ratio * p.natural_frequency
+    return np.column_stack([states, load - drag * states[:, 1] - square * states[:, 0]])
+
+
+def _after(side: Floats, shift: Floats) -> tuple[Floats, Floats]:
+    """Return displacement and velocity a short time on."""
+    place, speed, push = side.T
+    return place + shift * (speed + 0.5 * shift * push), speed + shift * push
+
+
+def _meeting_levels(earlier: Floats, later: Floats, late: Floats) -> Floats:
+    """Return where motion before and after impacts meets; the earlier one is `late` s short of the instant (Newton)."""
+    shift = np.zeros(len(earlier))
+    for _ in range(_NEWTON_STEPS):
+        (place, speed), (other, other_speed) = _after(earlier, late + shift), _after(later, shift)
+        shift = shift + (place - other) / (other_speed - speed)
+    return _after(earlier, late + shift)[0]
+
+
+def _short_by(flight: Flight, p: Parameters) -> float:
+    """Return what a P(1,q) flight that meets its own start is short of whole periods, s."""
+    period = 2.0 * math.pi / p.angular_frequency
+    return max(1, round(flight.duration / period)) * period - flight.duration
+
+
+def _speeds_at(side: Floats, level: float, interval: float) -> Floats:
+    """Return the velocities where motion meets a level (Newton)."""
+    shift = np.zeros(len(side))
+    for _ in range(_NEWTON_STEPS):
+        place, speed = _after(side, shift)
+        shift = np.clip(shift + (level - place) / speed, -interval, interval)
+    return _after(side, shift)[1]
+
+
+def _speed_noise(fitted: Sequence[FittedFlight], p: Parameters, noise: float) -> Floats:
+    """Return the variance of the speed at which each flight meets the stop."""
+    ends = np.array([one.end_state for one in fitted])
+    sides = with_acceleration(ends, np.array([one.flight.end for one in fitted]), p)
+    # earlier at the stop, by what the place is further on: another speed there
+    weights = [
+        (one.to_end[1, :2] - push / speed * one.to_end[0, :2]) @ one.gain
+        for one, (_, speed, push) in zip(fitted, sides, strict=True)
+    ]
+    return noise**2 * np.array([float(row @ row) for row in weights])
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,17 +310,20 @@ def fit_flights(
     states = np.array([one.state for one in fitted])
     maps = np.array([one.to_end for one in fitted])
 
-    def read(states: Floats, maps: Floats, parameters: Parameters) -> Floats:
+    freedom = sum(len(one.rests) - 2 for one in fitted) - len(names)
+    noise = math.sqrt(sum(float(one.rests @ one.rests) for one in fitted) / freedom)
+    speed_noise = _speed_noise(fitted, parameters, noise)
+
+    def reading_of(states: Floats, maps: Floats, parameters: Parameters) -> ImpactReading:
         ends = np.einsum("jab,jb->ja", maps[:, :, :2], states) + maps[:, :, 2]
-        reading = read_impacts(states, ends, flights, parameters, stop_position, 2 * signal.interval)
+        reach = 2.0 * signal.interval
+        return read_impacts(states, ends, flights, parameters, stop_position, reach, speed_noise)
+
+    def read(states: Floats, maps: Floats, parameters: Parameters) -> Floats:
+        reading = reading_of(states, maps, parameters)
         return np.array([getattr(reading, name) for name in _READ])
 
-    ends = np.array([one.end_state for one in fitted])
-    reading = read_impacts(states, ends, flights, parameters, stop_position, 2 * signal.interval)
-    count = sum(len(one.rests) for one in fitted)
-    noise = math.sqrt(
-        sum(float(one.rests @ one.rests) for one in fitted) / (count - 2 * len(fitted) - len(names))
-    )
+    reading = reading_of(states, maps, parameters)
     by_state = _derivative(lambda x: read(x.reshape(states.shape), maps, parameters), states.ravel())
 
     def of_parameters(values: Floats) -> Floats:

@@ -9,6 +9,9 @@ from functools import partial
 import numpy as np
 from scipy.stats import norm
 
+from vibroimpact.analysis.estimation.checks import check_displacement
+from vibroimpact.analysis.estimation.coordinates import Coordinates
+from vibroimpact.analysis.estimation.doubts import doubts_of
 from vibroimpact.analysis.estimation.draws import (
     Resampled,
     by_speeds,
@@ -17,16 +20,21 @@ from vibroimpact.analysis.estimation.draws import (
     with_intervals,
 )
 from vibroimpact.analysis.estimation.estimates import METHODS, Estimate, ImpactEstimates, Refusal
+from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.period_one import period_one
-from vibroimpact.analysis.estimation.physics import Forcing, Known
-from vibroimpact.analysis.estimation.prepared import Prepared, prepare
+from vibroimpact.analysis.estimation.physics import Forcing, Known, Parameters
+from vibroimpact.analysis.estimation.prepared import Prepared, fitted_motion, prepare
 from vibroimpact.analysis.estimation.remarks import conditioning_of, facts_of, remarks_of
 from vibroimpact.analysis.estimation.trajectory import fit_trajectory
 from vibroimpact.analysis.recording import Channel
-from vibroimpact.fmus.errors import EstimationError
+from vibroimpact.fmus.errors import EstimationError, UsageError
 
 # A damping ratio of fewer standard errors than this is not told from restitution, or from the force.
 _CLEAR = 3.0
+# A standard error of the restitution below this part of what noise and samples allow is none.
+_NO_WIDTH = 1e-3
+# What a method's numbers may end with on motion that its model is far from; one method's failure leaves the others.
+_FAILURES = (EstimationError, UsageError, ArithmeticError, ValueError)
 # Speeds read off at impacts whose instants are less certain than this (rad of the fastest motion) are those of another
 # instant, by more than their stated error.
 _INSTANT_DOUBT = 0.03
@@ -79,8 +87,10 @@ def estimate_impacts(
     held = known or Known()
     _check(methods, draws, confidence)
     _check_known(held)
+    check_displacement(channel)
     record = prepare(channel, forcing, held, window)
     values, refusals, resampled = _attempted(record, forcing, held, methods, draws, confidence, seed)
+    doubts = doubts_of(record, forcing, values)
     sign = record.segmentation.signal.sign
     return ImpactEstimates(
         channel.name,
@@ -89,9 +99,11 @@ def estimate_impacts(
         conditioning_of(record, resampled),
         facts_of(record, resampled),
         tuple(refusals),
-        remarks_of(record, forcing, held, values),
+        doubts,
+        remarks_of(record, held, values),
         confidence,
         np.array([impact.time for impact in record.segmentation.impacts]),
+        fitted_motion(channel, record),
     )
 
 
@@ -105,11 +117,10 @@ def _attempted(
     seed: int,
 ) -> tuple[dict[str, dict[str, Estimate]], list[Refusal], Resampled | None]:
     """Return what each method says, why others refuse, and the draws of the energy balance."""
-    z = float(norm.ppf(0.5 + confidence / 2.0))
     natural, offset = record.parameters.natural_frequency, record.parameters.offset
     ways: dict[str, Callable[[], dict[str, Estimate]]] = {
-        "weak_form": lambda: _weak_values(record, held, z),
-        "trajectory": lambda: _trajectory_values(record, held, z),
+        "weak_form": lambda: _weak_values(record, held, confidence),
+        "trajectory": lambda: _trajectory_values(record, held, confidence),
         "period_one": lambda: period_one(record.segmentation, natural, offset),
     }
     refusals: list[Refusal] = []
@@ -117,8 +128,8 @@ def _attempted(
     resampled: Resampled | None = None
     try:
         resampled = _resampled(record, draws, seed) if energies else None
-    except EstimationError as problem:
-        refusals = [Refusal(name, str(problem)) for name in energies]
+    except _FAILURES as problem:
+        refusals = [Refusal(name, _reason(name, problem)) for name in energies]
     if resampled is not None:
         for name in energies:
             ways[name] = partial(_energy_values, name, record, resampled, forcing, held, confidence)
@@ -127,10 +138,42 @@ def _attempted(
         if name not in methods:
             continue
         try:
-            values[name] = run()
-        except EstimationError as problem:
-            refusals.append(Refusal(name, str(problem)))
+            found = run()
+            _check_answer(name, found, record)
+        except _FAILURES as problem:
+            refusals.append(Refusal(name, _reason(name, problem)))
+        else:
+            values[name] = found
     return values, refusals, resampled
+
+
+def _reason(method: str, problem: Exception) -> str:
+    """Return why a method gave no answer: what it says, or what went wrong in its numbers."""
+    if isinstance(problem, EstimationError):
+        return str(problem)
+    return (
+        f"{method}: expected numbers that its fit can go on with, got none ({problem}). "
+        "The motion is far from that of one oscillator."
+    )
+
+
+def _check_answer(method: str, found: dict[str, Estimate], record: Prepared) -> None:
+    """Refuse an answer that cannot be: its interval has no width though there is noise, or nothing physical in it."""
+    signal = record.segmentation.signal
+    size = float(np.ptp(signal.values[signal.good])) * math.sqrt(len(signal.time))
+    restitution = found.get("restitution")
+    if restitution is not None and restitution.standard_error < _NO_WIDTH * record.fit.noise / size:
+        raise EstimationError(
+            f"{method}: expected a restitution that the motion depends on, got {restitution.value:.3g} with an "
+            "interval of no width. The fit does not go through the impacts."
+        )
+    for name, rule, high in (("restitution", "0 <= {} <= 1", 1.0), ("damping_ratio", "{} >= 0", math.inf)):
+        one = found.get(name)
+        if one is not None and (one.high < 0.0 or one.low > high):
+            raise EstimationError(
+                f"{method}: expected {rule.format(name.replace('_', ' '))}, got {one.value:.3g} +- "
+                f"{one.standard_error:.2g}. The motion is not that of one oscillator against one stop."
+            )
 
 
 def _check(methods: Sequence[str], draws: int, confidence: float) -> None:
@@ -152,39 +195,44 @@ def _check_known(held: Known) -> None:
         raise EstimationError(f'side: expected upper or lower, got "{held.side}".')
 
 
-def _with_normal(value: float, error: float, z: float) -> Estimate:
+def _with_normal(value: float, error: float, confidence: float) -> Estimate:
+    z = float(norm.ppf(0.5 + confidence / 2.0))
     return Estimate(value, error, value - z * error, value + z * error)
 
 
-def _weak_values(record: Prepared, held: Known, z: float) -> dict[str, Estimate]:
+def _with_coordinates(
+    found: Parameters, names: tuple[str, ...], covariance: Floats, confidence: float
+) -> dict[str, Estimate]:
+    """Return estimates whose intervals are those of the coordinates in which the equation is linear."""
+    intervals = Coordinates(names, found).intervals(found, covariance, confidence)
+    return {
+        name: Estimate(getattr(found, name), math.sqrt(float(covariance[k, k])), *intervals[name])
+        for k, name in enumerate(names)
+        if name in intervals
+    }
+
+
+def _weak_values(record: Prepared, held: Known, confidence: float) -> dict[str, Estimate]:
     """Return what weak form and flights say."""
-    errors = record.fit.standard_errors
+    read = ["restitution", "impact_velocity"] + ["stop_position"] * (held.stop_position is None)
     found = {
-        "restitution": _with_normal(
-            record.fit.reading.restitution, record.inflation * errors["restitution"], z
+        name: _with_normal(
+            getattr(record.fit.reading, name), record.inflation * record.fit.standard_errors[name], confidence
         )
+        for name in read
     }
     if record.weak is not None:
-        for k, name in enumerate(record.weak.names):
-            error = record.inflation * math.sqrt(record.weak.covariance[k, k])
-            found[name] = _with_normal(getattr(record.weak.parameters, name), error, z)
-    if held.stop_position is None:
-        error = record.inflation * errors["stop_position"]
-        found["stop_position"] = _with_normal(record.fit.reading.stop_position, error, z)
-    error = record.inflation * errors["impact_velocity"]
-    found["impact_velocity"] = _with_normal(record.fit.reading.impact_velocity, error, z)
+        covariance = record.inflation**2 * record.weak.covariance
+        found |= _with_coordinates(record.weak.parameters, record.weak.names, covariance, confidence)
     return found
 
 
-def _trajectory_values(record: Prepared, held: Known, z: float) -> dict[str, Estimate]:
+def _trajectory_values(record: Prepared, held: Known, confidence: float) -> dict[str, Estimate]:
     """Return what the fit of whole trajectories says."""
     free = ("restitution", *record.free, *(("stop_position",) if held.stop_position is None else ()))
     found = fit_trajectory(record.segmentation, record.fit.fitted, record.parameters, free, record.fit.noise)
     record.trajectory = found
-    return {
-        name: _with_normal(getattr(found.parameters, name), record.inflation * found.standard_error(name), z)
-        for name in free
-    }
+    return _with_coordinates(found.parameters, free, record.inflation**2 * found.covariance, confidence)
 
 
 def _check_instants(method: str, record: Prepared) -> None:
@@ -231,12 +279,6 @@ def _energy_values(
             f"{method}: expected data that separate damping from restitution, got a damping ratio of "
             f"{damping.value:.3g} +- {damping.standard_error:.2g}. Give the damping ratio, from a free decay or a "
             "resonance curve, or use a longer or cleaner recording."
-        )
-    restitution = found.get("restitution")
-    if restitution is not None and (restitution.low > 1.0 or restitution.high < 0.0):
-        raise EstimationError(
-            f"{method}: expected a restitution from 0 to 1, got {restitution.value:.3g} +- "
-            f"{restitution.standard_error:.2g}. Damping or forcing are not what the motion shows."
         )
     return found
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vibroimpact.analysis.estimation.flight_fit import FlightFit, fit_flights
+from vibroimpact.analysis.estimation.estimates import FittedMotion
+from vibroimpact.analysis.estimation.flight_fit import FlightFit, fit_flights, search_flights
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.physics import Forcing, Known, Parameters
 from vibroimpact.analysis.estimation.segments import Flight, Segmentation, segment
-from vibroimpact.analysis.estimation.trajectory import Trajectory
+from vibroimpact.analysis.estimation.trajectory import Trajectory, follow
 from vibroimpact.analysis.estimation.weak_form import (
     WeakForm,
     robust_weak_form,
@@ -125,14 +126,14 @@ def _prepared(
             f"{len(segmentation.impacts)} impacts. Use a higher sampling rate."
         )
     weak, flights = _weak(segmentation, flights, start, free, fastest)
-    parameters, fit = _fitted(segmentation, flights, start, weak, stop)
+    weak, parameters, fit = _fitted(segmentation, flights, start, weak, stop)
     followed = _followed(fit)
     if weak is not None and len(followed) < len(flights):
         # rests of all samples show a weak impact that the few integrals of the weak form do not
         flights = [flights[k] for k in followed]
         whole = weighted_flights(segmentation.signal, flights, fastest)
         weak = weak_form(whole, weak.parameters, free)
-        parameters, fit = _fitted(segmentation, flights, start, weak, stop)
+        weak, parameters, fit = _fitted(segmentation, flights, start, weak, stop)
     parameters = replace(
         parameters,
         restitution=min(max(fit.reading.restitution, 0.0), 1.0),
@@ -151,13 +152,20 @@ def _fitted(
     start: Parameters,
     weak: WeakForm | None,
     stop: float | None,
-) -> tuple[Parameters, FlightFit]:
-    """Return the parameters that the weak form found or were held, and the exact flow with them on each flight."""
-    parameters = weak.parameters if weak else start
-    # noise may put weak damping below zero, where there is no flow
-    parameters = replace(parameters, damping_ratio=max(parameters.damping_ratio, _LEAST_DAMPING))
-    names, influence = (weak.names, weak.influence) if weak else ((), ())
-    return parameters, fit_flights(segmentation.signal, flights, parameters, stop, names, influence)
+) -> tuple[WeakForm | None, Parameters, FlightFit]:
+    """Return the weak form, the parameters that it found or were held, and the exact flow with them on each flight."""
+    signal = segmentation.signal
+    if weak is None:
+        return None, start, fit_flights(signal, flights, start, stop)
+    found = search_flights(signal, flights, _damped(weak.parameters), weak.names)
+    weak = replace(weak, parameters=found.parameters, covariance=found.covariance, influence=found.influence)
+    parameters = _damped(weak.parameters)
+    return weak, parameters, fit_flights(signal, flights, parameters, stop, weak.names, weak.influence)
+
+
+def _damped(parameters: Parameters) -> Parameters:
+    """Return parameters of a flow: noise may put weak damping below zero, where there is none."""
+    return replace(parameters, damping_ratio=max(parameters.damping_ratio, _LEAST_DAMPING))
 
 
 def _followed(fit: FlightFit) -> list[int]:
@@ -226,3 +234,16 @@ def _coloured(fit: FlightFit) -> tuple[float, float]:
     if correlation * math.sqrt(count) < _CORRELATED:
         return correlation, 1.0
     return correlation, math.sqrt((1.0 + correlation) / (1.0 - min(correlation, 0.99)))
+
+
+def fitted_motion(channel: Channel, record: Prepared) -> FittedMotion:
+    """Return the motion of the trajectories, or of the single flights where there are none."""
+    signal, found = record.segmentation.signal, record.trajectory
+    fitted = np.full(len(signal.values), np.nan)
+    for one in record.fit.fitted:
+        fitted[one.flight.index] = signal.values[one.flight.index] - one.rests
+    if found is not None:
+        for piece in found.pieces:
+            fitted[piece.index] = follow(signal, piece, found.parameters)
+    measured = np.where(channel.good, channel.values, np.nan)
+    return FittedMotion(channel.time, measured, signal.sign * fitted, "trajectory" if found else "weak_form")

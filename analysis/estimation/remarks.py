@@ -10,12 +10,9 @@ import numpy as np
 from vibroimpact.analysis.estimation.draws import Resampled
 from vibroimpact.analysis.estimation.energy import sensitivities
 from vibroimpact.analysis.estimation.estimates import Estimate
-from vibroimpact.analysis.estimation.physics import Forcing, Known
+from vibroimpact.analysis.estimation.physics import Known
 from vibroimpact.analysis.estimation.prepared import Prepared
 from vibroimpact.analysis.estimation.trajectory import MOST_IMPACTS
-
-# More flights left out than this part: something else is wrong than an impact not seen.
-_MANY_LEFT_OUT = 0.25
 
 
 def conditioning_of(record: Prepared, resampled: Resampled | None) -> dict[str, float]:
@@ -65,27 +62,20 @@ def _scatter(record: Prepared) -> float:
 
 
 def remarks_of(
-    record: Prepared, forcing: Forcing, held: Known, values: Mapping[str, Mapping[str, Estimate]]
+    record: Prepared, held: Known, values: Mapping[str, Mapping[str, Estimate]]
 ) -> tuple[str, ...]:
     """Return what a reader must know."""
-    return (*_of_flights(record, forcing), *_of_methods(record, held, values))
+    return (*_of_flights(record), *_of_methods(record, held, values))
 
 
-def _of_flights(record: Prepared, forcing: Forcing) -> Iterator[str]:
-    """Yield what the flights and their rests show."""
-    clocks = " If the clocks of force and recording may differ, say so (clock_drifts, --clock-drifts)."
-    clocks = "" if forcing.clock_drifts else clocks
+def _of_flights(record: Prepared) -> Iterator[str]:
+    """Yield what became of the flights."""
     if record.fit.reading.periodic:
         yield "No impact has a usable flight on both sides: P(1,1) was assumed."
     if record.left_out:
         yield (
             f"{record.left_out} flights do not follow the model and were left out: an impact in them was not seen, "
             "or it is not one oscillator there."
-        )
-    if record.left_out > _MANY_LEFT_OUT * (record.left_out + len(record.flights)):
-        yield (
-            "So many flights were left out that the estimates of the others are not to be trusted: force, clock or "
-            f"model are not what was assumed.{clocks}"
         )
     if record.inflation > 1.0:
         yield (
@@ -94,12 +84,6 @@ def _of_flights(record: Prepared, forcing: Forcing) -> Iterator[str]:
         )
     if record.trajectory is not None and len(record.flights) > MOST_IMPACTS:
         yield f"The trajectories are those of about {MOST_IMPACTS} impacts, the first."
-    if record.trajectory is not None and not record.trajectory.adequate:
-        yield (
-            f"The fitted trajectories leave rests of {record.trajectory.noise:.3g}, the single flights only "
-            f"{record.fit.noise:.3g}: restitution or forcing is not constant, and the intervals of the trajectory fit "
-            f"are too narrow.{clocks}"
-        )
 
 
 def _of_methods(record: Prepared, held: Known, values: Mapping[str, Mapping[str, Estimate]]) -> Iterator[str]:

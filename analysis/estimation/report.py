@@ -6,18 +6,22 @@ import math
 
 from rich.table import Table
 
-from vibroimpact.analysis.estimation.estimates import METHODS, QUANTITIES, Estimate, ImpactEstimates
+from vibroimpact.analysis.estimation.estimates import QUANTITIES, SHOWN, Estimate, ImpactEstimates
 from vibroimpact.fmus.terminal import Terminal
 
 
 def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
-    """Print all methods side by side, how far errors move the estimates, refusals and remarks."""
+    """Print the verdict, all methods side by side, how far errors move the estimates, refusals and remarks."""
+    console.print(estimates.verdict)
     console.print(_estimates(estimates))
     if estimates.conditioning:
         console.print(_conditioning(estimates))
     for name, value in estimates.facts.items():
         shown = value if isinstance(value, str) else f"{value:.6g}"
         console.print(f"{name.replace('_', ' ')}: {shown}")
+    for doubt in estimates.doubts:
+        of = f" of {', '.join(doubt.methods)}" if doubt.methods else ""
+        console.print(f"doubt{of}: {doubt.reason}")
     for refusal in estimates.refusals:
         console.print(f"refused: {refusal.reason}")
     for remark in estimates.remarks:
@@ -26,7 +30,7 @@ def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
 
 def _estimates(estimates: ImpactEstimates) -> Table:
     """Return quantities by methods."""
-    methods = [name for name in METHODS if name in estimates.values]
+    methods = [name for name in SHOWN if name in estimates.values]
     table = Table(title=f"{estimates.channel}: estimates with {estimates.confidence:.0%} intervals")
     table.add_column("quantity")
     table.add_column("unit")

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve
+from scipy.signal import find_peaks, oaconvolve
 
 from vibroimpact.analysis.estimation.noise import Floats, Mask, noise_level, one_sided_window
 from vibroimpact.analysis.robust import robust_sigma
@@ -38,6 +38,12 @@ _FEWEST_IN_WINDOW = 6
 _MORE = 1.1
 # ... which is not tried where impacts lie so many windows apart.
 _APART = 2.5
+# A window has no other kink in it where the next one is this many of its halves away.
+_CLEAR_OF = 1.1
+# Jumps the other way count from this part of the largest one on: smooth motion makes small ones.
+_PART_OF_LARGEST = 0.1
+# A known stop is wrong that is this part of the motion's size off the impacts; told from so many of them on.
+_STOP_OF_SIZE, _FEWEST_TO_CHECK = 0.1, 5
 # Samples within so many standard errors of an impact's instant are in no flight.
 _DOUBTFUL = 2.5
 
@@ -203,7 +209,8 @@ def segment(
             f"({noise:.3g}), got {0 if found is None else len(found.impacts)}. Give a longer recording of impacting "
             "motion, or one with less noise or more samples between impacts."
         )
-    return found
+    shorter = [count for count in counts if count * interval <= found.window]
+    return replace(found, opposite=max(_opposite(found.signal, scales, count) for count in shorter))
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,28 +242,34 @@ def _cut(
 ) -> Segmentation:
     """Return a signal cut at the impacts that windows of `count` samples on each side show."""
     noise, interval, size = scales.noise, scales.interval, scales.size
-    even = np.abs(np.diff(raw.time) - interval) < _UNEVEN * interval
-    jump = _jumps(raw.values, raw.good, even, count, interval)
+    jump, least = _jumps_and_least(raw, scales, count)
     sign = _side_sign(jump, side)
     signal = replace(raw, values=sign * raw.values, sign=sign)
-    error, bias = _hinge_errors(scales, count)
-    least = max(_JUMPS_BEYOND * error, _BIAS_BEYOND * bias)
     places = _kinks(-sign * jump, least, count)
     stop = None if stop_position is None else sign * stop_position
     located = _located(signal, places, count, stop)
+    if stop is not None and len(located) < 0.5 * len(places):
+        _check_stop(_consistent(_located(signal, places, count, None), noise, count, size), stop, size, sign)
     impacts = _consistent(located, noise, count, size)
-    opposite = sum(
-        all(abs(place - other) > _APART * count for other in places)
-        for place in _kinks(sign * jump, least, count)
-    )
-    return Segmentation(
-        signal,
-        tuple(impacts),
-        _flights(signal, impacts),
-        count * interval,
-        len(located) - len(impacts),
-        opposite,
-    )
+    stray = len(located) - len(impacts)
+    return Segmentation(signal, tuple(impacts), _flights(signal, impacts), count * interval, stray)
+
+
+def _opposite(signal: Signal, scales: _Scales, count: int) -> int:
+    """Return how many kinks the other way windows of `count` samples show, away from those of the stop."""
+    jump, least = _jumps_and_least(signal, scales, count)
+    ours = _kinks(-jump, least, count)
+    largest = float(np.max(-jump[ours])) if ours else 0.0
+    others = _kinks(jump, max(least, _PART_OF_LARGEST * largest), count)
+    return sum(all(abs(place - one) > _CLEAR_OF * count for one in ours) for place in others)
+
+
+def _jumps_and_least(signal: Signal, scales: _Scales, count: int) -> tuple[Floats, float]:
+    """Return the jumps of the velocity, and what the least is that counts."""
+    even = np.abs(np.diff(signal.time) - scales.interval) < _UNEVEN * scales.interval
+    error, bias = _hinge_errors(scales, count)
+    jump = _jumps(signal.values, signal.good, even, count, scales.interval)
+    return jump, max(_JUMPS_BEYOND * error, _BIAS_BEYOND * bias)
 
 
 def _hinge(count: int) -> Floats:
@@ -310,14 +323,10 @@ def _hinge_errors(scales: _Scales, count: int) -> tuple[float, float]:
 def _kinks(drop: Floats, least: float, count: int) -> list[int]:
     """Return the sampling intervals with the largest drop of the velocity around them."""
     height = np.where(np.isfinite(drop), drop, -np.inf)
-    found: list[int] = []
-    for place in np.argsort(height)[::-1]:
-        if not height[place] >= least:
-            break
-        # within a window of a larger kink the one-sided fits have that kink in them
-        if all(abs(int(place) - other) >= count for other in found):
-            found.append(int(place))
-    return sorted(found)
+    # within a window of a larger kink the one-sided fits have that kink in them
+    edges = np.concatenate([[-np.inf], height, [-np.inf]])
+    places = find_peaks(edges, height=least, distance=count)[0] - 1
+    return [int(place) for place in places]
 
 
 def _located(signal: Signal, places: list[int], count: int, stop: float | None) -> list[Impact]:
@@ -409,6 +418,20 @@ def _at_stop(one: Floats, other: Floats, stop: float, reach: float) -> float:
     if not known or sum(weights[k] for k in known) == 0.0:
         return math.inf
     return sum(weights[k] * shifts[k] for k in known) / sum(weights[k] for k in known)
+
+
+def _check_stop(impacts: list[Impact], stop: float, size: float, sign: float) -> None:
+    """Refuse a known stop that is not where the impacts are."""
+    if len(impacts) < _FEWEST_TO_CHECK:
+        return
+    levels = np.array([impact.level for impact in impacts])
+    middle = float(np.median(levels))
+    error = robust_sigma(levels - middle) / math.sqrt(len(levels))
+    if abs(middle - stop) > max(_LEVEL_BEYOND * error, _STOP_OF_SIZE * size):
+        raise EstimationError(
+            f"stop: expected the place where the impacts are, {sign * middle:.4g} +- {error:.1g}, got "
+            f"{sign * stop:.4g}. Correct it, or leave it out: it is estimated then."
+        )
 
 
 def _consistent(impacts: list[Impact], noise: float, count: int, size: float) -> list[Impact]:

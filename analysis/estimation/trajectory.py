@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from vibroimpact.analysis.estimation.coordinates import Coordinates
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.physics import Parameters
@@ -97,8 +98,16 @@ class Trajectory:
         return math.sqrt(float(self.covariance[k, k]))
 
 
-def follow(signal: Signal, piece: Piece, parameters: Parameters) -> Floats:
-    """Return the displacements of a piece on the exact flow, through all its impacts, at its samples."""
+def follow(
+    signal: Signal, piece: Piece, parameters: Parameters, slope: tuple[float, float] = (0.0, 1.0)
+) -> Floats:
+    """Return the displacements of a piece on the exact flow, through all its impacts, at its samples.
+
+    Parameters
+    ----------
+    slope : tuple of float
+        Change of the restitution from a typical speed of approach to its double, and that speed.
+    """
     time = signal.time[piece.index]
     body, stop = parameters.oscillator(), parameters.stop_position - parameters.offset
     found = np.empty(len(time))
@@ -125,7 +134,8 @@ def follow(signal: Signal, piece: Piece, parameters: Parameters) -> Floats:
         if contact is None:
             break
         done, now = until, now + contact.time
-        state = (stop, -parameters.restitution * contact.velocity)
+        restitution = parameters.restitution + slope[0] * (contact.velocity / slope[1] - 1.0)
+        state = (stop, -restitution * contact.velocity)
     return found + parameters.offset
 
 
@@ -164,7 +174,7 @@ def _cut(
     counts = [run[0].flight.first + (0 if head else 1)]
     for one in run:
         if one.flight.first + 1 - counts[-1] >= span:
-            cuts.append(_deepest(signal, one, parameters))
+            cuts.append(deepest(signal, one, parameters))
             counts.append(one.flight.first + 1)
     last = run[-1].flight
     end = int(last.index[-1]) + 1
@@ -202,7 +212,7 @@ def _state_at(
     return place, (float(x[0]), float(v[0]))
 
 
-def _deepest(signal: Signal, one: FittedFlight, parameters: Parameters) -> tuple[int, tuple[float, float]]:
+def deepest(signal: Signal, one: FittedFlight, parameters: Parameters) -> tuple[int, tuple[float, float]]:
     """Return the sample where a flight is furthest from its stop, and the fitted state there."""
     index = one.flight.index
     return _state_at(signal, one, parameters, int(index[np.argmin(signal.values[index] - one.rests)]))
@@ -254,7 +264,6 @@ def fit_trajectory(
         The model does not follow the samples with pieces of any length.
     """
     size = 0.5 * float(np.ptp(segmentation.signal.values[segmentation.signal.good]))
-    scale = np.array([_size(start, name, size) for name in free])
     best: Trajectory | None = None
     tried: set[int] = set()
     for span in spans:
@@ -262,14 +271,14 @@ def fit_trajectory(
         if len(pieces) in tried:
             continue
         tried.add(len(pieces))
-        problem = _Problem(segmentation.signal, pieces, start, tuple(free), scale, size)
+        problem = Problem(segmentation.signal, pieces, start, tuple(free), size)
         if span > spans[-1] and problem.distance() > _NEAR * size:
             continue
         trial = problem.solve(noise, span)
         odd = problem.misfits(trial)
         if odd and len(odd) <= _MOST_ODD * len(pieces):
             kept = [piece for k, piece in enumerate(trial.pieces) if k not in odd]
-            again = _Problem(segmentation.signal, kept, trial.parameters, tuple(free), scale, size)
+            again = Problem(segmentation.signal, kept, trial.parameters, tuple(free), size)
             trial = again.solve(noise, span)
         if best is None or trial.noise < best.noise:
             best = trial
@@ -284,20 +293,35 @@ def fit_trajectory(
     return best
 
 
-def _size(parameters: Parameters, name: str, size: float) -> float:
-    """Return the size of changes of a parameter."""
+def _size(parameters: Parameters, name: str, size: float, both: bool) -> float:
+    """Return the size of changes of a linear coordinate; both: amplitude and phase of the force are free."""
+    square = parameters.natural_frequency**2
     sizes = {
         "restitution": 0.1,
-        "damping_ratio": 0.1,
-        "natural_frequency": 0.1 * parameters.natural_frequency,
+        "damping_ratio": 0.2 * parameters.natural_frequency,
+        "natural_frequency": 0.2 * square,
         "angular_frequency": 1e-3 * parameters.angular_frequency,
-        "phase": 0.1,
+        "phase": 0.1 * square * size if both else 0.1,
+        "stop_position": 0.1 * size,
     }
-    return sizes.get(name, 0.1 * size)
+    return sizes.get(name, 0.1 * square * size)
 
 
-class _Problem:
-    """The least-squares problem: unknowns are the free parameters, then displacement and velocity of each piece."""
+class Problem:
+    """The least-squares problem: linear coordinates of the free parameters, then place and velocity of each piece.
+
+    Parameters
+    ----------
+    signal : Signal
+    pieces : list of Piece
+        With start states to begin at.
+    start : Parameters
+        Start values, and the values of what is held.
+    names : tuple of str
+        What is free.
+    size : float
+        Of the motion, in its unit: changes are counted in parts of it.
+    """
 
     def __init__(
         self,
@@ -305,43 +329,46 @@ class _Problem:
         pieces: list[Piece],
         start: Parameters,
         names: tuple[str, ...],
-        scale: Floats,
         size: float,
     ) -> None:
-        self.signal, self.pieces, self.start, self.names = signal, pieces, start, names
+        self.signal, self.pieces, self.names = signal, pieces, names
+        self.coordinates = Coordinates(names, start)
+        both = "static_deflection" in names and "phase" in names
+        scale = [_size(start, name, size, both) for name in names]
         speed = size * max(start.angular_frequency, start.natural_frequency)
         self.scale = np.concatenate([scale, np.tile([0.1 * size, 0.1 * speed], len(pieces))])
-        self.origin = np.array(
-            [getattr(start, name) for name in names] + [x for p in pieces for x in p.state]
-        )
+        states = [x for p in pieces for x in (p.state[0] + start.offset, p.state[1])]
+        self.origin = np.concatenate([self.coordinates.of(start), states])
         self.rows = np.cumsum([0, *(len(piece.index) for piece in pieces)])
 
-    def parameters(self, x: Floats) -> Parameters:
+    def parameters(self, x: Floats) -> Parameters | None:
+        """Return the parameters; None where they are those of no oscillator."""
         values = self.origin + self.scale * x
-        changes: dict[str, Any] = {
-            name: float(value) for name, value in zip(self.names, values, strict=False)
-        }
-        return replace(self.start, **changes)
+        found = self.coordinates.parameters(values[: len(self.names)])
+        return None if found is None or found.damping_ratio < 0.0 else found
 
-    def piece(self, x: Floats, k: int) -> Piece:
+    def piece(self, x: Floats, k: int, parameters: Parameters) -> Piece:
+        """Return a piece with the start state that the unknowns give it."""
         first = len(self.names) + 2 * k
-        state = (self.origin + self.scale * x)[first : first + 2]
-        return replace(self.pieces[k], state=(float(state[0]), float(state[1])))
+        place, speed = (self.origin + self.scale * x)[first : first + 2]
+        return replace(self.pieces[k], state=(float(place) - parameters.offset, float(speed)))
 
-    def rests_of(self, x: Floats, k: int, parameters: Parameters | None = None) -> Floats:
-        piece = self.piece(x, k)
-        model = follow(self.signal, piece, parameters or self.parameters(x))
-        rests: Floats = self.signal.values[piece.index] - model
+    def rests_of(self, x: Floats, k: int, parameters: Parameters) -> Floats:
+        """Return samples minus trajectory of one piece."""
+        piece = self.piece(x, k, parameters)
+        rests: Floats = self.signal.values[piece.index] - follow(self.signal, piece, parameters)
         return rests
 
     def rests(self, x: Floats) -> Floats:
+        """Return samples minus trajectories of all pieces."""
         parameters = self.parameters(x)
-        if parameters.damping_ratio < 0.0 or parameters.natural_frequency < 0.0:
-            # no oscillator; a trial that fits so badly makes the search take a shorter step
+        if parameters is None:
+            # a trial that fits so badly makes the search take a shorter step
             return np.full(self.rows[-1], _FAR * float(np.ptp(self.signal.values)))
         return np.concatenate([self.rests_of(x, k, parameters) for k in range(len(self.pieces))])
 
     def distance(self) -> float:
+        """Return the root mean square of the rests at the start."""
         return float(np.sqrt(np.mean(self.rests(np.zeros(len(self.origin))) ** 2)))
 
     def jacobian(self, x: Floats) -> Floats:
@@ -352,6 +379,9 @@ class _Problem:
             moved = x.copy()
             moved[j] += _STEP
             parameters = self.parameters(moved)
+            if parameters is None:
+                # at the edge of what is an oscillator, which the search does not cross
+                continue
             shared = j < len(self.names)
             for k in range(len(self.pieces)) if shared else [(j - len(self.names)) // 2]:
                 rows = slice(self.rows[k], self.rows[k + 1])
@@ -359,6 +389,7 @@ class _Problem:
         return jacobian
 
     def solve(self, noise: float, span: int) -> Trajectory:
+        """Return the least squares from the start on."""
         unit = max(noise, 1e-300)
         found: Any = least_squares(
             lambda x: self.rests(x) / unit,
@@ -372,18 +403,22 @@ class _Problem:
         )
         freedom = max(self.rows[-1] - len(self.origin), 1)
         sigma = math.sqrt(float(np.sum(self.rests(found.x) ** 2)) / freedom)
+        best = self.parameters(found.x)
+        if best is None:
+            raise EstimationError("trajectory: expected an oscillator that fits the impacts, got none.")
         jacobian = self.jacobian(found.x)
         inverse = np.linalg.pinv(jacobian.T @ jacobian) * np.outer(self.scale, self.scale)
-        covariance: Floats = sigma**2 * np.asarray(inverse, dtype=np.float64)
         count = len(self.names)
+        to_parameters = np.linalg.inv(self.coordinates.derivative(best))
+        covariance: Floats = sigma**2 * to_parameters @ inverse[:count, :count] @ to_parameters.T
         size = float(np.max(np.abs(self.signal.values[self.signal.good])))
         return Trajectory(
-            self.parameters(found.x),
+            best,
             self.names,
-            covariance[:count, :count],
+            covariance,
             sigma,
             sigma <= _ADEQUATE * noise + 1e-5 * size,
-            tuple(self.piece(found.x, k) for k in range(len(self.pieces))),
+            tuple(self.piece(found.x, k, best) for k in range(len(self.pieces))),
             span,
         )
 

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, canvas, page_style, unit_symbol
-from vibroimpact.analysis.unit_symbols import written_unit
+from vibroimpact.analysis.figures.impact_estimate import draw_impact_estimate, limit
+from vibroimpact.analysis.figures.page import LINE, MARK, STOP, canvas, page_style, unit_symbol
 from vibroimpact.fmus.errors import DatasetError
 
 _PANEL_MM = 32
-_NARROWEST = 1e-4
-"""Of the values: differences below are not worth a panel."""
 
 
 def draw_estimates(dataset: xr.Dataset) -> Figure:
@@ -26,7 +22,7 @@ def draw_estimates(dataset: xr.Dataset) -> Figure:
     DatasetError
         If it is no such dataset.
     """
-    drawers = {"decay": _draw_decay, "response": _draw_response, "impacts": _draw_methods}
+    drawers = {"decay": _draw_decay, "response": _draw_response, "impacts": draw_impact_estimate}
     kind = str(dataset.attrs.get("estimates", ""))
     if kind not in drawers:
         raise DatasetError(
@@ -148,7 +144,7 @@ def _errorbars(axis: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray) -> N
     reach = 1.3 * float(np.percentile(np.abs(y - middle) + error, 85)) or 1.0
     low, high = float(np.min(y - 2 * error)), float(np.max(y + 2 * error))
     low, high = max(middle - 2 * reach, low), min(middle + 2 * reach, high)
-    _limit(axis.set_ylim, low, high)
+    limit(axis.set_ylim, low, high)
     _mark_beyond(axis, x, y)
 
 
@@ -206,46 +202,3 @@ def _draw_response(dataset: xr.Dataset) -> Figure:
     axes[-1].set_xlabel("frequency (Hz)")
     axes[-1].set_xlim(float(hertz[0]), float(hertz[-1]))
     return figure
-
-
-def _draw_methods(dataset: xr.Dataset) -> Figure:
-    """Draw each quantity in a panel of its own: the methods that give it side by side, with their intervals."""
-    panels = []
-    for name in dataset["quantity"].values:
-        chosen = dataset.sel(quantity=name)
-        panels.append(chosen.isel(estimator=np.flatnonzero(np.isfinite(chosen.estimate.values))))
-    panels = [chosen for chosen in panels if chosen.sizes["estimator"]]
-    rows = [1 + chosen.sizes["estimator"] for chosen in panels] or [1]
-    figure = canvas(6 + 10 * len(rows) + 3.2 * sum(rows))
-    axes = figure.subplots(len(rows), 1, squeeze=False, height_ratios=rows)[:, 0]
-    for axis, chosen in zip(axes, panels, strict=False):
-        _draw_intervals(axis, chosen, list(dataset["estimator"].values))
-    return figure
-
-
-def _draw_intervals(axis: Axes, chosen: xr.Dataset, methods: list[str]) -> None:
-    """Draw values as points and their intervals as bars; a value without an interval is open."""
-    names = [str(name) for name in chosen["estimator"].values]
-    ends = []
-    for place, name in enumerate(names):
-        value = float(chosen.estimate[place])
-        low, high = float(chosen.interval_low[place]), float(chosen.interval_high[place])
-        bounded = np.isfinite(low) and np.isfinite(high)
-        colour = COLOURS[methods.index(name) % len(COLOURS)]
-        if bounded:
-            axis.plot([low, high], [place, place], color=colour, linewidth=1.0)
-        axis.plot([value], [place], "o", markersize=3, color=colour, fillstyle="full" if bounded else "none")
-        ends += [low, value, high]
-    axis.set_yticks(np.arange(len(names)), [name.replace("_", " ") for name in names])
-    axis.set_ylim(len(names) - 0.4, -0.6)
-    _limit(axis.set_xlim, float(np.nanmin(ends)), float(np.nanmax(ends)))
-    axis.ticklabel_format(axis="x", useOffset=False)
-    axis.locator_params(axis="x", nbins=5)
-    unit = str(chosen["unit"].values)
-    axis.set_xlabel(f"{str(chosen['quantity'].values).replace('_', ' ')} ({written_unit(unit)})")
-
-
-def _limit(setter: Callable[[float, float], object], low: float, high: float) -> None:
-    """Set limits with a margin, and never so near each other that rounding fills the panel."""
-    margin = max(0.08 * (high - low), _NARROWEST * max(abs(low), abs(high)), 1e-300)
-    setter(low - margin, high + margin)

@@ -1,0 +1,157 @@
+"""What makes estimates doubtful: of all methods or of some, each in one sentence."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from vibroimpact.analysis.estimation.estimates import ANSWERING, Doubt, Estimate
+from vibroimpact.analysis.estimation.flight_fit import pairs_of
+from vibroimpact.analysis.estimation.model_tests import (
+    dry_friction,
+    excess_of_trajectories,
+    slope_of_restitution,
+    unexplained_flights,
+)
+from vibroimpact.analysis.estimation.physics import Forcing
+from vibroimpact.analysis.estimation.prepared import Prepared
+
+# What speaks against the model counts from so many standard errors on.
+_CLEAR = 4.0
+# Kinks the other way are those of a second stop from so many, and from this part of the impacts, on.
+_FEWEST_OPPOSITE, _PART_OPPOSITE = 3, 0.1
+# Kinks that are not at the stop, and flights that nothing explains, may be this part.
+_PART_STRAY = 0.15
+_PART_UNEXPLAINED = 0.1
+_FEWEST_IMPACTS = 5
+_FEWEST_SAMPLES = 12
+# A natural frequency known worse than this is hardly determined.
+_DETERMINED = 0.1
+
+Values = Mapping[str, Mapping[str, Estimate]]
+
+
+def doubts_of(record: Prepared, forcing: Forcing, values: Values) -> tuple[Doubt, ...]:
+    """Return what makes the estimates of a record doubtful, the gravest first."""
+    clocks = "" if forcing.clock_drifts else ", or clocks that differ (--clock-drifts)"
+    return (
+        *_of_stops(record),
+        *_of_flights(record, clocks),
+        *_of_model(record, clocks),
+        *_of_contradictions(values),
+        *_of_precision(record, values),
+    )
+
+
+def _of_stops(record: Prepared) -> Iterator[Doubt]:
+    """Yield what kinks say that are not those of one stop."""
+    cut = record.segmentation
+    if cut.opposite >= max(_FEWEST_OPPOSITE, _PART_OPPOSITE * len(cut.impacts)):
+        yield Doubt(f"{cut.opposite} impacts turn the motion the other way: there is a second stop")
+    if cut.stray > _PART_STRAY * (cut.stray + len(cut.impacts)):
+        yield Doubt(
+            f"{cut.stray} of {cut.stray + len(cut.impacts)} jumps of the velocity are not where the others are: "
+            "the stop is not one place, or the channel is not the displacement of the contact"
+        )
+
+
+def _of_flights(record: Prepared, clocks: str) -> Iterator[Doubt]:
+    """Yield what the flights show: how many, and how well they are followed."""
+    missed, used = unexplained_flights(record), len(record.flights)
+    pairs = sum(one != other for one, other in pairs_of(record.flights))
+    if pairs < _FEWEST_IMPACTS:
+        yield Doubt(f"only {pairs} impacts have a usable flight on both sides: record more of them")
+    if missed > max(1.0, _PART_UNEXPLAINED * (missed + used)):
+        yield Doubt(
+            f"{missed} of {missed + record.left_out - missed + used} flights do not follow one oscillator with this "
+            f"force: a second mode, another force{clocks}"
+        )
+    samples = float(np.median([len(flight.index) for flight in record.flights]))
+    if samples < _FEWEST_SAMPLES:
+        yield Doubt(f"flights have {samples:.0f} samples: {_FEWEST_SAMPLES} are needed, sample faster")
+
+
+def _of_model(record: Prepared, clocks: str) -> Iterator[Doubt]:
+    """Yield what speaks against one linear oscillator with white noise and one restitution."""
+    if record.inflation > 1.0:
+        yield Doubt(
+            f"what the motion leaves is no white noise (correlation {record.correlation:.2f} from sample to sample): "
+            "a sensor that filters, or motion that the model lacks"
+        )
+    slope, error = slope_of_restitution(record)
+    if abs(slope) > _CLEAR * error:
+        yield Doubt(
+            f"the restitution changes with the speed of impact ({slope:+.2g} +- {error:.1g} at double the typical "
+            "speed), or friction does"
+        )
+    friction, error = dry_friction(record)
+    if abs(friction) > _CLEAR * error:
+        yield Doubt(
+            f"the flights show dry friction ({abs(friction):.2g} +- {error:.1g} over the stiffness), or other damping "
+            "that is not viscous"
+        )
+    excess = excess_of_trajectories(record)
+    if excess > _CLEAR:
+        yield Doubt(
+            f"trajectories through the impacts leave more than the flights between them, by {excess:.0f} standard "
+            f"errors: the restitution or the stop is not the same at all impacts{clocks}"
+        )
+    if excess < -_CLEAR:
+        yield Doubt(
+            f"the trajectories follow the flights better than the weak form does, by {-excess:.0f} standard errors",
+            tuple(name for name in ANSWERING if name != "trajectory"),
+        )
+    if record.trajectory is not None and not record.trajectory.adequate:
+        yield Doubt(
+            f"the fitted trajectories leave {record.trajectory.noise:.3g}, the single flights {record.fit.noise:.3g}: "
+            f"restitution or forcing is not constant{clocks}"
+        )
+
+
+def _of_contradictions(values: Values) -> Iterator[Doubt]:
+    """Yield methods whose intervals have nothing in common."""
+    best = next((name for name in ("trajectory", "weak_form") if name in values), None)
+    for method in ANSWERING:
+        if best is None or method not in values or method == best:
+            continue
+        apart = [
+            name
+            for name, one in values[method].items()
+            if name in values[best] and _apart(name, one, values[best][name])
+        ]
+        if apart:
+            said = " and ".join(name.replace("_", " ") for name in apart)
+            yield Doubt(
+                f"{method} and {best} contradict each other about {said}",
+                () if method == "weak_form" else (method,),
+            )
+
+
+def _apart(name: str, one: Estimate, other: Estimate) -> bool:
+    """Tell whether two intervals have nothing in common."""
+    turn = 2.0 * math.pi * round((other.value - one.value) / (2.0 * math.pi)) if name == "phase" else 0.0
+    return one.low + turn > other.high or one.high + turn < other.low
+
+
+def _of_precision(record: Prepared, values: Values) -> Iterator[Doubt]:
+    """Yield methods that the data hardly determine."""
+    for method in ANSWERING:
+        found = values.get(method, {})
+        natural = found.get("natural_frequency")
+        free = "natural_frequency" in record.names
+        if method in ("weak_form", "trajectory") and method in values and free and natural is None:
+            yield Doubt("the motion does not determine the natural frequency: give it", (method,))
+        elif natural is not None and natural.standard_error > _DETERMINED * natural.value:
+            yield Doubt(
+                f"the motion hardly determines the natural frequency ({natural.value:.3g} +- "
+                f"{natural.standard_error:.1g} rad/s): give it",
+                (method,),
+            )
+        restitution = found.get("restitution")
+        if restitution is not None and not 0.0 <= restitution.value <= 1.0:
+            yield Doubt(f"a restitution of {restitution.value:.3g} is not between 0 and 1", (method,))
+        damping = found.get("damping_ratio")
+        if damping is not None and damping.value < 0.0:
+            yield Doubt(f"a damping ratio of {damping.value:.2g} is below 0", (method,))

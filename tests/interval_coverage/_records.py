@@ -1,0 +1,162 @@
+"""The records: drawn over the spread that an experiment may have, three levels of what is known, a twelfth spoiled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from interval_coverage._motion import Body, Impact, simulate
+
+SPOILS = ("second mode", "second stop", "dry friction", "speed-dependent restitution")
+"""What one record in twelve has, and the model of the estimators has not."""
+SPOILED_EVERY = 12
+KNOWN = ("frequency", "stop", "damping")
+"""What is known, each level with those before it: the forcing frequency, the stop, damping and offset."""
+PER_PERIOD = (50, 100, 200, 500, 1000, 2000)
+_FEWEST_IMPACTS = 9
+_SETTLED = 30.0
+# A second stop is there when it is hit so often, a restitution depends on the speed when it varies by so much.
+_FEWEST_SHOWN = 4
+_LEAST_SCATTER = 0.02
+
+
+@dataclass(frozen=True)
+class Record:
+    """A record with its truth.
+
+    Attributes
+    ----------
+    time, values : ndarray, shape (sample,)
+    truth : dict
+        By the names of `vibroimpact.analysis.estimation.QUANTITIES`.
+    known, spoil : str
+        Of `KNOWN`, and of `SPOILS` or empty.
+    noise : float
+        Part of the peak.
+    per_period, impacts : int
+    flight_samples : float
+        Median number of samples between impacts.
+    """
+
+    time: np.ndarray
+    values: np.ndarray
+    truth: dict[str, float]
+    known: str
+    spoil: str
+    noise: float
+    per_period: int
+    impacts: int
+    flight_samples: float
+
+
+def record(case: int, seed: int) -> Record:
+    """Return one record; the same for the same case and seed."""
+    rng = np.random.default_rng([seed, case])
+    spoil = SPOILS[(case // SPOILED_EVERY) % len(SPOILS)] if case % SPOILED_EVERY == SPOILED_EVERY - 1 else ""
+    while True:
+        found = _drawn(rng, KNOWN[(case + case // SPOILED_EVERY) % len(KNOWN)], spoil)
+        if found is not None:
+            return found
+
+
+def _drawn(rng: np.random.Generator, known: str, spoil: str) -> Record | None:
+    """Return a record, None where the motion hardly hits the stop."""
+    natural, deflection = _log(rng, 10.0, 1000.0), _log(rng, 0.1, 10.0)
+    ratio, damping = _log(rng, 0.7, 4.0), _log(rng, 0.02, 0.15)
+    position, restitution = rng.uniform(-0.2, 1.0) * deflection, rng.uniform(0.6, 0.9)
+    frequency, per_period = ratio * natural, int(rng.choice(PER_PERIOD))
+    body = _body(natural, damping, deflection, frequency, position, restitution, spoil, rng)
+    time = np.arange(round(rng.uniform(15.0, 44.0) * per_period)) * 2.0 * math.pi / frequency / per_period
+    begin = 2.0 * math.pi / frequency * (_SETTLED + rng.uniform())
+    rest = np.zeros((2, len(body.natural)))
+    rest[0, 0] = position - rng.uniform(0.5, 2.0) * deflection
+    motion, impacts = simulate(body, rest, np.append(0.0, begin + time))
+    instants = np.array([impact.instant for impact in impacts if impact.instant > begin])
+    if len(instants) < _FEWEST_IMPACTS or not _shows(spoil, body, impacts, begin):
+        return None
+    sign, offset = rng.choice([-1.0, 1.0]), rng.uniform(-2.0, 2.0) * deflection
+    noise = _log(rng, 1e-3, 5e-2)
+    peak = float(np.max(np.abs(motion[1:])))
+    values = sign * motion[1:] + offset + noise * peak * rng.standard_normal(len(time))
+    turned = body.phase + frequency * begin + (0.0 if sign > 0.0 else math.pi)
+    truth = {
+        "restitution": restitution,
+        "damping_ratio": damping,
+        "natural_frequency": natural,
+        "static_deflection": deflection,
+        "phase": turned % (2.0 * math.pi),
+        "stop_position": sign * position + offset,
+        "offset": offset,
+    }
+    samples = float(np.median(np.diff(instants)) / time[1])
+    return Record(
+        time,
+        values,
+        truth | {"angular_frequency": frequency},
+        known,
+        spoil,
+        noise,
+        per_period,
+        len(instants),
+        samples,
+    )
+
+
+def _shows(spoil: str, body: Body, impacts: Sequence[Impact], begin: float) -> bool:
+    """Tell whether the motion shows what spoils it: a second stop that is not hit, or speeds all alike, do not."""
+    seen = [impact for impact in impacts if impact.instant > begin]
+    if spoil == "second stop":
+        return sum(impact.side < 0.0 for impact in seen) >= _FEWEST_SHOWN
+    if spoil == "speed-dependent restitution":
+        return float(np.std([body.restitution(impact.speed) for impact in seen])) > _LEAST_SCATTER
+    return True
+
+
+def _log(rng: np.random.Generator, low: float, high: float) -> float:
+    return float(np.exp(rng.uniform(math.log(low), math.log(high))))
+
+
+def _body(
+    natural: float,
+    damping: float,
+    deflection: float,
+    frequency: float,
+    position: float,
+    restitution: float,
+    spoil: str,
+    rng: np.random.Generator,
+) -> Body:
+    """Return the body, with what spoils it: of a size that an experiment may have and its maker not know."""
+    modes, ratios, shape = [natural], [damping], [1.0]
+    stops, friction = [(position, 1.0)], 0.0
+    power, typical = 0.0, natural * deflection
+    if spoil == "second mode":
+        modes, ratios, shape = (
+            [natural, rng.uniform(2.5, 6.5) * natural],
+            [damping, damping],
+            [1.0, rng.uniform(0.2, 0.6)],
+        )
+    elif spoil == "second stop":
+        stops.append((position - rng.uniform(0.3, 1.0) * deflection, -1.0))
+    elif spoil == "dry friction":
+        friction = rng.uniform(0.02, 0.08) * deflection
+    elif spoil:
+        power = rng.uniform(0.1, 0.25)
+
+    def law(speed: float) -> float:
+        return float(min(1.0, restitution * (max(speed, 1e-9 * typical) / typical) ** -power))
+
+    return Body(
+        np.array(modes),
+        np.array(ratios),
+        np.array(shape),
+        deflection,
+        frequency,
+        rng.uniform(0.0, 2.0 * math.pi),
+        tuple(stops),
+        law,
+        friction,
+    )
