@@ -1,6 +1,6 @@
 # Everything sets itself up: a virtual environment in .venv, the packages, the FMUs.
 .DEFAULT_GOAL := help
-.PHONY: help demo test soak oldest sanitize bench lint clean
+.PHONY: help demo test soak coverage oldest sanitize bench lint clean
 
 OLDEST := $(or $(PYTHON),python3.11)
 ifneq ($(PYTHON),)
@@ -44,6 +44,9 @@ sanitize: $(VENV)/test.stamp ## run the C tests under the address and undefined-
 
 bench: $(VENV)/bench.stamp $(VENV)/fmus.stamp ## run the benchmarks; each leaves its figures and a sentence
 	@for script in tests/benchmarks/bench_*.py; do $(BIN)/python "$$script" || exit 1; done
+
+coverage: $(VENV)/test.stamp $(VENV)/fmus.stamp ## ask 300 records whether the intervals of estimates hold the truth; goes on where it ended; SEED= RECORDS=
+	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m interval_coverage
 
 oldest: ## run all tests on Python 3.11 with the lowest versions that pyproject.toml allows
 	@$(OLDEST) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || { echo "make oldest: expected Python 3.11, got $$($(OLDEST) --version 2>&1). Say where it is: make oldest PYTHON=/path/to/python3.11" >&2; exit 1; }

@@ -14,6 +14,8 @@ Floats = NDArray[np.float64]
 
 FEWEST_PERIODS = 2.0
 _MOST_GRID = 1 << 18
+# A window of this part of the largest amplitude says nothing.
+_NO_WEIGHT = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +65,9 @@ def first_guess(samples: DecaySamples) -> FirstGuess:
     decay_rate = 0.0
     for _ in range(3):
         envelope = windowed_cosines(samples, omega, decay_rate)
-        if len(envelope.time) < 2:
-            break  # one window has no slope
         weights = envelope.amplitude
+        if len(weights) < 2 or not np.sort(weights)[-2] > _NO_WEIGHT * np.max(weights):
+            break  # one window has no slope
         slope = np.polyfit(envelope.time, envelope.phase, 1, w=weights)[0]
         omega = float(slope) if 0.5 * omega < slope < 2.0 * omega else omega
         logarithm = np.log(np.maximum(envelope.amplitude, 1e-300))

@@ -10,10 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from vibroimpact.analysis.estimation.coordinates import Coordinates
 from vibroimpact.analysis.estimation.noise import Floats
@@ -24,9 +22,12 @@ from vibroimpact.fmus.errors import EstimationError
 
 # Steps of the numerical derivatives, relative to the size of what is varied.
 _STEP = 1e-5
-# Steps of the search over flights are counted in this part of a coordinate; so many are tried for each of them.
-_STEP_OF_SEARCH = 0.1
-_MOST_TRIALS = 30
+# Steps of the search over flights are counted in this part of a coordinate; its derivatives are differences over so
+# much of that.
+_STEP_OF_SEARCH, _DIFFERENCE = 0.1, 1e-4
+_MOST_STEPS, _MOST_HALVINGS = 10, 12
+# It ends where a step promises to lessen chi squared by no more than this.
+_SETTLED = 1e-3
 # A trial that is no oscillator fits this many times the range of the signal badly.
 _FAR = 1e3
 # Instants on motion of constant acceleration are found in so many Newton steps.
@@ -67,7 +68,8 @@ def fit_flight(signal: Signal, flight: Flight, parameters: Parameters) -> Fitted
     """Fit the exact flow to one flight, with all parameters given."""
     basis, forced, to_end = flow_of(signal.time[flight.index], flight, parameters)
     samples = signal.values[flight.index] - parameters.offset
-    gain = np.asarray(np.linalg.pinv(basis), dtype=np.float64)
+    orthogonal, triangle = np.linalg.qr(basis)
+    gain: Floats = np.linalg.solve(triangle, orthogonal.T)
     state: Floats = gain @ (samples - forced)
     return FittedFlight(flight, state, gain, to_end, samples - forced - basis @ state)
 
@@ -114,24 +116,42 @@ def search_flights(
             return np.full(sum(counts), _FAR * size)
         return np.concatenate([fit_flight(signal, flight, trial).rests for flight in flights])
 
-    unit = max(float(np.sqrt(np.mean(rests(np.zeros(len(names))) ** 2))), 1e-300)
-    found: Any = least_squares(
-        lambda x: rests(x) / unit,
-        np.zeros(len(names)),
-        method="lm",
-        diff_step=1e-4,
-        x_scale=1.0,
-        max_nfev=_MOST_TRIALS * (len(names) + 1),
-    )
-    best = coordinates.parameters(origin + scale * found.x)
+    freedom = max(sum(counts) - 2 * len(flights) - len(names), 1)
+    x, left, columns = _gauss_newton(rests, len(names), freedom)
+    best = coordinates.parameters(origin + scale * x)
     if best is None:
         raise EstimationError("weak form: expected an oscillator that fits the flights, got none.")
-    freedom = max(sum(counts) - 2 * len(flights) - len(names), 1)
-    noise = unit * math.sqrt(2.0 * found.cost / freedom)
-    columns = found.jac * unit / scale
-    gain = np.linalg.inv(coordinates.derivative(best)) @ np.linalg.pinv(columns)
+    noise = math.sqrt(float(left @ left) / freedom)
+    gain = np.linalg.inv(coordinates.derivative(best)) @ np.linalg.pinv(columns / scale)
     parts = np.split(-gain, np.cumsum(counts)[:-1], axis=1)
     return FlightSearch(best, noise**2 * gain @ gain.T, parts)
+
+
+def _gauss_newton(
+    function: Callable[[Floats], Floats], count: int, freedom: int
+) -> tuple[Floats, Floats, Floats]:
+    """Return the unknowns from 0 on at which the squares are least, the rests there, and their derivatives."""
+    x = np.zeros(count)
+    left = function(x)
+    columns = np.empty((len(left), count))
+    for _ in range(_MOST_STEPS):
+        for k in range(count):
+            moved = x.copy()
+            moved[k] += _DIFFERENCE
+            columns[:, k] = (function(moved) - left) / _DIFFERENCE
+        step = np.linalg.lstsq(columns, -left, rcond=1e-12)[0]
+        square = float(left @ left)
+        for _ in range(_MOST_HALVINGS):
+            there = function(x + step)
+            if float(there @ there) <= square:
+                break
+            step *= 0.5
+        else:
+            break
+        x, left = x + step, there
+        if float(np.sum((columns @ step) ** 2)) * freedom <= _SETTLED * square:
+            break
+    return x, left, columns
 
 
 def flow_of(time: Floats, flight: Flight, parameters: Parameters) -> tuple[Floats, Floats, Floats]:

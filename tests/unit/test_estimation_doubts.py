@@ -13,6 +13,7 @@ from rich.console import Console
 from vibroimpact.analysis.estimation import Forcing, Known, estimate_impacts, impacts, print_impacts
 from vibroimpact.analysis.estimation.coordinates import Coordinates
 from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.figures import draw_estimates
 from vibroimpact.fmus.errors import EstimationError
 
 METHODS = ["weak_form", "trajectory"]
@@ -174,3 +175,15 @@ def test_the_dataset_has_what_was_measured_and_the_motion_that_fits():
     rests = rests[np.isfinite(rests)]
     assert len(rests) > 0.8 * dataset.sizes["time"]
     assert np.std(rests) == pytest.approx(found.facts["noise"], rel=0.05)
+
+
+def test_the_figure_shows_signal_impacts_and_what_is_left_above_the_intervals():
+    dataset = estimated(PLAIN).dataset().assign_attrs(estimates="impacts")
+    labels = [axis.get_ylabel() for axis in draw_estimates(dataset).axes]
+    assert labels[:2] == ["displacement (m)", "residual (m)"]
+    signal = draw_estimates(dataset).axes[0]
+    low, high = signal.get_xlim()
+    # of a long record some flights, or none would be told apart
+    assert 5 < np.count_nonzero((dataset.impact_time > low) & (dataset.impact_time < high)) <= 11
+    old = dataset.drop_vars(["measured", "fitted", "time"])
+    assert len(draw_estimates(old).axes) == len(labels) - 2

@@ -1,0 +1,75 @@
+"""One record asked: what each method says of it, and whether it is sure."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from interval_coverage._records import Record, record
+from vibroimpact.analysis.estimation import Forcing, ImpactEstimates, Known, estimate_impacts
+from vibroimpact.analysis.recording import Channel, TimeAxis
+from vibroimpact.fmus.errors import EstimationError
+
+METHODS = ("energy_known_damping", "energy_joint", "energy_amplitude", "weak_form", "trajectory")
+
+
+def estimates_of(one: Record) -> ImpactEstimates:
+    """Return the estimates from a record with what is known of it."""
+    axis = TimeAxis(one.time, float(one.time[1] - one.time[0]))
+    channel = Channel("tip", one.values, "m", axis, np.zeros(len(one.time), np.uint8))
+    with_stop, with_damping = one.known != "frequency", one.known == "damping"
+    known = Known(
+        damping_ratio=one.truth["damping_ratio"] if with_damping else None,
+        stop_position=one.truth["stop_position"] if with_stop else None,
+        offset=one.truth["offset"] if with_damping else None,
+    )
+    return estimate_impacts(channel, Forcing(one.truth["angular_frequency"]), known, methods=METHODS)
+
+
+def asked(case: int, seed: int) -> dict[str, Any]:
+    """Return the line of the journal for a case.
+
+    `sure` holds, for each method without a doubt, [value, standard error, low, high, truth] by quantity.
+    """
+    one, begin = record(case, seed), time.process_time()
+    line: dict[str, Any] = {
+        "case": case,
+        "spoil": one.spoil,
+        "known": one.known,
+        "noise": one.noise,
+        "per_period": one.per_period,
+        "impacts": one.impacts,
+        "flight_samples": one.flight_samples,
+        "sure": {},
+        "verdict": "",
+    }
+    try:
+        found = estimates_of(one)
+    except EstimationError as problem:
+        line["verdict"] = f"refused: {problem}"
+    else:
+        line["verdict"] = found.verdict
+        line["sure"] = {
+            method: {
+                name: [
+                    value.value,
+                    value.standard_error,
+                    value.low,
+                    value.high,
+                    _near(name, one, value.value),
+                ]
+                for name, value in values.items()
+                if name in one.truth
+            }
+            for method, values in found.values.items()
+            if not found.reasons(method)
+        }
+    return line | {"seconds": time.process_time() - begin}
+
+
+def _near(name: str, one: Record, value: float) -> float:
+    """Return the truth; of a phase that which is nearest to the estimate."""
+    truth = one.truth[name]
+    return truth + 2.0 * np.pi * round((value - truth) / (2.0 * np.pi)) if name == "phase" else truth

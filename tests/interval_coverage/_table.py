@@ -1,0 +1,90 @@
+"""What the lines of a journal say: shares of intervals that hold the truth, of answers, of spoiled records found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rich.table import Table
+from scipy.stats import binom
+
+from interval_coverage._asked import METHODS
+
+HELD = (0.92, 0.98)
+ANSWERED, ANSWERED_GOOD, FLAGGED = 0.70, 0.90, 0.90
+GOOD_NOISE, GOOD_FLIGHT = 0.02, 12
+# A share misses its target when this chance, or less, would bring it so far off were the target just met.
+CHANCE = 0.01
+
+Line = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Share:
+    """A share with the target that it is held to."""
+
+    what: str
+    hits: int
+    total: int
+    low: float
+    high: float = 1.0
+
+    @property
+    def missed(self) -> bool:
+        """Tell whether chance does not explain how far the share is off its target."""
+        if not self.total:
+            return False
+        few = binom.cdf(self.hits, self.total, self.low) < CHANCE
+        many = self.high < 1.0 and binom.sf(self.hits - 1, self.total, self.high) < CHANCE
+        return bool(few or many)
+
+
+def shares(lines: Sequence[Line]) -> list[Share]:
+    """Return all shares, in the order of the table."""
+    clean = [line for line in lines if not line["spoil"]]
+    spoiled = [line for line in lines if line["spoil"]]
+    good = [line for line in clean if line["noise"] <= GOOD_NOISE and line["flight_samples"] >= GOOD_FLIGHT]
+    found = list(_held(clean))
+    for method in METHODS:
+        asked = _can_answer(method)
+        for words, some, target in (("clean", clean, ANSWERED), ("good", good, ANSWERED_GOOD)):
+            able = [line for line in some if asked(line)]
+            hits = sum(method in line["sure"] for line in able)
+            found.append(Share(f"{method}: answers that are sure, {words} records", hits, len(able), target))
+    flagged = sum(not line["sure"] for line in spoiled)
+    found.append(Share("spoiled records of which nothing is sure", flagged, len(spoiled), FLAGGED))
+    return found
+
+
+def _held(clean: Iterable[Line]) -> Iterable[Share]:
+    """Yield the shares of intervals that hold the truth, by method and quantity."""
+    counts: dict[tuple[str, str], list[bool]] = {}
+    for line in clean:
+        for method, values in line["sure"].items():
+            for name, (_, _, low, high, truth) in values.items():
+                counts.setdefault((method, name), []).append(low <= truth <= high)
+    for method, name in sorted(counts, key=lambda key: (METHODS.index(key[0]), key[1])):
+        held = counts[method, name]
+        yield Share(f"{method}: {name}", sum(held), len(held), *HELD)
+
+
+def _can_answer(method: str) -> Callable[[Line], bool]:
+    """Return which records a method can answer: the others lack what it takes as known.
+
+    Energy with known damping takes the damping ratio. That with an unknown amplitude of the force has as many unknowns
+    as P(1,1) motion has equations, two, only where the damping ratio is known.
+    """
+    if method in ("energy_known_damping", "energy_amplitude"):
+        return lambda line: line["known"] == "damping"
+    return lambda line: True
+
+
+def table_of(found: Sequence[Share]) -> Table:
+    """Return the shares as a table."""
+    table = Table("what", "share", "of", "target", "")
+    for one in found:
+        share = f"{100.0 * one.hits / one.total:.1f} %" if one.total else "-"
+        target = f"{100.0 * one.low:g} to {100.0 * one.high:g} %"
+        table.add_row(one.what, share, f"{one.hits}/{one.total}", target, "MISSED" if one.missed else "")
+    return table

@@ -1,0 +1,54 @@
+"""Twelve short records of `make coverage`, eight plain ones and one of each kind that is spoiled."""
+
+from functools import cache
+
+import pytest
+
+from interval_coverage._asked import asked
+from interval_coverage._records import SPOILS, record
+from interval_coverage._table import HELD, Share, shares
+
+SEED = 1
+PLAIN = (0, 2, 14, 16, 20, 24, 30, 34)
+SPOILED = {11: "second mode", 35: "dry friction", 47: "speed-dependent restitution", 71: "second stop"}
+
+
+@cache
+def line(case):
+    return asked(case, SEED)
+
+
+@pytest.mark.parametrize("case", SPOILED)
+def test_nothing_is_sure_of_a_spoiled_record(case):
+    assert line(case)["spoil"] == SPOILED[case]
+    assert not line(case)["sure"]
+    assert line(case)["verdict"].startswith(("not sure, because ", "refused: "))
+
+
+def test_intervals_of_plain_records_hold_the_truth():
+    lines = [line(case) for case in PLAIN]
+    assert sum({"weak_form", "trajectory"} <= set(one["sure"]) for one in lines) >= 7
+    held = [share for share in shares(lines) if share.low == HELD[0]]
+    hits, total = sum(share.hits for share in held), sum(share.total for share in held)
+    # intervals of one record are correlated: about two records' worth may miss at once
+    assert total > 80
+    assert hits > 0.85 * total
+
+
+def test_a_record_is_the_same_for_the_same_case_and_seed():
+    one, other = record(20, SEED), record(20, SEED)
+    assert one.truth == other.truth
+    assert (one.values == other.values).all()
+    assert record(20, SEED + 1).truth != one.truth
+    assert set(SPOILED.values()) == set(SPOILS)
+
+
+@pytest.mark.parametrize(
+    ("hits", "missed"), [(95, False), (92, False), (99, False), (84, True), (100, False), (60, True)]
+)
+def test_a_share_misses_its_target_only_beyond_chance(hits, missed):
+    assert Share("intervals", hits, 100, *HELD).missed is missed
+
+
+def test_intervals_that_hold_too_often_miss_their_target_too():
+    assert Share("intervals", 400, 400, *HELD).missed
