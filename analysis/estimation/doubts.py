@@ -25,6 +25,8 @@ _FEWEST_OPPOSITE, _PART_OPPOSITE = 3, 0.1
 # Kinks that are not at the stop, and flights that nothing explains, may be this part.
 _PART_STRAY = 0.15
 _PART_UNEXPLAINED = 0.1
+# Noise below this part of the motion's range is the rounding of a simulation.
+_ROUNDING = 1e-6
 _FEWEST_IMPACTS = 5
 _FEWEST_SAMPLES = 12
 # A natural frequency known worse than this is hardly determined.
@@ -36,11 +38,15 @@ Values = Mapping[str, Mapping[str, Estimate]]
 def doubts_of(record: Prepared, forcing: Forcing, values: Values) -> tuple[Doubt, ...]:
     """Return what makes the estimates of a record doubtful, the gravest first."""
     clocks = "" if forcing.clock_drifts else ", or clocks that differ (--clock-drifts)"
+    signal = record.segmentation.signal
+    # without noise there is no chance to judge by: what is left is rounding
+    noisy = record.fit.noise > _ROUNDING * float(np.ptp(signal.values[signal.good]))
     return (
         *_of_stops(record),
         *_of_flights(record, clocks),
-        *_of_model(record, clocks),
-        *_of_contradictions(values),
+        *(_of_model(record, clocks) if noisy else ()),
+        *_of_constancy(record, clocks),
+        *(_of_contradictions(values) if noisy else ()),
         *_of_precision(record, values),
     )
 
@@ -103,6 +109,10 @@ def _of_model(record: Prepared, clocks: str) -> Iterator[Doubt]:
             f"the trajectories follow the flights better than the weak form does, by {-excess:.0f} standard errors",
             tuple(name for name in ANSWERING if name != "trajectory"),
         )
+
+
+def _of_constancy(record: Prepared, clocks: str) -> Iterator[Doubt]:
+    """Yield trajectories that do not follow at all what single flights do."""
     if record.trajectory is not None and not record.trajectory.adequate:
         yield Doubt(
             f"the fitted trajectories leave {record.trajectory.noise:.3g}, the single flights {record.fit.noise:.3g}: "

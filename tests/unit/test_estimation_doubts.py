@@ -187,3 +187,9 @@ def test_the_figure_shows_signal_impacts_and_what_is_left_above_the_intervals():
     assert 5 < np.count_nonzero((dataset.impact_time > low) & (dataset.impact_time < high)) <= 11
     old = dataset.drop_vars(["measured", "fitted", "time"])
     assert len(draw_estimates(old).axes) == len(labels) - 2
+
+
+def test_a_simulated_record_without_noise_is_sure():
+    record = record_of(THESIS, periods=8)
+    found = estimate_impacts(record.channel(), record.forcing(), methods=METHODS)
+    assert found.verdict == "sure of weak form, trajectory."
