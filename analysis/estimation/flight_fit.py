@@ -343,7 +343,6 @@ def fit_flights(
         reading = reading_of(states, maps, parameters)
         return np.array([getattr(reading, name) for name in _READ])
 
-    reading = reading_of(states, maps, parameters)
     by_state = _derivative(lambda x: read(x.reshape(states.shape), maps, parameters), states.ravel())
 
     def of_parameters(values: Floats) -> Floats:
@@ -359,7 +358,7 @@ def fit_flights(
             weights = weights + by_name @ influence[j]
         variance += np.sum(weights**2, axis=1)
     errors = dict(zip(_READ, (noise * np.sqrt(variance)).tolist(), strict=True))
-    return FlightFit(reading, errors, fitted, noise)
+    return FlightFit(reading_of(states, maps, parameters), errors, fitted, noise)
 
 
 def _derivative(function: Callable[[Floats], Floats], at: Floats) -> Floats:
