@@ -13,7 +13,7 @@ from rich.console import Console
 from vibroimpact.analysis.estimation import Forcing, Known, estimate_impacts, impacts, print_impacts
 from vibroimpact.analysis.estimation.coordinates import Coordinates
 from vibroimpact.analysis.estimation.physics import Parameters
-from vibroimpact.analysis.figures import draw_estimates
+from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.fmus.errors import EstimationError
 
 METHODS = ["weak_form", "trajectory"]
