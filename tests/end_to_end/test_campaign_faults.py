@@ -262,10 +262,13 @@ def test_an_innocent_point_is_computed_however_often_its_worker_is_taken_away(tm
 
 def test_two_campaigns_do_not_share_a_folder(tmp_path: Path) -> None:
     scene, folder = tmp_path / "scene.toml", tmp_path / "campaign"
-    scene.write_text(frequency_text(POINTS, milliseconds=2 * MILLISECONDS))
+    scene.write_text(frequency_text(POINTS, milliseconds=MILLISECONDS))
     first = CampaignProcess(scene, folder, *TWO)
     first.wait_for_parts(1)
+    # stopped, it has not ended before the other begins, however long that takes to start
+    os.killpg(first.process.pid, signal.SIGSTOP)
     code, _, err = run_campaign_process(scene, folder, *TWO)
+    os.killpg(first.process.pid, signal.SIGCONT)
     assert code == 2
     assert_one_clear_message(err)
     assert "another campaign is running" in err
