@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.cluster import processor_count
-from vibroimpact.orchestrator.result_size import refuse_large_results
+from vibroimpact.orchestrator.result_size import refuse_large_results, size
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene_check import (
     BYTES_BESIDE,
@@ -19,7 +19,6 @@ from vibroimpact.orchestrator.scene_check import (
 from vibroimpact.orchestrator.scene_summary import effects, engine, laws
 
 _WIDTH = 10
-_SIZES = ("B", "kB", "MB", "GB", "TB", "PB")
 _DURATIONS = (
     (1e-3, "us", 1e6),
     (1.0, "ms", 1e3),
@@ -108,18 +107,6 @@ def _memory(cost: SceneCost, copies: int) -> str:
     if cost.trial is None or cost.trial.given_up:
         return ""
     return f"; at its end {size(copies * cost.points * cost.trial.size)} of memory for results"
-
-
-def size(count: float) -> str:
-    """Return a number of bytes as a person reads it.
-
-    >>> size(999), size(157e6), size(2.34e12)
-    ('999 B', '157 MB', '2.3 TB')
-    """
-    power = 0
-    while count >= 999.5 and power < len(_SIZES) - 1:
-        count, power = count / 1000, power + 1
-    return f"{count:.{0 if count >= 9.95 or power == 0 else 1}f} {_SIZES[power]}"
 
 
 def duration(seconds: float) -> str:

@@ -9,11 +9,12 @@ from vibroimpact.orchestrator.empty_record import sample_variables
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.sweep import run_count
 
-MOST_BYTES = 2**30
+MOST_BYTES = 10**9
 """Results that are kept in memory at once; arranging and writing them takes up to four times as much."""
 
 _RUN_BYTES = 1000
 _NUMBER_BYTES = 8
+_SIZES = ("B", "kB", "MB", "GB", "TB", "PB")
 
 
 def bytes_of_a_run(scene: Scene) -> int:
@@ -37,6 +38,18 @@ def _recorded_seconds(scene: Scene) -> float:
     return scene.record.recorded_periods * scene.period
 
 
+def size(count: float) -> str:
+    """Return a number of bytes as a person reads it.
+
+    >>> size(999), size(157e6), size(2.34e12)
+    ('999 B', '157 MB', '2.3 TB')
+    """
+    power = 0
+    while count >= 999.5 and power < len(_SIZES) - 1:
+        count, power = count / 1000, power + 1
+    return f"{count:.{0 if count >= 9.95 or power == 0 else 1}f} {_SIZES[power]}"
+
+
 def refuse_large_results(scene: Scene) -> None:
     """Refuse a scene whose results do not fit into the memory of one process.
 
@@ -45,14 +58,14 @@ def refuse_large_results(scene: Scene) -> None:
     UsageError
         With the size and what to do.
     """
-    runs, size = run_count(scene.sweep), bytes_of_a_run(scene)
-    if runs * size <= MOST_BYTES:
+    runs, each = run_count(scene.sweep), bytes_of_a_run(scene)
+    if runs * each <= MOST_BYTES:
         return
-    if runs == 1 or size > MOST_BYTES:
+    if runs == 1 or each > MOST_BYTES:
         todo = "Record fewer periods, or sample fewer variables, more slowly or for a shorter time."
     else:
         todo = "Use `vibroimpact campaign`, which keeps each point on the disk as soon as it is computed."
     raise UsageError(
-        f"{scene.source}: expected results of at most {MOST_BYTES / 2**30:g} GiB, which `vibroimpact run` keeps in "
-        f"memory, got {runs} {'run' if runs == 1 else 'runs'} of {size / 2**20:.3g} MiB each. {todo}"
+        f"{scene.source}: expected results of at most {size(MOST_BYTES)}, which `vibroimpact run` keeps in memory, "
+        f"got {size(runs * each)} of {runs} {'run' if runs == 1 else 'runs'}. {todo}"
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.orchestrator.chunks import DEFAULT_RUNNER, BranchPoint, dataset_of, open_runner, run_point
-from vibroimpact.orchestrator.result_size import MOST_BYTES, bytes_of_a_run
+from vibroimpact.orchestrator.result_size import MOST_BYTES, bytes_of_a_run, size
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.sweep import Point, run_count
 
@@ -121,12 +121,8 @@ def cost_of(scene: Scene) -> SceneCost:
 def _why_untried(scene: Scene) -> str:
     if scene.replay is not None and not scene.replay.recordings:
         return "its recording is given to `vibroimpact replay`"
-    size = bytes_of_a_run(scene)
-    return (
-        f"it would record {size / 2**30:.3g} GiB, more than {MOST_BYTES / 2**30:g}"
-        if size > MOST_BYTES
-        else ""
-    )
+    recorded = bytes_of_a_run(scene)
+    return f"it would record {size(recorded)}, more than {size(MOST_BYTES)}" if recorded > MOST_BYTES else ""
 
 
 def _tried(scene: Scene) -> Trial:

@@ -7,6 +7,7 @@ import math
 from rich.table import Table
 
 from vibroimpact.analysis.estimation.estimates import QUANTITIES, SHOWN, Estimate, ImpactEstimates
+from vibroimpact.analysis.unit_symbols import written_unit
 from vibroimpact.fmus.terminal import Terminal
 
 
@@ -40,7 +41,7 @@ def _estimates(estimates: ImpactEstimates) -> Table:
         cells = [estimates.values[method].get(quantity) for method in methods]
         if any(cells):
             words = quantity.replace("_", " ")
-            table.add_row(words, estimates.unit_of(quantity), *(_cell(cell) for cell in cells))
+            table.add_row(words, written_unit(estimates.unit_of(quantity)), *(_cell(cell) for cell in cells))
     return table
 
 

@@ -90,7 +90,7 @@ def _automatic_merge(method: str) -> str:
 
 def _spikes(data: xr.Dataset) -> Table:
     """Return one row for each spike."""
-    peak, impulse = str(data["spike_peak"].attrs["units"]), str(data["spike_impulse"].attrs["units"])
+    peak, impulse = (written_unit(str(data[name].attrs["units"])) for name in ("spike_peak", "spike_impulse"))
     heads = ["time (s)", f"peak ({peak})", f"impulse ({impulse})", "passes"]
     columns = [("spike_peak", "spike_peak_error"), ("spike_impulse", "spike_impulse_error")]
     if "spike_velocity" in data:
@@ -112,7 +112,7 @@ def _spikes(data: xr.Dataset) -> Table:
 def _contacts(data: xr.Dataset) -> Table:
     """Return how long each spike lasts, and its sum above the threshold, which depends on the threshold."""
     heads = ("time (s)", "foot to foot (ms)", "above (ms)")
-    sums = f"sum above ({data['spike_impulse'].attrs['units']})"
+    sums = f"sum above ({written_unit(str(data['spike_impulse'].attrs['units']))})"
     table = Table(*heads, sums, title="Contacts, and what is above the threshold", title_justify="left")
     for place in range(min(int(data.sizes["spike"]), _MOST_ROWS)):
         one = data.isel(spike=place)

@@ -142,7 +142,7 @@ def test_what_does_not_fit_into_memory_is_refused_before_it_is_computed(
         str(tmp_path / "x.nc"),
     ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    misuse(done, "expected results of at most 1 GiB")
+    misuse(done, "expected results of at most 1.0 GB")
     assert todo in done.stderr
     (peak,) = (int(line.split()[1]) for line in done.stdout.splitlines() if line.startswith("VmHWM:"))
     # kB: what any command takes, not what 10^8 points would

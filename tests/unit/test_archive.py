@@ -192,7 +192,7 @@ def test_a_file_that_is_no_zip_is_refused(tmp_path: Path, content: bytes) -> Non
 def test_a_truncated_fmu_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path / "M.fmu")
     path.write_bytes(path.read_bytes()[:-30])
-    refusal(path)
+    assert "expected an FMU (a zip archive)" in refusal(path)
 
 
 def test_a_damaged_member_is_refused_and_leaves_nothing(tmp_path: Path, cache: Path) -> None:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from decay_motion import Damped
 
+from vibroimpact.analysis.decay.estimate import Estimate
 from vibroimpact.analysis.decay.exponential import fit_exponential
 from vibroimpact.analysis.decay.half_swing import Coefficients
 from vibroimpact.analysis.decay.law_choice import choose_law
@@ -14,7 +17,7 @@ from vibroimpact.analysis.decay.laws import ALL_LAWS, damping_law, spoken
 from vibroimpact.analysis.decay.motion import decaying_motion
 from vibroimpact.analysis.decay.samples import DecaySamples
 from vibroimpact.analysis.decay.windows import first_guess
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import EstimationError, UsageError
 
 # Released from 10: each law alone takes about two thirds of the amplitude in 30 s.
 RATES = {"viscous": 0.04, "coulomb": 0.9, "quadratic": 0.006}
@@ -137,3 +140,11 @@ def test_laws_are_named_in_any_order_and_misspellings_are_helped() -> None:
         damping_law("viscos")
     with pytest.raises(UsageError, match="each term once"):
         damping_law("viscous+viscous")
+
+
+def test_a_start_so_damped_that_no_turning_point_is_finite_is_refused() -> None:
+    samples = measured(body("viscous").motion(START, TIME), 0.01, 5)
+    guess = first_guess(samples)
+    overdamped = replace(fit_exponential(samples, guess), decay_rate=Estimate(1e5, 1.0))
+    with pytest.raises(EstimationError, match="motion that no decaying cosine is near to"):
+        fit_law(samples, damping_law("viscous"), overdamped, guess.envelope)

@@ -88,7 +88,8 @@ def test_a_ball_that_comes_to_rest_is_read_as_a_decay_without_a_warning():
     # windows in which nothing moves have no weight: one window alone has no slope
     flying = ball(0.6, bounces=8)
     values = np.append(flying.values, np.zeros(3000))
-    estimate_decay(decay_samples(channel_of(np.arange(len(values)) / 500.0, values), None, None), ())
+    decay = estimate_decay(decay_samples(channel_of(np.arange(len(values)) / 500.0, values), None, None), ())
+    assert decay.estimates()
 
 
 def test_estimate_of_a_ball_under_its_weight_takes_the_flight_times(tmp_path):

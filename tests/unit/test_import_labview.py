@@ -174,3 +174,15 @@ def test_a_header_without_its_data_is_refused(tmp_path: Path, text: str, said: s
             imported(tmp_path, text)
     else:
         assert len(imported(tmp_path, text).channels) == 2
+
+
+@pytest.mark.parametrize("begins", ["20:00:00.5", "20:00:07.5"])
+def test_segments_that_began_at_the_same_instant_have_one_trigger(tmp_path: Path, begins: str) -> None:
+    rows = [f"{k * 0.01:.6f}\t{k}.5" for k in range(20)]
+    first = segment(rows, "X_Value\tbase\tComment")
+    second = segment(rows, "X_Value\tboard\tComment", begins=begins, interval="0.02")
+    recording = imported(tmp_path, file_header("One", "Yes") + first + "\n" + second)
+    triggers = {channel.axis.trigger for channel in recording.channels.values()}
+    assert len(recording.channels) == 2
+    assert len(triggers) == (1 if begins == "20:00:00.5" else 2)
+    assert ("triggers: the lag" in "\n".join(recording.remarks)) == (len(triggers) == 2)

@@ -151,8 +151,8 @@ def test_results_that_memory_does_not_hold_are_said_and_not_tried(scene_file: Pa
     scene_file.write_text(frequency_text(3).replace("recorded_periods = 2", "recorded_periods = 100000000"))
     done = in_this_process("check", scene_file)
     assert done.returncode == 0, done.stderr
-    assert "trial     none: it would record 3.73 GiB, more than 1" in done.stdout
-    assert "run       refused: expected results of at most 1 GiB" in done.stdout
+    assert "trial     none: it would record 4.0 GB, more than 1.0 GB" in done.stdout
+    assert "run       refused: expected results of at most 1.0 GB" in done.stdout
 
 
 def test_check_says_what_runs_and_what_it_costs(scene_file: Path) -> None:
