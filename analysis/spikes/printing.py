@@ -13,6 +13,8 @@ from vibroimpact.fmus.terminal import Terminal
 
 #: A longer list of spikes is cut; all of them are in the dataset.
 _MOST_ROWS = 12
+#: From here on numbers are written with an exponent.
+_LARGE = 1e7
 
 
 def print_spikes(console: Terminal, report: SpikeReport) -> None:
@@ -128,11 +130,14 @@ def _contacts(data: xr.Dataset) -> Table:
 def _with_error(value: float, error: float) -> str:
     """Return a value to the second digit of its error.
 
-    >>> _with_error(0.87483, 0.0062), _with_error(43949.8, 23.8)
-    ('0.8748 ± 0.0062', '43950 ± 24')
+    >>> _with_error(0.87483, 0.0062), _with_error(43949.8, 23.8), _with_error(39357.0, 263.0)
+    ('0.8748 ± 0.0062', '43950 ± 24', '39360 ± 260')
     """
     if not 0.0 < error < np.inf or value == 0.0:
         return f"{value:.5g} ± {error:.2g}"
+    place = int(np.floor(np.log10(error))) - 1
+    if place > 0 and abs(value) < _LARGE:
+        return f"{round(value, -place):.0f} ± {round(error, -place):.0f}"
     digits = int(np.floor(np.log10(abs(value)))) - int(np.floor(np.log10(error))) + 2
     return f"{value:.{min(max(digits, 1), 7)}g} ± {error:.2g}"
 
