@@ -301,7 +301,7 @@ class WorkerPool:
         return None
 
     def _is_stalled(self) -> bool:
-        """Return whether no worker computes although work is out: messages about it were not sent.
+        """Return whether no worker computes although work is out: messages about it were not sent, or one hangs.
 
         Dask sends a message when the wall clock has passed a deadline; where the clock was set back, that is
         never.
@@ -316,19 +316,24 @@ class WorkerPool:
         return self._ended.empty()
 
     def _is_idle(self) -> bool:
-        """Return whether all workers answer, and none computes; asked on a way of its own."""
+        """Return whether no worker computes, or one does not answer; asked on a way of its own.
+
+        A worker answers while it computes: what it calls for a point leaves its other threads free.
+        """
         scheduler = self._client.scheduler
         if scheduler is None:
             return False
         try:
             return not self._client.sync(scheduler.call_stack, keys=None, callback_timeout=RESULT_SECONDS)
-        except (OSError, TimeoutError):
+        except TimeoutError:
+            return True
+        except OSError:
             return False
 
     def _restart(self) -> None:
         """Connect anew and send all work again; a chunk that is computed twice gives the same part."""
         stalled = CampaignError(
-            f"{self._where}: expected workers that compute, got workers that wait while work is there. "
+            f"{self._where}: expected workers that compute, got some that wait, or do not answer, while work is there. "
             "Was a clock set back? The same command resumes."
         )
         if self._restarts == MOST_RESTARTS:

@@ -84,7 +84,8 @@ def drive_of(channel: Channel, drive: str, offset: float | None = None) -> Drive
 def _remarks(channel: Channel, level: float, bridged: NDArray[np.bool_]) -> list[str]:
     remarks = []
     if level:
-        remarks.append(f"{channel.name}: an offset of {level:.6g} {unit_label(channel.unit)} was taken off")
+        offset = f"{level:.6g}" + ("" if channel.unit == "1" else f" {unit_label(channel.unit)}")
+        remarks.append(f"{channel.name}: an offset of {offset} was taken off")
     if bridged.any():
         remarks.append(f"{channel.name}: {int(bridged.sum())} missing samples were bridged by straight lines")
     clipped = int(np.count_nonzero(channel.quality & Quality.clipped))

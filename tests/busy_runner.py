@@ -156,6 +156,14 @@ def die_while(folder: str) -> int:
     return os.getpid()
 
 
+def freeze_once(wish: str) -> str:
+    """Stop this process for good while the file is there, and take it away before."""
+    if Path(wish).exists():
+        Path(wish).unlink()
+        os.kill(os.getpid(), signal.SIGSTOP)
+    return "thawed"
+
+
 def same(value: int) -> int:
     """Return a number."""
     return value

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from busy_runner import die_while, same
+from busy_runner import die_while, freeze_once, same
 from distributed.comm import connect
 from distributed.security import Security
 
@@ -76,6 +76,20 @@ def test_a_long_point_is_no_stall(monkeypatch: pytest.MonkeyPatch) -> None:
         pool.submit(time.sleep, 2.0)
         assert pool.next_finished().error is None
     assert not said.notes
+
+
+@kills_itself
+def test_a_worker_that_does_not_answer_any_more_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, seconds in (("STALL_SECONDS", 0.5), ("LOOK_SECONDS", 0.2), ("RESULT_SECONDS", 1.0)):
+        monkeypatch.setattr(cluster, name, seconds)
+    said = Said()
+    (tmp_path / "wish").touch()
+    with open_workers(workers=1, progress=said) as pool:
+        pool.submit(freeze_once, str(tmp_path / "wish"))
+        assert pool.next_finished().result == "thawed"
+    assert len(said.notes) == 1
 
 
 class Said(Silence):

@@ -77,7 +77,7 @@ def test_one_grazing_impact_does_not_make_a_scale_logarithmic(tmp_path: Path) ->
 
 def test_a_strobe_of_a_sweep_has_each_recorded_period_at_its_parameter_below_zero_too(tmp_path: Path) -> None:
     dataset = up_down()
-    dataset["strobe_displacement"] = dataset.strobe_displacement - 4.0
+    dataset.strobe_displacement.values -= 4.0
     (axis,) = figures.draw(opened(dataset, tmp_path), "strobe").axes
     up, _ = axis.get_lines()
     assert up.get_xdata().tolist() == np.repeat([0.0, 1.0, 2.0], 3).tolist()

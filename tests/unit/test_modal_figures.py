@@ -109,6 +109,6 @@ def test_what_a_figure_cannot_show_is_refused(kind: str, dataset: xr.Dataset, me
 
 def test_impacts_without_a_phase_have_no_map() -> None:
     dataset = moving()
-    dataset["impact_phase"] = dataset.impact_phase * np.nan
+    dataset.impact_phase.values[:] = np.nan
     with pytest.raises(DatasetError, match="expected impacts with a forcing phase"):
         figures.draw(dataset, "impact-map")
