@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from scipy.stats import norm
 
 from vibroimpact.analysis.estimation.estimates import ANSWERING, Doubt, Estimate
 from vibroimpact.analysis.estimation.flight_fit import pairs_of
@@ -18,25 +19,29 @@ from vibroimpact.analysis.estimation.model_tests import (
 from vibroimpact.analysis.estimation.physics import Forcing
 from vibroimpact.analysis.estimation.prepared import Prepared
 
-# What speaks against the model counts from so many standard errors on.
-_CLEAR = 4.0
+# What speaks against the model counts from so many standard errors on: chance gets there once in a thousand times.
+_CLEAR = 3.3
 # Kinks the other way are those of a second stop from so many, and from this part of the impacts, on.
 _FEWEST_OPPOSITE, _PART_OPPOSITE = 3, 0.1
 # Kinks that are not at the stop, and flights that nothing explains, may be this part.
 _PART_STRAY = 0.15
-_PART_UNEXPLAINED = 0.1
+_PART_UNEXPLAINED = 0.15
 # Noise below this part of the motion's range is the rounding of a simulation.
 _ROUNDING = 1e-6
 _FEWEST_IMPACTS = 5
 _FEWEST_SAMPLES = 12
+# Two methods contradict each other when they differ by more than this many standard errors of both together.
+_APART = 3.0
 # A natural frequency known worse than this is hardly determined.
 _DETERMINED = 0.1
 
 Values = Mapping[str, Mapping[str, Estimate]]
 
 
-def doubts_of(record: Prepared, forcing: Forcing, values: Values) -> tuple[Doubt, ...]:
-    """Return what makes the estimates of a record doubtful, the gravest first."""
+def doubts_of(
+    record: Prepared, forcing: Forcing, values: Values, confidence: float = 0.95
+) -> tuple[Doubt, ...]:
+    """Return what makes the estimates of a record, with intervals of a confidence, doubtful: the gravest first."""
     clocks = "" if forcing.clock_drifts else ", or clocks that differ (--clock-drifts)"
     signal = record.segmentation.signal
     # without noise there is no chance to judge by: what is left is rounding
@@ -46,7 +51,7 @@ def doubts_of(record: Prepared, forcing: Forcing, values: Values) -> tuple[Doubt
         *_of_flights(record, clocks),
         *(_of_model(record, clocks) if noisy else ()),
         *_of_constancy(record, clocks),
-        *(_of_contradictions(values) if noisy else ()),
+        *(_of_contradictions(values, confidence) if noisy else ()),
         *_of_precision(record, values),
     )
 
@@ -120,8 +125,11 @@ def _of_constancy(record: Prepared, clocks: str) -> Iterator[Doubt]:
         )
 
 
-def _of_contradictions(values: Values) -> Iterator[Doubt]:
-    """Yield methods whose intervals have nothing in common."""
+def _of_contradictions(values: Values, confidence: float) -> Iterator[Doubt]:
+    """Yield methods that differ by more than chance explains.
+
+    Intervals of 95 % beside much narrower ones have no point in common with them once in twenty times.
+    """
     best = next((name for name in ("trajectory", "weak_form") if name in values), None)
     for method in ANSWERING:
         if best is None or method not in values or method == best:
@@ -129,7 +137,7 @@ def _of_contradictions(values: Values) -> Iterator[Doubt]:
         apart = [
             name
             for name, one in values[method].items()
-            if name in values[best] and _apart(name, one, values[best][name])
+            if name in values[best] and _apart(name, one, values[best][name], confidence)
         ]
         if apart:
             said = " and ".join(name.replace("_", " ") for name in apart)
@@ -139,10 +147,17 @@ def _of_contradictions(values: Values) -> Iterator[Doubt]:
             )
 
 
-def _apart(name: str, one: Estimate, other: Estimate) -> bool:
-    """Tell whether two intervals have nothing in common."""
+def _apart(name: str, one: Estimate, other: Estimate, confidence: float) -> bool:
+    """Tell whether two intervals have nothing in common, and by more than chance explains."""
     turn = 2.0 * math.pi * round((other.value - one.value) / (2.0 * math.pi)) if name == "phase" else 0.0
-    return one.low + turn > other.high or one.high + turn < other.low
+    above = one.value + turn > other.value
+    facing = (
+        (one.value - one.low, other.high - other.value)
+        if above
+        else (one.high - one.value, other.value - other.low)
+    )
+    reach = _APART / float(norm.ppf(0.5 + 0.5 * confidence)) * math.hypot(*facing)
+    return abs(one.value + turn - other.value) > max(sum(facing), reach)
 
 
 def _of_precision(record: Prepared, values: Values) -> Iterator[Doubt]:

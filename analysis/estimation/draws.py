@@ -161,21 +161,20 @@ def with_intervals(
     return found
 
 
-def known_damping(damping_ratio: float | None) -> Estimator:
-    """Return the estimator of restitution with the damping known, and of the energy-loss factor without any."""
+def known_damping(
+    balance: EnergyBalance, halves: HalfEnergies, p: Parameters, drawn: Drawn
+) -> dict[str, Floats]:
+    """Estimate the restitution with the damping known."""
+    energy = halves.energy(p, drawn)
+    return {"restitution": balance.restitution(energy), "impact_velocity": _speed(balance, energy)}
 
-    def estimate(
-        balance: EnergyBalance, halves: HalfEnergies, p: Parameters, drawn: Drawn
-    ) -> dict[str, Floats]:
-        lossless = dict(drawn) | {"damping_ratio": np.zeros(1)}
-        found = {"energy_loss_factor": balance.restitution(halves.energy(p, lossless))}
-        if damping_ratio is not None:
-            energy = halves.energy(p, drawn)
-            found["restitution"] = balance.restitution(energy)
-            found["impact_velocity"] = _speed(balance, energy)
-        return found
 
-    return estimate
+def all_loss_at_impact(
+    balance: EnergyBalance, halves: HalfEnergies, p: Parameters, drawn: Drawn
+) -> dict[str, Floats]:
+    """Estimate the energy-loss factor: the restitution if nothing else took energy out."""
+    lossless = dict(drawn) | {"damping_ratio": np.zeros(1)}
+    return {"energy_loss_factor": balance.restitution(halves.energy(p, lossless))}
 
 
 def by_speeds(unknown: Sequence[str]) -> Estimator:

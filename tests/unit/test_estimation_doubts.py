@@ -12,6 +12,8 @@ from rich.console import Console
 
 from vibroimpact.analysis.estimation import Forcing, Known, estimate_impacts, impacts, print_impacts
 from vibroimpact.analysis.estimation.coordinates import Coordinates
+from vibroimpact.analysis.estimation.doubts import _of_contradictions
+from vibroimpact.analysis.estimation.estimates import Estimate
 from vibroimpact.analysis.estimation.physics import Parameters
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.fmus.errors import EstimationError
@@ -117,6 +119,22 @@ def test_the_failure_of_one_method_leaves_the_others(monkeypatch):
     assert set(found.values) == {"weak_form"}
     assert [refusal.method for refusal in found.refusals] == ["trajectory"]
     assert "SVD did not converge" in found.refusals[0].reason
+
+
+@pytest.mark.parametrize(
+    ("name", "apart", "contradicts"),
+    # at 2.5 standard errors the 95 % intervals have no point in common either
+    [("restitution", 0.025, False), ("restitution", -0.035, True), ("phase", 2 * math.pi + 0.02, False)],
+)
+def test_methods_contradict_each_other_when_chance_does_not_explain_how_far_they_are_apart(
+    name, apart, contradicts
+):
+    def around(value, error):
+        return {name: Estimate(value, error, value - 1.96 * error, value + 1.96 * error)}
+
+    values = {"trajectory": around(0.8, 0.001), "energy_joint": around(0.8 + apart, 0.01)}
+    found = list(_of_contradictions(values, 0.95))
+    assert [doubt.methods for doubt in found] == [("energy_joint",)] * contradicts
 
 
 def test_chatter_that_is_not_seen_leaves_the_estimates_sure():

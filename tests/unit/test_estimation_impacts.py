@@ -120,6 +120,18 @@ def test_the_energy_loss_factor_counts_the_damping_as_loss_at_the_impact():
     assert found["energy_loss_factor"].value < found["restitution"].value - 0.1
 
 
+def test_damping_that_takes_more_than_the_impacts_could_leaves_the_restitution_and_no_loss_factor():
+    strong = replace(THESIS, damping_ratio=0.2, angular_frequency=130.0, restitution=0.65)
+    record = record_of(strong, periods=20)
+    found = estimate_impacts(
+        record.channel(1e-3), record.forcing(), Known(damping_ratio=0.2), methods=["energy_known_damping"]
+    )
+    assert not found.refusals
+    values = found.values["energy_known_damping"]
+    assert values["restitution"].covers(strong.restitution)
+    assert "energy_loss_factor" not in values
+
+
 def test_correlated_rests_widen_the_intervals_and_are_said():
     record = record_of(THESIS, periods=8)
     white = np.random.default_rng(4).standard_normal(len(record.time) + 1)
@@ -159,7 +171,7 @@ def test_table_and_dataset_have_every_method_side_by_side(tmp_path):
     out = io.StringIO()
     print_impacts(Console(file=out, width=200), found)
     text = out.getvalue()
-    for words in ("restitution", "weak form", "joint damping ratio per relative velocity", "m s-1", "note:"):
+    for words in ("restitution", "weak form", "joint damping ratio per relative velocity", "m/s", "note:"):
         assert words in text
 
 
