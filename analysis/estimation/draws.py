@@ -177,13 +177,21 @@ def all_loss_at_impact(
     return {"energy_loss_factor": balance.restitution(halves.energy(p, lossless))}
 
 
-def by_speeds(unknown: Sequence[str]) -> Estimator:
-    """Return the estimator of restitution together with damping or forcing, from the speeds at the impacts."""
+def by_speeds(unknown: Sequence[str], squares: Floats) -> Estimator:
+    """Return the estimator of restitution together with damping or forcing, from the speeds at the impacts.
+
+    Parameters
+    ----------
+    unknown : sequence of str
+        As of `unknowns_by_speed`.
+    squares : ndarray, shape (half,)
+        Squares of the speeds of the noiseless motion.
+    """
 
     def estimate(
         balance: EnergyBalance, halves: HalfEnergies, p: Parameters, drawn: Drawn
     ) -> dict[str, Floats]:
-        values, _ = unknowns_by_speed(halves, p, unknown, drawn)
+        values, _ = unknowns_by_speed(halves, p, unknown, drawn, squares)
         found = {name: values[:, k] for k, name in enumerate(unknown)}
         energy = halves.energy(p, dict(drawn) | found)
         return {

@@ -273,7 +273,11 @@ def _turning_time(one: Smoother, samples: Floats) -> float:
 
 
 def unknowns_by_speed(
-    halves: HalfEnergies, p: Parameters, unknown: Sequence[str], drawn: Drawn | None = None
+    halves: HalfEnergies,
+    p: Parameters,
+    unknown: Sequence[str],
+    drawn: Drawn | None = None,
+    squares: Floats | None = None,
 ) -> tuple[Floats, float]:
     """Return what the speeds measured at the impacts say of damping or forcing, by weighted least squares.
 
@@ -286,6 +290,9 @@ def unknowns_by_speed(
         Of damping_ratio, static_deflection, and phase (with static_deflection: as cos and sin parts).
     drawn : mapping or None
         Values that differ between draws, by name, shape (draw,).
+    squares : ndarray, shape (half,), or None
+        Squares of the speeds without noise, for the weights: by its own noise a speed read too low would weigh more.
+        None: those that were measured.
 
     Returns
     -------
@@ -315,7 +322,7 @@ def unknowns_by_speed(
         rest = rest - 2.0 * square * value["static_deflection"] * work
     matrix = np.stack(columns, axis=2)
     # the square of a slope is the less certain the larger it is
-    speeds = np.abs(halves.speed_squared[0])
+    speeds = np.abs(halves.speed_squared[0] if squares is None else squares)
     weight = 1.0 / np.sqrt(np.maximum(speeds, _SLOW * np.max(speeds)))
     matrix, rest = matrix * weight[:, None], rest * weight
     condition = float(np.linalg.cond(matrix[0] / np.linalg.norm(matrix[0], axis=0)))

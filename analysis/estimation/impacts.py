@@ -272,7 +272,8 @@ def _energy_values(
     if method == "energy_amplitude":
         unknown = [] if held.damping_ratio is not None else ["damping_ratio"]
         unknown += ["static_deflection"] + (["phase"] if forcing.phase is None else [])
-    found = with_intervals(resampled, by_speeds(unknown), confidence, record.inflation)
+    estimator = by_speeds(unknown, resampled.exact[0].speed_squared[0])
+    found = with_intervals(resampled, estimator, confidence, record.inflation)
     damping = found.get("damping_ratio")
     # judged by the size that the weak form gives: judged by its own, only chance excesses would pass
     if damping is not None and not resampled.parameters.damping_ratio > _CLEAR * damping.standard_error:
