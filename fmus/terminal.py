@@ -2,10 +2,15 @@
 
 Names in files, scenes and the log lines of FMUs are strangers' text. Every message goes through `printable`: by `say`,
 or by a `Terminal`, which also takes square brackets as what they are.
+
+Where nobody reads any more, as behind `| head`, nothing more is written, and the command goes on: what it computed is
+still to be saved.
 """
 
 from __future__ import annotations
 
+import os
+import sys
 import unicodedata
 from typing import Any
 
@@ -36,7 +41,17 @@ def printable(text: str) -> str:
 
 def say(text: object, *, err: bool = False) -> None:
     """Write a line to standard output, or to standard error."""
-    typer.echo(printable(str(text)), err=err)
+    try:
+        typer.echo(printable(str(text)), err=err)
+    except BrokenPipeError:
+        _write_no_more(err)
+
+
+def _write_no_more(err: bool) -> None:
+    """Let standard output, or standard error, lead nowhere: its reader has gone."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, (sys.stderr if err else sys.stdout).fileno())
+    os.close(nowhere)
 
 
 class Terminal(Console):
@@ -49,3 +64,8 @@ class Terminal(Console):
     def render_str(self, text: str, **options: Any) -> Text:
         """Return a text as it is shown; everything that is printed as a string passes here."""
         return super().render_str(printable(text), **options)
+
+    def on_broken_pipe(self) -> None:
+        """Go on without a reader."""
+        self.quiet = True
+        _write_no_more(self.stderr)

@@ -148,3 +148,29 @@ def test_what_does_not_fit_into_memory_is_refused_before_it_is_computed(
     # kB: what any command takes, not what 10^8 points would
     assert peak < 600_000
     assert not (tmp_path / "x.nc").exists()
+
+
+@pytest.mark.parametrize("command", ["import", "spikes", "run"])
+def test_a_command_whose_reader_has_gone_writes_what_it_computed(
+    command: str, scene: Path, tmp_path: Path
+) -> None:
+    """As behind `| head`: the tables come before the dataset."""
+    written = ["time,force"] + [f"{k / 1000:.3f},{np.sin(k / 9.0) ** 40:.6f}" for k in range(2000)]
+    table, recording, output = (tmp_path / name for name in ("table.csv", "recording.nc", "output.nc"))
+    table.write_text("\n".join(written))
+    if command == "spikes":
+        assert in_this_process("import", table, "-o", recording, "--unit", "N").returncode == 0
+    given = {"import": table, "spikes": recording, "run": scene}[command]
+    with subprocess.Popen(
+        [sys.executable, "-c", ENTRY, command, given, "-o", output],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        told = process.stderr.read()
+    assert (process.returncode, told) == (0, "")
+    with xr.open_dataset(output) as dataset:
+        assert dataset.sizes
