@@ -12,7 +12,7 @@ from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.held import MOST_ERROR, instant
 from vibroimpact.analysis.replay.replay_dataset import comparison_names
 from vibroimpact.analysis.replay.spectra import DominantFrequency
-from vibroimpact.analysis.units import measured_unit
+from vibroimpact.analysis.units import measured_unit, unit_label
 from vibroimpact.fmus.terminal import Terminal
 
 _MOST_WINDOWS = 12
@@ -62,6 +62,13 @@ def _frequency(line: DominantFrequency) -> str:
     return f"{line.frequency:.5g}{doubt} Hz"
 
 
+def _offset(comparison: Comparison) -> str:
+    """Return the offset in the unit of the channel."""
+    unit = measured_unit(comparison.measured.unit)
+    label = "" if unit.cf == "1" else f" {unit_label(unit.cf)}"
+    return f"{comparison.offset / unit.factor:.4g}{label}"
+
+
 def _counts(comparison: Comparison) -> str:
     return ", ".join(f"{count} {why.replace('_', ' ')}" for why, count in comparison.counts.items() if count)
 
@@ -92,10 +99,7 @@ _ROWS: tuple[tuple[str, Callable[[Comparison], str]], ...] = (
     ("  less the other polarity's", lambda c: _margin(c.alignment.polarity_margin)),
     ("  less the next best lag's", lambda c: _margin(c.alignment.lag_margin)),
     ("onset of the event", lambda c: instant(c.event.onset)),
-    (
-        "offset removed",
-        lambda c: f"{c.offset:.4g} {measured_unit(c.measured.unit).si.removeprefix('1')}".rstrip(),
-    ),
+    ("offset removed", _offset),
     ("measured frequency", lambda c: _frequency(c.measured_frequency)),
     ("simulated frequency", lambda c: _frequency(c.simulated_frequency)),
     ("  resolved within", lambda c: f"{c.measured_frequency.resolution:.3g} Hz"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -95,6 +96,16 @@ def test_table_says_score_lag_sign_and_what_was_left_out() -> None:
         "not scored",
     ):
         assert expected in said
+
+
+def test_table_has_the_offset_in_the_unit_of_the_channel() -> None:
+    text, comparison = io.StringIO(), board()
+    in_g = replace(
+        comparison, measured=replace(comparison.measured, unit="9.80665 m s-2"), offset=3.0 * 9.80665
+    )
+    print_comparison(Console(file=text, width=120), [in_g])
+    (line,) = [line for line in text.getvalue().splitlines() if "offset removed" in line]
+    assert line.split() == ["offset", "removed", "3", "g"]
 
 
 def test_figure_shows_both_signals_their_residual_and_scores(tmp_path: Path) -> None:
