@@ -15,7 +15,7 @@ from scipy.stats import t as student
 
 from vibroimpact.analysis.estimation.energy import Drawn, EnergyBalance, HalfEnergies, unknowns_by_speed
 from vibroimpact.analysis.estimation.estimates import Estimate
-from vibroimpact.analysis.estimation.flight_fit import FittedFlight
+from vibroimpact.analysis.estimation.flight_fit import FittedFlight, flights_to_level
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.physics import Parameters
 from vibroimpact.analysis.estimation.segments import Signal
@@ -85,7 +85,8 @@ def resample(
         What came from the weak form, and how it changes with the samples of each flight.
     draws, seed : int
     """
-    flights = [one.flight for one in fitted]
+    level = (parameters.stop_position if stop_position is None else stop_position) - parameters.offset
+    flights = flights_to_level(signal, fitted, level, parameters)
     fastest = max(parameters.angular_frequency, parameters.natural_frequency)
     window = choose_window(signal, flights, fastest)
     balance = EnergyBalance(signal, flights, parameters.angular_frequency, window)

@@ -32,6 +32,8 @@ _SETTLED = 1e-3
 _FAR = 1e3
 # Instants on motion of constant acceleration are found in so many Newton steps.
 _NEWTON_STEPS = 4
+# An end of a flight is moved by this part of it at most.
+_REACH = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,13 +267,46 @@ def _short_by(flight: Flight, p: Parameters) -> float:
     return max(1, round(flight.duration / period)) * period - flight.duration
 
 
-def _speeds_at(side: Floats, level: float, interval: float) -> Floats:
-    """Return the velocities where motion meets a level (Newton)."""
+def _speeds_at(side: Floats, level: float, reach: float) -> Floats:
+    """Return the velocities where motion meets a level."""
+    return _after(side, _shifts_to(side, level, reach))[1]
+
+
+def _shifts_to(side: Floats, level: float, reach: Floats | float) -> Floats:
+    """Return how much later motion meets a level, at most `reach` away (Newton)."""
     shift = np.zeros(len(side))
     for _ in range(_NEWTON_STEPS):
         place, speed = _after(side, shift)
-        shift = np.clip(shift + (level - place) / speed, -interval, interval)
-    return _after(side, shift)[1]
+        shift = np.clip(shift + (level - place) / speed, -reach, reach)
+    return shift
+
+
+def flights_to_level(
+    signal: Signal, fitted: Sequence[FittedFlight], level: float, p: Parameters
+) -> list[Flight]:
+    """Return the flights from and to the instants at which their exact flow meets a level.
+
+    All samples of a flight have a part in these; instants of kinks rest on the few samples about them, and share their
+    noise with the slopes there.
+
+    Parameters
+    ----------
+    level : float
+        From the offset.
+    """
+    starts, ends = (np.array([getattr(one.flight, name) for one in fitted]) for name in ("start", "end"))
+    reach = _REACH * (ends - starts)
+    first = _shifts_to(with_acceleration(np.array([one.state for one in fitted]), starts, p), level, reach)
+    last = _shifts_to(with_acceleration(np.array([one.end_state for one in fitted]), ends, p), level, reach)
+    found = []
+    for one, start, end in zip(fitted, starts + first, ends + last, strict=True):
+        times = signal.time[one.flight.index]
+        found.append(
+            replace(
+                one.flight, start=min(float(start), float(times[0])), end=max(float(end), float(times[-1]))
+            )
+        )
+    return found
 
 
 def _speed_noise(fitted: Sequence[FittedFlight], p: Parameters, noise: float) -> Floats:

@@ -30,15 +30,15 @@ from vibroimpact.analysis.estimation.trajectory import fit_trajectory
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
-# A damping ratio of fewer standard errors than this is not told from restitution, or from the force.
-_CLEAR = 2.0
+# A damping ratio of fewer standard errors is not told from restitution or, with more unknowns, from the force.
+_CLEAR = {"energy_joint": 0.5, "energy_amplitude": 3.0}
 # A standard error of the restitution below this part of what noise and samples allow is none.
 _NO_WIDTH = 1e-3
 # What a method's numbers may end with on motion that its model is far from; one method's failure leaves the others.
 _FAILURES = (EstimationError, UsageError, ArithmeticError, ValueError)
 # Speeds read off at impacts whose instants are less certain than this (rad of the fastest motion) are those of another
 # instant, by more than their stated error.
-_INSTANT_DOUBT = 0.03
+_INSTANT_DOUBT = 0.1
 
 
 def estimate_impacts(
@@ -276,7 +276,10 @@ def _energy_values(
     found = with_intervals(resampled, estimator, confidence, record.inflation)
     damping = found.get("damping_ratio")
     # judged by the size that the weak form gives: judged by its own, only chance excesses would pass
-    if damping is not None and not resampled.parameters.damping_ratio > _CLEAR * damping.standard_error:
+    if (
+        damping is not None
+        and not resampled.parameters.damping_ratio > _CLEAR[method] * damping.standard_error
+    ):
         raise EstimationError(
             f"{method}: expected data that separate damping from restitution, got a damping ratio of "
             f"{damping.value:.3g} +- {damping.standard_error:.2g}. Give the damping ratio, from a free decay or a "
