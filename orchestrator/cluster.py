@@ -14,6 +14,7 @@ import os
 import queue
 import signal
 import time
+import warnings
 from collections.abc import Callable, Iterator, Set
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -382,7 +383,9 @@ def open_workers(
     """
     # Its warnings about workers that end are about what is meant here, or said better by an error.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    with dask.config.set(QUIET), ExitStack() as stack:
+    with warnings.catch_warnings(), dask.config.set(QUIET), ExitStack() as stack:
+        # Ctrl-C may come between the making of a coroutine of Dask and its start.
+        warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)
         if scheduler is None:
             stack.enter_context(safe_module_path())
             scratch = stack.enter_context(ScratchFolder("workers"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 import os
 import ssl
 import sys
@@ -90,6 +91,19 @@ def test_a_worker_that_does_not_answer_any_more_is_replaced(
         pool.submit(freeze_once, str(tmp_path / "wish"))
         assert pool.next_finished().result == "thawed"
     assert len(said.notes) == 1
+
+
+def test_a_call_of_dask_that_ctrl_c_ended_before_it_began_says_nothing(
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    async def never_awaited() -> None:
+        raise AssertionError
+
+    with open_workers(workers=1):
+        left = never_awaited()
+        del left
+        gc.collect()
+    assert not [one for one in recwarn if "never awaited" in str(one.message)]
 
 
 class Said(Silence):
