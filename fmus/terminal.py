@@ -4,7 +4,8 @@ Names in files, scenes and the log lines of FMUs are strangers' text. Every mess
 or by a `Terminal`, which also takes square brackets as what they are.
 
 Where nobody reads any more, as behind `| head`, nothing more is written, and the command goes on: what it computed is
-still to be saved.
+still to be saved. So it does where the terminal's text goes to a disk that is full, but this is said, and the command
+has failed.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from rich.text import Text
 _KEPT = "\n\t"
 # Control, format (such as U+202E, which turns what follows around), surrogate, line and paragraph separator.
 _ESCAPED = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+_UNWRITTEN: set[str] = set()
 
 
 def printable(text: str) -> str:
@@ -43,15 +45,29 @@ def say(text: object, *, err: bool = False) -> None:
     """Write a line to standard output, or to standard error."""
     try:
         typer.echo(printable(str(text)), err=err)
-    except BrokenPipeError:
-        _write_no_more(err)
+    except OSError as error:
+        _write_no_more(err, error)
 
 
-def _write_no_more(err: bool) -> None:
-    """Let standard output, or standard error, lead nowhere: its reader has gone."""
+def all_was_written() -> bool:
+    """Return whether all text of this process reached its reader, or the reader had gone."""
+    return not _UNWRITTEN
+
+
+def _write_no_more(err: bool, error: OSError) -> None:
+    """Let standard output, or standard error, lead nowhere: its reader has gone, or it takes nothing."""
+    stream = sys.stderr if err else sys.stdout
     nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, (sys.stderr if err else sys.stdout).fileno())
+    os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
+    if isinstance(error, BrokenPipeError):
+        return
+    name = "Standard error" if err else "Standard output"
+    _UNWRITTEN.add(name)
+    say(
+        f"{name}: cannot be written to ({error.strerror or error}). What is computed is saved all the same.",
+        err=True,
+    )
 
 
 class Terminal(Console):
@@ -67,5 +83,15 @@ class Terminal(Console):
 
     def on_broken_pipe(self) -> None:
         """Go on without a reader."""
+        self._write_no_more(BrokenPipeError())
+
+    def __exit__(self, *error: Any) -> None:
+        """Write what was printed; every way to print ends here."""
+        try:
+            super().__exit__(*error)
+        except OSError as problem:
+            self._write_no_more(problem)
+
+    def _write_no_more(self, error: OSError) -> None:
         self.quiet = True
-        _write_no_more(self.stderr)
+        _write_no_more(self.stderr, error)

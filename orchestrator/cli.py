@@ -6,6 +6,7 @@ module imports nothing above it, and another package can add commands of its own
 
 from __future__ import annotations
 
+import errno
 import functools
 import sys
 import traceback
@@ -16,10 +17,11 @@ from typing import Annotated
 import typer
 
 from vibroimpact.fmus.errors import VibroimpactError
-from vibroimpact.fmus.terminal import say
+from vibroimpact.fmus.terminal import all_was_written, say
 
 COMMAND_GROUP = "vibroimpact.commands"
 DEBUG = "--debug"
+_FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 
 app = typer.Typer(
     name="vibroimpact",
@@ -60,11 +62,19 @@ def main(arguments: Sequence[str] | None = None) -> None:
         load_commands()
         # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
         typer.main.get_command(app).main(args=given, prog_name="vibroimpact")
+    except SystemExit as end:
+        sys.exit(end.code or (0 if all_was_written() else 1))
     except VibroimpactError as error:
         sys.exit(_report(str(error), error.exit_code, DEBUG in given))
     except KeyboardInterrupt:
         sys.exit(130)
     except Exception as error:
+        if isinstance(error, OSError) and error.errno in _FULL:
+            sys.exit(
+                _report(
+                    f"{error.filename or 'Output'}: cannot be written ({error.strerror}).", 1, DEBUG in given
+                )
+            )
         # The last stop for what nobody foresaw: a person gets a line, a developer the place.
         text = f"Unexpected error: {type(error).__name__}: {error}\nThis is a defect of vibroimpact."
         hint = f" Repeat the command as `vibroimpact {DEBUG} ...` and report what it shows."

@@ -174,3 +174,26 @@ def test_a_command_whose_reader_has_gone_writes_what_it_computed(
     assert (process.returncode, told) == (0, "")
     with xr.open_dataset(output) as dataset:
         assert dataset.sizes
+
+
+@pytest.mark.skipif(
+    not Path("/dev/full").exists(), reason="no /dev/full, which takes nothing, on this system"
+)
+@pytest.mark.parametrize("command", ["import", "run", "--help"])
+def test_text_for_a_disk_that_is_full_is_told_of_and_the_dataset_is_written(
+    command: str, scene: Path, tmp_path: Path
+) -> None:
+    table, output = tmp_path / "table.csv", tmp_path / "output.nc"
+    table.write_text("time,force\n" + "".join(f"{k / 1000:.3f},{k % 7}\n" for k in range(200)))
+    given = {"import": [str(table), "-o", str(output), "--unit", "N"], "run": [str(scene), "-o", str(output)]}
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", ENTRY, command, *given.get(command, [])],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
+    assert "cannot be written" in done.stderr
+    assert command == "--help" or xr.open_dataset(output).sizes
