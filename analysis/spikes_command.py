@@ -55,9 +55,7 @@ def spikes(
         str | None,
         typer.Option(help="SI unit of the channel, or 5% of the largest value; else from the noise."),
     ] = None,
-    hysteresis: Annotated[
-        float, typer.Option(help="A spike is over below this part of the threshold.")
-    ] = 0.5,
+    hysteresis: Annotated[float, typer.Option(help="A spike ends below this part of the threshold.")] = 0.5,
     minimum_samples: Annotated[int, typer.Option(help="Fewer samples above the threshold are no spike.")] = 4,
     merge: Annotated[
         float | None, typer.Option(help="Excursions closer than this (s) are one spike with its ringing.")

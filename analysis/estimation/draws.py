@@ -88,8 +88,6 @@ def resample(
     level = (parameters.stop_position if stop_position is None else stop_position) - parameters.offset
     flights = flights_to_level(signal, fitted, level, parameters)
     fastest = max(parameters.angular_frequency, parameters.natural_frequency)
-    window = choose_window(signal, flights, fastest)
-    balance = EnergyBalance(signal, flights, parameters.angular_frequency, window)
     motion = signal.values.copy()
     for one in fitted:
         motion[one.flight.index] -= one.rests
@@ -97,6 +95,8 @@ def resample(
     noiseless = replace(signal, values=motion, noise=rounding)
     shortest = _SAMPLES_PER_SPAN * signal.interval
     fine_window = max(_FINE * 2.0 * np.pi / fastest, shortest)
+    window = choose_window(noiseless, flights, fine_window, fastest, noise)
+    balance = EnergyBalance(signal, flights, parameters.angular_frequency, window)
     fine = EnergyBalance(noiseless, flights, parameters.angular_frequency, fine_window)
     errors = noise * np.random.default_rng(seed).standard_normal((draws, len(motion)))
     shifts = sum(

@@ -1,4 +1,4 @@
-"""Velocities of flights by regression splines: one-sided at both ends, windows fixed in time, chosen from the noise.
+"""Velocities of flights by regression splines: one-sided at both ends, with windows that suit the motion and its noise.
 
 Each flight has its own least-squares spline with knots one window apart, so that no impact is smoothed over and there
 are no end effects but the larger noise of one-sided derivatives. Values, slopes and integrals are linear or quadratic
@@ -24,8 +24,8 @@ _GAUSS_POINTS = 6
 _WINDOWS = (4.0, 2.0, 1.0, 0.75, 0.5, 0.35, 0.25, 0.18, 0.125, 0.09, 0.06)
 _SAMPLES_PER_COEFFICIENT = 2.0
 _FLIGHTS_TRIED = 5
-# What a coefficient costs in units of the noise variance: 2 would be Mallows' Cp, which at times takes far too many.
-_PRICE = 4.0
+# Weight of what a window smooths away beside what noise leaves: the first is known as well as the fitted motion only.
+_PRICE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,32 +71,53 @@ def smoother(signal: Signal, flight: Flight, window: float) -> Smoother:
     return Smoother(flight, np.linalg.pinv(design), knots)
 
 
-def choose_window(signal: Signal, flights: Sequence[Flight], fastest: float) -> float:
-    """Return the window (s) with the least sum of squared rests and of a price for each coefficient.
+def choose_window(
+    motion: Signal, flights: Sequence[Flight], fine: float, fastest: float, noise: float
+) -> float:
+    """Return the window (s) with the smallest error of the slopes at the ends of flights.
+
+    The motion without noise says what a window smooths away: were it chosen from the samples, their noise would choose
+    the window that suits it, and no draw of other noise would show what that does to the answer.
+
+    Parameters
+    ----------
+    motion : Signal
+        The fitted motion, without noise.
+    flights : sequence of Flight
+    fine : float
+        A window that smooths nothing of the motion away, s.
+    fastest : float
+        Angular frequency of the fastest motion, rad/s.
+    noise : float
+        Standard deviation of the samples.
 
     Raises
     ------
     EstimationError
         The flights have too few samples for a spline.
     """
+    tried = flights[:_FLIGHTS_TRIED]
+    exact = [_end_slopes(smoother(motion, flight, fine)) @ motion.values[flight.index] for flight in tried]
     costs: dict[float, float] = {}
     for periods in _WINDOWS:
-        window = periods * 2.0 * math.pi / fastest
-        squares = count = 0.0
-        for flight in flights[:_FLIGHTS_TRIED]:
+        window, cost = periods * 2.0 * math.pi / fastest, 0.0
+        for flight, slopes in zip(tried, exact, strict=True):
             coefficients = max(1, round(flight.duration / window)) + _DEGREE
             if len(flight.index) < _SAMPLES_PER_COEFFICIENT * coefficients:
                 break
-            one = smoother(signal, flight, window)
-            samples = signal.values[flight.index]
-            rests = samples - one.row(signal.time[flight.index]) @ samples
-            squares += float(rests @ rests)
-            count += coefficients
+            weights = _end_slopes(smoother(motion, flight, window))
+            wrong = weights @ motion.values[flight.index] - slopes
+            cost += float(np.sum((_PRICE * wrong) ** 2) + noise**2 * np.sum(weights**2))
         else:
-            costs[window] = squares / signal.noise**2 + _PRICE * count
+            costs[window] = cost
     if not costs:
         raise EstimationError(
             "energy balance: expected flights of at least 12 samples, got shorter ones. "
             "Use the weak form or the trajectory fit, or a higher sampling rate."
         )
     return min(costs, key=lambda window: costs[window])
+
+
+def _end_slopes(one: Smoother) -> Floats:
+    """Return the weights of the samples for the slopes at both ends of a flight, shape (2, sample)."""
+    return one.row(np.array([one.flight.start, one.flight.end]), 1)

@@ -70,7 +70,7 @@ def _draw_statistic(axis: Axes, report: SpikeReport) -> None:
     magnitude = np.abs(found.statistic)
     _line(axis, found.time, np.maximum(magnitude, 0.01 * found.threshold), color=LINE)
     axis.axhline(found.threshold, color=MARK, label="threshold")
-    axis.axhline(found.lower_threshold, color=MARK, linestyle=":", label="over below")
+    axis.axhline(found.lower_threshold, color=MARK, linestyle=":", label="spike ends below")
     axis.set_yscale("log")
     axis.set_ylabel("robust score (-)" if scores else f"from baseline ({_unit(report)})")
     axis.set_xlabel("time (s)")

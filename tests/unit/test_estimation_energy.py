@@ -9,6 +9,7 @@ from vibroimpact.analysis.estimation import Known, estimate_impacts
 from vibroimpact.analysis.estimation.energy import EnergyBalance, sensitivities, unknowns_by_speed
 from vibroimpact.analysis.estimation.physics import Parameters
 from vibroimpact.analysis.estimation.segments import segment
+from vibroimpact.analysis.estimation.smoothing import choose_window, smoother
 from vibroimpact.fmus.errors import EstimationError
 
 #: Regression splines of a fifteenth of a period: exact to more digits than are asked of noiseless samples.
@@ -33,6 +34,25 @@ def forcing_energy(truth, halves):
     work = math.cos(truth.phase) * halves.work_cos[0] + math.sin(truth.phase) * halves.work_sin[0]
     # what adds to the speed after an impact is the work with the other sign
     return truth.natural_frequency**2 * truth.static_deflection * (work[1] - work[0])
+
+
+def test_the_window_is_that_of_the_motion_and_the_size_of_the_noise():
+    record = record_of(WORKED, periods=6, per_period=400)
+    channel, w = record.channel(), WORKED.angular_frequency
+    found = segment(channel.time, channel.values, channel.good, fastest=w, stop_position=WORKED.stop_position)
+    flights = [flight for flight in found.flights if flight.usable]
+    fine, size = FINE * 2.0 * math.pi / w, float(np.ptp(channel.values))
+    sizes = np.geomspace(1e-5, 1e-2, 7) * size
+    windows = [choose_window(found.signal, flights, fine, w, noise) for noise in sizes]
+    assert windows == sorted(windows)
+    assert windows[-1] > 1.5 * windows[0]
+    # of the slopes at the stop, what smoothing takes away is small beside what noise leaves
+    for window, noise in zip(windows, sizes, strict=True):
+        for flight in flights:
+            ends = np.array([flight.start, flight.end])
+            rows, exact = (smoother(found.signal, flight, one).row(ends, 1) for one in (window, fine))
+            wrong = (rows - exact) @ found.signal.values[flight.index]
+            assert np.all(np.abs(wrong) < noise * np.linalg.norm(rows, axis=1))
 
 
 def test_undamped_forcing_energy_is_that_of_the_closed_form():
