@@ -10,9 +10,9 @@ import sys
 from pathlib import Path
 from unittest.mock import patch
 
-from vibroimpact.orchestrator.cli import main
+from vibroimpact.orchestrator.commands.cli import main
 
-ENTRY = "from vibroimpact.orchestrator.cli import main; main()"
+ENTRY = "from vibroimpact.orchestrator.commands.cli import main; main()"
 ENVIRONMENT = {"COLUMNS": "200"}
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.recording import Channel, Recording, TimeAxis
-from vibroimpact.analysis.recording_files import write_recording
+from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
 
 Floats = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-import vibroimpact.orchestrator.campaign as campaign
+import vibroimpact.orchestrator.campaign.campaign as campaign
 from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
-from vibroimpact.orchestrator.cluster import Finished
-from vibroimpact.orchestrator.progress import Silence
+from vibroimpact.orchestrator.campaign.cluster import Finished
+from vibroimpact.orchestrator.campaign.progress import Silence
 from vibroimpact.orchestrator.scene import parse_scene
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponential
 from vibroimpact.analysis.decay.samples import FEWEST_SAMPLES, DecaySamples
 from vibroimpact.analysis.decay.windows import FirstGuess, first_guess
-from vibroimpact.analysis.units import unit_label
+from vibroimpact.analysis.recording.units import unit_label
 from vibroimpact.fmus.errors import EstimationError
 
 Floats = NDArray[np.float64]

@@ -10,7 +10,7 @@ from scipy.signal import csd, get_window, welch
 
 from vibroimpact.analysis.decay.samples import clock_remark
 from vibroimpact.analysis.recording import Channel
-from vibroimpact.analysis.units import measured_unit
+from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import UsageError
 
 Floats = NDArray[np.float64]

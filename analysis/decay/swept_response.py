@@ -7,9 +7,9 @@ import os
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.reading import read_flat
+from vibroimpact.analysis.dataset.schema import Outcome, swept_names
 from vibroimpact.analysis.decay.resonance import Curve
-from vibroimpact.analysis.reading import read_flat
-from vibroimpact.analysis.schema import Outcome, swept_names
 from vibroimpact.fmus.errors import DatasetError
 
 Floats = NDArray[np.float64]

@@ -10,8 +10,8 @@ import xarray as xr
 
 from vibroimpact.analysis.decay.estimate import CONFIDENCE, Estimate
 from vibroimpact.analysis.decay.laws import spoken
-from vibroimpact.analysis.estimate_table import estimate_table
-from vibroimpact.analysis.units import unit_label
+from vibroimpact.analysis.files.estimate_table import estimate_table
+from vibroimpact.analysis.recording.units import unit_label
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from vibroimpact.analysis.recording import Channel
-from vibroimpact.analysis.units import measured_unit, unit_label
+from vibroimpact.analysis.recording.units import measured_unit, unit_label
 from vibroimpact.fmus.errors import EstimationError
 
 _OTHER_UNITS = {"m s-1": "a velocity", "m s-2": "an acceleration", "N": "a force"}

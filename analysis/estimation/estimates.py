@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.estimate_table import estimate_table
+from vibroimpact.analysis.files.estimate_table import estimate_table
 
 Floats = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import math
 from rich.table import Table
 
 from vibroimpact.analysis.estimation.estimates import QUANTITIES, SHOWN, Estimate, ImpactEstimates
-from vibroimpact.analysis.unit_symbols import written_unit
+from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.terminal import Terminal
 
 

@@ -10,7 +10,7 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.figures.page import COLOURS, canvas, label, page_style
-from vibroimpact.analysis.orders import observed_order
+from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus.errors import DatasetError
 
 _QUANTITIES = ("error", "energy_drift")

@@ -13,10 +13,10 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.atomic import write_atomically
+from vibroimpact.analysis.dataset.outputs import FIGURE_ENDINGS
 from vibroimpact.analysis.figures.style import page_style as page_style
-from vibroimpact.analysis.outputs import FIGURE_ENDINGS
-from vibroimpact.analysis.unit_symbols import written_unit
+from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.errors import UsageError
 
 Floats = npt.NDArray[np.float64]

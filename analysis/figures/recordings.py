@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, STOP, Floats, canvas, page_style
 from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording
-from vibroimpact.analysis.unit_symbols import written_unit
+from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.errors import DatasetError
 
 _QUANTITIES = {

@@ -13,10 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from vibroimpact.analysis.dataset.schema import RULES
 from vibroimpact.analysis.figures.page import COLOURS, STOP, Floats, canvas, label, title, unit_symbol
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order, limits
 from vibroimpact.analysis.figures.window import ANY, SHOWN_PERIODS, Window
-from vibroimpact.analysis.schema import RULES
 from vibroimpact.fmus.errors import DatasetError
 
 _STYLES = ("-", "--", ":", "-.")

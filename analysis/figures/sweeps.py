@@ -13,9 +13,9 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
+from vibroimpact.analysis.dataset.schema import swept_names
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label
 from vibroimpact.analysis.figures.scene_text import column_of, scene_of, swept_keys
-from vibroimpact.analysis.schema import swept_names
 from vibroimpact.fmus.errors import DatasetError
 
 # Of their size, what runs on one orbit differ by: rounding, and what is left of their transients.

@@ -10,9 +10,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import Quality, TimeAxis
+from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.scoring import Span
-from vibroimpact.analysis.units import measured_unit
 
 Floats = NDArray[np.float64]
 

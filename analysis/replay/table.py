@@ -8,11 +8,11 @@ import numpy as np
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from vibroimpact.analysis.recording.units import measured_unit, unit_label
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.held import MOST_ERROR, instant
 from vibroimpact.analysis.replay.replay_dataset import comparison_names
 from vibroimpact.analysis.replay.spectra import DominantFrequency
-from vibroimpact.analysis.units import measured_unit, unit_label
 from vibroimpact.fmus.terminal import Terminal
 
 _MOST_WINDOWS = 12

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import Channel, Quality
+from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.analysis.spikes.baseline import drift_window, running_median
 from vibroimpact.analysis.spikes.cycle import Cycle, cycle_scores, find_cycle
 from vibroimpact.analysis.spikes.detection import Excursions, Group, find_excursions, group_excursions
 from vibroimpact.analysis.spikes.noise import Tail, samples_in_half_wave, tail_threshold
-from vibroimpact.analysis.units import measured_unit
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
 Floats = NDArray[np.float64]

@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
+from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.analysis.spikes.contact import SHORT_CONTACT
 from vibroimpact.analysis.spikes.report import SpikeReport
-from vibroimpact.analysis.unit_symbols import written_unit
 from vibroimpact.fmus.terminal import Terminal
 
 #: A longer list of spikes is cut; all of them are in the dataset.

@@ -10,11 +10,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import Channel
+from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.analysis.spikes.contact import Calibration, calibrate, contact_time_measure, impact_velocity
 from vibroimpact.analysis.spikes.identify import Identification, SpikeSettings, identify
 from vibroimpact.analysis.spikes.pulses import FOOT, Pulses, measure_pulses
 from vibroimpact.analysis.spikes.waveforms import WAVEFORMS
-from vibroimpact.analysis.units import measured_unit
 from vibroimpact.fmus.errors import UsageError
 
 Floats = NDArray[np.float64]

@@ -28,6 +28,9 @@ STEP_ROUNDING = 1e-6
 
 #: Wraps a function of an FMU, given its name: for a guard that notes which call is under way.
 Wrapper = Callable[[str, Function], Function]
+LogOf = Callable[[str], LogTail]
+WrapOf = Callable[[str], Wrapper]
+"""What gives a component, by its name, its log tail or the wrapper of its functions."""
 
 
 class Instance(ABC):

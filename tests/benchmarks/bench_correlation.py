@@ -30,7 +30,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from vibroimpact.analysis.results import write_results
+from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.fmus.correlation import near_pairs, radius_ladder
 
 Floats = NDArray[np.float64]

@@ -33,14 +33,14 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.model_description import read_model_description
 from fmu_factory import bouncing_ball
 
-from vibroimpact.analysis.orders import observed_order
+from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.archive import unpack
+from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+from vibroimpact.orchestrator.guard import make_runner
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import EventSpec
-from vibroimpact.orchestrator.provenance import git_commit, versions
-from vibroimpact.orchestrator.runners import make_runner
 from vibroimpact.orchestrator.scene import parse_scene
 
 PERIOD = 2.0 * math.pi

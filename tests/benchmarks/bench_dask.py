@@ -24,9 +24,9 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
-from vibroimpact.orchestrator.chunks import Chunk, Work, get_ready, open_runner, points_of, run_chunk
+from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, get_ready, open_runner, points_of, run_chunk
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.sweep import expand
+from vibroimpact.orchestrator.scene.sweep import expand
 
 WORKERS = 2
 LONGEST_SECONDS = 600.0

@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from vibroimpact.orchestrator.runner import PointRunner
+from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
 PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773

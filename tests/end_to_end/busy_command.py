@@ -5,9 +5,9 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-import vibroimpact.orchestrator.campaign as campaign
-import vibroimpact.orchestrator.schedule as schedule
-from vibroimpact.orchestrator.cli import main
+import vibroimpact.orchestrator.campaign.campaign as campaign
+import vibroimpact.orchestrator.campaign.schedule as schedule
+from vibroimpact.orchestrator.commands.cli import main
 
 CHUNK_SECONDS = 0.25
 """Shorter than usual, so that a campaign of two seconds has as many parts as a long one."""

@@ -17,7 +17,7 @@ from command_line import in_this_process, vibroimpact
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.fmus import fmu_path
-from vibroimpact.orchestrator.cli import app, load_commands, main
+from vibroimpact.orchestrator.commands.cli import app, load_commands, main
 
 ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
@@ -52,7 +52,7 @@ def test_every_command_has_help_with_an_example() -> None:
 
 def test_help_does_not_load_dask() -> None:
     code = (
-        "import sys\nfrom vibroimpact.orchestrator.cli import main\n"
+        "import sys\nfrom vibroimpact.orchestrator.commands.cli import main\n"
         "try:\n    main(['--help'])\nexcept SystemExit:\n    print('loaded:', 'distributed' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
@@ -155,7 +155,7 @@ def test_the_demo_reads_the_known_landmarks_within_two_steps(tmp_path: Path) -> 
 
 
 def test_the_demo_runs_the_example() -> None:
-    packaged = resources.files("vibroimpact.orchestrator") / "demo_scene.toml"
+    packaged = resources.files("vibroimpact.orchestrator.commands") / "demo_scene.toml"
     assert packaged.read_bytes() == (EXAMPLES / "bifurcation.toml").read_bytes()
 
 

@@ -19,7 +19,7 @@ from tolerance import SEQUENCE
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import read_flat
-from vibroimpact.orchestrator.body_driver import BodyDriver
+from vibroimpact.orchestrator.run.fused import BodyDriver
 
 FILES = Path(__file__).parents[1] / "version_0_1.zip"
 

@@ -14,8 +14,9 @@ import pytest
 
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator import guard
-from vibroimpact.orchestrator.runners import Runner, make_runner
+from vibroimpact.orchestrator.guard import guarded as guard
+from vibroimpact.orchestrator.guard import make_runner
+from vibroimpact.orchestrator.run import Runner
 from vibroimpact.orchestrator.scene import parse_scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and processes")
@@ -191,7 +192,7 @@ def test_processes_of_a_component_that_then_crashes_end_with_it(
 PARENT = """
 import sys
 from pathlib import Path
-from vibroimpact.orchestrator.runners import make_runner
+from vibroimpact.orchestrator.guard import make_runner
 from vibroimpact.orchestrator.scene import parse_scene
 runner = make_runner(parse_scene(Path(sys.argv[1]).read_text(), sys.argv[1]))
 print("ready", flush=True)

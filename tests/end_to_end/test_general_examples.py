@@ -61,7 +61,14 @@ def test_a_campaign_over_a_single_component_finishes(tmp_path: Path) -> None:
 def test_a_law_in_python_is_exported_by_the_command_line_and_answers(tmp_path: Path) -> None:
     pytest.importorskip("pythonfmu", reason="needs pip install 'vibroimpact[python-fmus]'")
     law = EXAMPLES / "user_contact_law.py"
-    command = [sys.executable, "-m", "vibroimpact.orchestrator.cli", "fmu", "export", "user-contact-law"]
+    command = [
+        sys.executable,
+        "-m",
+        "vibroimpact.orchestrator.commands.cli",
+        "fmu",
+        "export",
+        "user-contact-law",
+    ]
     target = tmp_path / "user_contact_law.fmu"
     subprocess.run(
         [*command, "--law", str(law), "-o", str(target)], check=True, capture_output=True, timeout=120

@@ -15,8 +15,7 @@ import pytest
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.guard import GuardedRunner
-from vibroimpact.orchestrator.runners import make_runner
+from vibroimpact.orchestrator.guard import GuardedRunner, make_runner
 from vibroimpact.orchestrator.scene import parse_scene
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and processes")
@@ -252,7 +251,7 @@ def test_an_fmu_that_cannot_be_loaded_is_an_error_of_the_runner(folder: Path, tm
 
 PARENT = """
 import sys
-from vibroimpact.orchestrator.runners import make_runner
+from vibroimpact.orchestrator.guard import make_runner
 from vibroimpact.orchestrator.scene import load_scene
 runner = make_runner(load_scene(sys.argv[1]))
 print("ready", flush=True)
@@ -300,7 +299,7 @@ def wait_until(condition: Callable[[], bool], seconds: float = 20.0) -> None:
 
 
 def campaign(scene: Path, output: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    entry = "from vibroimpact.orchestrator.cli import main; main()"
+    entry = "from vibroimpact.orchestrator.commands.cli import main; main()"
     command = [sys.executable, "-c", entry, "campaign", str(scene), "-o", str(output), *options]
     return subprocess.run(command, capture_output=True, text=True, timeout=120)
 

@@ -16,9 +16,8 @@ import pytest
 import typer
 from real_data import recording_folder
 
-from vibroimpact.hardware.import_settings import read_settings
-from vibroimpact.hardware.importing import import_recording
-from vibroimpact.orchestrator.cli import app, load_commands
+from vibroimpact.hardware.recordings import import_recording, read_settings
+from vibroimpact.orchestrator.commands.cli import app, load_commands
 from vibroimpact.orchestrator.scene import load_scene
 
 ROOT = Path(__file__).parents[2]

@@ -19,7 +19,7 @@ TIME = 2e-5 * np.arange(900)
 
 
 def vibroimpact(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "vibroimpact.orchestrator.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "vibroimpact.orchestrator.commands.cli", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 

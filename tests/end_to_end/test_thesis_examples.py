@@ -18,8 +18,8 @@ from reference_bodies import beam_shape, period_one_orbits, uniform_chain
 from scipy.interpolate import CubicSpline
 
 from vibroimpact.analysis import figures, open_dataset
+from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.scene import load_scene
-from vibroimpact.orchestrator.single_run import run_scene
 
 FOLDER = Path(__file__).parents[2] / "examples" / "thesis"
 SCENES = sorted(path.stem for path in FOLDER.glob("*.toml"))

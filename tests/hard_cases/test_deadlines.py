@@ -15,8 +15,7 @@ from command_line import ENVIRONMENT, in_this_process
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.general_runner import GeneralRunner
-from vibroimpact.orchestrator.runner import PointRunner
+from vibroimpact.orchestrator.run import GeneralRunner, PointRunner
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -167,7 +166,7 @@ def test_a_signal_is_heard_within_one_step(case: str, how: str) -> None:
 
 INTERRUPTED = """
 import os, signal, threading
-from vibroimpact.orchestrator.cli import main
+from vibroimpact.orchestrator.commands.cli import main
 signal.signal(signal.SIGINT, signal.default_int_handler)
 threading.Timer(1.5, os.kill, (os.getpid(), signal.SIGINT)).start()
 main()

@@ -6,7 +6,7 @@ import pytest
 from oscillator_fmu import VERSIONS, OscillatorFmu, forced, simulate, stop
 from tolerance import SEQUENCE
 
-from vibroimpact.orchestrator.runner import PointRunner
+from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
 ZETA, W = 0.05, 0.8

@@ -8,8 +8,8 @@ import pytest
 from tolerance import ROUNDING
 
 from vibroimpact.fmus.structure import Modes, Structure
+from vibroimpact.orchestrator.run import Session
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.session import Session
 
 PERIODS = 512
 RATES = (1, 10, 97)

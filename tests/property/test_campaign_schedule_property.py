@@ -9,11 +9,11 @@ from types import SimpleNamespace
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vibroimpact.orchestrator.chunks import Chunk, ChunkResult, State
-from vibroimpact.orchestrator.parts import StoredPart
-from vibroimpact.orchestrator.schedule import CHUNK_SECONDS, MOST_POINTS, ChunkSchedule
-from vibroimpact.orchestrator.sweep import Branch, SweepAxis, expand
-from vibroimpact.orchestrator.sweep import Path as SweepPath
+from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, State
+from vibroimpact.orchestrator.campaign.parts import StoredPart
+from vibroimpact.orchestrator.campaign.schedule import CHUNK_SECONDS, MOST_POINTS, ChunkSchedule
+from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, expand
+from vibroimpact.orchestrator.scene.sweep import Path as SweepPath
 
 paths = st.sampled_from(["independent", "up", "down", "up-down"])
 

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vibroimpact.orchestrator.runner import PointRunner
+from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
 #: Impacts that are compared.

@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from replay_scenes import Floats
 
-from vibroimpact.orchestrator.drive_signal import quiet_level, step_instants
+from vibroimpact.orchestrator.replay.drive import quiet_level, step_instants
+from vibroimpact.orchestrator.run import Session
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.session import Session
 
 BODY = "[body]\nmass = 1.0\nstiffness = {stiffness!r}\ndamping = {damping!r}\n[record]\nrecorded_time = 1\n"
 STEP = 0.01

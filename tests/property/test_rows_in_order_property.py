@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from vibroimpact.analysis.dataset import check, read_flat
+from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.single_run import run_scene
 
 FEW = settings(max_examples=60, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 LAWS = (

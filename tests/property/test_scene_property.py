@@ -14,8 +14,7 @@ from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.scene_errors import known_keys
-from vibroimpact.orchestrator.scene_models import (
+from vibroimpact.orchestrator.scene.models import (
     Execution,
     Forcing,
     OscillatorBody,
@@ -23,7 +22,8 @@ from vibroimpact.orchestrator.scene_models import (
     RestitutionStop,
     SceneHeader,
 )
-from vibroimpact.orchestrator.sweep import expand, run_count
+from vibroimpact.orchestrator.scene.problems import known_keys
+from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 MODELS: dict[str, type[BaseModel]] = {
     "scene": SceneHeader,

@@ -12,8 +12,8 @@ import pytest
 from compliant_parts import FREE, LAWS, contact_energy_error, coupled, plain_energy_error
 from coupled_parts import EXCHANGES, VERSIONS
 
-from vibroimpact.orchestrator.body_driver import BodyDriver
-from vibroimpact.orchestrator.coupled_driver import CoupledDriver
+from vibroimpact.orchestrator.run.coupled import CoupledDriver
+from vibroimpact.orchestrator.run.fused import BodyDriver
 
 MIXED = [(b, s) for b in VERSIONS for s in VERSIONS]
 EXACT = 1e-12

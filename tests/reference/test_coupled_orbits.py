@@ -24,7 +24,7 @@ from tolerance import SEQUENCE
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.master import Importer
-from vibroimpact.orchestrator.runner import PointRunner
+from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples"

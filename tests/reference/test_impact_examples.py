@@ -6,7 +6,7 @@ import pytest
 from oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
 from tolerance import FLOW, ORBIT, PRINTED_14, ROUNDING
 
-from vibroimpact.analysis.exact import ImpactOscillator, grazing_frequencies
+from vibroimpact.analysis.landmarks import ImpactOscillator, grazing_frequencies
 from vibroimpact.fmus.core import Oscillator, next_contact
 
 

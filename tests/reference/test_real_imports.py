@@ -13,8 +13,7 @@ import pytest
 from real_data import recording_folder
 
 from vibroimpact.analysis.recording import Quality, Recording
-from vibroimpact.hardware.import_settings import ImportSettings
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 GRAVITY = 9.80665
 

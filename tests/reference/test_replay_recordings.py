@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 from real_data import recording_folder
 
-from vibroimpact.analysis.recording_files import write_recording
+from vibroimpact.analysis.recording import write_recording
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.trust import trust
-from vibroimpact.hardware.import_settings import checked, read_settings
-from vibroimpact.hardware.importing import import_recording
-from vibroimpact.orchestrator.replay import opened_replays
-from vibroimpact.orchestrator.replay_fit import ReplayFit, fit_replay
-from vibroimpact.orchestrator.replay_scoring import compare_motion, scores_of
+from vibroimpact.hardware.recordings import import_recording, read_settings
+from vibroimpact.hardware.recordings.settings import checked
+from vibroimpact.orchestrator.replay import ReplayFit, compare_motion, fit_replay, opened_replays, scores_of
 from vibroimpact.orchestrator.scene import load_scene
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "recordings"

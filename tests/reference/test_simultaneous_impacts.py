@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from vibroimpact.orchestrator.runner import PointRunner
+from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
 # symmetric about its middle, and moved symmetrically: both masses do the same

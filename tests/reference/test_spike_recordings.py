@@ -14,13 +14,11 @@ from real_data import recording_folder
 from spike_signals import channel, pulses, time_above
 
 from vibroimpact.analysis.intervals import interval_report
-from vibroimpact.analysis.recording import Channel, EventTrain
-from vibroimpact.analysis.recording_files import open_signals
+from vibroimpact.analysis.recording import Channel, EventTrain, open_signals
 from vibroimpact.analysis.spikes import Mechanics, SpikeSettings, identify, measure_pulses, spike_report
-from vibroimpact.hardware.import_settings import ImportSettings
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import ImportSettings, import_recording
+from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.single_run import run_scene
 
 
 @cache

@@ -13,7 +13,7 @@ from command_line import in_this_process
 from dataset_examples import up_down
 
 from vibroimpact.analysis import write_dataset
-from vibroimpact.orchestrator.cli import app, load_commands
+from vibroimpact.orchestrator.commands.cli import app, load_commands
 
 SAMPLE = 60
 SECONDS = 30.0

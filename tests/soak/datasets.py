@@ -18,13 +18,21 @@ from scipy.io import savemat
 
 from vibroimpact.analysis import open_dataset, write_dataset
 from vibroimpact.analysis.dataset import open_measured, read_flat, read_part
-from vibroimpact.analysis.fingerprints import LINE_LENGTH
-from vibroimpact.analysis.recording import Channel, EventTrain, Recording, SingleValue, TimeAxis
-from vibroimpact.analysis.recording_files import open_recording, open_signals, write_recording
-from vibroimpact.analysis.results import results_kind
-from vibroimpact.analysis.schema import RULES
+from vibroimpact.analysis.dataset.results import results_kind
+from vibroimpact.analysis.dataset.schema import RULES
+from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
+from vibroimpact.analysis.recording import (
+    Channel,
+    EventTrain,
+    Recording,
+    SingleValue,
+    TimeAxis,
+    open_recording,
+    open_signals,
+    write_recording,
+)
 from vibroimpact.fmus.errors import VibroimpactError
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import import_recording
 
 SAMPLE = 60
 SECONDS = 40.0

@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 
 from vibroimpact.fmus.errors import ComponentError, SceneError
-from vibroimpact.orchestrator.chunks import DEFAULT_RUNNER, open_runner
+from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, open_runner
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.sweep import expand
+from vibroimpact.orchestrator.scene.sweep import expand
 
 SAMPLE = 12
 DEADLINE = 1.0

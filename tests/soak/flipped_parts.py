@@ -21,7 +21,7 @@ import xarray as xr
 from campaign_scenes import TIMING, frequency_text
 from serial_pool import campaign_here
 
-import vibroimpact.orchestrator.schedule as schedule
+import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.fmus.errors import VibroimpactError

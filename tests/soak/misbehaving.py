@@ -15,8 +15,9 @@ import psutil  # type: ignore[import-untyped, unused-ignore]
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator import guard
-from vibroimpact.orchestrator.runners import Runner, make_runner
+from vibroimpact.orchestrator.guard import guarded as guard
+from vibroimpact.orchestrator.guard import make_runner
+from vibroimpact.orchestrator.run import Runner
 from vibroimpact.orchestrator.scene import parse_scene
 
 CASES = 5000

@@ -17,10 +17,9 @@ from pyarrow import feather, parquet
 from scipy.io import savemat, wavfile
 
 from soak.scenes import wrong_message
-from vibroimpact.analysis.recording import Recording
-from vibroimpact.analysis.recording_files import write_recording
+from vibroimpact.analysis.recording import Recording, write_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import import_recording
 
 SAMPLE = 100
 SECONDS = 10.0

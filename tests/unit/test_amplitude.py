@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.run import Session
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.session import Session
 
 BODY = """
 [body]

@@ -8,7 +8,8 @@ from campaign_scenes import amplitude_text, assert_same_rows, frequency_text, pl
 
 from vibroimpact.analysis.dataset import Outcome, read_flat, write_dataset
 from vibroimpact.fmus.errors import CampaignError
-from vibroimpact.orchestrator.chunks import (
+from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.campaign.chunks import (
     Chunk,
     RunnerIdentity,
     Work,
@@ -18,17 +19,16 @@ from vibroimpact.orchestrator.chunks import (
     run_points,
     write_crashed,
 )
-from vibroimpact.orchestrator.manifest import scene_hash
-from vibroimpact.orchestrator.parts import (
+from vibroimpact.orchestrator.campaign.manifest import scene_hash
+from vibroimpact.orchestrator.campaign.parts import (
     StoredPart,
     compact,
     list_parts,
     remove_temporary_files,
     unfit_parts,
 )
-from vibroimpact.orchestrator.schedule import gaps_between
-from vibroimpact.orchestrator.single_run import run_scene
-from vibroimpact.orchestrator.sweep import expand
+from vibroimpact.orchestrator.campaign.schedule import gaps_between
+from vibroimpact.orchestrator.scene.sweep import expand
 
 BUSY = "busy_runner:BusyRunner"
 

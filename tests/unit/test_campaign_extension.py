@@ -13,7 +13,7 @@ import xarray as xr
 from campaign_scenes import TIMING, assert_same_rows
 from serial_pool import Notes, campaign_here
 
-import vibroimpact.orchestrator.schedule as schedule
+import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.fmus.errors import UsageError

@@ -4,10 +4,10 @@ from pathlib import Path
 import pytest
 from campaign_scenes import frequency_text, scene_of
 
+from vibroimpact.analysis.files.folder_lock import locked_folder
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.chunks import RunnerIdentity
-from vibroimpact.orchestrator.folder_lock import locked_folder
-from vibroimpact.orchestrator.manifest import (
+from vibroimpact.orchestrator.campaign.chunks import RunnerIdentity
+from vibroimpact.orchestrator.campaign.manifest import (
     Manifest,
     differences,
     flat_scene,
@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.manifest import (
     scene_hash,
     write_manifest,
 )
-from vibroimpact.orchestrator.shared_folder import answer_question, refuse_blind_workers
+from vibroimpact.orchestrator.campaign.shared_folder import answer_question, refuse_blind_workers
 
 TEXT = frequency_text(11, "up")
 LOWER_STOP = "[[stop]]\nposition = -1.0\nside = 'lower'\nrestitution = 1.0\n"

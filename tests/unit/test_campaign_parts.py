@@ -13,10 +13,10 @@ import xarray as xr
 from campaign_scenes import assert_same_rows, frequency_text
 from serial_pool import Notes, campaign_here
 
-import vibroimpact.orchestrator.campaign as campaign
-import vibroimpact.orchestrator.schedule as schedule
+import vibroimpact.orchestrator.campaign.campaign as campaign
+import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis.dataset import read_flat, write_dataset
-from vibroimpact.analysis.fingerprints import LINE_LENGTH
+from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted
 

@@ -1,7 +1,7 @@
 from types import SimpleNamespace
 
-from vibroimpact.orchestrator.chunks import Chunk, ChunkResult
-from vibroimpact.orchestrator.schedule import (
+from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult
+from vibroimpact.orchestrator.campaign.schedule import (
     CHUNK_SECONDS,
     FIRST_POINTS,
     MOST_POINTS,
@@ -9,7 +9,7 @@ from vibroimpact.orchestrator.schedule import (
     SHORTEST_SECONDS,
     ChunkSchedule,
 )
-from vibroimpact.orchestrator.sweep import Branch, Path, SweepAxis, expand
+from vibroimpact.orchestrator.scene.sweep import Branch, Path, SweepAxis, expand
 
 
 def branches(points: int, path: Path = "independent", others: int = 1) -> tuple[Branch, ...]:

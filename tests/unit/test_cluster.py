@@ -18,9 +18,9 @@ from distributed.comm import connect
 from distributed.security import Security
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
-from vibroimpact.orchestrator import cluster
-from vibroimpact.orchestrator.cluster import MOST_DEATHS, MOST_STARTS, open_workers
-from vibroimpact.orchestrator.progress import Silence
+from vibroimpact.orchestrator.campaign import cluster
+from vibroimpact.orchestrator.campaign.cluster import MOST_DEATHS, MOST_STARTS, open_workers
+from vibroimpact.orchestrator.campaign.progress import Silence
 
 kills_itself = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
 

@@ -24,7 +24,7 @@ from dataset_examples import (
     up_down,
 )
 
-from vibroimpact.analysis import atomic, open_dataset
+from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import (
     RULES,
     Direction,
@@ -41,6 +41,7 @@ from vibroimpact.analysis.dataset import (
     write_dataset,
 )
 from vibroimpact.analysis.figures import draw
+from vibroimpact.analysis.files import atomic
 from vibroimpact.fmus.errors import DatasetError
 
 CF_CHECK = """

@@ -9,11 +9,10 @@ import pytest
 import xarray as xr
 from decay_motion import Damped
 
-from vibroimpact.analysis.recording import Channel, Recording, TimeAxis
-from vibroimpact.analysis.recording_files import write_recording
-from vibroimpact.orchestrator.cli import main
+from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
+from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.commands.cli import main
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.single_run import run_scene
 
 TIME = np.arange(0.0, 25.0, 0.05)
 TRUTH = Damped(omega=4.0, viscous=0.03, coulomb=0.3)

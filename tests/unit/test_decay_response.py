@@ -19,8 +19,8 @@ from vibroimpact.analysis.decay.resonance import (
 from vibroimpact.analysis.decay.swept_response import swept_response
 from vibroimpact.analysis.recording import Channel, TimeAxis
 from vibroimpact.fmus.errors import DatasetError, EstimationError, UsageError
+from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.single_run import run_scene
 
 NATURAL, RATIO, MASS = 20.0, 0.03, 2.0
 INTERVAL = 0.01

@@ -7,6 +7,7 @@ import pytest
 from impact_records import CHAOTIC, THESIS, WORKED, channel_of, record_of
 from rich.console import Console
 
+from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.estimation import Known, estimate_impacts, print_impacts
 from vibroimpact.analysis.estimation.modal import (
     estimate_modes,
@@ -15,7 +16,6 @@ from vibroimpact.analysis.estimation.modal import (
 )
 from vibroimpact.analysis.estimation.period_one import natural_frequency_of, stop_position_of
 from vibroimpact.analysis.estimation.physics import Forcing
-from vibroimpact.analysis.results import write_results
 from vibroimpact.fmus.core import Oscillator, flow, motion, next_contact
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.structure import Modes, Stop, Structure

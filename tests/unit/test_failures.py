@@ -11,7 +11,7 @@ from dataset_examples import failed, record
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import Direction, RunRecord, build_dataset, write_dataset
-from vibroimpact.orchestrator.failures import MOST_LISTED, failure_lines
+from vibroimpact.orchestrator.commands.failures import MOST_LISTED, failure_lines
 
 TOO_LARGE = """
 [scene]

@@ -12,11 +12,12 @@ from impact_sweep import SCENE, Oscillator
 from matplotlib.figure import Figure
 from typer.testing import CliRunner
 
-from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
+from vibroimpact.analysis import figures, open_dataset, write_dataset
+from vibroimpact.analysis.commands import plot as commands
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.figures.scene_text import limits
-from vibroimpact.analysis.fingerprints import LINE_LENGTH
-from vibroimpact.analysis.orders import observed_order
+from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
+from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
 PNG = b"\x89PNG\r\n"

@@ -13,15 +13,15 @@ from dataset_examples import dataset_of, record, up_down
 from replay_signals import HIT, channel, clock, ring
 from typer.testing import CliRunner
 
-from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
+from vibroimpact.analysis import figures, open_dataset, write_dataset
+from vibroimpact.analysis.commands import plot as commands
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
+from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.kinds import fitting
 from vibroimpact.analysis.intervals import interval_report
-from vibroimpact.analysis.recording import Channel, Recording, TimeAxis
-from vibroimpact.analysis.recording_files import write_recording
+from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
 from vibroimpact.analysis.replay import compare, comparison_dataset
-from vibroimpact.analysis.results import write_results
 from vibroimpact.fmus.errors import DatasetError, UsageError
 
 

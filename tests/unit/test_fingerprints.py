@@ -12,7 +12,7 @@ import pytest
 from dataset_examples import record
 
 from vibroimpact.analysis.dataset import Direction, build_dataset, open_dataset, read_flat, write_dataset
-from vibroimpact.analysis.fingerprints import LINE_LENGTH, closing_line, matches_recorded_hash
+from vibroimpact.analysis.files.fingerprints import LINE_LENGTH, closing_line, matches_recorded_hash
 from vibroimpact.fmus.errors import DatasetError
 
 

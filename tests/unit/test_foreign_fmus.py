@@ -12,8 +12,8 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.archive import unpack
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, SceneError
 from vibroimpact.orchestrator.fmi import rounding
-from vibroimpact.orchestrator.general_runner import GeneralRunner
-from vibroimpact.orchestrator.runners import make_runner
+from vibroimpact.orchestrator.guard import make_runner
+from vibroimpact.orchestrator.run import GeneralRunner
 from vibroimpact.orchestrator.scene import parse_scene
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "bouncing_ball.toml"

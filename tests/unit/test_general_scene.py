@@ -15,12 +15,12 @@ import pytest
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.orchestrator.component_facts import component_facts
-from vibroimpact.orchestrator.general_scene import GeneralScene
+from vibroimpact.orchestrator.campaign.manifest import flat_scene, scene_hash
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
-from vibroimpact.orchestrator.manifest import flat_scene, scene_hash
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
-from vibroimpact.orchestrator.sweep import expand
+from vibroimpact.orchestrator.scene.general.component_facts import component_facts
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene
+from vibroimpact.orchestrator.scene.sweep import expand
 
 ROOT = Path(__file__).parents[2]
 
@@ -201,7 +201,7 @@ def test_units_agree_by_meaning_and_a_missing_one_agrees_with_all(ball: Callable
 
 def test_the_short_form_does_not_load_what_reads_descriptions() -> None:
     code = (
-        "import sys\nfrom vibroimpact.orchestrator.scene import load_scene\n"
+        "import sys\nfrom vibroimpact.orchestrator.scene.scene import load_scene\n"
         f"load_scene({str(ROOT / 'examples' / 'coupled_p11.toml')!r})\nprint('fmpy' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

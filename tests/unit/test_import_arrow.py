@@ -13,8 +13,7 @@ from pyarrow import feather, parquet
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.import_settings import ImportSettings
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 TIME = np.arange(80) / 512.0
 ACC = 9.81 * np.sin(TIME * 90.0)

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 import typer
 
-from vibroimpact.analysis.recording_files import open_recording
+from vibroimpact.analysis.recording import open_recording
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.hardware import import_command
-from vibroimpact.hardware.import_settings import checked, read_settings
-from vibroimpact.orchestrator import cli
+from vibroimpact.hardware.commands import import_recording as import_command
+from vibroimpact.hardware.recordings import read_settings
+from vibroimpact.hardware.recordings.settings import checked
+from vibroimpact.orchestrator.commands import cli
 
 
 @pytest.fixture(autouse=True)

@@ -10,7 +10,7 @@ from nptdms import ChannelObject, TdmsWriter
 
 from vibroimpact.analysis.recording import Quality, Recording
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import import_recording
 
 ROWS = 40
 TIME = np.arange(ROWS) / 1000.0

@@ -15,10 +15,9 @@ from hypothesis import strategies as st
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
-from vibroimpact.analysis.recording import Recording, SingleValue
-from vibroimpact.analysis.recording_files import write_recording
+from vibroimpact.analysis.recording import Recording, SingleValue, write_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import import_recording
 
 SIGNAL = np.round(np.sin(np.arange(120) / 7.0), 4)
 LABVIEW = (

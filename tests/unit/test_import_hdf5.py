@@ -11,8 +11,7 @@ import pytest
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.import_settings import ImportSettings
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 TIME = np.arange(60) / 128.0
 ACC = np.sin(TIME * 40.0)

@@ -9,7 +9,7 @@ import pytest
 
 from vibroimpact.analysis.recording import Quality, Recording
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import import_recording
 
 FILE_HEADER = """LabVIEW Measurement\t
 Writer_Version\t2

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from vibroimpact.analysis.recording import Quality
-from vibroimpact.analysis.recording_files import open_recording, write_recording
+from vibroimpact.analysis.recording import Quality, open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.hardware.import_settings import ImportSettings
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 RANDOM = np.random.default_rng(8)
 

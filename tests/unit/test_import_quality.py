@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.event_trains import event_train, looks_like_events
-from vibroimpact.hardware.importers.table import Column
-from vibroimpact.hardware.sample_quality import clipped_samples
+from vibroimpact.hardware.formats.table import Column
+from vibroimpact.hardware.recordings.events import event_train, looks_like_events
+from vibroimpact.hardware.recordings.sample_quality import clipped_samples
 
 RANDOM = np.random.default_rng(5)
 TIME = np.linspace(0.0, 1.0, 2000)

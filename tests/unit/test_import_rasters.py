@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from vibroimpact.analysis.recording_files import open_recording, write_recording
+from vibroimpact.analysis.recording import open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.import_settings import ImportSettings
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 SPIKES = ((3, 40, 41 + 20, 199), (7, 90, 150), (0, 120))
 AS_EVENTS = "the columns hold 0 and 1 only: an event train each"

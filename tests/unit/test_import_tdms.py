@@ -12,7 +12,7 @@ from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import import_recording
 
 WAVEFORM = {"wf_increment": 0.001, "wf_start_offset": 0.0, "unit_string": "m/s^2"}
 

@@ -10,12 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vibroimpact.analysis.recording import Quality
-from vibroimpact.analysis.recording_files import open_recording, write_recording
+from vibroimpact.analysis.recording import Quality, open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.import_settings import ImportSettings
-from vibroimpact.hardware.importers.text import find_dialect, headings, read_text
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.formats.text import find_dialect, headings, read_text
+from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 
 def written(folder: Path, text: str, name: str = "record.csv") -> Path:

@@ -8,10 +8,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.importers.table import Column, Floats, Table
-from vibroimpact.hardware.printed_grid import common_step, decimal_step
-from vibroimpact.hardware.segments import split_at_restarts
-from vibroimpact.hardware.time_axis import Placement, place
+from vibroimpact.hardware.formats.table import Column, Floats, Table
+from vibroimpact.hardware.recordings.printed_grid import common_step, decimal_step
+from vibroimpact.hardware.recordings.segments import split_at_restarts
+from vibroimpact.hardware.recordings.time_axis import Placement, place
 
 RANDOM = np.random.default_rng(4)
 

@@ -12,8 +12,7 @@ import pyuff
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.import_settings import ImportSettings
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 TIME = np.arange(200) / 256.0
 BASE = 9.81 * np.sin(TIME * 40.0)

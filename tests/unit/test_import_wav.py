@@ -13,8 +13,7 @@ from scipy.io import wavfile
 
 from vibroimpact.analysis.recording import Quality
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.import_settings import ImportSettings
-from vibroimpact.hardware.importing import import_recording
+from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 RATE = 5120
 SIGNAL = 0.5 * np.sin(np.arange(300) / 9.0)

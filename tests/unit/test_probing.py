@@ -16,13 +16,21 @@ import pytest
 from command_line import in_this_process
 from dataset_examples import up_down
 
-from vibroimpact.analysis import open_dataset, probing, write_dataset
+from vibroimpact.analysis import open_dataset, write_dataset
 from vibroimpact.analysis.dataset import open_measured, read_flat, read_part
-from vibroimpact.analysis.fingerprints import LINE_LENGTH
-from vibroimpact.analysis.probing import UnsoundFileError, check_sound
-from vibroimpact.analysis.recording import Channel, Recording, TimeAxis
-from vibroimpact.analysis.recording_files import is_recording, open_recording, open_signals, write_recording
-from vibroimpact.analysis.results import results_kind
+from vibroimpact.analysis.dataset.results import results_kind
+from vibroimpact.analysis.files import probing
+from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
+from vibroimpact.analysis.files.probing import UnsoundFileError, check_sound
+from vibroimpact.analysis.recording import (
+    Channel,
+    Recording,
+    TimeAxis,
+    is_recording,
+    open_recording,
+    open_signals,
+    write_recording,
+)
 from vibroimpact.fmus.errors import DatasetError
 
 DOORS = (open_dataset, open_measured, read_flat, read_part, open_recording, open_signals)
@@ -285,7 +293,7 @@ def test_a_cache_that_others_may_write_is_not_believed(
 
 def test_a_process_made_by_fork_has_a_server_of_its_own(tmp_path: Path) -> None:
     code = (
-        "import os, sys; from vibroimpact.analysis.probing import check_sound, _server\n"
+        "import os, sys; from vibroimpact.analysis.files.probing import check_sound, _server\n"
         "check_sound(sys.argv[1]); child = os.fork()\n"
         "if child == 0:\n    check_sound(sys.argv[2]); _server.close(); os._exit(7)\n"
         "assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7; check_sound(sys.argv[3])"

@@ -10,8 +10,13 @@ from impact_sweep import SCENE, up_down_sweep
 
 from vibroimpact.analysis import open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Outcome
-from vibroimpact.analysis.exact import ImpactOscillator, folds, grazing_frequencies, period_doublings
-from vibroimpact.analysis.readings import bifurcation_readings
+from vibroimpact.analysis.landmarks import (
+    ImpactOscillator,
+    bifurcation_readings,
+    folds,
+    grazing_frequencies,
+    period_doublings,
+)
 from vibroimpact.fmus.errors import DatasetError
 
 THESIS = ImpactOscillator.from_scene(SCENE)

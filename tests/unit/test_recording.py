@@ -13,22 +13,20 @@ import xarray as xr
 from dataset_examples import dataset_of, record
 
 from vibroimpact.analysis.dataset import write_dataset
+from vibroimpact.analysis.dataset.results import results_kind, write_results
 from vibroimpact.analysis.recording import (
     Channel,
     EventTrain,
     Recording,
     SingleValue,
     TimeAxis,
-)
-from vibroimpact.analysis.recording_files import (
     is_recording,
     open_recording,
     open_signals,
     write_recording,
 )
-from vibroimpact.analysis.recording_rules import problems_of
-from vibroimpact.analysis.results import results_kind, write_results
-from vibroimpact.analysis.units import measured_unit, unit_label
+from vibroimpact.analysis.recording.rules import problems_of
+from vibroimpact.analysis.recording.units import measured_unit, unit_label
 from vibroimpact.fmus.errors import DatasetError
 
 

@@ -10,21 +10,27 @@ import xarray as xr
 from replay_scenes import BOARD, Floats, G, channel, pulse, written
 from tolerance import PARTITION
 
-from vibroimpact.analysis.recording import Quality
-from vibroimpact.analysis.recording_files import open_signals
-from vibroimpact.analysis.results import write_results
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.recording import Quality, open_signals
 from vibroimpact.fmus.errors import DatasetError, EstimationError, SceneError, UsageError
 from vibroimpact.fmus.modes import beam_modes
 from vibroimpact.fmus.structure import Modes, Structure
-from vibroimpact.orchestrator.cli import main
-from vibroimpact.orchestrator.drive_signal import drive_of, quiet_level, step_instants
-from vibroimpact.orchestrator.replay import Replayer, named, opened_replays
-from vibroimpact.orchestrator.replay_covariance import covariance_of, drawn_noise
-from vibroimpact.orchestrator.replay_fit import ReplayFit, fit_keys, fit_replay
-from vibroimpact.orchestrator.replay_output import Replayed, replay_dataset
-from vibroimpact.orchestrator.replay_scoring import compare_motion, scores_of
+from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.commands.cli import main
+from vibroimpact.orchestrator.replay import (
+    Replayer,
+    ReplayFit,
+    compare_motion,
+    fit_replay,
+    opened_replays,
+    scores_of,
+)
+from vibroimpact.orchestrator.replay.covariance import covariance_of, drawn_noise
+from vibroimpact.orchestrator.replay.drive import drive_of, quiet_level, step_instants
+from vibroimpact.orchestrator.replay.fit import fit_keys
+from vibroimpact.orchestrator.replay.output import Replayed, replay_dataset
+from vibroimpact.orchestrator.replay.replayer import named
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.single_run import run_scene
 
 TIME = 2e-5 * np.arange(1500)
 

@@ -13,10 +13,10 @@ from replay_signals import FREQUENCY, HIT, INTERVAL, channel, clock, ring
 from rich.console import Console
 
 from vibroimpact.analysis import figures
+from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.figures.replay import draw_replay
 from vibroimpact.analysis.recording import TimeAxis
 from vibroimpact.analysis.replay import Comparison, compare, comparison_dataset, print_comparison
-from vibroimpact.analysis.results import write_results
 from vibroimpact.fmus.errors import DatasetError
 
 TIME = clock()

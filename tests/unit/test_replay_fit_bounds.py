@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from replay_scenes import BOARD, channel, pulse, written
 
-from vibroimpact.analysis.recording_files import open_signals
+from vibroimpact.analysis.recording import open_signals
 from vibroimpact.fmus.errors import EstimationError
-from vibroimpact.orchestrator.replay import Replayer
-from vibroimpact.orchestrator.replay_fit import ReplayFit, fit_replay
+from vibroimpact.orchestrator.replay import Replayer, ReplayFit, fit_replay
 from vibroimpact.orchestrator.scene import parse_scene
 
 TIME = np.arange(2000) * 1e-5

@@ -16,11 +16,11 @@ from vibroimpact.fmus.core import Oscillator, flow
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.replay_fmu import build_replay
 from vibroimpact.fmus.structure import Modes, Stop, Structure
+from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.importer.component import kind_of
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.scene import load_scene
-from vibroimpact.orchestrator.single_run import run_scene
 
 pytest.importorskip("pythonfmu")
 

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from replay_scenes import BOARD, channel, pulse, written
 
-from vibroimpact.orchestrator.cli import main
+from vibroimpact.orchestrator.commands.cli import main
 from vibroimpact.orchestrator.replay import opened_replays
 from vibroimpact.orchestrator.scene import load_scene, parse_scene
 

@@ -9,8 +9,9 @@ import pytest
 import xarray as xr
 from replay_scenes import BOARD, channel, pulse, written
 
-from vibroimpact.orchestrator.cli import main
-from vibroimpact.orchestrator.replay import is_linear, opened_replays
+from vibroimpact.orchestrator.commands.cli import main
+from vibroimpact.orchestrator.replay import opened_replays
+from vibroimpact.orchestrator.replay.replayer import is_linear
 from vibroimpact.orchestrator.scene import parse_scene
 
 TIME = 2e-5 * np.arange(900)

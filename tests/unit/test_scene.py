@@ -11,11 +11,14 @@ import pytest
 from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.general_models import ComponentTable, ConnectionTable, EventTable, GeneralRecord
-from vibroimpact.orchestrator.replay_models import Replay
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
-from vibroimpact.orchestrator.scene_errors import known_keys
-from vibroimpact.orchestrator.scene_models import (
+from vibroimpact.orchestrator.scene.general.models import (
+    ComponentTable,
+    ConnectionTable,
+    EventTable,
+    GeneralRecord,
+)
+from vibroimpact.orchestrator.scene.models import (
     BODY_MODELS,
     STOP_MODELS,
     AxisTable,
@@ -27,7 +30,9 @@ from vibroimpact.orchestrator.scene_models import (
     Sensor,
     TimeSeries,
 )
-from vibroimpact.orchestrator.sweep import SweepAxis
+from vibroimpact.orchestrator.scene.problems import known_keys
+from vibroimpact.orchestrator.scene.replay_models import Replay
+from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 ROOT = Path(__file__).parents[2]
 MADE_BY_THE_USER = {"bouncing_ball", "user_contact_law"}  # need an FMU that is not shipped

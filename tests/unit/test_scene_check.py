@@ -8,13 +8,13 @@ import pytest
 from campaign_scenes import frequency_text, plane_text, scene_of
 from command_line import in_this_process
 
-import vibroimpact.orchestrator.scene_check as scene_check
-import vibroimpact.orchestrator.sweep as sweep
+import vibroimpact.orchestrator.campaign.check as scene_check
+import vibroimpact.orchestrator.scene.sweep as sweep
 from vibroimpact.analysis.dataset import Outcome, read_flat
+from vibroimpact.orchestrator.campaign import cost_of, run_scene
+from vibroimpact.orchestrator.campaign.check import BYTES_BESIDE
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene_check import BYTES_BESIDE, cost_of
-from vibroimpact.orchestrator.scene_summary import effects, engine, in_one_line, laws
-from vibroimpact.orchestrator.single_run import run_scene
+from vibroimpact.orchestrator.scene.summary import effects, engine, in_one_line, laws
 
 BODY = "[body]\nmass = 1.0\nstiffness = 1.0\n"
 RECORD = "[record]\nrecorded_time = 5.0\n"

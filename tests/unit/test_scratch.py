@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from vibroimpact.orchestrator.folder_lock import locked_folder
-from vibroimpact.orchestrator.scratch import ScratchFolder, sweep
+from vibroimpact.analysis.files.folder_lock import locked_folder
+from vibroimpact.analysis.files.scratch import ScratchFolder, sweep
 
 OWNER = """
 import sys, time
-from vibroimpact.orchestrator.scratch import ScratchFolder
+from vibroimpact.analysis.files.scratch import ScratchFolder
 folder = ScratchFolder("test")
 print(folder.name, flush=True)
 if sys.argv[1] == "wait":

@@ -8,8 +8,8 @@ from tolerance import PARTITION
 
 from vibroimpact.fmus.core import Oscillator, flow
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.run import Session
 from vibroimpact.orchestrator.scene import parse_scene
-from vibroimpact.orchestrator.session import Session
 
 FREE = "[body]\nmass = 2\nstiffness = 800\ndamping = 1.6\n[record]\nrecorded_time = 1\n"
 STOPPED = FREE + "[[stop]]\nposition = 0.01\nrestitution = 0.5\n"

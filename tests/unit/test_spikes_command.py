@@ -12,10 +12,9 @@ import xarray as xr
 from spike_signals import channel, pulses
 from typer.testing import CliRunner
 
-from vibroimpact.analysis import spikes_command
+from vibroimpact.analysis.commands import spikes as spikes_command
 from vibroimpact.analysis.intervals import dimension
-from vibroimpact.analysis.recording import EventTrain, Recording
-from vibroimpact.analysis.recording_files import open_recording, write_recording
+from vibroimpact.analysis.recording import EventTrain, Recording, open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError, EstimationError, UsageError
 
 RATE = 20_000.0

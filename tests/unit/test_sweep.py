@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from vibroimpact.orchestrator.sweep import Branch, SweepAxis, expand, run_count
+from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, expand, run_count
 
 FREQUENCY = "forcing.angular_frequency"
 POSITION = "stop[1].position"

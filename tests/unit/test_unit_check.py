@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vibroimpact.orchestrator.unit_check import (
+from vibroimpact.orchestrator.scene.unit_check import (
     BASE_UNITS,
     Unit,
     agree,

@@ -1,0 +1,278 @@
+"""What `vibroimpact estimate` takes from the scene of a simulated run, and what its options add."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.analysis.dataset.reading import read_flat
+from vibroimpact.analysis.dataset.schema import file_name_of, swept_names
+from vibroimpact.analysis.estimation.physics import Forcing, Known
+from vibroimpact.analysis.recording import Channel, Recording, is_recording
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.safe_toml import parse_toml
+
+#: A table among several: `stop[1]`.
+_NUMBERED = re.compile(r"(\w+)\[(\d+)\]")
+
+
+_ABOVE_0 = "a number > 0"
+_OPTION_RULES = {
+    **dict.fromkeys(("natural_frequency", "mass"), _ABOVE_0),
+    **dict.fromkeys(("forcing_frequency", "angular_frequency", "damping_ratio"), "a number >= 0"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ImpactOptions:
+    """What a person says about impacting motion; None: not said.
+
+    Attributes
+    ----------
+    forcing_frequency, natural_frequency : float or None
+        Hz; a forcing frequency of 0 says that no force oscillates.
+    angular_frequency : float or None
+        Of the force, rad/s; 0 likewise.
+    amplitude, static_deflection : float or None
+        Force, N, and force over stiffness, unit of the channel.
+    phase : float or None
+        rad.
+    stop : float or None
+        Unit of the channel.
+    damping_ratio : float or None
+    mass : float or None
+        kg.
+    offset : float or None
+        What the channel reads at rest, in its unit.
+    clock_drifts : bool
+        The forcing frequency is a start value only.
+    """
+
+    forcing_frequency: float | None = None
+    angular_frequency: float | None = None
+    amplitude: float | None = None
+    static_deflection: float | None = None
+    phase: float | None = None
+    stop: float | None = None
+    natural_frequency: float | None = None
+    damping_ratio: float | None = None
+    mass: float | None = None
+    offset: float | None = None
+    clock_drifts: bool = False
+
+    def __post_init__(self) -> None:
+        for name, value in ((item.name, getattr(self, item.name)) for item in fields(self)):
+            rule = _OPTION_RULES.get(name, "a finite number")
+            low = 0.0 if name in _OPTION_RULES else -math.inf
+            if isinstance(value, float) and not (math.isfinite(value) and value >= low):
+                raise UsageError(f"--{name.replace('_', '-')}: expected {rule}, got {value:g}.")
+            if value == 0.0 and rule == _ABOVE_0:
+                raise UsageError(f"--{name.replace('_', '-')}: expected {rule}, got 0.")
+
+    def given(self) -> list[str]:
+        """Return the names of the options that were given."""
+        return [
+            "--" + item.name.replace("_", "-")
+            for item in fields(self)
+            if getattr(self, item.name) is not item.default
+        ]
+
+
+def chosen_kind(data: Path, kind: str, run: int | None, drive: str | None, options: ImpactOptions) -> str:
+    """Return the kind of estimation: the one named, or what the data are."""
+    if kind != "auto":
+        return kind
+    if drive is not None:
+        return "response"
+    if options.given():
+        return "impacts"
+    if is_recording(data):
+        return "decay"
+    flat = read_flat(data)
+    swept = {"angular_frequency", "frequency"} & set(swept_names(flat))
+    if run is None and flat.sizes["run"] > 1 and swept:
+        return "response"
+    rows = slice(None) if run is None else flat.run_index.values == run
+    return "impacts" if "impact_count" in flat and np.any(flat.impact_count.values[rows] > 0) else "decay"
+
+
+def refuse_far_options(
+    kind: str, impacts: ImpactOptions, response: Mapping[str, bool], decay: Mapping[str, bool]
+) -> None:
+    """Refuse options of another kind than the one that is estimated: they would do nothing.
+
+    Parameters
+    ----------
+    kind : str
+        That is estimated.
+    impacts : ImpactOptions
+    response, decay : mapping of str to bool
+        Options of these kinds, and whether each was given.
+
+    Raises
+    ------
+    UsageError
+        With the names of these options.
+    """
+    far = []
+    if kind != "impacts":
+        far += impacts.given()
+    for other, options in (("response", response), ("decay", decay)):
+        if kind != other:
+            far += [name for name, given in options.items() if given]
+    if far:
+        raise UsageError(
+            f"--kind {kind}: expected none of the options of other kinds, got {', '.join(far)}. "
+            "Leave them out, or choose another --kind."
+        )
+
+
+def scene_of(attrs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of the scene of a simulated dataset; empty where there is none."""
+    try:
+        return parse_toml(str(attrs.get("scene", "")))
+    except ValueError:
+        return {}
+
+
+def run_scene(data: Path, run: int | None, recording: Recording) -> dict[str, Any]:
+    """Return the scene of one run, swept values in their places; empty for a recording."""
+    if not recording.attrs.get("simulated"):
+        return {}
+    scene = scene_of(recording.attrs)
+    flat = read_flat(data)
+    row = 0 if run is None else flat.run_index.values.tolist().index(run)
+    for key in scene.get("sweep", {}):
+        owner, _, name = str(key).rpartition(".")
+        coordinate = next((c for c in (name, file_name_of(str(key))) if c in swept_names(flat)), None)
+        table = _table_of(scene, owner)
+        if coordinate is not None and table is not None:
+            table[name] = float(flat[coordinate].values[row])
+    return scene
+
+
+def _table_of(scene: dict[str, Any], owner: str) -> dict[str, Any] | None:
+    """Return the table of a swept key, `body` or `stop[1]`; None where the scene has none such."""
+    numbered = _NUMBERED.fullmatch(owner)
+    if numbered is None:
+        table = scene.setdefault(owner, {})
+    else:
+        tables, place = scene.get(numbered[1], []), int(numbered[2]) - 1
+        table = tables[place] if isinstance(tables, list) and 0 <= place < len(tables) else None
+    return table if isinstance(table, dict) else None
+
+
+def forcing_and_known(
+    data: Path, run: int | None, recording: Recording, options: ImpactOptions
+) -> tuple[Forcing | None, Known]:
+    """Return the force, and what is known of oscillator and stop: from the options, else from the scene.
+
+    No force where its frequency or amplitude is 0: a body that bounces under its weight. Of the scene only forcing and
+    stop are taken: what an experiment would know too. Stiffness and damping are left to be estimated, unless options
+    say them.
+
+    Raises
+    ------
+    UsageError
+        The forcing frequency is not known, or options contradict each other.
+    """
+    scene = run_scene(data, run, recording)
+    natural = None if options.natural_frequency is None else 2.0 * math.pi * options.natural_frequency
+    frequency = _angular_frequency(scene, options)
+    forcing = Forcing(
+        frequency,
+        _static_deflection(scene, options, natural),
+        options.phase if options.phase is not None else _scene_phase(scene),
+        options.clock_drifts,
+    )
+    stops = scene.get("stop", [])
+    stop = stops[0] if isinstance(stops, list) and len(stops) == 1 else {}
+    position = options.stop if options.stop is not None else stop.get("position")
+    known = Known(
+        damping_ratio=options.damping_ratio,
+        natural_frequency=natural,
+        stop_position=None if position is None else float(position),
+        # A simulated body rests at 0; an instrument may read anything there.
+        offset=0.0 if options.offset is None and scene else options.offset,
+        # An option about another stop leaves the side to the signal.
+        side=str(stop.get("side", "upper")) if stop and options.stop is None else None,
+    )
+    return forcing if frequency > 0.0 else None, known
+
+
+def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> float:
+    if options.forcing_frequency is not None and options.angular_frequency is not None:
+        raise UsageError(
+            "--forcing-frequency: expected it without --angular-frequency, got both. Leave one out."
+        )
+    table = scene.get("forcing", {})
+    given = options.forcing_frequency is not None or options.angular_frequency is not None
+    if not given and "body" in scene and table.get("amplitude", 0.0) == 0.0:
+        return 0.0
+    for value, factor in (
+        (options.angular_frequency, 1.0),
+        (options.forcing_frequency, 2.0 * math.pi),
+        (table.get("angular_frequency"), 1.0),
+        (table.get("frequency"), 2.0 * math.pi),
+    ):
+        if value is not None:
+            return float(value) * factor
+    raise UsageError(
+        "--kind impacts: expected the frequency of the force, got none. Give --forcing-frequency (Hz; 0 for bounces "
+        "without a force that oscillates) or --angular-frequency (rad/s)."
+    )
+
+
+def _scene_phase(scene: Mapping[str, Any]) -> float | None:
+    if "forcing" not in scene:
+        return None
+    # relative to a base that accelerates forward, the body is pushed backward
+    turned = math.pi if scene["forcing"].get("kind") == "base_acceleration" else 0.0
+    return float(scene["forcing"].get("phase", 0.0)) + turned
+
+
+def _static_deflection(
+    scene: Mapping[str, Any], options: ImpactOptions, natural: float | None
+) -> float | None:
+    if options.static_deflection is not None:
+        return options.static_deflection
+    if options.amplitude is not None:
+        if options.mass is None or natural is None:
+            raise UsageError(
+                "--amplitude: expected --mass and --natural-frequency with it, got not both. "
+                "Give them, or --static-deflection."
+            )
+        return options.amplitude / (options.mass * natural**2)
+    forcing, body = scene.get("forcing", {}), scene.get("body", {})
+    per_amplitude = {"force": 1.0, "base_acceleration": body.get("mass")}.get(forcing.get("kind", "force"))
+    numbers = (forcing.get("amplitude"), per_amplitude, body.get("stiffness"))
+    if not all(isinstance(number, int | float) for number in numbers) or not body["stiffness"] > 0:
+        return None
+    return float(forcing["amplitude"] * per_amplitude / body["stiffness"])
+
+
+def cut(channel: Channel, start: float | None, stop: float | None) -> Channel:
+    """Return the part of a channel from start to stop (s); clocks stay as they are.
+
+    Raises
+    ------
+    UsageError
+        Nothing is left.
+    """
+    if start is None and stop is None:
+        return channel
+    low = -math.inf if start is None else start
+    high = math.inf if stop is None else stop
+    part = channel.between(low, high)
+    if not len(part.time):
+        raise UsageError(
+            f"{channel.name}: expected samples from {low:g} to {high:g} s, got none; the channel runs from "
+            f"{channel.time[0]:g} to {channel.time[-1]:g} s. Widen --from and --to."
+        )
+    return part

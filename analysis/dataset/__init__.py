@@ -1,0 +1,67 @@
+"""The door to the dataset: its schema, its writers and its readers.
+
+`schema` holds the table of names, dimensions, units and meanings, `checking` the check against it; `writing`
+builds and writes; `merging` joins parts; `reading` opens; `accessor` adds `ds.vibroimpact`. Everything public
+is importable from here.
+"""
+
+from __future__ import annotations
+
+from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor
+from vibroimpact.analysis.dataset.checking import check, marked
+from vibroimpact.analysis.dataset.merging import merge_datasets, refuse_unlike, take_runs
+from vibroimpact.analysis.dataset.reading import Part, open_dataset, open_measured, read_flat, read_part
+from vibroimpact.analysis.dataset.schema import (
+    CONVENTIONS,
+    EVENT_COLUMNS,
+    IMPACT_COLUMNS,
+    PERIOD_COLUMNS,
+    RESERVED_NAMES,
+    RULES,
+    STICK_COLUMNS,
+    Direction,
+    Outcome,
+    RunRecord,
+    UnitSystem,
+    VariableRule,
+    constant_names,
+    file_name_of,
+    file_names,
+    swept_names,
+)
+from vibroimpact.analysis.dataset.writing import build_dataset, with_constants, write_dataset
+from vibroimpact.analysis.files.opening import unreadable
+
+__all__ = [
+    "CONVENTIONS",
+    "EVENT_COLUMNS",
+    "IMPACT_COLUMNS",
+    "PERIOD_COLUMNS",
+    "RESERVED_NAMES",
+    "RULES",
+    "STICK_COLUMNS",
+    "Direction",
+    "Outcome",
+    "Part",
+    "RunRecord",
+    "UnitSystem",
+    "VariableRule",
+    "VibroimpactAccessor",
+    "build_dataset",
+    "check",
+    "constant_names",
+    "file_name_of",
+    "file_names",
+    "marked",
+    "merge_datasets",
+    "open_dataset",
+    "open_measured",
+    "read_flat",
+    "read_part",
+    "refuse_unlike",
+    "swept_names",
+    "take_runs",
+    "unreadable",
+    "with_constants",
+    "write_dataset",
+]

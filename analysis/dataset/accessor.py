@@ -1,0 +1,205 @@
+"""`ds.vibroimpact`: the impacts, sticks, samples and events of one run, under the dataset's coordinates."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset.schema import RAGGED, Direction, names_list
+from vibroimpact.fmus.errors import DatasetError
+
+_RECORD_KEYS = {
+    "impact": "impacts = true",
+    "stick": "impacts = true",
+    "sample": "time_series (in a scene of components, variables and rate)",
+    "event": "events = true",
+}
+
+
+# Of a parameter with one value only, how far another may be from it and still mean it.
+_SAME = 1e-6
+
+
+@xr.register_dataset_accessor("vibroimpact")
+class VibroimpactAccessor:
+    """What an opened dataset can be asked about its runs.
+
+    Examples
+    --------
+    >>> ds.vibroimpact.impacts(direction="up", angular_frequency=0.9)     # doctest: +SKIP
+    """
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        self._dataset = dataset
+
+    @property
+    def runs(self) -> xr.Dataset:
+        """The per-run variables along one dimension `run`, in file order, with the sweep as coordinates."""
+        dataset = self._dataset
+        run_id = _run_id(dataset)
+        kept = dataset.drop_vars([name for name, v in dataset.variables.items() if set(v.dims) & set(RAGGED)])
+        if run_id.dims == ("run",):
+            return kept
+        flat = kept.stack(run=run_id.dims, create_index=False) if run_id.dims else kept.expand_dims("run")
+        flat = flat.isel(run=flat["run_id"].values >= 0)
+        flat = flat.isel(run=np.argsort(flat["run_id"].values))
+        return flat.transpose("run", ...)
+
+    def impacts(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
+        """Return the impacts of one run along `impact`.
+
+        Parameters
+        ----------
+        exact : bool
+            Demand the very value of each swept parameter instead of the nearest, which is at most half a step away.
+        **selection
+            Values of coordinates (`direction="up"`, `angular_frequency=0.9`), or `run_id=`; what is not
+            given must be the same for all runs that are left.
+
+        Raises
+        ------
+        DatasetError
+            If impacts were not recorded, a name is unknown, a value lies beyond those computed, or the selection is
+            not one run.
+        """
+        return self._rows("impact", exact, selection)
+
+    def sticks(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
+        """Return the sticking phases of one run along `stick`; parameters as for `impacts`."""
+        return self._rows("stick", exact, selection)
+
+    def samples(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
+        """Return the time series of one run along `time`, s; parameters as for `impacts`.
+
+        Examples
+        --------
+        >>> samples = ds.vibroimpact.samples(angular_frequency=0.9)            # doctest: +SKIP
+        >>> samples.displacement.sel(time=slice(1.0, 2.0)).plot()              # doctest: +SKIP
+        """
+        return self._rows("sample", exact, selection).swap_dims(sample="time")
+
+    def events(self, *, exact: bool = False, **selection: Any) -> xr.Dataset:
+        """Return the events of one run along `event`; parameters as for `impacts`.
+
+        The attribute `flag_meanings` of `event_component` names the components 1, 2, ...
+        """
+        return self._rows("event", exact, selection)
+
+    def _rows(self, dimension: str, exact: bool, selection: dict[str, Any]) -> xr.Dataset:
+        """Return the rows of one run of a ragged array, with the run's coordinates as scalars."""
+        dataset = self._dataset
+        if dimension not in dataset.dims:
+            raise DatasetError(
+                f"{dimension}s: expected them in the dataset, got none recorded. "
+                f"Set {_RECORD_KEYS[dimension]} under [record] in the scene and run it again."
+            )
+        number, point = _the_run(dataset, exact, selection)
+        rows = np.flatnonzero(_owners(dataset, dimension) == number)
+        names = [
+            name
+            for name, v in dataset.variables.items()
+            if v.dims == (dimension,) and name != f"{dimension}_run"
+        ]
+        found = dataset[names].drop_vars([c for c in dataset[names].coords if c not in names])
+        return found.isel({dimension: rows}).assign_coords(point)
+
+
+def _run_id(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the run_id of each point; in a dataset that is still one-dimensional the runs are in order."""
+    if "run_id" in dataset.variables:
+        return dataset["run_id"]
+    return xr.DataArray(np.arange(dataset.sizes["run"], dtype=np.int32), dims="run")
+
+
+def _owners(dataset: xr.Dataset, dimension: str) -> NDArray[Any]:
+    """Return the run_id of each row of a ragged array."""
+    if f"{dimension}_run" in dataset.variables:
+        return np.asarray(dataset[f"{dimension}_run"].values)
+    return np.repeat(np.arange(dataset.sizes["run"]), dataset[RAGGED[dimension]].values)
+
+
+def _the_run(dataset: xr.Dataset, exact: bool, selection: dict[str, Any]) -> tuple[int, dict[str, Any]]:
+    """Return the run_id of the one run that a selection names, and its coordinates."""
+    run_id = _run_id(dataset)
+    columns = _coordinates(dataset, run_id)
+    unknown = [name for name in selection if name not in columns]
+    if unknown:
+        raise DatasetError(
+            f"selection: expected names among {names_list(sorted(columns))}, got {names_list(unknown)}."
+        )
+    left = run_id.values.ravel() >= 0
+    for name, value in selection.items():
+        left &= _matches(name, columns[name], left, value, exact)
+    found = np.flatnonzero(left)
+    if found.size != 1:
+        raise DatasetError(_not_one(columns, found, selection))
+    point = {name: values[found[0]] for name, values in columns.items() if name != "run_id"}
+    return int(run_id.values.ravel()[found[0]]), point
+
+
+def _coordinates(dataset: xr.Dataset, run_id: xr.DataArray) -> dict[str, NDArray[Any]]:
+    """Return each coordinate of the runs as one flat column."""
+    columns = {"run_id": run_id.values.reshape(-1)}
+    for name, coordinate in dataset.coords.items():
+        if name not in ("run", "period", "connection", "compared") and set(coordinate.dims) <= set(
+            run_id.dims
+        ):
+            values = np.broadcast_to(
+                xr.broadcast(coordinate, run_id)[0].transpose(*run_id.dims).values, run_id.shape
+            )
+            columns[str(name)] = values.reshape(-1)  # no copy of what is the same for all runs
+    if "direction" in columns and columns["direction"].dtype.kind == "i":
+        columns["direction"] = np.array([member.name for member in Direction])[columns["direction"]]
+    return columns
+
+
+def _matches(
+    name: str, values: NDArray[Any], left: NDArray[np.bool_], value: Any, exact: bool
+) -> NDArray[np.bool_]:
+    """Return which runs have this value, or the nearest there is among those left."""
+    if values.dtype.kind == "f" and not exact and left.any():
+        if not np.isfinite(value):
+            raise DatasetError(f"selection: {name}: expected a number, got {value}.")
+        there = np.unique(values[left])
+        nearest = there[np.argmin(np.abs(there - value))]
+        if not abs(value - nearest) <= _room_beyond(there, value):
+            raise DatasetError(
+                f"selection: {name}: expected {_span(there)}, got {value:g}. "
+                "Give a value that was computed, or near one."
+            )
+        value = nearest
+    return np.asarray(values == value)
+
+
+def _room_beyond(there: NDArray[Any], value: float) -> float:
+    """Return how far a value may be from the nearest of those there: half a step, beyond the ends too."""
+    if there.size == 1:
+        return float(_SAME * abs(there[0]))
+    if there[0] <= value <= there[-1]:
+        return math.inf
+    return float(0.5 * (there[1] - there[0] if value < there[0] else there[-1] - there[-2]))
+
+
+def _span(there: NDArray[Any]) -> str:
+    """Return what there is to choose from, in words."""
+    if there.size == 1:
+        return f"{there[0]:g}, the only value there is"
+    return f"a value of {there[0]:g} to {there[-1]:g}"
+
+
+def _not_one(columns: dict[str, NDArray[Any]], found: NDArray[np.intp], selection: dict[str, Any]) -> str:
+    """Return the message for a selection that names no run or several."""
+    given = names_list([f"{name}={value!r}" for name, value in selection.items()])
+    if found.size == 0:
+        return f"selection: expected one run, got none for {given}. Leave out exact=True to take the nearest."
+    several = [
+        n for n, v in columns.items() if n not in ("run_id", "run_index") and np.unique(v[found]).size > 1
+    ]
+    return (
+        f"selection: expected one run, got {found.size} for {given}. "
+        f"Give a value for {names_list(several or ['run_id'])} too."
+    )

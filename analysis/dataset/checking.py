@@ -1,0 +1,261 @@
+"""The check of a dataset against the schema; every writer calls it before it writes.
+
+Two kinds of problems: the file would be no dataset (a variable is missing, counts do not sum), which is refused;
+and the values of a run cannot be right (a speed of approach below 0), which marks that run and keeps all others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, get_args
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset.schema import (
+    CONVENTIONS,
+    EVENT_COLUMNS,
+    NEEDED_IMPACT_COLUMNS,
+    RAGGED,
+    RULES,
+    RUN_COLUMNS,
+    SCORE_COLUMNS,
+    STICK_COLUMNS,
+    Direction,
+    Outcome,
+    UnitSystem,
+    constant_names,
+    swept_names,
+)
+from vibroimpact.fmus.errors import DatasetError
+
+
+def check(dataset: xr.Dataset) -> None:
+    """Check a one-dimensional dataset against the schema.
+
+    A run with the outcome error promises nothing of its values: they are not looked at.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A dataset along `run`, as `build_dataset` makes it.
+
+    Raises
+    ------
+    DatasetError
+        With all problems, one on each line.
+    """
+    problems = _problems(dataset)
+    if not problems:
+        index = dataset.variables["run_index"].values
+        problems = [f"run {index[run]}: {problem}" for run, problem in _run_problems(dataset)]
+    if problems:
+        raise _refusal(problems)
+
+
+def marked(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset in which each run whose values fail the check has the outcome error, and says why.
+
+    Nothing that was computed is taken away: the values of a marked run stay as they are.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        A dataset along `run`; it is not changed.
+
+    Raises
+    ------
+    DatasetError
+        Names, dimensions, types or counts are wrong, so that no run can be told from another.
+    """
+    problems = _problems(dataset)
+    if problems:
+        raise _refusal(problems)
+    outcome, message = dataset.variables["outcome"].copy(), dataset.variables["message"].copy()
+    bad = list(_run_problems(dataset))
+    for run, problem in bad:
+        outcome.values[run] = Outcome.error
+        message.values[run] = "; ".join(text for text in (message.values[run], f"check: {problem}") if text)
+    return dataset.assign(outcome=outcome, message=message) if bad else dataset
+
+
+def _refusal(problems: list[str]) -> DatasetError:
+    return DatasetError("\n".join(f"dataset: {problem}" for problem in problems))
+
+
+def _problems(dataset: xr.Dataset) -> list[str]:
+    """Return why this is no dataset at all."""
+    # The contents mean nothing while a variable is missing or has another shape.
+    return structure_problems(dataset) or _content_problems(dataset)
+
+
+def structure_problems(dataset: xr.Dataset) -> list[str]:
+    """Return what is wrong with names, dimensions, types and attributes."""
+    problems = [f"{name}: expected this variable, got none." for name in _missing_names(dataset)]
+    if dataset.attrs.get("Conventions") != CONVENTIONS:
+        problems.append(f"Conventions: expected {CONVENTIONS!r}, got {dataset.attrs.get('Conventions')!r}.")
+    if dataset.attrs.get("units_system") not in get_args(UnitSystem):
+        problems.append(
+            f"units_system: expected {' or '.join(get_args(UnitSystem))}, "
+            f"got {dataset.attrs.get('units_system')!r}."
+        )
+    for name, variable in dataset.variables.items():
+        problems += _variable_problems(str(name), variable)
+    return problems
+
+
+# What a scene asks for together is stored together.
+_GROUPS = (
+    ("displacement_max", "displacement_min"),
+    ("strobe_displacement", "strobe_velocity"),
+    ("impact_count", *NEEDED_IMPACT_COLUMNS),
+    ("stick_count", *STICK_COLUMNS),
+    ("event_count", *EVENT_COLUMNS),
+    ("connection", "energy_residual"),
+    ("compared", *SCORE_COLUMNS),
+)
+
+
+def _missing_names(dataset: xr.Dataset) -> list[str]:
+    """Return the names that must be there: those of every run, and each recorded group as a whole."""
+    present = set(map(str, dataset.variables))
+    required = set(RUN_COLUMNS)
+    for group in _GROUPS:
+        if present.intersection(group):
+            required.update(group)
+    if "sample" in dataset.dims or "sample_count" in present:
+        required.update(("sample_count", "time"))
+    return sorted(required - present)
+
+
+def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
+    """Return what is wrong with one variable."""
+    rule = RULES.get(name)
+    problems = []
+    if rule is None:
+        if variable.dims not in ((), ("run",), ("sample",)):
+            problems.append(f"{name}: expected dimensions of a parameter or a sample, got {variable.dims}.")
+        if variable.dtype != np.float64:
+            problems.append(f"{name}: expected float64, got {variable.dtype}.")
+    else:
+        if variable.dims != rule.dims:
+            problems.append(f"{name}: expected dimensions {rule.dims}, got {variable.dims}.")
+        # text is object where it was built, and of some length where it was read
+        is_text = np.dtype(rule.dtype).kind == "O" and variable.dtype.kind in "OUT"
+        if variable.dtype != rule.dtype and not is_text:
+            problems.append(f"{name}: expected {np.dtype(rule.dtype)}, got {variable.dtype}.")
+    wanted = ["long_name", "units"]
+    if name == "event_component":
+        # The meanings of the other flags are in the schema; these are the scene's components.
+        wanted += ["flag_meanings"]
+    return problems + [
+        f"{name}: expected the attribute {key}, got none." for key in wanted if not variable.attrs.get(key)
+    ]
+
+
+def _content_problems(dataset: xr.Dataset) -> list[str]:
+    """Return what is wrong with the values that tell runs, rows and components apart."""
+    problems = []
+    for name, kind in (("outcome", Outcome), ("direction", Direction)):
+        values = dataset.variables[name].values
+        if values.size and (values.min() < 0 or values.max() >= len(kind)):
+            problems.append(f"{name}: expected 0 to {len(kind) - 1}, got {values.min()} to {values.max()}.")
+    index = dataset.variables["run_index"].values
+    if np.unique(index).size != index.size or (index.size and index.min() < 0):
+        problems.append(
+            "run_index: expected each index once and none below 0, got a repeated or negative index."
+        )
+    for name in (*swept_names(dataset), *constant_names(dataset)):
+        if not np.isfinite(dataset.variables[name].values).all():
+            problems.append(f"{name}: expected finite values of a parameter, got NaN or infinity.")
+    for dimension, count_name in RAGGED.items():
+        if count_name in dataset.variables:
+            count = dataset.variables[count_name].values
+            rows = dataset.sizes[dimension]
+            if (count < 0).any() or int(count.sum(dtype=np.int64)) != rows:
+                problems.append(
+                    f"{count_name}: expected counts that sum to the {rows} rows of {dimension}, got {count.sum()}."
+                )
+    return problems + _label_problems(dataset)
+
+
+def _label_problems(dataset: xr.Dataset) -> list[str]:
+    """Return what is wrong with the names of components and connections."""
+    problems = []
+    if "event" in dataset.dims:
+        component = dataset.variables["event_component"]
+        count = len(component.attrs["flag_meanings"].split())
+        # NetCDF gives an attribute of one element back as a number.
+        values = np.atleast_1d(component.attrs.get("flag_values", []))
+        if not np.array_equal(values, np.arange(1, count + 1)):
+            problems.append(
+                f"event_component: expected flag_values 1 to {count}, one for each of flag_meanings."
+            )
+    if "connection" in dataset.variables:
+        names = dataset.variables["connection"].values
+        if len(set(names)) != names.size:
+            problems.append("connection: expected each connection once, got one twice.")
+    return problems
+
+
+_Flags = NDArray[np.bool_]
+_CLOCKS = {"impact": "impact_time", "stick": "stick_start", "sample": "time", "event": "event_time"}
+
+
+def _run_problems(dataset: xr.Dataset) -> Iterator[tuple[int, str]]:
+    """Yield each run whose values cannot be right, by its place, with the first value that is not."""
+    failed = dataset.variables["outcome"].values == Outcome.error
+    for dimension, count_name in RAGGED.items():
+        if count_name in dataset.variables:
+            count = dataset.variables[count_name].values.astype(np.int64)
+            owner = np.repeat(np.arange(count.size), count)
+            first = np.cumsum(count) - count
+            for name, expected, bad in _row_checks(dataset, dimension, owner):
+                rows = np.flatnonzero(bad & ~failed[owner])
+                _, places = np.unique(owner[rows], return_index=True)
+                values = dataset.variables[name].values
+                for row in rows[places]:
+                    run = int(owner[row])
+                    where = f"of {dimension} {row - first[run] + 1}"
+                    yield run, f"{name}: expected {expected}, got {values[row]} {where}."
+    if "loop_residual" in dataset.variables:
+        residual = dataset.variables["loop_residual"].values
+        for run in np.flatnonzero((residual < 0) & ~failed).tolist():
+            yield run, f"loop_residual: expected a residual >= 0 or NaN, got {residual[run]}."
+
+
+def _row_checks(
+    dataset: xr.Dataset, dimension: str, owner: NDArray[np.int64]
+) -> Iterator[tuple[str, str, _Flags]]:
+    """Yield the variables of a ragged dimension: name, what its values must be, and which rows are not."""
+    clock = _CLOCKS[dimension]
+    time = dataset.variables[clock].values
+    yield clock, "finite times", ~np.isfinite(time)
+    backwards = np.zeros(time.size, dtype=np.bool_)
+    # The first row of a run may be earlier than the last row of the run before it.
+    backwards[1:] = (np.diff(time) < 0) & (np.diff(owner) == 0)
+    yield clock, "times that do not decrease in a run", backwards
+
+    def value(name: str) -> NDArray[Any]:
+        values: NDArray[Any] = dataset.variables[name].values
+        return values
+
+    if dimension == "impact":
+        phase = value("impact_phase")
+        yield "impact_phase", "0 <= phase < 2 pi rad or NaN", (phase < 0) | (phase >= 2 * np.pi)
+        yield "impact_velocity", "a speed of approach >= 0", ~(value("impact_velocity") >= 0)
+        for name in ("impact_restitution", "impact_duration"):
+            if name in dataset.variables:
+                yield name, "a number >= 0 or NaN", value(name) < 0
+    if dimension in ("impact", "stick"):
+        name = f"{dimension}_contact"
+        yield name, "stops numbered from 1", value(name) < 1
+    if dimension == "stick":
+        yield "stick_end", "an end that is not before its start", value("stick_end") < time
+    if dimension == "event":
+        yield "event_index", "events at the same time numbered from 0", value("event_index") < 0
+        component = dataset.variables["event_component"]
+        count = len(component.attrs["flag_meanings"].split())
+        outside = (component.values < 1) | (component.values > count)
+        yield "event_component", f"components numbered 1 to {count}", outside

@@ -1,0 +1,153 @@
+"""The files that a command is to write: looked at before it reads and computes, and named where writing fails."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.fmus.errors import UsageError
+
+FIGURE_ENDINGS = (".png", ".pdf", ".svg")
+DATASET_ENDING = ".nc"
+FILE_ENDINGS = (
+    DATASET_ENDING,
+    *FIGURE_ENDINGS,
+    ".csv",
+    ".txt",
+    ".h5",
+    ".hdf5",
+    ".mat",
+    ".json",
+    ".toml",
+    ".fmu",
+)
+"""Endings that no folder is given on purpose."""
+FORCE_HELP = "Overwrite a file that holds something else; the same command may be repeated without."
+LONGEST_NAME = 200
+"""Bytes: most file systems take 255, and what is half-written has a longer name."""
+
+
+def refuse_outputs(
+    read: Iterable[Path], output: Path | None, figure: Path | None = None, *, ending: str = DATASET_ENDING
+) -> None:
+    """Refuse outputs that would overwrite what is read, have no folder, or whose ending is another kind's.
+
+    Parameters
+    ----------
+    read : iterable of Path
+        Files that the command reads.
+    output, figure : Path or None
+        What it is to write.
+    ending : str
+        Of the output.
+
+    Raises
+    ------
+    UsageError
+        With the file and what to do.
+    """
+    files = list(read)
+    if output is not None and output == figure:
+        raise UsageError(
+            f"{output}: expected two files for dataset and figure, got one. Choose another name."
+        )
+    for target in (output, figure):
+        if target is None:
+            continue
+        if len(os.fsencode(target.name)) > LONGEST_NAME:
+            raise UsageError(
+                f"{target.name[:60]}...: expected a name of {LONGEST_NAME} bytes at most, "
+                f"got {len(os.fsencode(target.name))}."
+            )
+        if any(_same(target, file) for file in files):
+            raise UsageError(f"{target}: expected a new file, got one that is read. Choose another name.")
+        if target.is_dir():
+            raise UsageError(f"{target}: expected a place where a file can be written, got a folder.")
+        if not os.access(target.parent, os.W_OK | os.X_OK):
+            got = "one that cannot be written to" if target.parent.is_dir() else "no folder of that name"
+            raise UsageError(
+                f"{target}: expected a place where a file can be written, got {got}: {target.parent}."
+            )
+    if output is not None and output.suffix != ending:
+        got = output.suffix[:60] or "none"
+        raise UsageError(f"{output}: expected a name ending in {ending}, got {got!r}.")
+    if figure is not None and figure.suffix.lower() not in FIGURE_ENDINGS:
+        endings = ", ".join(FIGURE_ENDINGS)
+        got = figure.suffix[:60] or "none"
+        raise UsageError(f"{figure}: expected a name ending in {endings}, got {got!r}.")
+
+
+def refuse_folder(folder: Path) -> None:
+    """Refuse a name for a new folder that is that of a file.
+
+    Raises
+    ------
+    UsageError
+    """
+    if folder.suffix.lower() in FILE_ENDINGS and not folder.is_dir():
+        raise UsageError(
+            f"{folder}: expected the name of a folder, got that of a file ({folder.suffix}). Choose another with -o."
+        )
+
+
+def refuse_overwriting(
+    output: Path | None, force: bool, is_same: Callable[[Mapping[str, Any]], bool]
+) -> None:
+    """Refuse to overwrite a dataset that holds something else; a command may be repeated, and figures are drawn anew.
+
+    Parameters
+    ----------
+    output : Path or None
+    force : bool
+        Whether the user wants it all the same.
+    is_same : callable
+        Whether global attributes are those of what the command would write.
+
+    Raises
+    ------
+    UsageError
+        With the file and what to do.
+    """
+    # NetCDF takes time to load, and most outputs are new.
+    if output is None or force or not output.exists():
+        return
+    from vibroimpact.analysis.dataset.results import file_attributes
+
+    if is_same(file_attributes(output)):
+        return
+    raise UsageError(
+        f"{output}: expected a new file, or one that holds the same, got one that holds something else. "
+        "Choose another name, or overwrite it with --force."
+    )
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn what keeps a file from being written, such as a full disk, into an error with its name.
+
+    Raises
+    ------
+    UsageError
+        Of an OSError within.
+
+    Examples
+    --------
+    >>> with writing(Path("a.nc")):
+    ...     raise OSError(28, "No space left on device")
+    Traceback (most recent call last):
+    vibroimpact.fmus.errors.UsageError: a.nc: could not be written: No space left on device.
+    """
+    try:
+        yield
+    except OSError as problem:
+        raise UsageError(f"{path}: could not be written: {problem.strerror or problem}.") from problem
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return one.samefile(other)
+    except OSError:
+        return False

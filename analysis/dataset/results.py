@@ -1,0 +1,69 @@
+"""Write what an analysis found: small NetCDF-4 files (CF-1.11), whole or not there at all."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset.schema import CONVENTIONS
+from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.analysis.files.fingerprints import sealed
+from vibroimpact.analysis.files.opening import opened_netcdf
+from vibroimpact.fmus.errors import DatasetError
+
+RESULTS_SCHEMA = "1"
+
+
+def results_kind(path: str | os.PathLike[str]) -> str | None:
+    """Return what kind of analysis wrote a file; None for any other file, also one that cannot be read."""
+    kind = file_attributes(path).get("results_kind")
+    return None if kind is None else str(kind)
+
+
+def file_attributes(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the global attributes of a NetCDF file; none of a file that cannot be read."""
+    try:
+        with opened_netcdf(path) as file:
+            return {name: file.getncattr(name) for name in file.ncattrs()}
+    except DatasetError:
+        return {}
+
+
+def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: str) -> None:
+    """Write the dataset of an analysis.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Every variable with `units` and `long_name`; any dimensions.
+    path : path
+        An older file of this name is replaced only when the new one is complete.
+    kind : str
+        What it is (`spikes`, `estimates`, `replay`, ...), by which `vibroimpact plot` knows how to draw it.
+
+    Raises
+    ------
+    DatasetError
+        A variable has no unit or no name in words.
+    OSError
+        The file cannot be written, with the reason of the operating system.
+    """
+    problems = [
+        f"{kind}: {name}: expected the attribute {key}, got none."
+        for name, variable in dataset.variables.items()
+        for key in ("units", "long_name")
+        if not variable.attrs.get(key)
+    ]
+    if problems:
+        raise DatasetError("\n".join(problems))
+    identity = {"Conventions": CONVENTIONS, "results_schema": RESULTS_SCHEMA, "results_kind": kind}
+    described = dataset.assign_attrs(dataset.attrs | identity)
+    encoding: dict[Any, dict[str, Any]] = {
+        name: {"_FillValue": np.nan if name not in dataset.coords else None}
+        for name, variable in dataset.variables.items()
+        if variable.dtype.kind == "f"
+    }
+    write_atomically(path, *sealed(bytes(described.to_netcdf(engine="netcdf4", encoding=encoding))))

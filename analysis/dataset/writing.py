@@ -1,0 +1,449 @@
+"""Build datasets from runs, and write them so that a file is whole or not there at all."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import netCDF4
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset.checking import marked
+from vibroimpact.analysis.dataset.schema import (
+    CONVENTIONS,
+    EVENT_COLUMNS,
+    IMPACT_COLUMNS,
+    NOT_SWEPT,
+    PERIOD_COLUMNS,
+    RAGGED,
+    RESERVED_NAMES,
+    RULES,
+    SCHEMA_VERSION,
+    SCORE_COLUMNS,
+    STICK_COLUMNS,
+    Direction,
+    RunRecord,
+    UnitSystem,
+    attributes_of,
+    constant_names,
+    file_names,
+    known_unit,
+    names_list,
+    quantity_unit,
+    sample_rule,
+    swept_names,
+    unit_in,
+)
+from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.analysis.files.fingerprints import sealed
+from vibroimpact.fmus.errors import DatasetError
+
+_Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]
+
+
+def build_dataset(
+    runs: Sequence[RunRecord],
+    *,
+    coordinates: Mapping[str, NDArray[np.float64]],
+    direction: Sequence[Direction],
+    run_index: Sequence[int] | NDArray[np.integer[Any]],
+    sample_variables: Sequence[str] = (),
+    units: UnitSystem = "SI",
+    attrs: Mapping[str, Any] | None = None,
+    unit_of: Mapping[str, str] | None = None,
+    omit: Collection[str] = (),
+    event_components: Sequence[str] = (),
+    connections: Sequence[str] = (),
+    compared: Sequence[str] = (),
+) -> xr.Dataset:
+    """Build the one-dimensional dataset of some runs, as it is written to a file.
+
+    Parameters
+    ----------
+    runs : sequence of RunRecord
+        All with the same groups recorded; a failed run may have None where the others have arrays.
+    coordinates : mapping of str to ndarray, shape (run,)
+        Values of each swept parameter, under its name in the file.
+    direction : sequence of Direction, length run
+    run_index : ndarray of int, shape (run,)
+        Index of each run in its campaign.
+    sample_variables : sequence of str
+        Names of the sampled variables, columns 1 on of `RunRecord.samples`; `component.variable` in a
+        general scene. In the file they have the names that `file_names` gives.
+    units : {"SI", "nondimensional"}
+        Units of the scene.
+    attrs : mapping, optional
+        Provenance: scene text, versions, hashes; written as global attributes.
+    unit_of : mapping of str to str, optional
+        SI units of swept parameters or sampled variables whose name does not tell; a variable of one of
+        the `event_components` that is not here has the unit 1.
+    omit : collection of str
+        Per-period variables that the scene does not record; they are not stored.
+    event_components : sequence of str, optional
+        Names of all components of a general scene, in the order that `RunRecord.events` counts them.
+    connections : sequence of str, optional
+        Force-displacement connections, as "body.displacement -> other.force", in the order of
+        `RunRecord.energy_residual`. A run without residuals has NaN.
+    compared : sequence of str, optional
+        Compared pairs of a replay, in the order of `RunRecord.scores`. A run without scores has NaN.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions `run`, and `state`, `period`, `impact`, `stick`, `sample`, `event`, `interface` where recorded.
+        Not checked yet: `checking.check`.
+
+    Raises
+    ------
+    DatasetError
+        If the parts do not fit together.
+
+    Examples
+    --------
+    >>> from vibroimpact.analysis.dataset.schema import Outcome
+    >>> run = RunRecord(Outcome.ok, "", None, np.empty((0, 5)), None, None, 0.0, 0.0, 0.0, 1e-3)
+    >>> dataset = build_dataset([run], coordinates={}, direction=[Direction.independent], run_index=[0])
+    >>> dict(dataset.sizes)
+    {'run': 1, 'impact': 0}
+    """
+    _check_lengths(len(runs), coordinates, direction, run_index)
+    variables = _run_variables(runs, direction, run_index, units)
+    variables |= _state_variables(runs, units)
+    variables |= _period_variables(runs, units, omit)
+    variables |= _ragged_variables("impact", [run.impacts for run in runs], IMPACT_COLUMNS, units)
+    variables |= _ragged_variables("stick", [run.sticks for run in runs], STICK_COLUMNS, units)
+    samples = _Samples(sample_variables, event_components, frozenset(coordinates), unit_of or {}, units)
+    variables |= _sample_variables(runs, samples)
+    variables |= _event_variables(runs, event_components, units)
+    variables |= _coupling_variables(runs, connections, units)
+    variables |= _score_variables(runs, compared, units)
+    swept: _Variables = {
+        name: (
+            ("run",),
+            np.asarray(values, dtype=np.float64),
+            _quantity_attributes(name, units, unit_of or {}),
+        )
+        for name, values in coordinates.items()
+    }
+    described = {
+        "Conventions": CONVENTIONS,
+        "dataset_schema": SCHEMA_VERSION,
+        "units_system": units,
+        "history": "simulated by vibroimpact",
+    }
+    named: tuple[str, ...] = ("run_index", "direction")
+    named += (("connection",) if connections else ()) + (("compared",) if compared else ())
+    coords = {name: variables.pop(name) for name in named} | swept
+    return xr.Dataset(variables, coords=coords, attrs=described | dict(attrs or {}))
+
+
+def with_constants(
+    dataset: xr.Dataset, constants: Mapping[str, float], *, unit_of: Mapping[str, str] | None = None
+) -> xr.Dataset:
+    """Return a dataset with the numbers of its scene that are the same for all runs, as scalar coordinates.
+
+    They keep the datasets of two scenes apart when these are joined: `xr.concat([...], dim="restitution")`.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One-dimensional, as `build_dataset` and `merge_datasets` make it.
+    constants : mapping of str to float
+        By their names in the file; the dataset has nothing of such a name.
+    unit_of : mapping of str to str, optional
+        SI units of those whose name does not tell.
+
+    Raises
+    ------
+    DatasetError
+        If the unit of one is not known.
+    """
+    units = dataset.attrs["units_system"]
+    return dataset.assign_coords(
+        {
+            name: ((), np.float64(value), _quantity_attributes(name, units, unit_of or {}) | NOT_SWEPT)
+            for name, value in constants.items()
+        }
+    )
+
+
+def _check_lengths(
+    runs: int,
+    coordinates: Mapping[str, NDArray[np.float64]],
+    direction: Sequence[Direction],
+    run_index: Sequence[int] | NDArray[np.integer[Any]],
+) -> None:
+    """Refuse per-run arrays of different lengths, and swept parameters that would hide a variable."""
+    lengths = {"direction": len(direction), "run_index": len(run_index)}
+    lengths |= {name: len(values) for name, values in coordinates.items()}
+    problems = [
+        f"dataset: {name}: expected one value for each of {runs} runs, got {length}."
+        for name, length in lengths.items()
+        if length != runs
+    ]
+    problems += [
+        f"dataset: {name}: expected a swept parameter with a name of its own, got that of a variable."
+        for name in coordinates
+        if name in RESERVED_NAMES
+    ]
+    if problems:
+        raise DatasetError("\n".join(problems))
+
+
+def _run_variables(
+    runs: Sequence[RunRecord],
+    direction: Sequence[Direction],
+    run_index: Sequence[int] | NDArray[np.integer[Any]],
+    units: UnitSystem,
+) -> _Variables:
+    """Return the variables that every run has."""
+    message = np.empty(len(runs), dtype=object)
+    message[:] = [run.message for run in runs]
+    values: dict[str, NDArray[Any]] = {
+        "run_index": np.asarray(run_index, dtype=np.int32),
+        "direction": np.array(direction, dtype=np.int8),
+        "outcome": np.array([run.outcome for run in runs], dtype=np.int8),
+        "message": message,
+        "point_seconds": np.array([run.seconds for run in runs], dtype=np.float64),
+        "final_displacement": np.array([run.final_displacement for run in runs], dtype=np.float64),
+        "final_velocity": np.array([run.final_velocity for run in runs], dtype=np.float64),
+        "final_phase": np.array([run.final_phase for run in runs], dtype=np.float64),
+    }
+    return {name: (("run",), array, attributes_of(name, units)) for name, array in values.items()}
+
+
+def _state_variables(runs: Sequence[RunRecord], units: UnitSystem) -> _Variables:
+    """Return the whole state at the end of each run, where it is more than that of the observed point."""
+    states = [run.final_state for run in runs]
+    sizes = {state.size for state in states if state is not None}
+    if not sizes:
+        return {}
+    if len(sizes) > 1:
+        raise DatasetError(
+            f"dataset: final_state: expected states of one size, got {', '.join(map(str, sorted(sizes)))}."
+        )
+    missing = np.full(sizes.pop(), np.nan)
+    values = np.array([missing if state is None else state for state in states], dtype=np.float64)
+    return {"final_state": (("run", "state"), values, attributes_of("final_state", units))}
+
+
+def _period_variables(runs: Sequence[RunRecord], units: UnitSystem, omit: Collection[str]) -> _Variables:
+    """Return the per-period variables; a run that recorded fewer periods than the others ends in NaN."""
+    tables = [run.periods for run in runs]
+    if all(table is None for table in tables):
+        return {}
+    length = max(len(table) for table in tables if table is not None)
+    values = np.full((len(runs), length, len(PERIOD_COLUMNS)), np.nan)
+    for row, table in enumerate(tables):
+        if table is not None:
+            values[row, : len(table)] = table
+    return {
+        name: (("run", "period"), np.ascontiguousarray(values[:, :, column]), attributes_of(name, units))
+        for column, name in enumerate(PERIOD_COLUMNS)
+        if name not in omit
+    }
+
+
+def _ragged_variables(
+    dimension: str, tables: Sequence[NDArray[np.float64] | None], columns: Sequence[str], units: UnitSystem
+) -> _Variables:
+    """Return a contiguous ragged array (CF-1.11 section 9.3.3): the count of each run, then all rows."""
+    if all(table is None for table in tables):
+        return {}
+    count = np.array([0 if table is None else len(table) for table in tables], dtype=np.int32)
+    rows = np.concatenate([_with_columns(table, len(columns)) for table in tables if table is not None])
+    variables: _Variables = {RAGGED[dimension]: (("run",), count, attributes_of(RAGGED[dimension], units))}
+    for column, name in enumerate(columns):
+        values = rows[:, column].astype(RULES[name].dtype)
+        variables[name] = ((dimension,), values, attributes_of(name, units))
+    return variables
+
+
+@dataclass(frozen=True, slots=True)
+class _Samples:
+    """What is known of the sampled variables beside their values."""
+
+    names: Sequence[str]
+    components: Collection[str]
+    swept: Collection[str]
+    unit_of: Mapping[str, str]
+    units: UnitSystem
+
+    def attributes(self, name: str, stored: str) -> dict[str, Any]:
+        """Return the attributes of a variable that is stored under another name than its component's."""
+        rule = None if self.components or stored == name else sample_rule(stored)
+        if rule is not None:
+            return {"long_name": rule.long_name, "units": unit_in(self.units, rule.unit)}
+        unit = self.unit_of.get(name) or self.unit_of.get(stored)
+        owner, dot, _ = name.partition(".")
+        if not unit and (owner in self.components or (dot and known_unit(stored) is None)):
+            # What other people's FMUs say of their units is all that is known: names would only mislead.
+            unit = "1"
+        attributes = _quantity_attributes(stored, self.units, {stored: unit} if unit else {})
+        return attributes if stored == name else attributes | {"long_name": name, "component_variable": name}
+
+
+def _sample_variables(runs: Sequence[RunRecord], known: _Samples) -> _Variables:
+    """Return the time series: `time` and the sampled variables."""
+    tables = [run.samples for run in runs]
+    variables = _ragged_variables("sample", tables, ("time",), known.units)
+    if not variables:
+        return {}
+    rows = np.concatenate([table for table in tables if table is not None])
+    if rows.shape[1] != 1 + len(known.names):
+        raise DatasetError(
+            f"dataset: samples: expected time and {len(known.names)} variables ({names_list(known.names)}), "
+            f"got {rows.shape[1]} columns."
+        )
+    stored_names = file_names(known.names, RESERVED_NAMES | set(known.swept))
+    for column, (name, stored) in enumerate(zip(known.names, stored_names, strict=True), start=1):
+        values = np.ascontiguousarray(rows[:, column])
+        variables[stored] = (("sample",), values, known.attributes(name, stored))
+    return variables
+
+
+def _with_columns(table: NDArray[np.float64], number: int) -> NDArray[np.float64]:
+    """Return a table with so many columns; those that its run does not know are NaN."""
+    known = table[:, :number]
+    return np.hstack([known, np.full((len(known), number - known.shape[1]), np.nan)])
+
+
+def _event_variables(runs: Sequence[RunRecord], components: Sequence[str], units: UnitSystem) -> _Variables:
+    """Return the located events; the components are named by flags."""
+    variables = _ragged_variables("event", [run.events for run in runs], EVENT_COLUMNS, units)
+    if not variables:
+        return {}
+    if not components:
+        raise DatasetError(
+            "dataset: event_components: expected the names of the components that have the events, got none."
+        )
+    variables["event_component"][2].update(
+        flag_values=np.arange(1, len(components) + 1, dtype=RULES["event_component"].dtype),
+        flag_meanings=" ".join(file_names(components, ())),
+    )
+    return variables
+
+
+def _coupling_variables(
+    runs: Sequence[RunRecord], connections: Sequence[str], units: UnitSystem
+) -> _Variables:
+    """Return the residuals that the coupling of components left."""
+    variables: _Variables = {}
+    for run in runs:
+        if run.energy_residual is not None and len(run.energy_residual) != len(connections):
+            raise DatasetError(
+                f"dataset: energy_residual: expected one value for each of {len(connections)} connections "
+                f"({names_list(connections)}), got {len(run.energy_residual)}."
+            )
+    if connections:
+        missing = np.full(len(connections), np.nan)
+        rows = [missing if run.energy_residual is None else run.energy_residual for run in runs]
+        values = np.array(rows, dtype=np.float64).reshape(len(runs), len(connections))
+        names = np.array(connections, dtype=object)
+        # CF wants numbers in a variable with the name of its dimension, so the dimension has another one.
+        variables["connection"] = (("interface",), names, attributes_of("connection", units))
+        variables["energy_residual"] = (
+            ("run", "interface"),
+            values,
+            attributes_of("energy_residual", units),
+        )
+    if any(run.loop_residual is not None for run in runs):
+        loops = [np.nan if run.loop_residual is None else run.loop_residual for run in runs]
+        variables["loop_residual"] = (("run",), np.array(loops), attributes_of("loop_residual", units))
+    return variables
+
+
+def _score_variables(runs: Sequence[RunRecord], compared: Sequence[str], units: UnitSystem) -> _Variables:
+    """Return the scores of replays."""
+    if not compared:
+        return {}
+    missing = np.full((len(compared), len(SCORE_COLUMNS)), np.nan)
+    rows = [missing if run.scores is None else run.scores for run in runs]
+    values = np.array(rows, dtype=np.float64).reshape(len(runs), *missing.shape)
+    variables: _Variables = {
+        "compared": (("comparison",), np.array(compared, dtype=object), attributes_of("compared", units))
+    }
+    for column, name in enumerate(SCORE_COLUMNS):
+        variables[name] = (
+            ("run", "comparison"),
+            np.ascontiguousarray(values[:, :, column]),
+            attributes_of(name, units),
+        )
+    return variables
+
+
+def _quantity_attributes(name: str, units: UnitSystem, unit_of: Mapping[str, str]) -> dict[str, Any]:
+    """Return the attributes of a swept parameter or sampled variable."""
+    unit = unit_in(units, unit_of[name]) if name in unit_of else quantity_unit(name, units)
+    return {"long_name": name.replace("_", " "), "units": unit}
+
+
+def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compression: int = 0) -> None:
+    """Check a dataset and write it as one NetCDF-4 file that is whole or not there at all.
+
+    A run whose values fail the check is marked (`checking.marked`) and written with the others.
+
+    The SHA-256 of the content follows it, see `fingerprints`. The file is made in memory first and then
+    written in one go: the HDF5 library would keep a file open, and its space taken, after the disk was full.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        One-dimensional, as `build_dataset` and `merge_datasets` make it.
+    path : path
+        An older file of this name is replaced only when the new one is complete.
+    compression : int
+        zlib level from 0 (none) to 9.
+
+    Raises
+    ------
+    DatasetError
+        If names, dimensions, types or counts are not those of the schema.
+    OSError
+        If the file cannot be written (no space, no permission), with the reason of the operating system.
+    """
+    write_atomically(path, *sealed(_image(marked(dataset), compression)))
+
+
+def _image(dataset: xr.Dataset, compression: int) -> memoryview:
+    """Return the bytes of the NetCDF-4 file of a dataset."""
+    linked = " ".join(("run_index", "direction", *swept_names(dataset), *constant_names(dataset)))
+    file = netCDF4.Dataset("dataset.nc", "w", format="NETCDF4", memory=1)
+    # Every value is written below: filling first would write everything twice.
+    file.set_fill_off()
+    file.setncatts(dict(dataset.attrs))
+    for name, size in dataset.sizes.items():
+        file.createDimension(str(name), size)
+    for name, variable in dataset.variables.items():
+        is_data = variable.dims[:1] == ("run",) and name not in dataset.coords
+        labels = " connection" if "interface" in variable.dims else ""
+        labels += " compared" if "comparison" in variable.dims else ""
+        _store(file, str(name), variable, compression, linked + labels if is_data else None)
+    return memoryview(file.close())
+
+
+def _store(
+    file: netCDF4.Dataset, name: str, variable: xr.Variable, compression: int, linked: str | None
+) -> None:
+    """Store one variable with its attributes; floats mark what is missing by NaN."""
+    is_text = variable.dtype.kind == "O"
+    # CF forbids missing values in coordinates, so these have no fill value.
+    may_miss = variable.dtype.kind == "f" and (linked is not None or variable.dims[:1] not in ((), ("run",)))
+    kind: Any = str if is_text else variable.dtype
+    level: Any = compression
+    stored = file.createVariable(
+        name,
+        kind,
+        tuple(map(str, variable.dims)),
+        fill_value=np.nan if may_miss else None,
+        compression="zlib" if compression and not is_text else None,
+        complevel=level,
+        shuffle=True,
+    )
+    stored.setncatts(dict(variable.attrs) if linked is None else {**variable.attrs, "coordinates": linked})
+    if variable.size:
+        stored[...] = variable.values

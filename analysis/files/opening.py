@@ -1,0 +1,66 @@
+"""The one door through which this package reads NetCDF files: checked first, and every damage is one DatasetError."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import netCDF4
+
+from vibroimpact.analysis.files.probing import UnsoundFileError, check_sound, refuse_changed
+from vibroimpact.fmus.errors import DatasetError
+
+DAMAGE = (
+    *(
+        OSError,
+        RuntimeError,
+        ValueError,
+        AttributeError,
+        LookupError,
+        TypeError,
+        MemoryError,
+        ArithmeticError,
+    ),
+    UnsoundFileError,
+)
+"""What damaged bytes lead the libraries to; a text that is not UTF-8 is a ValueError."""
+
+
+@contextmanager
+def one_error(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Make one DatasetError, which names the file, of whatever reading damaged contents leads to."""
+    try:
+        yield
+    except DAMAGE as problem:
+        raise unreadable(path, problem) from problem
+
+
+@contextmanager
+def opened_netcdf(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
+    """Open a file with the NetCDF library, once it is known to be sound; values come as they are stored.
+
+    Raises
+    ------
+    DatasetError
+        The file is missing or damaged, also where that shows only while it is read.
+    """
+    with one_error(path):
+        state = check_sound(path)
+        with netCDF4.Dataset(os.path.abspath(path), "r") as file:
+            refuse_changed(path, state)
+            file.set_auto_maskandscale(False)
+            yield file
+
+
+def unreadable(path: str | os.PathLike[str], problem: Exception) -> DatasetError:
+    """Return the error for a file that is missing or damaged."""
+    if isinstance(problem, FileNotFoundError):
+        return DatasetError(f"{os.fspath(path)}: expected a dataset file, got no such file.")
+    said = str(problem)
+    if not isinstance(problem, OSError | RuntimeError | UnsoundFileError):
+        said = f"contents that do not fit together ({type(problem).__name__}: {said[:200]})"
+    return DatasetError(
+        f"{os.fspath(path)}: expected a readable NetCDF dataset, got {said}. "
+        "The file is damaged or of another kind; write it again."
+    )

@@ -1,0 +1,233 @@
+"""Recordings: measured or simulated signals, as importers write them and analyses read them.
+
+A recording holds channels (sampled on one of its time axes), event trains (instants only) and single values. It is one
+NetCDF file (CF-1.11) of its own schema, beside that of runs; `docs/recordings.md` says the same in words.
+
+`open_signals` gives the same object for a recording, for the time series of a simulated run, and for a replay, so
+that one analysis serves all three.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import IntFlag
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.recording.units import measured_unit
+from vibroimpact.fmus.errors import DatasetError
+
+RECORDING_SCHEMA = "1"
+
+Floats = NDArray[np.float64]
+T = TypeVar("T")
+
+
+class Quality(IntFlag):
+    """What is wrong with a sample; 0 is a good one."""
+
+    clipped = 1
+    """At the limit of the measuring chain: the true value is beyond it."""
+    missing = 2
+    """No sample was taken here, or it is NaN in the file; its value is NaN."""
+    overrange = 4
+    """The file has a marker of overrange or of an open input; its value is NaN."""
+    suspect = 8
+    """Kept as it is, but its time was doubtful: repeated, or out of order."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimeAxis:
+    """Instants that some channels share.
+
+    Attributes
+    ----------
+    time : ndarray of float, shape (sample,)
+        s, ascending strictly.
+    interval : float or None
+        Sampling interval, s; None where the samples are not evenly spaced.
+    interval_uncertainty : float
+        Relative uncertainty of the interval, and so of every frequency: 0 where the file is of one mind,
+        half the relative spread or more where it contradicts itself.
+    source : str
+        Where the instants come from, in words; and what contradicts them.
+    trigger : str
+        Which trigger began it: axes of different triggers are shifted by an unknown lag.
+    """
+
+    time: Floats
+    interval: float | None
+    interval_uncertainty: float = 0.0
+    source: str = ""
+    trigger: str = ""
+
+    @property
+    def rate(self) -> float:
+        """Samples per second; the mean rate where they are not evenly spaced."""
+        if self.interval is not None:
+            return 1.0 / self.interval
+        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """A sampled signal.
+
+    Attributes
+    ----------
+    name : str
+        Its name here and in the file of the recording: letters, digits, underscores.
+    values : ndarray of float, shape (sample,)
+        In `unit`; NaN where there is none.
+    unit : str
+        CF unit, see `units.MeasuredUnit.cf`.
+    axis : TimeAxis
+    quality : ndarray of uint8, shape (sample,)
+        Sums of `Quality`.
+    label : str
+        What the source calls it.
+    attrs : dict
+        What else is known: `role` (measured, simulated, residual), `sensitivity`, `scale`, `offset`, ...
+    """
+
+    name: str
+    values: Floats
+    unit: str
+    axis: TimeAxis
+    quality: NDArray[np.uint8]
+    label: str = ""
+    attrs: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def time(self) -> Floats:
+        """Instants of the samples, s."""
+        return self.axis.time
+
+    @property
+    def good(self) -> NDArray[np.bool_]:
+        """Where the sample is a plain measurement: finite, not clipped, nothing missing."""
+        chosen: NDArray[np.bool_] = np.isfinite(self.values) & (
+            (self.quality & ~np.uint8(Quality.suspect)) == 0
+        )
+        return chosen
+
+    def between(self, start: float, stop: float) -> Channel:
+        """Return the samples from start to stop (s), both included; the clock stays as it is."""
+        rows = (self.time >= start) & (self.time <= stop)
+        axis = replace(self.axis, time=self.time[rows])
+        return replace(self, values=self.values[rows], quality=self.quality[rows], axis=axis)
+
+    def si(self) -> Floats:
+        """Return the values in the SI unit of their kind (`g` becomes m/s^2)."""
+        return self.values * measured_unit(self.unit).factor
+
+
+@dataclass(frozen=True, slots=True)
+class EventTrain:
+    """Instants at which something happened: spikes of a neuron, bounces, impacts of a simulation.
+
+    Attributes
+    ----------
+    name : str
+    times : ndarray of float, shape (event,)
+        s, ascending; two may coincide.
+    window : tuple of float or None
+        Start and end of the observation, s; None: not known, then the first and the last event.
+    resolution : float
+        Grid on which the instants were written, s; 0 where none shows.
+    label : str
+        What the source calls it.
+    attrs : dict
+        What else is known.
+    """
+
+    name: str
+    times: Floats
+    window: tuple[float, float] | None = None
+    resolution: float = 0.0
+    label: str = ""
+    attrs: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class SingleValue:
+    """A number that a recording carries beside its channels: value and CF unit; NaN where it was beyond the range."""
+
+    value: float
+    unit: str = "1"
+    label: str = ""
+    overrange: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Channels, event trains and single values of one measurement, by name.
+
+    Attributes
+    ----------
+    channels, events, scalars : mapping
+    attrs : dict
+        Provenance (`source_file`, `source_sha256`, `source_format`, ...) and `remarks`: one line for each thing
+        that a reader must know (gaps, clipping, conflicting axes).
+    """
+
+    channels: Mapping[str, Channel]
+    events: Mapping[str, EventTrain] = field(default_factory=dict)
+    scalars: Mapping[str, SingleValue] = field(default_factory=dict)
+    attrs: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader must know, line by line."""
+        return tuple(line for line in str(self.attrs.get("remarks", "")).splitlines() if line)
+
+    @property
+    def remarks_counted(self) -> tuple[str, ...]:
+        """How many remarks there are and where, in one line, for reports of what was imported before; none for none."""
+        if not self.remarks:
+            return ()
+        name, many = os.path.basename(self.title), len(self.remarks)
+        said = "1 remark of its import is" if many == 1 else f"{many} remarks of its import are"
+        return (
+            f"{name}: {said} in its attribute `remarks` (`vibroimpact import {name} -o COPY.nc` shows them)",
+        )
+
+    @property
+    def title(self) -> str:
+        """What messages call it: the file it was read from."""
+        return str(self.attrs.get("opened_from", "") or self.attrs.get("source_file", "") or "recording")
+
+    def channel(self, name: str | None = None) -> Channel:
+        """Return a channel by name, or the only one.
+
+        Raises
+        ------
+        DatasetError
+            There is none of that name, or several and no name; the message has the names.
+        """
+        return _chosen(self.channels, name, "channel", self.title)
+
+    def event_train(self, name: str | None = None) -> EventTrain:
+        """Return an event train by name, or the only one; errors as `channel`."""
+        return _chosen(self.events, name, "event train", self.title)
+
+
+def _chosen(found: Mapping[str, T], name: str | None, what: str, title: str) -> T:
+    if not found:
+        wanted = "one" if name is None else f'"{name}"'
+        raise DatasetError(f"{title}: {what}: expected {wanted}, got a file without any.")
+    names = ", ".join(found)
+    if name is None:
+        if len(found) == 1:
+            return next(iter(found.values()))
+        raise DatasetError(f"{title}: {what}: expected one to be named, got {len(found)}: {names}.")
+    if name not in found:
+        near = difflib.get_close_matches(name, list(found), 1)
+        hint = f' Did you mean "{near[0]}"?' if near else ""
+        raise DatasetError(f'{title}: {what}: expected one of {names}, got "{name}".{hint}')
+    return found[name]

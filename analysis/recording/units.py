@@ -1,0 +1,149 @@
+"""Units of measured channels: what a file calls them, what CF calls them, and their factor to SI.
+
+The one place that calls pint. A channel labelled `g` is an acceleration in units of gravity, never grams: that is
+what accelerometers are read in.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import pint
+
+from vibroimpact.analysis.recording.unit_symbols import written_unit
+from vibroimpact.fmus.errors import DatasetError
+
+STANDARD_GRAVITY = 9.80665
+"""m/s^2, exact by definition."""
+
+# What instruments write, in pint's words; `g` and `G` are gravity here.
+_LABELS = {
+    "": "dimensionless",
+    "1": "dimensionless",
+    "-": "dimensionless",
+    "au": "dimensionless",
+    "a.u.": "dimensionless",
+    "counts": "dimensionless",
+    "g": "standard_gravity",
+    "G": "standard_gravity",
+    "gn": "standard_gravity",
+    "g0": "standard_gravity",
+    "volts": "volt",
+    "Volts": "volt",
+    "Amps": "ampere",
+}
+_OFFSET_LABELS = ("degC", "deg C", "°C", "Celsius", "degree_Celsius")
+# Preferred SI names, as CF (UDUNITS) writes them.
+_SI_NAMES = ("N", "Pa", "V", "J", "W", "N s", "N m", "N m-1", "V s2 m-1", "V N-1", "Hz", "rad", "rad s-1")
+_SUPERSCRIPTS = str.maketrans("¹²³⁻", "123-")
+_FACTOR = re.compile(
+    r"(?:(?P<number>\d{1,9}(?:\.\d{0,18})?(?:[eE][-+]?\d{1,2})?)|(?P<name>[A-Za-zµμΩ_%]{1,30}))"
+    r"(?:(?:\*\*|\^)?(?P<power>[-+]?[1-9]))?(?P<joint>\s*[*/·]\s*|\s+|$)"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredUnit:
+    """A unit of a channel.
+
+    Attributes
+    ----------
+    label : str
+        As the file or the user wrote it.
+    cf : str
+        As it is stored: an SI unit that CF (UDUNITS) reads, with a factor where it is not SI: `9.80665 m s-2`.
+    si : str
+        The SI unit, as CF writes it: `m s-2`.
+    factor : float
+        SI value of one such unit.
+    """
+
+    label: str
+    cf: str
+    si: str
+    factor: float
+
+
+def unit_label(cf: str) -> str:
+    """Return a unit as people write it behind a number, see `unit_symbols.written_unit`.
+
+    >>> unit_label("9.80665 m s-2"), unit_label("0.001 m"), unit_label("1")
+    ('g', 'mm', '1')
+    """
+    return cf if cf == "1" else written_unit(cf)
+
+
+@lru_cache(maxsize=1)
+def _registry() -> pint.UnitRegistry[float]:
+    return pint.UnitRegistry()
+
+
+def measured_unit(label: str) -> MeasuredUnit:
+    """Return what a unit label means.
+
+    Parameters
+    ----------
+    label : str
+        `g`, `m/s^2`, `mV`, `N`, `lbf`, `deg`, `9.80665 m s-2`, ...; empty or `1` for a pure number.
+
+    Raises
+    ------
+    DatasetError
+        No such unit is known.
+
+    Examples
+    --------
+    >>> measured_unit("g").cf, measured_unit("g").factor
+    ('9.80665 m s-2', 9.80665)
+    >>> measured_unit("mV").cf, measured_unit("m/s^2").cf, measured_unit("m s-2").cf
+    ('0.001 V', 'm s-2', 'm s-2')
+    """
+    text = label.strip().translate(_SUPERSCRIPTS)
+    if text in _OFFSET_LABELS:
+        return MeasuredUnit(label, "degree_Celsius", "degree_Celsius", 1.0)
+    try:
+        base = _product(_LABELS.get(text, text)).to_base_units()
+    except (
+        pint.PintError,
+        AssertionError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        ArithmeticError,
+    ) as problem:
+        raise DatasetError(
+            f"unit: expected a unit such as m/s^2, g, V, mV or N, got {label[:60]!r}. "
+            "Give the channel's unit yourself."
+        ) from problem
+    factor, si = float(base.magnitude), _si_name(base)
+    return MeasuredUnit(label, si if factor == 1.0 else f"{factor:.15g} {si}", si, factor)
+
+
+def _product(text: str) -> Any:
+    """Return the quantity of a product of powers of units; nothing else of pint's expressions is evaluated."""
+    quantity: Any = _registry().Quantity(1.0, "dimensionless")
+    sign, rest = 1, text
+    while rest:
+        match = _FACTOR.match(rest)
+        if match is None:
+            raise ValueError(rest)
+        number, name, power = match["number"], match["name"], int(match["power"] or 1)
+        quantity = quantity * (float(number) if number else _registry().Quantity(1.0, name)) ** (sign * power)
+        rest = rest[match.end() :]
+        sign = -1 if match["joint"].strip() == "/" else 1
+    return quantity
+
+
+def _si_name(base: Any) -> str:
+    """Return the CF name of a quantity in SI base units."""
+    if base.unitless and not str(base.units).startswith("rad"):
+        return "1"
+    for name in _SI_NAMES:
+        trial = _product(name).to_base_units()
+        if trial.units == base.units and trial.magnitude == 1.0:
+            return name
+    powers = ((f"{_registry().Unit(name):~}", int(power)) for name, power in base.unit_items())
+    return " ".join(name if power == 1 else f"{name}{power}" for name, power in powers)

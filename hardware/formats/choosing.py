@@ -1,0 +1,151 @@
+"""From a file to its raw columns: the format is told by the first bytes, not by the ending of the name."""
+
+from __future__ import annotations
+
+import stat
+from dataclasses import replace
+from pathlib import Path
+
+from vibroimpact.analysis.recording import is_recording
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.arrow import SIGNATURES as ARROW
+from vibroimpact.hardware.formats.arrow import read_arrow
+from vibroimpact.hardware.formats.extras import missing_extra
+from vibroimpact.hardware.formats.foreign_netcdf import check_netcdf4, read_foreign_netcdf
+from vibroimpact.hardware.formats.hdf5 import SIGNATURE as HDF5
+from vibroimpact.hardware.formats.hdf5 import is_h5py_there, is_netcdf4, read_hdf5
+from vibroimpact.hardware.formats.labview import SIGNATURE, read_labview
+from vibroimpact.hardware.formats.mat import read_mat
+from vibroimpact.hardware.formats.probe import UnreadableError
+from vibroimpact.hardware.formats.table import LARGEST_FILE, RawFile
+from vibroimpact.hardware.formats.tdms import read_tdms
+from vibroimpact.hardware.formats.text import read_text
+from vibroimpact.hardware.formats.uff import is_uff, read_uff
+from vibroimpact.hardware.formats.wav import SIGNATURES as WAV
+from vibroimpact.hardware.formats.wav import read_wav
+
+_NETCDF3 = (b"CDF\x01", b"CDF\x02")
+_NETCDF_64_BIT = b"CDF\x05"
+_OTHERS = {
+    b"PK": "a zip archive or a spreadsheet (.xlsx, .ods)",
+    b"\xd0\xcf\x11\xe0": "an old spreadsheet (.xls)",
+    b"\x1f\x8b": "a gzip archive",
+    b"%PDF": "a PDF",
+    b"fLaC": "compressed audio (FLAC)",
+    b"OggS": "compressed audio (Ogg)",
+    b"\x93NUMPY": "an array of numpy (.npy)",
+}
+
+
+def check_file(path: Path) -> None:
+    """Refuse what is no regular file of a bearable size.
+
+    Raises
+    ------
+    DatasetError
+        There is no such file, or it cannot be read, is empty or too large.
+    """
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as problem:
+        reason = getattr(problem, "strerror", None) or str(problem)
+        raise DatasetError(f"expected a file to read, got none: {reason}.") from problem
+    if not stat.S_ISREG(status.st_mode):
+        raise DatasetError("expected a regular file, got something else. Name the file itself.")
+    if status.st_size > LARGEST_FILE:
+        raise DatasetError(
+            f"expected at most {LARGEST_FILE} bytes, got {status.st_size}. Cut it into pieces."
+        )
+    if status.st_size == 0:
+        raise DatasetError("expected a recording, got an empty file.")
+
+
+def holds_recording(path: Path) -> bool:
+    """Tell whether a file is a recording of this program already.
+
+    Raises
+    ------
+    DatasetError
+        It begins as one might, and crashes the library that reads it.
+    """
+    with path.open("rb") as file:
+        if file.read(len(HDF5)) != HDF5:
+            return False
+    try:
+        check_netcdf4(path)
+    except UnreadableError as problem:
+        if problem.raised and is_h5py_there():
+            return False  # HDF5 that is no NetCDF
+        raise
+    return is_recording(path)
+
+
+def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFile:
+    """Read a file of any format known here.
+
+    Parameters
+    ----------
+    path : Path
+    delimiter, decimal : str
+        For tables of text, as `text.read_text` takes them.
+
+    Raises
+    ------
+    DatasetError
+        The file is none of the formats, or is damaged.
+    """
+    check_file(path)
+    try:
+        with path.open("rb") as file:
+            start = file.read(512)
+    except OSError as problem:
+        raise DatasetError(f"expected a readable file, got an error: {problem.strerror}.") from problem
+    if start.startswith((b"TDSm", b"TDSh")):
+        return read_tdms(path)
+    if start.startswith(b"MATLAB 7.3"):
+        return read_hdf5(path, matlab=True)
+    if start.startswith(b"MATLAB 5.0") or (path.suffix.lower() == ".mat" and not start.startswith(HDF5)):
+        return read_mat(path)
+    if start.startswith(HDF5) and is_h5py_there() and not is_netcdf4(path):
+        return read_hdf5(path)
+    if start.startswith(_NETCDF_64_BIT):
+        raise DatasetError(
+            "expected a NetCDF file of version 3 or 4, got CDF-5. Convert it: nccopy -k nc4 OLD NEW."
+        )
+    if start.startswith((HDF5, *_NETCDF3)):
+        raw = read_foreign_netcdf(path)
+        if start.startswith(HDF5) and not raw.tables and not is_h5py_there():
+            raise missing_extra("an HDF5 file with groups", "h5py", "hdf5")
+        return raw
+    if is_uff(start):
+        return read_uff(path)
+    if start.startswith(WAV) and start[8:12] == b"WAVE":
+        return read_wav(path.read_bytes())
+    if start.startswith(ARROW):
+        return read_arrow(path)
+    for magic, kind in _OTHERS.items():
+        if start.startswith(magic):
+            raise DatasetError(f"expected a recording, got {kind}. Unpack it, or save it as text first.")
+    content, remarks = _decoded(path.read_bytes())
+    raw = read_labview(content) if content.startswith(SIGNATURE) else read_text(content, delimiter, decimal)
+    return replace(raw, remarks=[*remarks, *raw.remarks])
+
+
+def _decoded(content: bytes) -> tuple[str, list[str]]:
+    """Return the text of a file, and what is to be said of its encoding."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        try:
+            return content.decode("utf-16"), []
+        except UnicodeDecodeError as problem:
+            raise DatasetError("expected UTF-16 text as its first bytes say, got others.") from problem
+    if b"\x00" in content:
+        raise DatasetError(
+            "expected TDMS, LabVIEW, MATLAB, NetCDF, HDF5, UFF, WAV, Parquet, Feather or a table of text, got other "
+            "binary contents."
+        )
+    try:
+        return content.decode("utf-8-sig"), []
+    except UnicodeDecodeError:
+        return content.decode("latin-1"), [
+            "the text is not UTF-8; it is read as Latin-1, its names may be wrong"
+        ]

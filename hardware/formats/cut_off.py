@@ -1,0 +1,109 @@
+"""Rows of a text that was cut off: what is left of its last number may be another number.
+
+`6.569866e-01` without its last three characters is 6.6. A text without a line break at its end may be one whose writer
+leaves that out, or one that was cut off; the cells above the last one tell which, as far as they are alike.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from vibroimpact.hardware.formats.cells import is_date, is_number, split_line
+
+_ROWS_COMPARED = 1000
+_FEWEST_ALIKE = 8
+_LONGEST_QUOTE = 40
+_LOST = "nan"
+# Of as many digits in each cell: those after the decimal sign, and those of an exponent of two or more.
+_FIXED = re.compile(r"9+(?:[eEdD][-+]99+)?Z?", re.ASCII)
+_EXPONENT = re.compile(r"\d[eEdD][-+]?\d", re.ASCII)
+
+
+def without_cut_cells(
+    rows: Sequence[str], content: str, delimiter: str | None, decimal: str
+) -> tuple[list[str], list[str]]:
+    """Return the rows of a table without what was cut off, and what is to be said of it.
+
+    Where the text has no final line break, its last cell counts as missing if it is not written as all cells
+    above it, or, where those differ from each other, if it is shorter than all of them or in a row that lacks cells; so
+    do the cells that the row has less than the one before. A row of which nothing else is left is dropped.
+
+    Parameters
+    ----------
+    rows : sequence of str
+        The last rows of the text.
+    content : str
+        The whole text.
+    delimiter : str or None
+        Between cells; None: blanks.
+    decimal : {".", ","}
+
+    Examples
+    --------
+    >>> without_cut_cells(["0.1,0.45", "0.2,0.6"], "0.1,0.45\\n0.2,0.6", ",", ".")
+    (['0.1,0.45', '0.2,nan'], ["the text ends within a row: its last value, '0.6', counts as missing"])
+    """
+    kept = list(rows)
+    if not kept or content.endswith(("\n", "\r")) or not content.endswith(kept[-1]):
+        return kept, []
+    cells = _filled(split_line(kept[-1], delimiter))
+    above = [split_line(row, delimiter) for row in kept[-1 - _ROWS_COMPARED : -1]]
+    before = _filled(above[-1]) if above else cells
+    column = [row[len(cells) - 1] for row in above if len(row) >= len(cells)]
+    alike, told = True, []
+    if not _ends_after_cell(kept[-1], delimiter):
+        found = _like_all(cells[-1], column, decimal)
+        alike = not _lacks_something(cells[-1], column) if found is None else found
+        if found is None and len(cells) < len(before):  # certainly cut off, and maybe in this cell
+            alike = False
+        elif found is None:
+            told = [
+                f"the text ends without a line break: its last value, {_quote(cells[-1])}, may be cut off"
+            ]
+    if alike and len(cells) >= len(before):
+        return kept, told
+    whole = cells if alike else cells[:-1]
+    if not any(whole):
+        return kept[:-1], [
+            f"the text ends within a row: what is left of it, {_quote(cells[-1])}, is left out"
+        ]
+    lost = [_LOST if cell else "" for cell in before[len(whole) :]] or [_LOST]
+    kept[-1] = (" " if delimiter is None else delimiter).join([*whole, *lost])
+    what = "its last columns count" if alike else f"its last value, {_quote(cells[-1])}, counts"
+    return kept, [f"the text ends within a row: {what} as missing"]
+
+
+def _filled(cells: list[str]) -> list[str]:
+    """Return the cells of a row up to the last one that holds something."""
+    return cells[: next((place for place in range(len(cells), 0, -1) if cells[place - 1]), 0)]
+
+
+def _ends_after_cell(row: str, delimiter: str | None) -> bool:
+    """Whether the last cell of a row is certainly whole: a delimiter follows."""
+    return row[-1:].isspace() if delimiter is None else row.rstrip(" ").endswith(delimiter)
+
+
+def _like_all(cell: str, column: Sequence[str], decimal: str) -> bool | None:
+    """Whether a cell is written as all those above it; None where those differ, or are too few to tell."""
+    shapes = {_shape(other, decimal) for other in column if is_number(other, decimal) or is_date(other)}
+    if len(column) < _FEWEST_ALIKE or len(shapes) != 1:
+        return None
+    (shape,) = shapes
+    return _shape(cell, decimal) == shape if _FIXED.fullmatch(shape) else None
+
+
+def _lacks_something(cell: str, column: Sequence[str]) -> bool:
+    """Whether a cell is shorter than all above it, or has no exponent where others have one."""
+    shortest = min((len(other) for other in column if other), default=0)
+    return len(cell) < shortest or (not _EXPONENT.search(cell) and any(map(_EXPONENT.search, column)))
+
+
+def _shape(cell: str, decimal: str) -> str:
+    """Return what follows the decimal sign, every digit as 9 and every sign of an exponent as a plus."""
+    point = max(cell.rfind(decimal), cell.rfind("."))
+    return re.sub("[0-9]", "9", cell[point + 1 :]).replace("-", "+") if point >= 0 else ""
+
+
+def _quote(cell: str) -> str:
+    return repr(cell[:_LONGEST_QUOTE])

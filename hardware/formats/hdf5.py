@@ -1,0 +1,186 @@
+"""HDF5 files, read with h5py: datasets of numbers in groups, and MATLAB files of version 7.3.
+
+A file may name other files in links, in external storage and in virtual datasets: nothing of that is followed. h5py is
+compiled and can crash on damaged bytes, so that another process reads the file first.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.analysis.files.probing import Reading
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.arrays import INTERVALS, RATES, Scope, tables_of
+from vibroimpact.hardware.formats.extras import missing_extra
+from vibroimpact.hardware.formats.mat import NUMERIC
+from vibroimpact.hardware.formats.probe import check_reads
+from vibroimpact.hardware.formats.table import MOST_SAMPLES, RawFile
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_UNITS = ("units", "unit")
+_CLASS = "MATLAB_class"
+_READING = Reading("HDF5", (*_UNITS, _CLASS.lower(), "matlab_empty", "class", *sorted(RATES | INTERVALS)))
+_DEEPEST = 16
+_MOST_OBJECTS = 10_000
+# MATLAB keeps what its cells refer to, and objects of its classes, in groups of these names.
+_OF_MATLAB = frozenset({"#refs#", "#subsystem#"})
+
+
+def is_h5py_there() -> bool:
+    """Whether HDF5 files that are no NetCDF files can be read."""
+    try:
+        import h5py  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def is_netcdf4(path: os.PathLike[str] | str) -> bool:
+    """Whether an HDF5 file was written by a NetCDF library, or has dimensions as such a file has."""
+    import h5py
+
+    check_reads(path, _READING)
+    with _one_refusal("an HDF5 file"), h5py.File(path, "r") as file:
+        return "_NCProperties" in file.attrs or any(
+            _text(item.attrs.get("CLASS")) == "DIMENSION_SCALE" for _, item in _items(file, [])
+        )
+
+
+@contextmanager
+def _one_refusal(what: str) -> Iterator[None]:
+    """Turn what the library raises into one refusal: it reports damage as errors of every kind, MemoryError too."""
+    try:
+        yield
+    except DatasetError:
+        raise
+    except Exception as problem:
+        raise DatasetError(
+            f"expected {what} that is whole, got one that cannot be read ({type(problem).__name__}: {problem})."
+        ) from problem
+
+
+def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
+    """Read the numeric datasets of an HDF5 file by the dotted names of their groups.
+
+    Parameters
+    ----------
+    path : path
+    matlab : bool
+        It is a MATLAB file of version 7.3: dimensions are the other way round, groups are structures.
+
+    Raises
+    ------
+    DatasetError
+        h5py is not installed, the file is damaged, or promises too much.
+    """
+    what = "a MATLAB file of version 7.3" if matlab else "an HDF5 file"
+    try:
+        import h5py
+    except ImportError as problem:
+        raise missing_extra(what, "h5py", "hdf5") from problem
+    check_reads(path, _READING)
+    remarks: list[str] = []
+    scopes = [Scope()]
+    with _one_refusal(what), h5py.File(path, "r") as file:
+        _read_group(file, scopes[0], scopes, remarks, matlab)
+    tables, told = tables_of(scopes)
+    return RawFile("MATLAB 7.3" if matlab else "HDF5", tables, remarks + told)
+
+
+def _read_group(group: Any, scope: Scope, scopes: list[Scope], remarks: list[str], matlab: bool) -> None:
+    """Read the datasets of a group, and of the groups in it."""
+    import h5py
+
+    _read_rate(group, scope)
+    for name, item in _items(group, remarks, scope):
+        label = scope.dotted(name)
+        if matlab and not scope.path and name in _OF_MATLAB:
+            continue
+        if isinstance(item, h5py.Dataset):
+            why = _why_not(item, matlab)
+            if why:
+                remarks.append(f"{label}: {why}")
+            else:
+                _read_dataset(name, item, scope, scopes, matlab)
+        elif label.count(".") >= _DEEPEST or len(scopes) > _MOST_OBJECTS:
+            remarks.append(f"{label}: a group within {_DEEPEST} others is left out")
+        elif isinstance(item, h5py.Group) and not _is_around(item, group):
+            scopes.append(scope.within(name))
+            _read_group(item, scopes[-1], scopes, remarks, matlab)
+        else:
+            remarks.append(f"{label}: is left out; datasets of numbers are read")
+
+
+def _items(group: Any, remarks: list[str], scope: Scope | None = None) -> Iterator[tuple[str, Any]]:
+    """Yield what lies in a group; links that lead elsewhere are not followed."""
+    import h5py
+
+    for name in group:
+        if isinstance(group.get(name, getlink=True), h5py.HardLink):
+            yield name, group[name]
+        else:
+            remarks.append(f"{(scope or Scope()).dotted(name)}: a link to elsewhere is left out")
+
+
+def _is_around(item: Any, group: Any) -> bool:
+    """Whether a group is one of those that another one lies in: a file may lead in circles."""
+    while True:
+        if item == group:
+            return True
+        if group.name == "/":
+            return False
+        group = group.parent
+
+
+def _why_not(item: Any, matlab: bool) -> str:
+    """Return why a dataset is left out; empty for one that is read."""
+    if item.external or item.is_virtual:
+        return "its values are in another file, it is left out"
+    kind = _text(item.attrs.get(_CLASS)) if matlab else ""
+    if item.dtype.kind not in "fiub" or (kind and kind not in NUMERIC):
+        return f"its values are {kind or item.dtype}, it is left out; numbers are read"
+    if item.shape is None or "MATLAB_empty" in item.attrs:
+        return "holds no numbers and is left out"
+    if item.ndim > 2:
+        return f"an array of {item.ndim} dimensions is left out; vectors are read"
+    return ""
+
+
+def _read_dataset(name: str, item: Any, scope: Scope, scopes: list[Scope], matlab: bool) -> None:
+    """Read the values of a dataset; its own rate makes it a structure of its own."""
+    there = sum(array.size for one in scopes for array in one.arrays.values())
+    if there + item.size > MOST_SAMPLES:
+        raise DatasetError(f"expected at most {MOST_SAMPLES} numbers, got more. Save fewer datasets.")
+    own = Scope(scope.path, around=scope)
+    _read_rate(item, own)
+    target = scope
+    if own.rate is not None and own.rate != scope.rate:
+        scopes.append(own)
+        target = own
+    values = np.asarray(item[()], dtype=np.float64)
+    target.arrays[name] = np.atleast_1d(values.T if matlab else values)
+    unit = next((_text(item.attrs[key]) for key in item.attrs if key.lower() in _UNITS), "")
+    if unit:
+        target.units[name] = unit
+
+
+def _read_rate(item: Any, scope: Scope) -> None:
+    """Take the rate from the attributes of a group or dataset, where they give one."""
+    for key in item.attrs:
+        if key.lower() in RATES | INTERVALS:
+            value = np.asarray(item.attrs[key])
+            if value.size == 1 and value.dtype.kind in "fiu" and 0.0 < float(value.ravel()[0]) < np.inf:
+                number = float(value.ravel()[0])
+                scope.rate = number if key.lower() in RATES else 1.0 / number
+
+
+def _text(value: Any) -> str:
+    """Return an attribute as text; empty for another kind."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return value if isinstance(value, str) else ""

@@ -1,0 +1,193 @@
+"""TDMS files of National Instruments, read with npTDMS.
+
+The instants come from `wf_increment` and `wf_start_offset`; `wf_samples` is the size of a block, not the length,
+and a start in 1904 (the epoch of LabVIEW) means that time is relative.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.cells import sorted_out
+from vibroimpact.hardware.formats.labels import is_time_name
+from vibroimpact.hardware.formats.table import MOST_COLUMNS, Column, Floats, RawFile, Table
+
+_MOST_HEARD = 20
+_LONGEST_HEARD = 120
+_SAYS_CUT_OFF = re.compile(
+    r"Last segment (of file has less data than expected|metadata is incomplete)"
+    r"|Data size \d+ is not a multiple|Cropping data from"
+)
+_CUT_OFF = "the file is cut off: its last segment holds less data than it declares, and what is there is read"
+_SCALE_TYPE = re.compile(r"NI_Scale\[\d+\]_Scale_Type")
+_EPOCH_ENDS = np.datetime64("1904-01-02")
+
+
+def read_tdms(path: os.PathLike[str] | str) -> RawFile:
+    """Read a TDMS file: a table for each group.
+
+    Raises
+    ------
+    DatasetError
+        The file is damaged, or has no channels of numbers.
+    """
+    from nptdms import TdmsFile
+
+    size = os.stat(path).st_size
+    try:
+        # opened here, so that it is closed too where the reader gives up
+        with _heard() as heard, open(path, "rb") as stream, TdmsFile.open(stream) as file:
+            raw = _read(file, size)
+            damage = _CUT_OFF if any(_SAYS_CUT_OFF.match(line) for line in heard) else ""
+            others = dict.fromkeys(f"npTDMS says: {line}" for line in heard if not _SAYS_CUT_OFF.match(line))
+            return replace(raw, remarks=[*raw.remarks, *others][:_MOST_HEARD], damage=damage)
+    except DatasetError:
+        raise
+    # the reader gives up on damaged bytes with whatever error they lead to
+    except Exception as problem:
+        raise DatasetError(
+            f"expected a whole TDMS file, got one that cannot be read ({type(problem).__name__}: {problem})."
+        ) from problem
+
+
+@contextmanager
+def _heard() -> Iterator[list[str]]:
+    """Collect what npTDMS would write to the terminal: that a file is cut off, that a text is not UTF-8."""
+    from nptdms.log import log_manager
+
+    heard: list[str] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        heard.append(record.getMessage()[:_LONGEST_HEARD])
+        return False
+
+    log_manager.console_handler.addFilter(keep)
+    try:
+        yield heard
+    finally:
+        log_manager.console_handler.removeFilter(keep)
+
+
+def _read(file: Any, size: int) -> RawFile:
+    groups, remarks = _without_copies(file.groups())
+    channels = [channel for group in groups for channel in group.channels()]
+    if len(channels) > MOST_COLUMNS:
+        raise DatasetError(f"expected at most {MOST_COLUMNS} channels, got {len(channels)}.")
+    declared = sum(len(channel) for channel in channels)
+    if declared > size:  # nothing in this format is compressed: a sample is a byte at least
+        raise DatasetError(
+            f"expected at most {size} samples in as many bytes, got {declared}. It is damaged."
+        )
+    starts = [_start(channel) for channel in channels]
+    known = [stamp for stamp in starts if stamp is not None]
+    origin = min(known) if known else None
+    # what began at the same instant has one trigger, whatever its group
+    tables = [
+        _table(group, origin, remarks, len(groups) > 1 and None in [_start(one) for one in group.channels()])
+        for group in groups
+    ]
+    if any(
+        stamp is None and "wf_start_time" in channel.properties
+        for stamp, channel in zip(starts, channels, strict=True)
+    ):
+        remarks.append(
+            "the start is given as 1904, the epoch of LabVIEW: time is relative, its date is not known"
+        )
+    attrs = {"source_title": str(file.properties["name"])} if file.properties.get("name") else {}
+    if origin is not None:
+        attrs["source_date"] = str(np.datetime_as_string(origin, unit="us"))
+    return RawFile("TDMS", [table for table in tables if table.columns or table.time], remarks, attrs)
+
+
+def _without_copies(groups: list[Any]) -> tuple[list[Any], list[str]]:
+    """Leave out the decimated copies that SignalExpress keeps beside its samples, to draw them."""
+    levels = [_number(group.properties.get("DecimationLevel")) or 0.0 for group in groups]
+    if not any(levels) or all(levels):
+        return groups, []
+    copies = [group.name for group, level in zip(groups, levels, strict=True) if level]
+    told = f"decimated copies of the samples are left out: {', '.join(copies)}"
+    return [group for group, level in zip(groups, levels, strict=True) if not level], [told]
+
+
+def _start(channel: Any) -> np.datetime64 | None:
+    stamp = channel.properties.get("wf_start_time")
+    if isinstance(stamp, np.datetime64) and stamp > _EPOCH_ENDS:
+        return stamp
+    return None
+
+
+def _table(group: Any, origin: np.datetime64 | None, remarks: list[str], titled: bool) -> Table:
+    columns: list[Column] = []
+    time = None
+    for channel in group.channels():
+        raw = channel[:]
+        if raw is None or not len(raw):
+            remarks.append(f"{channel.name}: holds no samples and is left out")
+        elif raw.dtype.kind == "M":
+            seconds = np.asarray((raw - raw[0]) / np.timedelta64(1, "ns") * 1e-9, dtype=np.float64)
+            time = Column(channel.name, seconds, "s")
+        elif raw.dtype.kind not in "fiub":
+            remarks.append(f"{channel.name}: its values are no numbers ({raw.dtype}), it is left out")
+        else:
+            columns.append(_column(channel, np.asarray(raw, dtype=np.float64), origin, remarks))
+    if time is None and len(columns) > 1 and is_time_name(columns[0].label) and columns[0].interval is None:
+        time, *columns = columns
+    return Table(columns, time, group.name if titled else "")
+
+
+def _column(channel: Any, values: Floats, origin: np.datetime64 | None, remarks: list[str]) -> Column:
+    known = channel.properties
+    start = _start(channel)
+    late = (
+        0.0 if start is None or origin is None else float((start - origin) / np.timedelta64(1, "us")) * 1e-6
+    )
+    increment = _number(known.get("wf_increment"))
+    samples = _number(known.get("wf_samples"))
+    said = "wf_samples is the size of a block, not the length: the samples are counted"
+    if samples is not None and samples != len(values) and said not in remarks:
+        remarks.append(said)
+    numbers = sorted_out(values)
+    return Column(
+        channel.name,
+        numbers.values,
+        str(known.get("unit_string", "")),
+        numbers.overrange,
+        increment if increment is not None and 0.0 < increment < np.inf else None,
+        (_number(known.get("wf_start_offset")) or 0.0) + late,
+        f"start {start}" if late else "",
+        _rails(channel),
+    )
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float | np.integer | np.floating) else None
+
+
+def _rails(channel: Any) -> tuple[float, float] | None:
+    """Return what the smallest and largest raw integers become by a linear scale; None where it is another."""
+    known = channel.properties
+    raw = channel.read_data(0, 1, scaled=False)
+    if isinstance(raw, dict):  # DAQmx: raw data by scaler
+        raw = next(iter(raw.values()), None)
+    if raw is None or raw.dtype.kind not in "iu" or raw.dtype.itemsize > 2:
+        return None
+    scales = [key for key in known if _SCALE_TYPE.fullmatch(key)]
+    if len(scales) != 1 or known[scales[0]] != "Linear":
+        return None
+    scale = scales[0].removesuffix("_Scale_Type")
+    slope = _number(known.get(f"{scale}_Linear_Slope"))
+    intercept = _number(known.get(f"{scale}_Linear_Y_Intercept"))
+    if slope is None or intercept is None:
+        return None
+    limits = np.iinfo(raw.dtype)
+    low, high = sorted((limits.min * slope + intercept, limits.max * slope + intercept))
+    return low, high

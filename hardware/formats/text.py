@@ -1,0 +1,328 @@
+"""CSV and other tables of text: the delimiter, the decimal sign, headings and units are found from the data."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.cells import (
+    Cells,
+    has_thousands,
+    is_date,
+    is_day,
+    is_marker,
+    is_number,
+    read_cells,
+    split_line,
+)
+from vibroimpact.hardware.formats.cut_off import without_cut_cells
+from vibroimpact.hardware.formats.labels import is_known_unit, is_time_name, seconds_in, split_label
+from vibroimpact.hardware.formats.table import MOST_COLUMNS, Column, RawFile, Table
+
+_COMMENTS = ("#", "%", "//", "!")
+_DELIMITERS: tuple[str | None, ...] = ("\t", ";", ",", "|", None)
+_QUOTED = re.compile(r'"([^"]{1,60})"')
+FIRST = "column_1"
+_LINES_TRIED = 60
+_LONGEST_HEADER = 1000
+_MOST_STRANGE = 0.01
+_NAMES = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", None: "blanks"}
+WORDS_FOR_DELIMITERS: dict[str, str | None] = {
+    "tab": "\t",
+    "semicolon": ";",
+    "comma": ",",
+    "bar": "|",
+    "blank": None,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How the rows of a text are written: what is between cells, the decimal sign, and whether words are among them."""
+
+    delimiter: str | None
+    decimal: str
+    words: bool = False
+
+    def is_row(self, line: str) -> bool:
+        """Whether a line is a row of numbers, markers and dates, with at least one that says something.
+
+        Where there are columns of words, a row begins with a number, a time or a day.
+        """
+        cells = split_line(line, self.delimiter)
+        kinds = [is_number(cell, self.decimal) or is_date(cell) for cell in cells]
+        if self.words:
+            return any(kinds) and (kinds[0] or is_day(cells[0]))
+        return any(kinds) and all(kind or is_marker(cell) for kind, cell in zip(kinds, cells, strict=True))
+
+
+def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> RawFile:
+    """Read a table of text.
+
+    Parameters
+    ----------
+    content : str
+        The whole file.
+    delimiter : str or None
+        Between cells; empty: find it; None: blanks.
+    decimal : {"", ".", ","}
+        Decimal sign; empty: find it.
+
+    Raises
+    ------
+    DatasetError
+        There are no rows of numbers.
+    """
+    lines = content.splitlines()
+    dialect, remarks = find_dialect(lines, delimiter, decimal)
+    first = next(place for place, line in enumerate(lines) if _is_plain(line) and dialect.is_row(line))
+    body = [(place, line) for place, line in enumerate(lines[first:], first) if _is_plain(line)]
+    rows, dropped = _rows(body, dialect)
+    rows, cut = without_cut_cells(rows, content, dialect.delimiter, dialect.decimal)
+    remarks += dropped + cut
+    cells = read_cells(rows, dialect.delimiter, dialect.decimal)
+    if len(cells) > MOST_COLUMNS:
+        raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got {len(cells)}. Is it turned over?")
+    labels, units, late = _all_headings(lines[:first], rows, len(cells), dialect.delimiter)
+    columns, told = columns_of(cells, labels, units)
+    told = late + told
+    written = f"text, cells between {_NAMES.get(dialect.delimiter, repr(dialect.delimiter))}"
+    comma = ", decimal comma" if dialect.decimal == "," else ""
+    table = with_time(Table([column for column in columns if len(column.values)]))
+    if table.time is not None and table.time.label == FIRST:
+        told.append(
+            "the first column has no heading and ascends: it is taken as the instants (--time-column)"
+        )
+    return RawFile(written + comma, [table], remarks + told)
+
+
+def _is_plain(line: str) -> bool:
+    """Whether a line is neither empty nor a comment."""
+    return bool(line.strip()) and not line.lstrip().startswith(_COMMENTS)
+
+
+def find_dialect(
+    lines: Sequence[str], delimiter: str | None = "", decimal: str = ""
+) -> tuple[Dialect, list[str]]:
+    """Return how the rows are written, and what is doubtful about it.
+
+    That dialect is chosen in which most lines are rows of one width; of equals the one with more columns.
+    """
+    tried = _tried_lines(lines)
+    _refuse_thousands(tried)
+    delimiters = _DELIMITERS if delimiter == "" else (delimiter,)
+    signs = (".", ",") if not decimal else (decimal,)
+    tries = [Dialect(mark, sign) for sign in signs for mark in delimiters if mark != sign]
+    best, (count, width) = _best_of(tries, tried)
+    if 2 * count < len(tried):  # a column of words may be among the numbers
+        lax, (rows, more) = _best_of([replace(dialect, words=True) for dialect in tries], tried)
+        if rows > 2 * count:
+            best, width = lax, more
+    if best is None:
+        raise DatasetError(
+            "expected rows of numbers, got none. Is it text? Give --delimiter and --decimal if it is."
+        )
+    doubtful = best.delimiter == "," and width == 2 and not any("." in line for line in tried)
+    if doubtful and not decimal and not delimiter:
+        return best, ["one comma in each row is read as between two columns; if it is decimal, --decimal ,"]
+    return best, []
+
+
+def _refuse_thousands(lines: Sequence[str]) -> None:
+    """Refuse numbers with separators of thousands, where a delimiter that is no such separator shows them."""
+    for line in lines:
+        marks = [mark for mark in ("\t", ";", "|") if mark in line]
+        cells = [cell for mark in marks for cell in split_line(line, mark)] + _QUOTED.findall(line)
+        found = next((cell for cell in cells if has_thousands(cell)), None)
+        if found is not None:
+            raise _thousands(f"the row {line.strip()[:40]!r}", found)
+
+
+def _thousands(where: str, cell: str) -> DatasetError:
+    return DatasetError(
+        f"{where}: expected numbers without separators of thousands, got {cell[:40]!r}. Save the table without them."
+    )
+
+
+def _best_of(dialects: Sequence[Dialect], lines: Sequence[str]) -> tuple[Dialect | None, tuple[int, int]]:
+    """Return the dialect in which most lines are rows of one width, and how many of what width.
+
+    Of equals that one counts which makes numbers of more cells, then that of more cells.
+    """
+    best: Dialect | None = None
+    score = (0, 0, 0)
+    for dialect in dialects:
+        rows = [split_line(line, dialect.delimiter) for line in lines if dialect.is_row(line)]
+        if rows:
+            width, count = Counter(map(len, rows)).most_common(1)[0]
+            numbers = sum(is_number(cell, dialect.decimal) for row in rows for cell in row)
+            if (count, numbers, width) > score:
+                best, score = dialect, (count, numbers, width)
+    return best, (score[0], score[2])
+
+
+def _tried_lines(lines: Sequence[str]) -> list[str]:
+    """Return lines from the start, where the header is, and from the middle, where the data are."""
+    start = [line for line in lines[:_LONGEST_HEADER] if _is_plain(line)]
+    middle = len(lines) // 2
+    return start[:_LINES_TRIED] + [line for line in lines[middle : middle + _LINES_TRIED] if _is_plain(line)]
+
+
+def _rows(body: Sequence[tuple[int, str]], dialect: Dialect) -> tuple[list[str], list[str]]:
+    """Return the rows; lines of words between them are left out and told, too many are refused."""
+    words = [
+        (place, line)
+        for place, line in body
+        if not any(is_number(cell, dialect.decimal) or is_date(cell) for cell in _cells(line, dialect))
+        and not all(is_marker(cell) for cell in _cells(line, dialect))
+    ]
+    if not words:
+        return [line for _, line in body], []
+    if len(words) > max(1, _MOST_STRANGE * len(body)):
+        place, line = words[0]
+        raise DatasetError(
+            f"line {place + 1}: expected a row of numbers as before, got {line.strip()[:40]!r}, and "
+            f"{len(words) - 1} more such lines. Cut the file where its table ends."
+        )
+    skipped = {place for place, _ in words}
+    told = [
+        f"line {place + 1} holds no numbers and is left out: {line.strip()[:60]!r}" for place, line in words
+    ]
+    return [line for place, line in body if place not in skipped], told[:5]
+
+
+def _cells(line: str, dialect: Dialect) -> list[str]:
+    return split_line(line, dialect.delimiter)
+
+
+def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[list[str], list[str]]:
+    """Return names and units of the columns, as far as the lines before the first row give them.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Lines before the first row; marks of comments are taken off.
+    width : int
+        Columns of the table.
+    delimiter : str or None
+        Between the cells of the rows; headings may use another.
+    """
+    lines = [_uncommented(line) for line in header if _uncommented(line)][-8:]
+    found = [cells for cells in (_heading_cells(line, width, delimiter) for line in lines) if cells]
+    units = [""] * width
+    if found and _are_units(found[-1]):
+        units = [cell.strip("[](){}<> ") for cell in found.pop()]
+    if not found:
+        return [""] * width, units
+    pairs = [split_label(cell) for cell in found[-1]]
+    return [name for name, _ in pairs], [own or below for (_, own), below in zip(pairs, units, strict=True)]
+
+
+def _all_headings(
+    header: Sequence[str], rows: Sequence[str], width: int, delimiter: str | None
+) -> tuple[list[str], list[str], list[str]]:
+    """Return names and units of all columns, also where some begin below the headings; and what to say of these."""
+    labels, units = headings(header, width, delimiter)
+    narrow = len(split_line(rows[0], delimiter)) if rows else width
+    if any(labels) or narrow >= width:
+        return labels, units, []
+    begun = next(place for place, row in enumerate(rows, 1) if len(split_line(row, delimiter)) > narrow)
+    labels, units = headings(header, narrow, delimiter)
+    several = f"columns {narrow + 1} to {width} begin" if width > narrow + 1 else f"column {width} begins"
+    verb = "have" if width > narrow + 1 else "has"
+    told = [f"{several} in row {begun} of the table, and {verb} no heading (--name)"] if any(labels) else []
+    more = [""] * (width - narrow)
+    return labels + more, units + more, told
+
+
+def _uncommented(line: str) -> str:
+    text = line.strip()
+    for mark in _COMMENTS:
+        text = text.removeprefix(mark)
+    return text.strip("# \r\n")
+
+
+def _heading_cells(line: str, width: int, delimiter: str | None) -> list[str]:
+    """Return the cells of a heading of this width, at any delimiter that gives it."""
+    for mark in (delimiter, "\t", ",", ";", None):
+        cells = [cell.strip().strip(",;").strip() for cell in split_line(line, mark)]
+        for form in (cells, [cell for cell in cells if cell]):
+            if len(form) == width and any(form):
+                return form
+            # a row may end in a delimiter, or its last heading be left out
+            if 2 <= len(form) == width - 1 and mark == delimiter and mark is not None and any(form):
+                return [*form, ""]
+    return []
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Whether a line is one of units: all in brackets, or all known, and not simply short names."""
+    filled = [cell for cell in cells if cell]
+    if all(cell[0] in "[({<" and cell[-1] in "])}>" for cell in filled):
+        return True
+    plain = [cell for cell in filled if cell != "-"]
+    return bool(plain) and all(is_known_unit(cell) and not is_time_name(cell) for cell in plain)
+
+
+def columns_of(
+    cells: Sequence[Cells], labels: Sequence[str], units: Sequence[str]
+) -> tuple[list[Column], list[str]]:
+    """Return the columns of numbers; those of words are left out. And what is to be said of them."""
+    columns, told = [], []
+    for place, (column, label, unit) in enumerate(zip(cells, labels, units, strict=True), 1):
+        name = label or f"column_{place}"
+        grouped = next((text for _, text in column.strange if has_thousands(text)), None)
+        if grouped is not None:
+            raise _thousands(name, grouped)
+        if len(column.values) and column.is_text:
+            words = [text for _, text in column.strange][:3]
+            told.append(f"{name}: a column of words is left out: {'; '.join(words)}")
+            column = replace(column, values=column.values[:0])
+        elif column.strange:
+            row, text = column.strange[0]
+            if len(column.strange) > max(3, _MOST_STRANGE * len(column.values)):
+                raise DatasetError(
+                    f"{name}: expected numbers, got {len(column.strange)} other cells, the first {text!r} in row "
+                    f"{row + 1}. Is the delimiter or the decimal sign another one (--delimiter, --decimal)?"
+                )
+            told.append(
+                f"{name}: {len(column.strange)} cells are no numbers and count as missing, the first is "
+                f"{text!r} in row {row + 1}"
+            )
+        shown = unit or ("s" if column.dated else "")
+        kind = {"time": 1} if column.dated else {}
+        columns.append(Column(name, column.values, shown, column.overrange, attrs=kind))
+    return columns, told
+
+
+def with_time(table: Table) -> Table:
+    """Return the table with the column of its instants told apart, where one is clear.
+
+    Clear is a heading that means time, or a first column without heading that ascends from row to row and is
+    followed by others.
+    """
+    for place, column in enumerate(table.columns):
+        if column.attrs.get("time") or is_time_name(column.label) or _is_time_by_unit(column, place):
+            return _apart(table, place)
+    if len(table.columns) > 1 and table.columns[0].label == FIRST and _ascends(table.columns[0]):
+        return _apart(table, 0)
+    return table
+
+
+def _apart(table: Table, place: int) -> Table:
+    others = [column for at, column in enumerate(table.columns) if at != place]
+    return replace(table, columns=others, time=table.columns[place], time_place=place) if others else table
+
+
+def _is_time_by_unit(column: Column, place: int) -> bool:
+    return place == 0 and seconds_in(column.unit) is not None and _ascends(column)
+
+
+def _ascends(column: Column) -> bool:
+    values = column.values[np.isfinite(column.values)]
+    return len(values) > 1 and float(np.mean(np.diff(values) >= 0.0)) > 0.99 and bool(values[-1] > values[0])

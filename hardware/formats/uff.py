@@ -1,0 +1,208 @@
+"""Universal files (UFF), read with pyuff: functions over time (dataset 58), of text or binary."""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.cells import sorted_out
+from vibroimpact.hardware.formats.extras import missing_extra
+from vibroimpact.hardware.formats.labels import seconds_in
+from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, Floats, RawFile, Table
+
+SIGNATURE = re.compile(rb"(?:[ ]*\r?\n)*[ ]{4}-1[ ]*\r?\n[ ]{1,5}\d{1,5}(?:[bB][^\r\n]*)?[ ]*\r?\n")
+_EDGE = re.compile(
+    rb"[ ]{4}-1(?:[\r\n]|[ ]{74}|\Z)"
+)  # as pyuff looks for them; binary samples stand right before
+_FUNCTION = 58
+_UNITS = 164
+_TIME = 17
+_KINDS = {
+    0: "a general function",
+    1: "a time response",
+    2: "an auto spectrum",
+    3: "a cross spectrum",
+    4: "a frequency response",
+    5: "a transmissibility",
+    6: "a coherence",
+    7: "an auto correlation",
+    8: "a cross correlation",
+    9: "a power spectral density",
+    12: "a spectrum",
+}
+_OVER_TIME = frozenset({0, 1})
+# What the ordinate is, in SI (dataset 164, units code 1); others have a label of their own.
+_SI_UNITS = {8: "m", 9: "N", 11: "m/s", 12: "m/s^2", 13: "N", 15: "Pa", 16: "kg"}
+_DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
+_CUT_OFF = "the file is cut off: its last dataset has no end, and is left out"
+
+
+def is_uff(start: bytes) -> bool:
+    """Whether a file begins as a universal file does: the mark of a dataset alone in a line, then its number.
+
+    >>> is_uff(b"    -1\\n    58\\nNONE\\n"), is_uff(b"-1\\n58\\n"), is_uff(b"    -1\\r\\n    58b     1     2\\r\\n")
+    (True, False, True)
+    """
+    return SIGNATURE.match(start) is not None
+
+
+def read_uff(path: os.PathLike[str] | str) -> RawFile:
+    """Read the functions over time of a universal file; those with one set of instants share a table.
+
+    Raises
+    ------
+    DatasetError
+        pyuff is not installed, the file is damaged, or has no function over time.
+    """
+    try:
+        import pyuff
+    except ImportError as problem:
+        raise missing_extra("a universal file (UFF)", "pyuff", "uff") from problem
+    with open(path, "rb") as stream:
+        cut = len(_EDGE.findall(stream.read())) % 2 == 1
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # numpy's, of numbers in damaged files
+            file = pyuff.UFF(os.fspath(path))
+            types = [int(kind) for kind in file.get_set_types()]
+            if len(types) > 2 * MOST_COLUMNS:
+                raise DatasetError(f"expected at most {2 * MOST_COLUMNS} datasets, got {len(types)}.")
+            datasets = [file.read_sets(at) for at, kind in enumerate(types) if kind in (_FUNCTION, _UNITS)]
+    except DatasetError:
+        raise
+    # the reader gives up on damaged bytes with whatever error they lead to
+    except Exception as problem:
+        besides = f" Besides, {_CUT_OFF}." if cut else ""
+        raise DatasetError(
+            f"expected a whole universal file (UFF), got one that cannot be read ({problem}).{besides}"
+        ) from problem
+    functions = [found for found in datasets if found["type"] == _FUNCTION]
+    units: Mapping[str, Any] = next((found for found in datasets if found["type"] == _UNITS), {})
+    raw = _sorted_out(functions, units, Counter(types), cut)
+    return replace(raw, damage=_CUT_OFF if cut else "")
+
+
+def _sorted_out(
+    functions: Sequence[Mapping[str, Any]], units: Mapping[str, Any], types: Counter[int], cut: bool
+) -> RawFile:
+    """Return the functions over time; say what the others are."""
+    remarks = [
+        f"{count} datasets of type {kind} are left out; functions (58) over time are read"
+        for kind, count in sorted(types.items())
+        if kind not in (_FUNCTION, _UNITS)
+    ]
+    in_si = not units or units.get("units_code") == 1
+    if not in_si:
+        remarks.append(f"the units of the file are {units.get('units_description', '')!r}, not SI (--unit)")
+    repeated = Counter(_text(found.get("id1")) for found in functions)
+    tables: list[Table] = []
+    even: list[Column] = []
+    for number, found in enumerate(functions, 1):
+        name = _label(found, repeated[_text(found.get("id1"))] > 1) or f"function {number}"
+        why = _why_not(found)
+        if why:
+            remarks.append(f"{name}: {why}, is left out; functions over time are read")
+            continue
+        remarks += _told_length(name, found)
+        column, instants = _column(name, found, bool(units) and in_si)
+        if instants is None:
+            even.append(column)
+        else:
+            tables.append(Table([column], Column("instants", instants, "s"), name))
+    if sum(len(table.columns[0].values) for table in tables) + sum(map(_length, even)) > MOST_SAMPLES:
+        raise DatasetError(f"expected at most {MOST_SAMPLES} samples, got more. Cut it into pieces.")
+    if even:
+        tables.insert(0, Table(even, vectors=True))
+    if not tables:
+        kinds = ", ".join(str(kind) for kind in sorted(types)) or "none"
+        lost = f" Besides, {_CUT_OFF}." if cut else ""
+        what = "; ".join(line.split(";")[0] for line in remarks)[:300]
+        raise DatasetError(
+            "expected a universal file (UFF) with functions over time (dataset 58), got datasets of type "
+            f"{kinds}{f' ({what})' if what else ''}.{lost}"
+        )
+    return RawFile("universal file (UFF 58)", _together(tables), remarks)
+
+
+def _together(tables: Sequence[Table]) -> list[Table]:
+    """Return tables in which functions on the same instants share one."""
+    found: list[Table] = []
+    for table in tables:
+        like = next((at for at, other in enumerate(found) if _same_instants(table, other)), None)
+        if like is None:
+            found.append(table)
+        else:
+            found[like] = replace(found[like], columns=[*found[like].columns, *table.columns], title="")
+    return found
+
+
+def _same_instants(one: Table, other: Table) -> bool:
+    return (
+        one.time is not None and other.time is not None and np.array_equal(one.time.values, other.time.values)
+    )
+
+
+def _length(column: Column) -> int:
+    return len(column.values)
+
+
+def _why_not(found: Mapping[str, Any]) -> str:
+    """Return what a function is that is none over time; empty for one that is."""
+    kind = int(found.get("func_type", 0))
+    if kind not in _OVER_TIME or found.get("abscissa_spec_data_type") not in (0, 1, _TIME):
+        return _KINDS.get(kind, f"a function of type {kind}") + (
+            " over another abscissa" * (kind in _OVER_TIME)
+        )
+    if np.iscomplexobj(found["data"]):
+        return "a complex function"
+    if len(found["data"]) < 1:
+        return "a function without samples"
+    return ""
+
+
+def _told_length(name: str, found: Mapping[str, Any]) -> list[str]:
+    declared, there = int(found.get("num_pts", 0)), len(found["data"])
+    return [f"{name}: the header says {declared} samples, the file has {there}"] if declared > there else []
+
+
+def _column(name: str, found: Mapping[str, Any], in_si: bool) -> tuple[Column, Floats | None]:
+    """Return a function, and its instants (s) where they are not counted by an increment."""
+    declared = int(found.get("num_pts", 0))
+    numbers = sorted_out(np.asarray(found["data"], dtype=np.float64)[: declared or None])
+    unit = _text(found.get("ordinate_axis_units_lab"))
+    if not unit and in_si:
+        unit = _SI_UNITS.get(int(found.get("ordinate_spec_data_type", 0)), "")
+    told = {key: _text(found.get(source)) for key, source in (("function", "id2"), ("date", "id3"))}
+    attrs = {f"source_{key}": text for key, text in told.items() if text}
+    second = seconds_in(_text(found.get("abscissa_axis_units_lab"))) or 1.0
+    column = Column(name, numbers.values, unit, numbers.overrange, attrs=attrs)
+    if int(found.get("abscissa_spacing", 1)) == 0:
+        return column, np.asarray(found["x"], dtype=np.float64)[: len(numbers.values)] * second
+    interval = float(found.get("abscissa_inc", 0.0)) * second
+    start = float(found.get("abscissa_min", 0.0)) * second
+    return replace(column, interval=interval if interval > 0.0 else None, start=start), None
+
+
+def _label(found: Mapping[str, Any], with_place: bool) -> str:
+    """Return what a function is called: its first line, and its node and direction where that is not enough."""
+    name = _text(found.get("id1"))
+    if name and not with_place:
+        return name
+    direction = int(found.get("rsp_dir", 0))
+    sign = _DIRECTIONS.get(abs(direction), "")
+    place = f"{found.get('rsp_node', '')}{sign.replace('+', '-') if direction < 0 else sign}"
+    return f"{name} {_text(found.get('rsp_ent_name'))} {place}".replace("  ", " ").strip()
+
+
+def _text(value: Any) -> str:
+    """Return a text of the file; NONE stands for none."""
+    text = str(value or "").strip()
+    return "" if text.upper() == "NONE" else text

@@ -1,0 +1,210 @@
+"""From the columns of files to the parts of a recording: channels, event trains and single values."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.analysis.recording import Channel, EventTrain, SingleValue, TimeAxis
+from vibroimpact.analysis.recording.units import measured_unit
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.labels import is_known_unit, seconds_in
+from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Table
+from vibroimpact.hardware.recordings.channel_of import channel_of
+from vibroimpact.hardware.recordings.events import (
+    AS_RASTER,
+    event_train,
+    is_raster,
+    looks_like_events,
+    raster_train,
+)
+from vibroimpact.hardware.recordings.naming import channel_name
+from vibroimpact.hardware.recordings.settings import ImportSettings
+from vibroimpact.hardware.recordings.sources import Source, named, shortened
+from vibroimpact.hardware.recordings.time_axis import Placement, place
+
+_NUMBERED = re.compile(r"column_\d+")
+
+
+@dataclass(slots=True)
+class Parts:
+    """What the recording is made of, growing from column to column.
+
+    Attributes
+    ----------
+    channels, events, scalars : dict
+        By name.
+    remarks : list of str
+        Each once.
+    """
+
+    channels: dict[str, Channel] = field(default_factory=dict)
+    events: dict[str, EventTrain] = field(default_factory=dict)
+    scalars: dict[str, SingleValue] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
+
+    def add(self, source: Source, titled: bool) -> None:
+        """Add the columns of one file.
+
+        Parameters
+        ----------
+        source : Source
+        titled : bool
+            Whether its remarks begin with the name of the file.
+
+        Raises
+        ------
+        DatasetError
+            A column cannot be placed in time; the message has the name of the file.
+        """
+        title = source.path.name if titled else ""
+        self.remark(source.remarks, title)
+        self.remark([line for table in source.tables for line in _told_lengths(table)], title)
+        axes: dict[Any, tuple[Placement, TimeAxis]] = {}
+        rasters = [is_raster(table, source.settings.events) for table in source.tables]
+        columns = [(at, column) for at, table in enumerate(source.tables) for column in table.columns]
+        if sum(len(column.values) for _, column in columns) > MOST_SAMPLES:
+            raise DatasetError(f"{source.path}: expected at most {MOST_SAMPLES} samples, got more.")
+        for number, (at, column) in enumerate(columns):
+            try:
+                self.remark(self._add_column(number, at, column, source, axes, rasters[at]), title)
+            except DatasetError as problem:
+                besides = f" Besides, {source.damage}." if source.damage else ""
+                raise named(DatasetError(f"{problem}{besides}"), source.path) from problem
+
+    def remark(self, lines: Sequence[str], title: str = "") -> None:
+        """Add what was noticed, each line once."""
+        for line in lines:
+            told = shortened(f"{title}: {line}" if title else line)
+            if told not in self.remarks:
+                self.remarks.append(told)
+
+    def _add_column(
+        self,
+        number: int,
+        at: int,
+        column: Column,
+        source: Source,
+        axes: dict[Any, tuple[Placement, TimeAxis]],
+        in_raster: bool,
+    ) -> list[str]:
+        """Add one column as what it is; return what is to be said of it."""
+        settings, table = source.settings, source.tables[at]
+        in_raster = in_raster and _has_clock(column, table, settings)
+        as_events = not in_raster and _is_event_train(column, table, settings)
+        name = self._name(column, number, settings, as_events)
+        changed, told = described(name, column, settings, number)
+        if as_events:
+            factor = seconds_in(changed.unit) or 1.0
+            instants = replace(changed, values=changed.values * factor)
+            self.events[name], more = event_train(name, instants, settings.window, settings.masked)
+            if settings.events is None:
+                told.append(
+                    f"{name}: ascends unevenly, so it is taken as instants of events (--no-events if not)"
+                )
+            return told + more
+        if len(column.values) == 1:
+            value, beyond = (
+                float(changed.values[0]),
+                column.overrange is not None and bool(column.overrange[0]),
+            )
+            self.scalars[name] = SingleValue(value, measured_unit(changed.unit).cf, column.label, beyond)
+            said = "which the file marks as overrange" if beyond else f"{value:g}"
+            return [*told, f"{name}: one value only, {said}: kept beside the channels"]
+        key = (at, len(column.values), column.interval, column.start, column.group)
+        if key not in axes:
+            placement = place(table, column, settings.rate, settings.start)
+            axes[key] = placement, _axis(placement, column, table, source)
+            told += placement.remarks
+        if in_raster:
+            train = raster_train(name, column, *axes[key], settings.window, settings.masked)
+            if train is None:
+                return [*told, f"{name}: has no event, and is left out"]
+            self.events[name] = train
+            return [*told, AS_RASTER]
+        self.channels[name], more = channel_of(name, changed, *axes[key], settings.masked)
+        return told + more
+
+    def _name(self, column: Column, number: int, settings: ImportSettings, as_events: bool) -> str:
+        label = settings.name[number] if number < len(settings.name) else column.label
+        if as_events and _NUMBERED.fullmatch(label):
+            label = "events"
+        return channel_name(label, {*self.channels, *self.events, *self.scalars})
+
+
+def _told_lengths(table: Table) -> list[str]:
+    """Say where columns that were written together end at different rows, as those of a file that was cut off do."""
+    lengths = sorted({len(column.values) for column in table.columns})
+    if table.vectors or len(lengths) < 2:
+        return []
+    shortest = next(column for column in table.columns if len(column.values) == lengths[0])
+    return [
+        f"channels of unequal lengths, {lengths[0]} to {lengths[-1]} samples: {shortest.label} ends first"
+    ]
+
+
+def described(name: str, column: Column, settings: ImportSettings, number: int) -> tuple[Column, list[str]]:
+    """Return a column with the unit, scale and offset that it gets, and what is to be said of it.
+
+    Parameters
+    ----------
+    name : str
+        In the recording.
+    column : Column
+    settings : ImportSettings
+    number : int
+        Place of the column in the lists of the settings, from 0.
+    """
+    told: list[str] = []
+    unit = _picked(settings.unit, number) or column.unit
+    if not is_known_unit(unit):
+        told.append(f"{name}: the unit {unit[:40]!r} is not known: taken as a pure number (--unit)")
+        unit = "1"
+    attrs = {key: value for key, value in column.attrs.items() if key != "time"}
+    if column.unit and column.unit != unit:
+        attrs["source_unit"] = column.unit
+    scale, offset = _picked(settings.scale, number), _picked(settings.offset, number)
+    if scale is None and offset is None:
+        return replace(column, unit=unit, attrs=attrs), told
+    factor, shift = 1.0 if scale is None else scale, offset or 0.0
+    told.append(f"{name}: {factor:g} times the values of the file, plus {shift:g}")
+    with np.errstate(over="ignore"):
+        values = column.values * factor + shift
+    rails = None
+    if column.rails is not None:
+        low, high = sorted(limit * factor + shift for limit in column.rails)
+        rails = low, high
+    return replace(
+        column, values=values, unit=unit, attrs=attrs | {"scale": factor, "offset": shift}, rails=rails
+    ), told
+
+
+def _picked(values: Sequence[Any], number: int) -> Any:
+    """Return the value for a column; one value is for all of them."""
+    if len(values) == 1:
+        return values[0]
+    return values[number] if number < len(values) else None
+
+
+def _has_clock(column: Column, table: Table, settings: ImportSettings) -> bool:
+    """Whether something says when the rows of a column were sampled."""
+    stated = (settings.rate, table.rate, column.interval, table.clock_of(column))
+    return any(one is not None for one in stated)
+
+
+def _is_event_train(column: Column, table: Table, settings: ImportSettings) -> bool:
+    """Whether a column is instants: as the user says, or where nothing gives it a time and it looks so."""
+    if settings.events is not None:
+        return settings.events
+    if settings.rate is not None or table.clock_of(column) is not None:
+        return False
+    return (table.vectors or len(table.columns) == 1) and looks_like_events(column)
+
+
+def _axis(placement: Placement, column: Column, table: Table, source: Source) -> TimeAxis:
+    trigger = ", ".join(part for part in (source.path.name, table.title, column.group) if part)
+    return TimeAxis(placement.time, placement.interval, placement.uncertainty, placement.source, trigger)

@@ -1,0 +1,91 @@
+"""Make a channel of a column: its samples where they belong in time, its flags, and what is odd about it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vibroimpact.analysis.recording import Channel, TimeAxis
+from vibroimpact.analysis.recording.units import measured_unit
+from vibroimpact.hardware.formats.table import Column, Flags, Floats
+from vibroimpact.hardware.recordings.sample_quality import clipped_samples, flags
+from vibroimpact.hardware.recordings.time_axis import Placement
+
+_OFFSET_SHOWS = 3.0
+"""Of the usual distance from the median: a level of rest that is farther from zero is an offset."""
+
+
+def channel_of(
+    name: str,
+    column: Column,
+    placement: Placement,
+    axis: TimeAxis,
+    masked: tuple[tuple[float, float], ...] = (),
+) -> tuple[Channel, list[str]]:
+    """Return the channel of a column, and what was noticed.
+
+    Parameters
+    ----------
+    name : str
+    column : Column
+        Its unit is one that is known.
+    placement : Placement
+        Which row each sample has.
+    axis : TimeAxis
+        Of the placement; shared by all channels that have it.
+    masked : tuple of tuple of float
+        Spans of time, s, in which the samples are no measurement: they become missing.
+    """
+    # a row -1 reads the last one here, and is overwritten as missing
+    values = np.where(placement.row < 0, np.nan, column.values[placement.row])
+    overrange = np.zeros(len(values), dtype=bool)
+    if column.overrange is not None:
+        overrange = (placement.row >= 0) & column.overrange[placement.row]
+    hidden = np.zeros(len(values), dtype=bool)
+    for begin, end in masked:
+        hidden |= (axis.time >= begin) & (axis.time <= end)
+    overrange |= np.isinf(values)
+    values[hidden | overrange] = np.nan
+    overrange &= ~hidden
+    clipped = clipped_samples(values, column.rails)
+    quality = flags(values, overrange, clipped, placement.suspect)
+    remarks = _remarks(name, column, values, clipped, overrange, hidden, placement)
+    unit = measured_unit(column.unit).cf
+    attrs = {"role": "measured", **column.attrs}
+    return Channel(name, values, unit, axis, quality, column.label, attrs), remarks
+
+
+def _remarks(
+    name: str,
+    column: Column,
+    values: Floats,
+    clipped: Flags,
+    overrange: Flags,
+    hidden: Flags,
+    placement: Placement,
+) -> list[str]:
+    """Say what is odd about the samples."""
+    told = []
+    if np.any(clipped):
+        levels = sorted({float(level) for level in values[clipped]})
+        said = " and ".join(
+            f"{level:.6g}" for level in (levels[:1] + levels[-1:] if len(levels) > 1 else levels)
+        )
+        told.append(f"{name}: {int(clipped.sum())} samples are clipped, at {said} {column.unit}".rstrip())
+    if np.any(overrange):
+        told.append(f"{name}: {int(overrange.sum())} samples are marked as overrange: NaN")
+    if np.any(hidden):
+        told.append(f"{name}: {int(hidden.sum())} samples are masked: NaN")
+    empty = int(np.sum(np.isnan(values) & ~overrange & ~hidden)) - placement.missing
+    if empty > 0:
+        told.append(f"{name}: {empty} samples have no number in the file: NaN")
+    finite = values[np.isfinite(values) & ~clipped]
+    if len(finite) < 2:
+        return told
+    in_unit = f" {column.unit}" if column.unit else ""
+    rest = float(np.median(finite))
+    usual = float(np.median(np.abs(finite - rest)))
+    if abs(rest) > _OFFSET_SHOWS * usual and np.ptp(finite) > 0.0:
+        told.append(f"{name}: rests at {rest:.4g}{in_unit}, not at zero: an offset, kept as it is")
+    elif np.ptp(finite) == 0.0:
+        told.append(f"{name}: has the one value {rest:.6g} all the way")
+    return told

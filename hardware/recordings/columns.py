@@ -1,0 +1,97 @@
+"""Which columns of a file become something, and which one has the instants, by what the user says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.labels import seconds_in
+from vibroimpact.hardware.formats.table import Column, RawFile, Table
+from vibroimpact.hardware.recordings.settings import ImportSettings
+from vibroimpact.orchestrator.scene.problems import nearest
+
+NO_COLUMN = "none"
+
+
+def chosen_tables(raw: RawFile, settings: ImportSettings) -> list[Table]:
+    """Return the tables of a file with the columns that the user wants, instants told apart and in s.
+
+    Numbers of columns count from 1 through all columns of all tables, the instants with them where they stand.
+
+    Raises
+    ------
+    DatasetError
+        A column that the user names is not there.
+    """
+    tables = list(raw.tables)
+    numbered = [column for table in tables for column in _in_file_order(table)]
+    if settings.time_column is not None:
+        tables = _with_time_column(tables, settings.time_column, numbered)
+    if settings.columns:
+        tables = _with_columns(tables, settings.columns, numbered)
+    return [_in_seconds(table) for table in tables if table.columns]
+
+
+def _in_file_order(table: Table) -> list[Column]:
+    """Return the columns as they stand in the file, the instants among them."""
+    columns = list(table.columns)
+    if table.time is not None:
+        columns.insert(table.time_place, table.time)
+    return columns
+
+
+def _find(wanted: str | int, columns: Sequence[Column], key: str) -> Column:
+    """Return the column of a number or heading."""
+    labels = [column.label for column in columns]
+    if wanted in labels:
+        return columns[labels.index(str(wanted))]
+    number = int(wanted) if str(wanted).isascii() and str(wanted).isdecimal() else 0
+    if 1 <= number <= len(columns):
+        return columns[number - 1]
+    hint = nearest(wanted, labels)
+    raise DatasetError(
+        f"{key}: expected a heading or a number from 1 to {len(columns)}, got {str(wanted)[:60]!r}. {hint}"
+    )
+
+
+def _with_time_column(tables: Sequence[Table], wanted: str | int, numbered: Sequence[Column]) -> list[Table]:
+    """Return the tables with another column as that of their instants, or with none."""
+    chosen = None if wanted == NO_COLUMN else _find(wanted, numbered, "time_column")
+    found = []
+    for table in tables:
+        columns = _in_file_order(table)
+        if chosen is None:
+            found.append(replace(table, columns=columns, time=None))
+        elif any(column is chosen for column in columns):
+            others = [column for column in columns if column is not chosen]
+            found.append(replace(table, columns=others, time=chosen))
+        else:
+            found.append(table)
+    return found
+
+
+def _with_columns(
+    tables: Sequence[Table], wanted: Sequence[str | int], numbered: Sequence[Column]
+) -> list[Table]:
+    chosen = [_find(one, numbered, "columns") for one in wanted]
+    kept = []
+    for table in tables:
+        columns = [column for column in chosen if any(column is own for own in table.columns)]
+        if table.time is not None and any(column is table.time for column in chosen) and not columns:
+            columns, table = [table.time], replace(table, time=None)
+        kept.append(replace(table, columns=columns))
+    return kept
+
+
+def _in_seconds(table: Table) -> Table:
+    """Return the table with its instants in s."""
+    if table.time is None:
+        return table
+    factor = seconds_in(table.time.unit) or 1.0
+    if factor == 1.0:
+        return table
+    with np.errstate(over="ignore"):
+        return replace(table, time=replace(table.time, values=table.time.values * factor, unit="s"))

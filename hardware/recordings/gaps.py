@@ -1,0 +1,117 @@
+"""Gaps in instants: where samples are missing between rows, and how many."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.hardware.formats.table import MOST_SAMPLES, Floats
+from vibroimpact.hardware.recordings.printed_grid import digits_of
+
+AGREEMENT = 1e-4
+"""Relative difference of two intervals that is no contradiction."""
+EVEN = 1e-3
+"""Of the interval: what an evenly sampled instant may be off, where no digits explain it."""
+_GAP = 0.5
+"""Of the interval: what a step has above it where samples are missing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gaps:
+    """Where instants skip samples.
+
+    Attributes
+    ----------
+    row : ndarray of int, shape (gap,)
+        First row after each gap.
+    skipped : ndarray of int, shape (gap,)
+        Samples that are missing before it.
+    at, length : float
+        Start and length of the longest gap, s.
+    on_grid : bool
+        The rows between the gaps are evenly spaced.
+    """
+
+    row: NDArray[np.intp]
+    skipped: NDArray[np.intp]
+    at: float
+    length: float
+    on_grid: bool
+
+    @property
+    def missing(self) -> int:
+        """Samples in all gaps."""
+        return int(self.skipped.sum())
+
+    def before(self, row: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return how many samples are missing before each row."""
+        total = np.append(0, np.cumsum(self.skipped))
+        return np.asarray(total[np.searchsorted(self.row, row, side="right")], dtype=np.intp)
+
+    def said(self) -> str:
+        """Return how many gaps there are, and which is the longest."""
+        several = f"{len(self.row)} gaps, the longest" if len(self.row) > 1 else "1 gap"
+        return f"{several} of {self.length:.6g} s at {self.at:.6g} s"
+
+    def told(self) -> str:
+        """Return the remark on gaps that are filled."""
+        many = self.missing > 1
+        return (
+            f"{self.missing} {'samples are' if many else 'sample is'} missing in {self.said()}: "
+            f"{'they are' if many else 'it is'} there as NaN"
+        )
+
+
+def gaps_in(row: NDArray[np.intp], instants: Floats, interval: float | None = None) -> Gaps | None:
+    """Return the gaps in the instants of rows, s; None where there are none.
+
+    Each run of rows between gaps has a start, averaged over its instants; two starts tell how many samples are
+    missing between their runs, also where the digits of one instant do not.
+
+    Parameters
+    ----------
+    row : ndarray of int
+        Rows that have an instant.
+    instants : ndarray of float
+        Of these rows.
+    interval : float or None
+        Sampling interval by the user, s; used where the instants do not contradict it.
+    """
+    if len(row) < 3:
+        return None
+    steps, rows, digits = np.diff(instants), np.diff(row), digits_of(instants)
+    usual = float(np.median(steps / rows))
+    # where each step is a whole number of intervals, nothing was rounded
+    coarse = 0.0 if usual > 0.0 and are_whole(steps / usual) else digits
+    if coarse:
+        lag = max(1, len(row) // 20)
+        usual = float(np.median((instants[lag:] - instants[:-lag]) / (row[lag:] - row[:-lag])))
+    if usual <= 0.0:
+        return None
+    is_gap = steps - rows * usual > _GAP * usual + coarse
+    if not np.any(is_gap) or np.all(is_gap):
+        return None
+    pace = _pace(steps[~is_gap], rows[~is_gap], digits, interval)
+    if pace <= 0.0:
+        return None
+    run = np.append(0, np.cumsum(is_gap))
+    starts = instants - row * pace
+    start = np.bincount(run, starts) / np.bincount(run)
+    skipped = np.clip(np.rint(np.diff(start) / pace), 0, MOST_SAMPLES).astype(np.intp)
+    on_grid = float(np.abs(starts - start[run]).max()) <= _GAP * pace + coarse and bool(np.any(skipped))
+    longest = int(np.argmax(np.where(is_gap, steps, -np.inf)))
+    return Gaps(row[1:][is_gap], skipped, float(instants[longest]), float(steps[longest]), on_grid)
+
+
+def _pace(steps: Floats, rows: NDArray[np.intp], digits: float, interval: float | None) -> float:
+    """Return the interval between rows without the gaps, s; that of the user where the steps allow it."""
+    pace = float(steps.sum()) / int(rows.sum())
+    doubt = digits / int(rows.sum())
+    return interval if interval is not None and abs(pace - interval) <= AGREEMENT * interval + doubt else pace
+
+
+def are_whole(jumps: Floats) -> bool:
+    """Whether steps are whole numbers of intervals, one at least."""
+    return bool(np.all(np.abs(jumps - np.rint(jumps)) <= EVEN) and np.all(jumps > 0.5))

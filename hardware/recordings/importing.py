@@ -1,0 +1,127 @@
+"""From files of any format to one recording."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.analysis.recording import Recording, open_recording
+from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.hardware.formats.choosing import check_file, holds_recording
+from vibroimpact.hardware.recordings.building import Parts
+from vibroimpact.hardware.recordings.gaps import AGREEMENT
+from vibroimpact.hardware.recordings.settings import ImportSettings
+from vibroimpact.hardware.recordings.sources import Source, named, read_source, spread
+
+
+def import_recording(
+    files: Sequence[Path], settings: ImportSettings | None = None, common: ImportSettings | None = None
+) -> Recording:
+    """Read files into one recording.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        Several files become one recording; each has a trigger, and so a time axis, of its own.
+    settings : ImportSettings or None
+        For all columns of all files together (the command line); it has the last word.
+    common : ImportSettings or None
+        For each file, in place of the settings file beside it.
+
+    Returns
+    -------
+    Recording
+        With provenance, and in `attrs["remarks"]` a line for each thing that was noticed.
+
+    Raises
+    ------
+    DatasetError
+        A file is damaged, of no known format, or contradicts itself beyond repair; the message has its name.
+    UsageError
+        The settings do not fit the files.
+    """
+    given = settings or ImportSettings()
+    if any(_is_ours(path) for path in files):
+        return _passed_on(files, given)
+    sources = [read_source(path, given, common) for path in files]
+    spread(sources, given)
+    parts = Parts()
+    for source in sources:
+        parts.add(source, titled=len(sources) > 1)
+    if not parts.channels and not parts.events:
+        left_out = [line for line in parts.remarks if "left out" in line]
+        besides = f" Besides, {'; '.join(left_out[:3])}." if left_out else ""
+        raise DatasetError(
+            f"{files[0]}: expected channels of two samples or more, or instants of events, got none.{besides}"
+        )
+    parts.remark(_of_the_whole(parts))
+    return Recording(parts.channels, parts.events, parts.scalars, _provenance(sources, parts))
+
+
+def _is_ours(path: Path) -> bool:
+    try:
+        check_file(path)
+        return holds_recording(path)
+    except OSError as problem:
+        raise DatasetError(
+            f"{path}: expected a readable file, got an error: {problem.strerror}."
+        ) from problem
+    except DatasetError as problem:
+        raise named(problem, path) from problem
+
+
+def _passed_on(files: Sequence[Path], given: ImportSettings) -> Recording:
+    """Return a recording as it is; options would change what is imported already."""
+    if len(files) > 1:
+        raise UsageError(
+            f"{files[0]}: expected one recording, or files of other formats, got {len(files)} files."
+        )
+    if given.model_fields_set:
+        keys = ", ".join(sorted(given.model_fields_set))
+        raise UsageError(f"{files[0]}: expected no options for what is a recording already, got {keys}.")
+    return open_recording(files[0])
+
+
+def _of_the_whole(parts: Parts) -> list[str]:
+    """Return what is to be said of all channels together."""
+    told = []
+    plain = [name for name, channel in parts.channels.items() if channel.unit == "1"]
+    if plain:
+        told.append(f"no unit is known for {', '.join(plain)}: pure numbers (--unit)")
+    axes = {id(channel.axis): channel.axis for channel in parts.channels.values()}.values()
+    triggers = list(dict.fromkeys(axis.trigger for axis in axes))
+    if len(triggers) > 1:
+        told.append(
+            f"{len(triggers)} triggers: the lag between their time axes is not known, and must be estimated"
+        )
+    rates = sorted(axis.rate for axis in axes if axis.interval is not None)
+    if rates and rates[-1] - rates[0] > AGREEMENT * rates[0]:
+        told.append(f"the channels are sampled at different rates, {rates[0]:.7g} to {rates[-1]:.7g} Hz")
+    return told
+
+
+def _provenance(sources: Sequence[Source], parts: Parts) -> dict[str, Any]:
+    """Return where the recording comes from: names of files, not their folders."""
+    attrs: dict[str, Any] = {}
+    for source in sources:
+        for key, value in source.attrs.items():
+            attrs.setdefault(key, value)
+    settings = {
+        source.path.name: source.settings.model_dump(exclude_unset=True, mode="json") for source in sources
+    }
+    return {
+        "source_file": ", ".join(source.path.name for source in sources),
+        "source_sha256": ", ".join(_hash(source.path) for source in sources),
+        "source_format": ", ".join(dict.fromkeys(source.source_format for source in sources)),
+        "import_settings": json.dumps(settings, sort_keys=True),
+        **attrs,
+        "remarks": "\n".join(" ".join(line.split()) for line in parts.remarks),
+    }
+
+
+def _hash(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,100 @@
+"""The grid on which numbers were written: the last digit, or a coarser step below it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vibroimpact.hardware.formats.table import Floats
+
+_MOST_DIGITS = 12
+_MOST_READ = 20_000
+_NEARLY_ALL = 0.9
+_DIGIT_LOST = 0.2
+"""Of the last digit, what may be lost in binary; of arbitrary numbers 40 % are as near to their digits."""
+
+
+def decimal_step(values: Floats) -> float:
+    """Return the power of ten that nearly all values are multiples of: the weight of their last digit.
+
+    Parameters
+    ----------
+    values : ndarray of float
+
+    Returns
+    -------
+    float
+        0 where they have more digits than can be told from rounding in binary.
+
+    Examples
+    --------
+    >>> decimal_step(np.array([0.05, 0.1, 0.151])), decimal_step(np.arange(5) / 3)
+    (0.001, 0.0)
+    """
+    finite = values[np.isfinite(values)]
+    read = finite[:: max(1, len(finite) // _MOST_READ)]
+    if not len(read):
+        return 0.0
+    # a clock's seconds since 1970 have lost some of their last digit in binary; whole numbers are on every grid
+    lost = float(np.spacing(np.abs(read).max())) / 2.0
+    if lost > _DIGIT_LOST:
+        return 0.0
+    beyond = read - np.rint(read[0])
+    for digits in range(_MOST_DIGITS + 1):
+        scaled = beyond * 10.0**digits
+        allowed = max(
+            1e-6, 1.01 * (lost + float(np.spacing(np.abs(scaled).max())) * 10.0**-digits) * 10.0**digits
+        )
+        if allowed > _DIGIT_LOST:
+            return 0.0
+        if float(np.mean(np.abs(scaled - np.rint(scaled)) <= allowed)) >= _NEARLY_ALL:
+            return 10.0**-digits
+    return 0.0
+
+
+def digits_of(instants: Floats) -> float:
+    """Return how coarsely instants are written, s: the weight of their last digit, and what binary takes of it."""
+    return decimal_step(instants) + float(np.spacing(np.abs(instants).max(initial=0.0)))
+
+
+def common_step(intervals: Floats, digits: float) -> float:
+    """Return the coarsest step that nearly all intervals are multiples of, up to their digits; 0 where none is.
+
+    Instants that were read off frames (of video, of blocks of audio) lie on such a step. The mean of
+    exp(2 pi i d / step) over the intervals d has modulus 1 for it. The largest such step is chosen, and refined by
+    least squares, d = step * whole number.
+
+    Parameters
+    ----------
+    intervals : ndarray of float, shape (interval,)
+        s, positive.
+    digits : float
+        Weight of their last digit, s.
+
+    Examples
+    --------
+    >>> frames = np.random.default_rng(1).integers(14, 22, 3000) * 1024 / 44100
+    >>> round(common_step(np.round(frames, 3), 1e-3), 4)
+    0.0232
+    """
+    if digits <= 0.0 or len(intervals) < 30:
+        return 0.0
+    usual = float(np.median(intervals))
+    rounded, times = np.unique(np.rint(intervals / digits), return_counts=True)
+    used = rounded * digits <= 3.0 * usual
+    values, weights = rounded[used] * digits, times[used] / times[used].sum()
+    if len(values) < 3 or len(values) > _MOST_READ // 4:
+        return 0.0
+    # a step needs five digits' weight to show, and some steps to an interval
+    frequencies = np.arange(2.0 / usual, 0.2 / digits, 0.05 / (3.0 * usual))[:_MOST_READ]
+    coherence = np.concatenate(
+        [
+            np.abs(np.exp(2j * np.pi * np.outer(part, values)) @ weights)
+            for part in np.array_split(frequencies, max(1, len(frequencies) * len(values) // 1_000_000))
+        ]
+    )
+    coherent = np.flatnonzero(coherence > 0.95)
+    if not len(coherent):
+        return 0.0
+    first = coherent[: int(np.argmax(np.append(np.diff(coherent) > 1, True))) + 1]
+    steps = np.rint(values * frequencies[first[np.argmax(coherence[first])]])
+    return float(np.sum(weights * values * steps) / np.sum(weights * steps * steps))

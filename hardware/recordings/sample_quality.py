@@ -1,0 +1,87 @@
+"""Mark samples that are no plain measurements: clipped, overrange, missing, of doubtful time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.recording import Quality
+from vibroimpact.hardware.formats.table import Flags, Floats
+
+FEWEST_CLIPPED = 3
+"""Equal samples at the extreme from which on they are no chance."""
+_REST = 0.2
+"""Share of the samples from which on a value is the level of rest, or a state of a switch, and no limit."""
+_SMOOTH_TOP = 6.0
+"""Steps of the converter by which a smooth top falls, at most, beside its flat part; see `_falls_steeply`."""
+
+
+def clipped_samples(values: Floats, rails: tuple[float, float] | None = None) -> Flags:
+    """Return which samples are at the limit of the measuring chain.
+
+    A limit shows as its extreme value coming again and again, exactly, and more often than its neighbours in
+    value, where the signal arrives too steeply for a smooth top that the converter's steps make flat.
+
+    Parameters
+    ----------
+    values : ndarray of float, shape (sample,)
+    rails : tuple of float or None
+        What the converter can give at most, where the file tells: then every sample there is clipped.
+
+    Examples
+    --------
+    >>> t = np.linspace(0.0, 1.0, 500)
+    >>> int(clipped_samples(np.clip(np.sin(40 * t) * np.exp(-t), -0.7, 2.0)).sum()) > 20
+    True
+    >>> bool(clipped_samples(np.round(100 * np.sin(40 * t))).any())
+    False
+    """
+    clipped = np.zeros(len(values), dtype=bool)
+    finite = values[np.isfinite(values)]
+    if len(finite) < FEWEST_CLIPPED:
+        return clipped
+    if rails is not None:
+        margin = 1e-9 * (rails[1] - rails[0])
+        clipped |= (values <= rails[0] + margin) | (values >= rails[1] - margin)
+    levels, counts = np.unique(finite, return_counts=True)
+    if len(levels) < 2 * FEWEST_CLIPPED:
+        return clipped
+    for end in (0, -1):
+        if _repeats(counts if end == 0 else counts[::-1], len(finite)) and _falls_steeply(
+            values, levels[end], levels
+        ):
+            clipped |= values == levels[end]
+    return clipped
+
+
+def _repeats(counts: NDArray[np.intp], total: int) -> bool:
+    """Whether the extreme value comes more often than chance, and than the values next to it."""
+    beside = counts[1 : max(4, len(counts) // 20)]
+    return bool(
+        counts[0] >= FEWEST_CLIPPED and counts[0] < _REST * total and counts[0] >= 2 * beside.max(initial=1)
+    )
+
+
+def _falls_steeply(values: Floats, extreme: float, levels: Floats) -> bool:
+    """Whether the signal leaves its extreme by more than a smooth top would.
+
+    A parabola that the step q of the converter makes flat over k >= 2 samples falls by at most
+    q (1 + 2/k)^2 + q <= 5 q from there to the next sample.
+    """
+    runs = np.flatnonzero(np.diff(np.concatenate([[False], values == extreme, [False]]))).reshape(-1, 2)
+    ends = np.concatenate([runs[:, 0] - 1, runs[:, 1]])
+    beside = values[ends[(ends >= 0) & (ends < len(values))]]
+    falls = np.abs(beside[np.isfinite(beside)] - extreme)
+    longest = int(np.diff(runs).max())
+    step = float(np.diff(levels).min())
+    return longest >= 2 and len(falls) > 0 and bool(np.median(falls) > _SMOOTH_TOP * step)
+
+
+def flags(values: Floats, overrange: Flags, clipped: Flags, suspect: Flags) -> NDArray[np.uint8]:
+    """Return the quality of each sample, sums of `Quality`."""
+    quality = np.zeros(len(values), dtype=np.uint8)
+    quality[clipped] |= np.uint8(Quality.clipped)
+    quality[np.isnan(values) & ~overrange] |= np.uint8(Quality.missing)
+    quality[overrange] |= np.uint8(Quality.overrange)
+    quality[suspect] |= np.uint8(Quality.suspect)
+    return quality

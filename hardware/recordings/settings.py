@@ -1,0 +1,189 @@
+"""What the user says of a file: options of `vibroimpact import`, or the same keys in a TOML file beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+    field_validator,
+)
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.hardware.formats.labels import is_known_unit
+from vibroimpact.orchestrator.scene.problems import Rule, lines_of, problems_of, syntax_problem
+
+_LARGEST = 2**16
+
+
+def _listed(value: Any) -> Any:
+    """Let one value stand for a list of one."""
+    return [value] if isinstance(value, str | int | float) and not isinstance(value, bool) else value
+
+
+_One = BeforeValidator(_listed)
+
+
+class ImportSettings(BaseModel):
+    """What the user says of the columns; what is None or empty is found from the file.
+
+    `name`, `unit`, `scale` and `offset` go through the columns in order, without the column of instants; a single
+    unit, scale or offset holds for all of them. A value is `scale` times what the file has, plus `offset`.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    name: Annotated[
+        tuple[str, ...],
+        _One,
+        Field(strict=False),
+        Rule("names of the columns", item="a name", hint='Write ["base", "board"].'),
+    ] = ()
+    unit: Annotated[
+        tuple[str, ...],
+        _One,
+        Field(strict=False),
+        Rule(
+            "units of the columns",
+            item="a unit such as m/s^2, g, V, mV, N",
+            hint="Write 1 for a pure number.",
+        ),
+    ] = ()
+    scale: Annotated[
+        tuple[FiniteFloat, ...],
+        _One,
+        Field(strict=False),
+        Rule("finite factors, none of them 0", item="a finite factor, not 0"),
+    ] = ()
+    offset: Annotated[
+        tuple[FiniteFloat, ...], _One, Field(strict=False), Rule("finite numbers", item="a finite number")
+    ] = ()
+    rate: Annotated[FiniteFloat | None, Field(gt=0.0), Rule("samples per second > 0", "Hz")] = None
+    start: Annotated[FiniteFloat | None, Rule("the instant of the first sample", "s")] = None
+    time_column: Annotated[
+        str | int | None,
+        Rule('the heading or the number of a column, or "none"', hint="The first column is 1."),
+    ] = None
+    columns: Annotated[
+        tuple[str | int, ...],
+        _One,
+        Field(strict=False),
+        Rule("headings or numbers of columns", item="a heading or a number", hint="The first column is 1."),
+    ] = ()
+    events: Annotated[bool | None, Rule("true (all columns are instants of events) or false (none is)")] = (
+        None
+    )
+    window: Annotated[
+        tuple[FiniteFloat, FiniteFloat] | None,
+        Field(strict=False),
+        Rule(
+            "start and end of the observation, the end later",
+            "s",
+            item="a finite number",
+            hint="Write [0, 30].",
+        ),
+    ] = None
+    masked: Annotated[
+        tuple[Annotated[tuple[FiniteFloat, FiniteFloat], Field(strict=False)], ...],
+        Field(strict=False),
+        Rule(
+            "pairs of start and end, each end later",
+            "s",
+            item="a start and a later end",
+            hint="Write [[10, 12.5]].",
+        ),
+    ] = ()
+    delimiter: Annotated[
+        Literal["tab", "comma", "semicolon", "bar", "blank"] | None,
+        Rule("tab, comma, semicolon, bar or blank"),
+    ] = None
+    decimal: Annotated[Literal[".", ","] | None, Rule('"." or ","')] = None
+
+    @field_validator("unit")
+    @classmethod
+    def _known(cls, units: tuple[str, ...]) -> tuple[str, ...]:
+        for unit in units:
+            if not is_known_unit(unit):
+                raise ValueError(unit)
+        return units
+
+    @field_validator("scale")
+    @classmethod
+    def _not_zero(cls, scales: tuple[float, ...]) -> tuple[float, ...]:
+        if 0.0 in scales:
+            raise ValueError("0")
+        return scales
+
+    @field_validator("window")
+    @classmethod
+    def _ascends(cls, window: tuple[float, float] | None) -> tuple[float, float] | None:
+        if window is not None and not window[0] < window[1]:
+            raise ValueError("order")
+        return window
+
+    @field_validator("masked")
+    @classmethod
+    def _all_ascend(cls, masked: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+        if not all(begin < end for begin, end in masked):
+            raise ValueError("order")
+        return masked
+
+
+def checked(values: Mapping[str, Any], source: str) -> ImportSettings:
+    """Return settings, or one error with all that is wrong with them.
+
+    Parameters
+    ----------
+    values : mapping
+        By key.
+    source : str
+        What messages begin with: the name of the file, or `command line`.
+
+    Raises
+    ------
+    UsageError
+        All problems, a line for each.
+    """
+    try:
+        return ImportSettings.model_validate(dict(values))
+    except ValidationError as error:
+        problems = problems_of(error, ImportSettings, ())
+        raise UsageError("\n".join(lines_of(problems, source))) from None
+
+
+def settings_beside(path: Path) -> ImportSettings:
+    """Return the settings in the file `NAME.toml` beside a recording; where there is none, none."""
+    beside = path.with_name(path.name + ".toml")
+    return read_settings(beside) if beside.is_file() else ImportSettings()
+
+
+def read_settings(path: Path) -> ImportSettings:
+    """Read a settings file.
+
+    Raises
+    ------
+    UsageError
+        It cannot be read, is no TOML, or has wrong keys: all problems.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(_LARGEST + 1)
+        text = content.decode("utf-8-sig")
+    except (OSError, ValueError) as problem:
+        reason = getattr(problem, "strerror", None) or "it is no UTF-8 text"
+        raise UsageError(f"{path}: expected a settings file (TOML), got none: {reason}.") from problem
+    if len(content) > _LARGEST:
+        raise UsageError(f"{path}: expected a settings file of at most {_LARGEST} bytes, got a larger one.")
+    try:
+        document = parse_toml(text)
+    except ValueError as problem:
+        raise UsageError(syntax_problem(problem, text).line(str(path))) from None
+    return checked(document, str(path))

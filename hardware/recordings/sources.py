@@ -1,0 +1,137 @@
+"""The files of one import, each with what the user says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.hardware.formats.choosing import read_raw
+from vibroimpact.hardware.formats.table import Table
+from vibroimpact.hardware.formats.text import WORDS_FOR_DELIMITERS
+from vibroimpact.hardware.recordings.columns import chosen_tables
+from vibroimpact.hardware.recordings.segments import joined, split_at_restarts
+from vibroimpact.hardware.recordings.settings import ImportSettings, settings_beside
+from vibroimpact.hardware.recordings.unix_time import counted_from_start
+
+_LONGEST_LINE = 500
+_PER_COLUMN = frozenset({"name", "unit", "scale", "offset"})
+
+
+@dataclass(slots=True)
+class Source:
+    """One file: what was read of it, and what the user says of it.
+
+    Attributes
+    ----------
+    path : Path
+    settings : ImportSettings
+        Its lists go through the columns of this file.
+    source_format : str
+    tables : list of Table
+        With the columns that are wanted, instants in s.
+    remarks : list of str
+    attrs : dict
+        Provenance that the file gives.
+    damage : str
+        What is wrong with the file as a whole.
+    """
+
+    path: Path
+    settings: ImportSettings
+    source_format: str
+    tables: list[Table]
+    remarks: list[str]
+    attrs: dict[str, Any]
+    damage: str = ""
+
+    @property
+    def columns(self) -> int:
+        """Columns of data in all tables."""
+        return sum(len(table.columns) for table in self.tables)
+
+
+def read_source(path: Path, given: ImportSettings, common: ImportSettings | None = None) -> Source:
+    """Read one file and choose its columns.
+
+    Parameters
+    ----------
+    path : Path
+    given : ImportSettings
+        Of the command line; what it says of single columns is for `spread`.
+    common : ImportSettings or None
+        In place of the settings file beside the file.
+
+    Raises
+    ------
+    DatasetError
+        The file cannot be read; the message has its name.
+    """
+    own = settings_beside(path) if common is None else common
+    own = own.model_copy(update={key: getattr(given, key) for key in given.model_fields_set - _PER_COLUMN})
+    try:
+        delimiter = "" if own.delimiter is None else WORDS_FOR_DELIMITERS[own.delimiter]
+        raw = read_raw(path, delimiter, own.decimal or "")
+        chosen, counted, date = counted_from_start(chosen_tables(raw, own))
+        tables, remarks = joined(chosen)
+        pieces = [split_at_restarts(table) for table in tables]
+    except DatasetError as problem:
+        raise named(problem, path) from problem
+    except MemoryError as problem:
+        raise DatasetError(f"{path}: expected a file that fits into memory, got a larger one.") from problem
+    found = [table for split, _ in pieces for table in split]
+    told = [
+        *([raw.damage] if raw.damage else []),
+        *raw.remarks,
+        *counted,
+        *remarks,
+        *(line for _, lines in pieces for line in lines),
+    ]
+    return Source(path, own, raw.source_format, found, told, {**date, **raw.attrs}, raw.damage)
+
+
+def shortened(line: str) -> str:
+    """Return a line of a bearable length: names in files may have millions of characters."""
+    return line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE - 3]}..."
+
+
+def named(problem: DatasetError, path: Path) -> DatasetError:
+    """Return an error whose lines begin with the name of their file."""
+    return DatasetError("\n".join(f"{path}: {line}" for line in map(shortened, str(problem).splitlines())))
+
+
+def spread(sources: Sequence[Source], given: ImportSettings) -> None:
+    """Hand what the command line says of the columns, in order, to the files that they are in.
+
+    Raises
+    ------
+    UsageError
+        There are fewer columns than names, units, scales or offsets.
+    """
+    edges = np.cumsum([0, *(source.columns for source in sources)]).tolist()
+    for key in sorted(_PER_COLUMN & given.model_fields_set):
+        _spread_one(sources, edges, key, getattr(given, key))
+    for source in sources:
+        for key in sorted(_PER_COLUMN):
+            _check_count(key, len(getattr(source.settings, key)), source.columns, f"{source.path}: ")
+
+
+def _spread_one(sources: Sequence[Source], edges: Sequence[int], key: str, values: Sequence[Any]) -> None:
+    _check_count(key, len(values), edges[-1], "command line: ")
+    alone = len(values) == 1 and key != "name"
+    for number, source in enumerate(sources):
+        part = values if alone else values[edges[number] : edges[number + 1]]
+        if part:
+            source.settings = source.settings.model_copy(update={key: tuple(part)})
+
+
+def _check_count(key: str, got: int, columns: int, where: str) -> None:
+    if got > max(columns, 1):
+        raise UsageError(
+            f"{where}{key}: expected at most {columns}, one for each column, got {got}. "
+            "The column of instants is not counted."
+        )

@@ -1,0 +1,351 @@
+"""Decide when the samples of a column were taken, from all that a file says of it, and say why.
+
+In order: the rate that the user gives; the column of instants, with the exact interval of the header where both
+agree and the instants are only printed with too few digits; the interval of the header. Where they contradict each
+other, the instants are used and the spread is kept as the uncertainty of the interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Flags, Floats, Table
+from vibroimpact.hardware.recordings.gaps import AGREEMENT, EVEN, Gaps, are_whole, gaps_in
+from vibroimpact.hardware.recordings.printed_grid import digits_of
+
+_ROUNDED = 0.7
+"""Of the last digit: rounding moves an instant by half of it, and a line through such instants by a little more."""
+_FEW_HOLES = 0.1
+_MOST_DOUBTFUL = 0.1
+_MOST_FILLED = 10
+"""Times as many samples missing as there are: then it is no gap but another kind of record."""
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where the rows of a column go in time.
+
+    Attributes
+    ----------
+    time : ndarray of float, shape (sample,)
+        s, ascending strictly.
+    interval : float or None
+        s; None where the samples are not even.
+    uncertainty : float
+        Relative, of the interval.
+    source : str
+        Where the instants come from.
+    row : ndarray of int, shape (sample,)
+        Row of the file that each sample has; -1 for one that is missing there.
+    suspect : ndarray of bool, shape (sample,)
+        Its instant was doubtful.
+    remarks : tuple of str
+    """
+
+    time: Floats
+    interval: float | None
+    uncertainty: float
+    source: str
+    row: NDArray[np.intp]
+    suspect: Flags
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def missing(self) -> int:
+        """Samples that the file skips."""
+        return int(np.sum(self.row < 0))
+
+
+def place(table: Table, column: Column, rate: float | None = None, start: float | None = None) -> Placement:
+    """Decide the instants of one column of a table.
+
+    Parameters
+    ----------
+    table : Table
+        With its column of instants in s, if it has one.
+    column : Column
+    rate : float or None
+        Samples per second by the user, who knows better than the file.
+    start : float or None
+        Instant of the first sample by the user, s.
+
+    Raises
+    ------
+    DatasetError
+        Nothing says when the samples were taken, or what says so is in disorder.
+    """
+    length = len(column.values)
+    instants = table.clock_of(column)
+    if column.interval is None and table.rate is not None:
+        column = replace(column, interval=1.0 / table.rate)
+    if rate is not None:
+        return _moved(_by_rate(rate, column, instants), start)
+    if instants is not None and length > 1:
+        return _moved(_by_instants(instants, column, _comparable(table, column), length), start)
+    if column.interval is not None and np.isfinite(column.interval):
+        source = "the sampling interval of the header"
+        late = f"{column.label}: by the header it begins at {column.start:.6g} s ({length} samples)"
+        remarks = (late,) if column.group else ()
+        return _moved(_even(column.start, column.interval, length, source, 0.0, remarks), start)
+    raise DatasetError(
+        f"{column.label}: expected a column of instants or a sampling interval, got neither. "
+        "Give --rate (samples per second), or --time-column."
+    )
+
+
+def _even(
+    start: float,
+    interval: float,
+    length: int,
+    source: str,
+    uncertainty: float = 0.0,
+    remarks: tuple[str, ...] = (),
+) -> Placement:
+    time = np.asarray(start + interval * np.arange(length), dtype=np.float64)
+    if not np.all(np.isfinite(time)) or (length > 1 and not np.all(np.diff(time) > 0.0)):
+        raise DatasetError(
+            f"interval: expected one of which {length} samples can be counted, got {interval:g} s."
+        )
+    rows = np.arange(length)
+    return Placement(time, interval, uncertainty, source, rows, np.zeros(length, dtype=bool), remarks)
+
+
+def _moved(placement: Placement, start: float | None) -> Placement:
+    """Let the axis begin where the user says."""
+    if start is None:
+        return placement
+    return replace(placement, time=placement.time - placement.time[0] + start)
+
+
+def _by_rate(rate: float, column: Column, instants: Floats | None) -> Placement:
+    """Place the rows by the rate of the user; gaps in the instants of the file stay gaps."""
+    interval, length = 1.0 / rate, len(column.values)
+    begin, remarks = column.start, []
+    gaps, count = None, np.arange(length)
+    if instants is not None and np.any(np.isfinite(instants)):
+        known = np.flatnonzero(np.isfinite(instants))
+        begin = float(instants[known[0]]) - interval * int(known[0])
+        remarks += _told_pace(known, instants[known], interval)
+        gaps = gaps_in(known, instants[known], interval)
+    if column.interval is not None and abs(column.interval - interval) > AGREEMENT * interval:
+        remarks.append(f"the header says {column.interval:.6g} s an interval; the rate given is used instead")
+    if gaps is not None and gaps.on_grid and _is_bearable(length + gaps.missing, length):
+        count = count + gaps.before(count)
+        remarks.append(gaps.told())
+    elif gaps is not None:
+        remarks.append(
+            f"the rate given counts the rows one after the other, and closes {gaps.said()} in the instants of the file"
+        )
+    return _on_grid(begin, interval, count, "the rate given by the user", remarks)
+
+
+def _told_pace(row: NDArray[np.intp], instants: Floats, interval: float) -> list[str]:
+    """Say where the instants of rows contradict an interval by more than their digits."""
+    steps, rows = np.diff(instants), np.diff(row)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    inner = steps <= 1.5 * usual if usual > 0.0 else np.ones(len(steps), dtype=bool)
+    if not np.any(inner):
+        return []
+    pace = float(steps[inner].sum()) / int(rows[inner].sum())
+    doubt = digits_of(instants) / int(rows[inner].sum())
+    if abs(pace - interval) <= AGREEMENT * interval + doubt:
+        return []
+    return [f"the instants of the file are {pace:.6g} s apart; the rate given is used instead"]
+
+
+def _is_bearable(samples: int, rows: int) -> bool:
+    """Whether rows may be filled up to so many samples."""
+    return samples <= min(MOST_SAMPLES, _MOST_FILLED * rows + 1000)
+
+
+def _on_grid(
+    start: float, interval: float, count: NDArray[np.intp], source: str, remarks: Sequence[str]
+) -> Placement:
+    """Place rows on an even grid, each at its count; what no row has is missing."""
+    placed = _even(start, interval, int(count[-1]) + 1 if len(count) else 0, source, 0.0, tuple(remarks))
+    row = np.full(len(placed.time), -1, dtype=np.intp)
+    row[count] = np.arange(len(count))
+    return replace(placed, row=row)
+
+
+def _comparable(table: Table, column: Column) -> list[float]:
+    """Return the intervals that the header gives to this column, and to those that were taken beside it."""
+    length = len(column.values)
+    beside = [
+        other.interval
+        for other in table.columns
+        if other.interval is not None and other.group == column.group and 2 * len(other.values) > length
+    ]
+    if table.rate is not None:
+        beside.append(1.0 / table.rate)
+    return [interval for interval in beside if np.isfinite(interval)]
+
+
+def _by_instants(instants: Floats, column: Column, declared: Sequence[float], length: int) -> Placement:
+    """Place the rows by a column of instants, which may end before the column does."""
+    known = np.isfinite(instants)
+    line = _straight(np.flatnonzero(known), instants[known])
+    if line is not None and not (line.is_rounded and _has_few_holes(instants[known])):
+        return _by_line(line, instants, column, declared, length)
+    if length > len(instants):
+        raise DatasetError(
+            f"{column.label}: expected an instant for each of {length} rows, got {len(instants)}, unevenly spaced."
+        )
+    return _uneven(instants)
+
+
+def _has_few_holes(instants: Floats) -> bool:
+    """Whether instants lie exactly on a grid of which few are missing: 0, 1, 3, 4 are no rounded 0, 1.3, 2.6, 3.9."""
+    steps = np.diff(instants)
+    usual = float(np.median(steps))
+    if usual <= 0.0:
+        return False
+    jumps = steps / usual
+    return are_whole(jumps) and 0.0 < float(np.sum(np.rint(jumps) - 1.0)) <= _FEW_HOLES * len(instants)
+
+
+@dataclass(frozen=True, slots=True)
+class _Line:
+    """Instants on a straight line over their count: start and interval, s, and the step of their digits, s."""
+
+    start: float
+    interval: float
+    digits: float
+    is_rounded: bool = False
+
+
+def _straight(count: NDArray[np.intp], instants: Floats) -> _Line | None:
+    """Return the line through instants that are even up to their digits; None where they are not."""
+    if len(instants) < 2 or instants[-1] <= instants[0]:
+        return None
+    span = int(count[-1] - count[0])
+    interval = float(instants[-1] - instants[0]) / span
+    centred = count - count.mean()
+    beyond = instants - instants[0]  # seconds since 1970 would leave a sum few digits
+    slope = float(np.sum(centred * beyond) / np.sum(centred * centred))
+    residual = beyond - beyond.mean() - slope * centred
+    digits = digits_of(instants)
+    allowed = max(EVEN * interval, _ROUNDED * digits)
+    # a straight line says nothing of two samples, or of instants coarser than all that they cover
+    if slope <= 0.0 or float(np.abs(residual).max()) > allowed or digits * 4.0 > span * interval:
+        return None
+    start = float(instants[0] + beyond.mean() - slope * count.mean())
+    if float(np.abs(residual).max()) <= 1e-6 * interval:
+        return _Line(float(instants[0] - count[0] * interval), interval, digits)
+    return _Line(start, slope, digits, digits > EVEN * interval)
+
+
+def _by_line(
+    line: _Line, instants: Floats, column: Column, declared: Sequence[float], length: int
+) -> Placement:
+    remarks = _told_line(line, instants, length)
+    # how far the printed digits can turn the line
+    turn = line.digits / (line.interval * max(len(instants) - 1, 1))
+    agreeing = [
+        interval
+        for interval in declared
+        if abs(interval - line.interval) <= (AGREEMENT + turn) * line.interval
+    ]
+    if declared and len(agreeing) == len(declared):
+        own = column.interval if column.interval is not None else agreeing[0]
+        if line.is_rounded:
+            begin = float(instants[0]) if np.isfinite(instants[0]) else line.start
+            source = "the first instant, and the sampling interval of the header"
+            return _even(begin, own, length, source, 0.0, tuple(remarks))
+    if declared and len(agreeing) < len(declared):
+        spread = [line.interval, *declared]
+        uncertainty = (max(spread) - min(spread)) / line.interval
+        said = ", ".join(f"{interval:.6g}" for interval in sorted(set(declared)))
+        remarks.append(
+            f"the time axes conflict: {said} s an interval in the header, {line.interval:.6g} s in the column of "
+            f"instants, which is used since it was written with the rows; all frequencies are uncertain by "
+            f"{uncertainty:.1%}"
+        )
+        source = f"the column of instants ({line.interval:.6g} s); the header says {said} s"
+        return _even(line.start, line.interval, length, source, uncertainty, tuple(remarks))
+    placed = _even(line.start, line.interval, length, "the column of instants", 0.0, tuple(remarks))
+    gone = ~np.isfinite(instants)
+    placed.suspect[: len(instants)][gone] = True
+    return placed
+
+
+def _told_line(line: _Line, instants: Floats, length: int) -> list[str]:
+    told = []
+    if line.is_rounded:
+        told.append(
+            f"the instants are rounded to {line.digits:.0e} s and {line.interval:.6g} s apart: they are taken as even"
+        )
+    gone = int(np.sum(~np.isfinite(instants)))
+    if gone:
+        told.append(f"{gone} rows have no instant; they are counted on")
+    if length > len(instants):
+        told.append(f"{length - len(instants)} rows after the last instant are counted on from it")
+    return told
+
+
+def _uneven(instants: Floats) -> Placement:
+    """Place rows by instants that are not even: gaps, jitter, repetitions, disorder."""
+    row, suspect, remarks = _in_order(instants)
+    time = instants[row]
+    if len(time) < 2:
+        return Placement(time, None, 0.0, "the column of instants", row, suspect, tuple(remarks))
+    filled = _with_gaps(time)
+    if filled is None:
+        steps = np.diff(time)
+        remarks.append(
+            f"the samples are not evenly spaced ({steps.min():.6g} to {steps.max():.6g} s apart): "
+            "their instants are kept"
+        )
+        return Placement(time, None, 0.0, "the column of instants, uneven", row, suspect, tuple(remarks))
+    gaps, line = filled
+    count = np.arange(len(row)) + gaps.before(np.arange(len(row)))
+    source = "the column of instants, its gaps filled"
+    placed = _on_grid(line.start, line.interval, count, source, [*remarks, gaps.told()])
+    placed.suspect[count] = suspect
+    return replace(placed, row=np.where(placed.row < 0, -1, row[placed.row]))
+
+
+def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
+    """Return rows in the order of their instants, each instant once; too much disorder is refused."""
+    known = np.flatnonzero(np.isfinite(instants))
+    remarks = (
+        [f"{len(instants) - len(known)} rows without an instant are left out"]
+        if len(known) < len(instants)
+        else []
+    )
+    if not len(known):
+        raise DatasetError("column of instants: expected numbers, got none. Give --rate, or --time-column.")
+    order = known[np.argsort(instants[known], kind="stable")]
+    back = int(np.sum(np.diff(instants[known]) < 0.0))
+    moved = order != known
+    again = np.append(False, np.diff(instants[order]) == 0.0)
+    if back + int(again.sum()) > _MOST_DOUBTFUL * len(known):
+        raise DatasetError(
+            f"column of instants: expected them to ascend, got {back} steps back and {int(again.sum())} repeated "
+            f"in {len(known)} rows. Give --rate, or name another --time-column."
+        )
+    if back:
+        remarks.append(
+            f"instants go back {back} times: the {int(moved.sum())} rows are put in order and marked suspect"
+        )
+    if again.any():
+        remarks.append(
+            f"{int(again.sum())} rows repeat an instant: the first of each is kept and marked suspect"
+        )
+    repeated = np.append(again[1:], False)
+    return order[~again], (moved | repeated)[~again], remarks
+
+
+def _with_gaps(time: Floats) -> tuple[Gaps, _Line] | None:
+    """Return the gaps in instants that lie on an even grid otherwise, and that grid; None where they do not."""
+    count = np.arange(len(time))
+    gaps = gaps_in(count, time)
+    if gaps is None or not gaps.on_grid or not _is_bearable(len(time) + gaps.missing, len(time)):
+        return None
+    line = _straight(count + gaps.before(count), time)
+    return None if line is None else (gaps, line)

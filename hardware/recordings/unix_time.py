@@ -1,0 +1,74 @@
+"""Instants that count from 1970: a recording counts from its start."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vibroimpact.hardware.formats.table import Column, Table
+from vibroimpact.hardware.recordings.printed_grid import decimal_step
+
+#: Seconds since 1970 from the year 2000 to 2100; no laboratory's clock runs for 30 years.
+_EARLIEST, _LATEST = 946_684_800.0, 4_102_444_800.0
+_PARTS = {1.0: "seconds", 1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanoseconds"}
+
+
+def counted_from_start(tables: Sequence[Table]) -> tuple[list[Table], list[str], dict[str, str]]:
+    """Let instants that count from 1970 count from the first of them.
+
+    Parameters
+    ----------
+    tables : sequence of Table
+        With their instants in s, where a unit is known; without one, seconds and parts of them are told by their size.
+
+    Returns
+    -------
+    tables : list of Table
+    remarks : list of str
+    attrs : dict
+        `source_date` of the first instant.
+    """
+    parts = [None if table.time is None else _parts_of(table.time) for table in tables]
+    firsts = [
+        _first(table.time) / part
+        for table, part in zip(tables, parts, strict=True)
+        if part and table.time is not None
+    ]
+    if not firsts:
+        return list(tables), [], {}
+    origin = min(firsts)
+    counted = [
+        table if part is None or table.time is None else replace(table, time=_since(table.time, origin, part))
+        for table, part in zip(tables, parts, strict=True)
+    ]
+    date = str(np.datetime64(round(origin * 1e6), "us"))
+    what = " and ".join(dict.fromkeys(_PARTS[part] for part in parts if part))
+    return (
+        counted,
+        [f"the instants are {what} since 1970: they are counted from {date} (UTC)"],
+        {"source_date": date},
+    )
+
+
+def _parts_of(time: Column) -> float | None:
+    """Return how many of its units make a second, where instants count from 1970; None where they do not."""
+    known = time.values[np.isfinite(time.values)]
+    if not len(known):
+        return None
+    for part in _PARTS if not time.unit else (1.0,):
+        if _EARLIEST * part <= known.min() and known.max() <= _LATEST * part:
+            return part
+    return None
+
+
+def _first(time: Column) -> float:
+    return float(time.values[np.isfinite(time.values)][0])
+
+
+def _since(time: Column, origin: float, part: float) -> Column:
+    """Return instants from an origin (s since 1970); what binary took of their last digits is put back or dropped."""
+    left = float(np.spacing(np.abs(time.values[np.isfinite(time.values)]).max())) / part
+    step = decimal_step(time.values) / part or 10.0 ** np.ceil(np.log10(left))
+    return replace(time, values=np.rint((time.values - origin * part) / part / step) * step, unit="s")

@@ -1,0 +1,373 @@
+"""A campaign: every point of a sweep, computed by workers, kept as parts, compacted into one dataset.
+
+Whatever ends a campaign (Ctrl-C, kill -9, a full disk, a lost machine), the parts that are complete stay, and
+the same command goes on from them. The rows are then bit-identical to those of an uninterrupted campaign.
+
+The folder holds `campaign.json` (what it was started with), `parts/` while it runs, and `dataset.nc` at the
+end.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.analysis.dataset import read_flat, write_dataset
+from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
+from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
+from vibroimpact.orchestrator.campaign.chunks import (
+    DEFAULT_RUNNER,
+    Chunk,
+    ChunkResult,
+    RunnerIdentity,
+    Work,
+    get_ready,
+)
+from vibroimpact.orchestrator.campaign.cluster import WorkerPool, open_workers
+from vibroimpact.orchestrator.campaign.computation import Computation
+from vibroimpact.orchestrator.campaign.extension import (
+    EarlierSweep,
+    Kept,
+    is_of,
+    kept_path,
+    other_differences,
+    read_finished,
+    read_kept,
+    scene_of_manifest,
+)
+from vibroimpact.orchestrator.campaign.manifest import (
+    Manifest,
+    differences,
+    flat_scene,
+    read_manifest,
+    refuse_other_runner,
+    refuse_other_scene,
+    scene_hash,
+    write_manifest,
+)
+from vibroimpact.orchestrator.campaign.parts import (
+    NO_RUNS,
+    StoredPart,
+    compact,
+    list_parts,
+    own_files,
+    remove_parts,
+    remove_temporary_files,
+    unfit_parts,
+)
+from vibroimpact.orchestrator.campaign.progress import Progress, Silence
+from vibroimpact.orchestrator.campaign.provenance import provenance
+from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
+from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.sweep import expand
+
+MOST_ROUNDS = 3
+"""How often parts that turn out unfit are computed again by one command."""
+MOST_NAMED = 5
+
+
+class CampaignInterrupted(KeyboardInterrupt):
+    """Ctrl-C ended a campaign in good order; its text says what is there and how to go on."""
+
+
+@dataclass(slots=True)
+class CampaignReport:
+    """What a campaign did.
+
+    Attributes
+    ----------
+    dataset : Path
+    runs : int
+        Runs in the dataset.
+    resumed : int
+        Runs that were there already; equal to `runs` when there was nothing to do.
+    outcomes : Counter
+        How the runs computed now ended.
+    chunks : list of Chunk
+        In the order in which they ended.
+    workers : int
+    lost_workers : int
+        How many died before the last point was done.
+    compute_seconds : float
+        From the first chunk handed out to the last one done; workers were ready before, s.
+    compaction_seconds : float
+        Making one dataset of the parts, s.
+    """
+
+    dataset: Path
+    runs: int
+    resumed: int = 0
+    outcomes: Counter[str] = field(default_factory=Counter)
+    chunks: list[Chunk] = field(default_factory=list)
+    workers: int = 0
+    lost_workers: int = 0
+    compute_seconds: float = 0.0
+    compaction_seconds: float = 0.0
+
+
+def run_campaign(
+    scene: Scene,
+    folder: str | os.PathLike[str],
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    runner: str = DEFAULT_RUNNER,
+    progress: Progress | None = None,
+) -> CampaignReport:
+    """Compute all points of a scene's sweep into `folder/dataset.nc`, or go on where an earlier try ended.
+
+    Parameters
+    ----------
+    scene : Scene
+    folder : path
+        One campaign, one folder; made when absent.
+    workers : int, optional
+        Worker processes on this machine; one for each processor by default.
+    scheduler : str, optional
+        Address of a Dask scheduler to use instead.
+    runner : str
+        The class that runs a point, as `module:name`.
+    progress : Progress, optional
+        Told how far the campaign is.
+
+    Raises
+    ------
+    UsageError
+        When the folder cannot be written or belongs to another scene, or nothing listens at `scheduler`.
+    CampaignError
+        When the campaign could not finish; the same call resumes it.
+    CampaignInterrupted
+        On Ctrl-C.
+    """
+    home = Path(folder).absolute()
+    make_folder(home)
+    with locked_folder(home):
+        campaign = _Campaign(scene, home, runner, progress or Silence())
+        return campaign.finished_before() or campaign.run(workers, scheduler)
+
+
+class _Campaign:
+    """One campaign in its folder, which this process holds."""
+
+    def __init__(self, scene: Scene, home: Path, runner: str, progress: Progress) -> None:
+        self._scene = scene
+        self._home = home
+        self._progress = progress
+        self._parts_folder = home / "parts"
+        self._manifest_path = home / "campaign.json"
+        self._manifest = self._checked_manifest()
+        # A worker may live in another folder, and files that a scene names lie beside it.
+        source = str(Path(scene.source).absolute())
+        self._branches = expand(scene)
+        runs = sum(len(branch.points) for branch in self._branches)
+        self._report = CampaignReport(home / "dataset.nc", runs)
+        self._go_on_with_this_sweep()
+        hashed = self._manifest.scene_hash if self._manifest is not None else scene_hash(scene)
+        self._kept_path = kept_path(self._parts_folder, hashed)
+        self._work = Work(
+            scene.text, source, str(self._parts_folder), runner, hashed, kept=str(self._kept_path)
+        )
+
+    def _checked_manifest(self) -> Manifest | None:
+        manifest = read_manifest(self._manifest_path)
+        has_parts = self._parts_folder.is_dir() and own_files(self._parts_folder)
+        if manifest is None and ((self._home / "dataset.nc").exists() or has_parts):
+            raise UsageError(
+                f"{self._home}: expected an empty folder or one of a campaign, got data without "
+                "campaign.json. Choose another folder with -o."
+            )
+        return manifest
+
+    def _go_on_with_this_sweep(self) -> None:
+        """Keep what an earlier sweep of the same scene has computed of this one."""
+        if self._manifest is None:
+            return
+        old = scene_of_manifest(self._manifest, self._scene)
+        different = differences(
+            self._manifest.scene if old is None else flat_scene(old), flat_scene(self._scene)
+        )
+        if not different:
+            return
+        others = different if old is None else other_differences(old, self._scene)
+        if old is None or others:
+            refuse_other_scene(self._manifest_path, others)
+        make_folder(self._parts_folder)
+        earlier = EarlierSweep(old, self._manifest, self._home, self._progress.note)
+        try:
+            handed_over = earlier.hand_over(self._scene, self._report.runs)
+        except OSError as error:
+            raise CampaignError(
+                f"{self._home}: the points of the earlier sweep could not be kept: {error.strerror or error}. "
+                "They are where they were. Make room or restore access; then the same command goes on."
+            ) from error
+        if not handed_over:
+            refuse_other_scene(self._manifest_path, different)
+        self._manifest = read_manifest(self._manifest_path)
+
+    def finished_before(self) -> CampaignReport | None:
+        """Return the report of a campaign with nothing left to do; None when there is."""
+        target = self._report.dataset
+        if self._manifest is None or not target.exists():
+            return None
+        done = read_finished(target)
+        if not is_of(done.attrs, self._manifest, self._scene):
+            return None
+        remove_parts(self._parts_folder)
+        remove_temporary_files(self._home)
+        self._give_title(done.attrs)
+        rows = len(done.run_index)
+        return replace(self._report, runs=rows, resumed=rows)
+
+    def _give_title(self, attrs: Mapping[str, Any]) -> None:
+        """Let the dataset have the title that the scene has now; it has no effect on any number."""
+        if self._scene.title and attrs.get("title") != self._scene.title:
+            rows = read_flat(self._report.dataset)
+            attributes = {name: self._attributes()[name] for name in ("title", "scene")}
+            write_dataset(rows.assign_attrs(attributes), self._report.dataset)
+            self._progress.note(f"{self._report.dataset} has the title {self._scene.title!r} now.")
+
+    def run(self, workers: int | None, scheduler: str | None) -> CampaignReport:
+        """Compute what is left and compact it; parts that turn out unfit are computed again."""
+        make_folder(self._parts_folder)
+        remove_temporary_files(self._home)
+        unfit: list[tuple[Path, str]] = []
+        try:
+            for _ in range(MOST_ROUNDS):
+                paths = self._complete(workers, scheduler)
+                unfit = self._compact(paths)
+                if not unfit:
+                    return self._report
+        except KeyboardInterrupt:
+            raise CampaignInterrupted(self._interrupted()) from None
+        names = "; ".join(f"{path.name}: {reason}" for path, reason in unfit[:MOST_NAMED])
+        raise CampaignError(
+            f"{self._parts_folder}: expected parts of this scene, got {len(unfit)} that are not, computed "
+            f"{MOST_ROUNDS} times: {names}"
+        )
+
+    def _complete(self, workers: int | None, scheduler: str | None) -> list[Path]:
+        """Compute what no part holds, and return the files that hold all runs."""
+        remove_temporary_files(self._parts_folder)
+        self._report.chunks.clear()
+        kept = self._read_kept()
+        runs = kept.runs if kept is not None else NO_RUNS
+        parts = list_parts(self._parts_folder, self._work.scene_hash, self._progress.note, runs)
+        self._report.resumed = runs.size + sum(part.rows for part in parts)
+        held = sorted(
+            [*parts, *(kept.stretches if kept is not None else ())], key=lambda part: part.chunk.first
+        )
+        if self._report.resumed < self._report.runs:
+            self._compute_on(held, workers, scheduler)
+        computed = [self._parts_folder / chunk.part_name for chunk in self._report.chunks]
+        return [part.path for part in parts] + computed + ([kept.path] if kept is not None else [])
+
+    def _read_kept(self) -> Kept | None:
+        for path in own_files(self._parts_folder):
+            if path.name.startswith("kept-") and path != self._kept_path:
+                path.unlink()  # of a sweep that this one has taken the place of
+        if not self._kept_path.exists():
+            return None
+        try:
+            return read_kept(self._kept_path, self._scene)
+        except DatasetError as error:
+            self._kept_path.unlink()
+            self._progress.note(
+                f"{self._kept_path.name} was damaged and is removed; its points come again: {error}"
+            )
+            return None
+
+    def _interrupted(self) -> str:
+        done = self._report.resumed + self._report.outcomes.total()
+        return (
+            f"Interrupted: {done} of {self._report.runs} points are complete in {self._home}. "
+            "The same command resumes."
+        )
+
+    def _compute_on(self, parts: Sequence[StoredPart], workers: int | None, scheduler: str | None) -> None:
+        try:
+            with open_workers(workers=workers, scheduler=scheduler, progress=self._progress) as pool:
+                self._compute_with(pool, parts, shared=scheduler is not None)
+        finally:
+            # A worker that was stopped may have been writing.
+            remove_temporary_files(self._parts_folder)
+
+    def _compute_with(self, pool: WorkerPool, parts: Sequence[StoredPart], *, shared: bool) -> None:
+        if shared:
+            refuse_blind_workers(pool, self._home)
+        identity = _common_identity(pool, self._work)
+        self._agree_with_manifest(identity)
+        self._report.workers = len(pool.worker_addresses())
+        schedule = ChunkSchedule(self._branches, parts, self._report.workers)
+        began = time.perf_counter()
+        self._progress.begin(self._report.runs, self._report.resumed)
+        try:
+            Computation(pool, replace(self._work, identity=identity), schedule, self._take).run()
+        finally:
+            self._report.compute_seconds += time.perf_counter() - began
+            self._report.lost_workers += pool.lost_workers
+            pool.cancel_all()
+
+    def _agree_with_manifest(self, identity: RunnerIdentity) -> None:
+        if self._manifest is not None:
+            refuse_other_runner(self._manifest_path, self._manifest, identity)
+        else:
+            write_manifest(self._manifest_path, self._scene, identity, self._report.runs)
+            self._manifest = read_manifest(self._manifest_path)
+
+    def _take(self, result: ChunkResult) -> None:
+        if result.outcomes:  # else all its runs were kept from an earlier sweep: there is no part
+            self._report.chunks.append(result.chunk)
+        self._report.outcomes.update(result.outcomes)
+        self._progress.advance(sum(result.outcomes.values()))
+
+    def _compact(self, parts: Sequence[Path]) -> list[tuple[Path, str]]:
+        """Make the dataset; returns the parts that prevent it, which are removed, each with the reason."""
+        began = time.perf_counter()
+        try:
+            compact(parts, self._report.dataset, self._scene, self._attributes())
+        except DatasetError as error:
+            unfit = list(unfit_parts(parts, self._scene))
+            if not unfit:
+                raise CampaignError(f"{self._home}: the parts do not fit together: {error}") from error
+            for path, reason in unfit:
+                path.unlink(missing_ok=True)
+                self._progress.note(
+                    f"{path.name} was damaged and is removed; its points come again: {reason}"
+                )
+            return unfit
+        except OSError as error:
+            raise CampaignError(
+                f"{self._report.dataset}: could not be written: {error.strerror or error}. "
+                f"All points are complete in {self._parts_folder}. "
+                "Make room or restore access; then the same command finishes."
+            ) from error
+        remove_parts(self._parts_folder)
+        self._report.compaction_seconds = time.perf_counter() - began
+        return []
+
+    def _attributes(self) -> dict[str, Any]:
+        manifest = self._manifest or read_manifest(self._manifest_path)
+        if manifest is None:
+            raise CampaignError(
+                f"{self._manifest_path}: expected the manifest of this campaign, got no file. Put it back."
+            )
+        return provenance(self._scene, manifest.identity) | {"scene_hash": scene_hash(self._scene)}
+
+
+def _common_identity(pool: WorkerPool, work: Work) -> RunnerIdentity:
+    """Let every worker load what it needs, and return the runner that all of them have."""
+    answers: dict[str, RunnerIdentity] = pool.call_everywhere(get_ready, work)
+    first, *others = answers.values()
+    for other in others:
+        if other != first:
+            raise UsageError(
+                f"workers: expected one kind of runner on all of them, got {first} and {other}. "
+                "Use workers of one kind of machine with one version of vibroimpact."
+            )
+    return first

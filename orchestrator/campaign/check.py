@@ -1,0 +1,159 @@
+"""What a scene would do and cost, known from the scene itself and from one of its points, which is computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
+from vibroimpact.orchestrator.campaign.chunks import (
+    DEFAULT_RUNNER,
+    BranchPoint,
+    dataset_of,
+    open_runner,
+    run_point,
+)
+from vibroimpact.orchestrator.run.result_size import MOST_BYTES, bytes_of_a_run, size
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.sweep import Point, run_count
+
+MOST_TRIAL_SECONDS = 20.0
+"""Wall time after which the trial point is given up, s."""
+LONG_ENOUGH = 0.5
+"""A shorter trial is repeated, s: the first call of a process is slower than all that follow."""
+SECONDS_BESIDE = 1e-4
+"""What a point takes beside its own time: handing out, arranging and writing it, s."""
+BYTES_BESIDE = 28_000
+"""What a dataset has beside its values: names, attributes, the text of the scene."""
+COPIES_IN_RUN, COPIES_IN_CAMPAIGN = 4, 2
+"""Size of the memory that arranging and writing all results takes, over that of the results."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One point of a scene, computed.
+
+    Attributes
+    ----------
+    values : mapping of str to float
+        What it has of the swept keys: of each axis the value in the middle.
+    outcome : Outcome
+        Likewise `timeout` where it was given up after `MOST_TRIAL_SECONDS`.
+    message : str
+        Why it ended so.
+    seconds : float
+        Wall time, s.
+    impacts : int
+        Number of recorded impacts.
+    size : int
+        Bytes of what was recorded.
+    given_up : bool
+        Whether it was ended here, and not by a deadline of the scene.
+    """
+
+    values: Mapping[str, float]
+    outcome: Outcome
+    message: str
+    seconds: float
+    impacts: int
+    size: int
+    given_up: bool
+
+
+@dataclass(frozen=True, slots=True)
+class SceneCost:
+    """What a scene would cost, extrapolated from one point.
+
+    Attributes
+    ----------
+    points : int
+        Of the sweep; 1 without.
+    branches : int
+        Chains of points along which each starts where the one before ended; `points` without a continuation.
+    trial : Trial or None
+        None where no point could be tried.
+    untried : str
+        Why none was tried.
+    """
+
+    points: int
+    branches: int
+    trial: Trial | None
+    untried: str = ""
+
+    @property
+    def result_bytes(self) -> int | None:
+        """Size of all results; None when no point was tried."""
+        return None if self.trial is None else self.points * self.trial.size
+
+    def seconds(self, workers: int = 1) -> float | None:
+        """Return the wall time of all points on so many workers, without their start, s; None when none was tried."""
+        if self.trial is None:
+            return None
+        return self.points * (self.trial.seconds + SECONDS_BESIDE) / min(workers, self.branches)
+
+
+def cost_of(scene: Scene) -> SceneCost:
+    """Run one point of a scene, and say what all of them would cost.
+
+    The point is the middle one of the sweep, from the scene's own start state. It is given up after
+    `MOST_TRIAL_SECONDS`.
+
+    Parameters
+    ----------
+    scene : Scene
+        As `load_scene` returns it.
+
+    Raises
+    ------
+    SceneError, ComponentError
+        A component cannot be loaded.
+
+    Examples
+    --------
+    >>> text = "[body]\\nmass = 1\\nstiffness = 1\\n[record]\\nrecorded_time = 5"
+    >>> cost = cost_of(parse_scene(text, "free.toml"))
+    >>> cost.points, cost.trial.outcome.name
+    (1, 'ok')
+    """
+    points = run_count(scene.sweep)
+    carried = next((axis for axis in scene.sweep if axis.continuation), None)
+    branches = points if carried is None else points // len(carried.values)
+    untried = _why_untried(scene)
+    return SceneCost(points, branches, None if untried else _tried(scene), untried)
+
+
+def _why_untried(scene: Scene) -> str:
+    if scene.replay is not None and not scene.replay.recordings:
+        return "its recording is given to `vibroimpact replay`"
+    recorded = bytes_of_a_run(scene)
+    return f"it would record {size(recorded)}, more than {size(MOST_BYTES)}" if recorded > MOST_BYTES else ""
+
+
+def _tried(scene: Scene) -> Trial:
+    deadline = min(MOST_TRIAL_SECONDS, scene.execution.deadline or math.inf)
+    limited = parse_scene(scene.text, scene.source, [f"execution.deadline={deadline}"])
+    point = Point(0, {axis.key: axis.values[len(axis.values) // 2] for axis in scene.sweep})
+    runner = open_runner(limited, DEFAULT_RUNNER)
+    try:
+        record = run_point(limited, runner, point, None)
+        if record.seconds < LONG_ENOUGH:
+            record = run_point(limited, runner, point, None)
+    finally:
+        runner.close()
+    return _trial(limited, point, record, given_up=deadline != scene.execution.deadline)
+
+
+def _trial(scene: Scene, point: Point, record: RunRecord, *, given_up: bool) -> Trial:
+    dataset = dataset_of(scene, [BranchPoint(point, Direction.independent, True)], [record], {})
+    [outcome], [message] = dataset.outcome.values, dataset.message.values
+    return Trial(
+        point.values,
+        Outcome(outcome),
+        str(message),
+        record.seconds,
+        impacts=0 if record.impacts is None else len(record.impacts),
+        size=dataset.nbytes,
+        given_up=given_up and bool(outcome == Outcome.timeout),
+    )

@@ -1,0 +1,379 @@
+"""What a worker does with a chunk: run its points, write them as one part, say how that went.
+
+A chunk is a range of neighbouring runs. Everything here runs on a worker; the scene is parsed
+and the components are loaded once in each process and used for every chunk after that. What a point returns
+never depends on how the runs were cut into chunks.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset import (
+    Direction,
+    Outcome,
+    RunRecord,
+    marked,
+    read_part,
+    write_dataset,
+)
+from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.fmus.errors import CampaignError, VibroimpactError
+from vibroimpact.orchestrator.run import dataset_of_runs
+from vibroimpact.orchestrator.run.empty_record import empty_record
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.sweep import Branch, Point, expand
+
+DEFAULT_RUNNER = "vibroimpact.orchestrator.guard.guarded:make_runner"
+"""The class that runs one point, as `module:name`, so that a worker can find it by itself."""
+
+CARRIED = ("carried_displacement", "carried_velocity")
+CARRIED_STATE = "carried_state"
+"""Attributes of a part: the state that the next run of its branch starts from; two numbers, or an array."""
+
+CARRYING = (Outcome.ok, Outcome.stuck)
+"""Outcomes whose final state is handed on along a branch: the run came to its end, at forcing phase 0."""
+
+State = tuple[float, ...]
+"""Displacement (m) and velocity (m/s) of an oscillator; of a structure N displacements, then N velocities."""
+
+
+class Runner(Protocol):
+    """Runs the points of one scene; see `vibroimpact.orchestrator.run.point.PointRunner`."""
+
+    @property
+    def execution(self) -> str:
+        """Which way of running the scene it uses."""
+
+    @property
+    def instruction_set(self) -> str:
+        """The instruction set of the machine code it runs."""
+
+    @property
+    def fmu_hashes(self) -> Mapping[str, str]:
+        """Content hash of each FMU it loaded."""
+
+    def run(self, values: Mapping[str, float], start: State | None) -> RunRecord:
+        """Run one point from a carried state, or from the scene's own start state."""
+
+    def close(self) -> None:
+        """Free the components."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerIdentity:
+    """What must be the same for all points of a campaign, or its rows could not be compared."""
+
+    execution: str
+    instruction_set: str
+    fmu_hashes: Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What all chunks of a campaign have in common; small, sent along with each.
+
+    Attributes
+    ----------
+    scene_text, source : str
+        The scene; each worker parses it once.
+    parts_folder : str
+        Absolute path of the folder that the parts go to.
+    runner : str
+        The runner class as `module:name`.
+    scene_hash : str
+        Written into each part, so that a stray part of another campaign is noticed.
+    identity : RunnerIdentity or None
+        What the runner must be; None while the campaign still asks.
+    kept : str
+        File with the runs of an earlier sweep that are left out of all chunks; it may be absent.
+    """
+
+    scene_text: str
+    source: str
+    parts_folder: str
+    runner: str = DEFAULT_RUNNER
+    scene_hash: str = ""
+    identity: RunnerIdentity | None = None
+    kept: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Chunk:
+    """Runs `first` to `stop - 1`; the first is in branch `branch` and starts from `start`.
+
+    Either a stretch of one branch, or several whole branches. `start` is the state (m, m/s) carried from the
+    run before; None is the scene's own start state. A chunk that takes longer than
+    `most_seconds` ends early, after a point; the rest is left to other chunks.
+    """
+
+    branch: int
+    first: int
+    stop: int
+    start: State | None = None
+    most_seconds: float = math.inf
+
+    @property
+    def count(self) -> int:
+        """Number of runs."""
+        return self.stop - self.first
+
+    @property
+    def part_name(self) -> str:
+        """Name of the file that its results go to."""
+        return f"branch-{self.branch:06d}_runs-{self.first:010d}-{self.stop:010d}.nc"
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkResult:
+    """What a worker says of a chunk whose part is on the disk.
+
+    Attributes
+    ----------
+    chunk : Chunk
+        The runs that the part holds: those asked for, or the first of them.
+    carried : tuple of float or None
+        The state (m, m/s) that the next run of the branch starts from.
+    outcomes : mapping of str to int
+        How many runs ended in each way.
+    compute_seconds, write_seconds : float
+        Wall time of the runs, and of building and writing the part, s.
+    """
+
+    chunk: Chunk
+    carried: State | None
+    outcomes: Mapping[str, int]
+    compute_seconds: float
+    write_seconds: float
+
+
+@dataclass(slots=True)
+class _Opened:
+    """A scene with its components, ready to run in this process."""
+
+    scene: Scene
+    branches: tuple[Branch, ...]
+    runner: Runner
+
+
+def open_runner(scene: Scene, dotted: str) -> Runner:
+    """Build the runner of a scene from its class, given as `module:name`."""
+    module, _, name = dotted.partition(":")
+    factory = getattr(importlib.import_module(module), name)
+    runner: Runner = factory(scene, execution=scene.execution.how)
+    return runner
+
+
+@lru_cache(maxsize=1)
+def _opened(scene_text: str, source: str, runner: str) -> _Opened:
+    scene = parse_scene(scene_text, source)
+    return _Opened(scene, expand(scene), open_runner(scene, runner))
+
+
+def identify(runner: Runner) -> RunnerIdentity:
+    """Return what a runner is: its execution, instruction set and FMU hashes."""
+    return RunnerIdentity(runner.execution, runner.instruction_set, dict(runner.fmu_hashes))
+
+
+def get_ready(work: Work) -> RunnerIdentity:
+    """Load all that a worker needs before its first chunk, and return which runner it has."""
+    opened = _opened(work.scene_text, work.source, work.runner)
+    # The first dataset of a process takes long, because libraries load what they need when they need it.
+    first_point = points_of(opened.branches[:1], Chunk(0, 0, 1))
+    record = empty_record(opened.scene, Outcome.error, "rehearsal", 0.0)
+    with ScratchFolder("rehearsal") as folder:
+        write_dataset(dataset_of(opened.scene, first_point, [record], {}), Path(folder.name, "rehearsal.nc"))
+    return identify(opened.runner)
+
+
+def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
+    """Run the points of a chunk and write them as one part.
+
+    Raises
+    ------
+    CampaignError
+        When this worker's runner is not the one the campaign began with, or the part cannot be written.
+    """
+    opened = _opened(work.scene_text, work.source, work.runner)
+    _refuse_other_runner(work, opened.runner)
+    began = time.perf_counter()
+    points = _points_left(work, opened.branches, chunk)
+    if not points:
+        return ChunkResult(chunk, chunk.start, {}, 0.0, 0.0)
+    deadline = began + chunk.most_seconds
+    records, carried = run_points(opened.scene, opened.runner, points, chunk.start, deadline)
+    computed = time.perf_counter()
+    left = points[len(records) :]
+    done = replace(chunk, stop=left[0].point.index if left else chunk.stop)
+    outcomes = write_part(work, opened.scene, done, points[: len(records)], records, carried)
+    return ChunkResult(done, carried, outcomes, computed - began, time.perf_counter() - computed)
+
+
+def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
+    """Write the part of points that kill the process that runs them; nothing of the points is run."""
+    began = time.perf_counter()
+    scene = parse_scene(work.scene_text, work.source)
+    points = _points_left(work, expand(scene), chunk)
+    records = [empty_record(scene, Outcome.crash, message, 0.0) for _ in points]
+    outcomes = write_part(work, scene, chunk, points, records, chunk.start)
+    return ChunkResult(chunk, chunk.start, outcomes, 0.0, time.perf_counter() - began)
+
+
+def _refuse_other_runner(work: Work, runner: Runner) -> None:
+    if work.identity is not None and identify(runner) != work.identity:
+        raise CampaignError(
+            f"worker: expected the runner that the campaign began with ({work.identity}), "
+            f"got {identify(runner)}. Use workers of one kind of machine with one version of vibroimpact."
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class BranchPoint:
+    """A point, the direction it is travelled in, and whether its branch begins with it."""
+
+    point: Point
+    direction: Direction
+    first: bool
+
+
+def points_of(branches: Sequence[Branch], chunk: Chunk) -> list[BranchPoint]:
+    """Return the points of a chunk, which may reach over several branches."""
+    points: list[BranchPoint] = []
+    for branch in branches[chunk.branch :]:
+        first = branch.points.first_index
+        if first >= chunk.stop:
+            break
+        direction = Direction[branch.direction]
+        inside = branch.points[max(chunk.first - first, 0) : chunk.stop - first]
+        points += [BranchPoint(point, direction, point.index == first) for point in inside]
+    return points
+
+
+def _points_left(work: Work, branches: Sequence[Branch], chunk: Chunk) -> list[BranchPoint]:
+    """Return the points of a chunk that are not kept from an earlier sweep."""
+    kept = _kept_runs(work.kept)
+    return [place for place in points_of(branches, chunk) if place.point.index not in kept]
+
+
+@lru_cache(maxsize=1)
+def _kept_runs(path: str) -> frozenset[int]:
+    return frozenset(read_part(path).run_index.tolist()) if path and Path(path).exists() else frozenset()
+
+
+def run_points(
+    scene: Scene,
+    runner: Runner,
+    points: Sequence[BranchPoint],
+    start: State | None,
+    deadline: float = math.inf,
+) -> tuple[list[RunRecord], State | None]:
+    """Run points in their order; along a branch with a direction each starts where the one before ended.
+
+    No point begins after `deadline` (s of `time.perf_counter`), except the first.
+
+    Returns
+    -------
+    records : list of RunRecord
+    carried : tuple of float or None
+        Where the next point of the branch starts; a run that did not come to its end hands on what it was
+        given.
+    """
+    carried = start
+    records = []
+    for place in points:
+        given = None if place.first else carried
+        record = run_point(scene, runner, place.point, given)
+        records.append(record)
+        carried = None if place.direction is Direction.independent else _next_start(record, given)
+        if time.perf_counter() > deadline:
+            break
+    return records, carried
+
+
+def _next_start(record: RunRecord, start: State | None) -> State | None:
+    end: State = (record.final_displacement, record.final_velocity)
+    if record.final_state is not None:
+        end = tuple(record.final_state.tolist())
+    usable = record.outcome in CARRYING and all(map(math.isfinite, end))
+    return end if usable else start
+
+
+def run_point(scene: Scene, runner: Runner, point: Point, start: State | None) -> RunRecord:
+    """Run one point; whatever goes wrong with it becomes a record with the outcome `error`."""
+    began = time.perf_counter()
+    try:
+        return runner.run(point.values, start)
+    except (VibroimpactError, ArithmeticError, ValueError) as error:
+        # A point that fails is a row that says so: the sweep is worth more than the point.
+        return empty_record(scene, Outcome.error, str(error), time.perf_counter() - began)
+
+
+def tally(dataset: xr.Dataset) -> dict[str, int]:
+    """Count the runs of each outcome."""
+    values, counts = np.unique(dataset.outcome.values, return_counts=True)
+    return {Outcome(value).name: int(count) for value, count in zip(values, counts, strict=True)}
+
+
+def dataset_of(
+    scene: Scene, points: Sequence[BranchPoint], records: Sequence[RunRecord], attrs: Mapping[str, Any]
+) -> xr.Dataset:
+    """Return the dataset of points and what became of them; points with impossible values are marked."""
+    dataset = dataset_of_runs(
+        scene,
+        [place.point.values for place in points],
+        [place.direction for place in points],
+        [place.point.index for place in points],
+        records,
+        attrs,
+    )
+    return marked(dataset)
+
+
+def carried_attributes(state: State) -> dict[str, Any]:
+    """Return the attributes of a part that keep the state its branch goes on from."""
+    if len(state) == len(CARRIED):
+        return dict(zip(CARRIED, state, strict=True))
+    return {CARRIED_STATE: np.array(state)}
+
+
+def carried_state(attrs: Mapping[str, Any]) -> State | None:
+    """Return the state that the attributes of a part keep; None where there is none."""
+    if CARRIED_STATE in attrs:
+        # NetCDF gives an array of one element back as a number.
+        return tuple(np.atleast_1d(np.asarray(attrs[CARRIED_STATE], dtype=np.float64)).tolist())
+    displacement, velocity = (attrs.get(name) for name in CARRIED)
+    return None if displacement is None or velocity is None else (float(displacement), float(velocity))
+
+
+def write_part(
+    work: Work,
+    scene: Scene,
+    chunk: Chunk,
+    points: Sequence[BranchPoint],
+    records: Sequence[RunRecord],
+    carried: State | None,
+) -> dict[str, int]:
+    """Write the part of a chunk, as a whole or not at all; returns how many runs ended in each way."""
+    attrs: dict[str, Any] = {"scene_hash": work.scene_hash}
+    if carried is not None:
+        attrs |= carried_attributes(carried)
+    path = Path(work.parts_folder, chunk.part_name)
+    try:
+        dataset = dataset_of(scene, points, records, attrs)
+        write_dataset(dataset, path)
+    except OSError as error:
+        raise CampaignError(
+            f"{path.parent}: the results of {chunk.count} points could not be written: "
+            f"{error.strerror or error}. Make room or restore access; then the same command resumes."
+        ) from error
+    return tally(dataset)

@@ -1,0 +1,99 @@
+"""Keeps workers busy with the chunks of a schedule until every run is on the disk.
+
+A chunk whose worker died twice is cut into smaller ones. A single run that was lost is tried once more with
+nothing else on the way, so that the point that kills its process is told from those that only waited beside
+it. Workers may also be taken away faster than a point lasts: before its row says that it crashed, a point is
+run in a process of its own, which is no worker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work, run_chunk, write_crashed
+from vibroimpact.orchestrator.campaign.cluster import WorkerPool
+from vibroimpact.orchestrator.campaign.lone_process import ProcessDied, call_alone
+from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
+
+CRASH_MESSAGE = "this point kills the process that runs it"
+
+
+class Computation:
+    """One pass over a schedule.
+
+    Parameters
+    ----------
+    pool : WorkerPool
+    work : Work
+        What all chunks have in common.
+    schedule : ChunkSchedule
+        What is left to do.
+    done : callable
+        Told of each chunk whose part is on the disk.
+    """
+
+    def __init__(
+        self, pool: WorkerPool, work: Work, schedule: ChunkSchedule, done: Callable[[ChunkResult], None]
+    ) -> None:
+        self._pool = pool
+        self._work = work
+        self._schedule = schedule
+        self._done = done
+        self._in_flight: dict[int, Chunk] = {}
+        self._suspects: list[Chunk] = []
+        self._alone: Chunk | None = None
+
+    def run(self) -> None:
+        """Compute all that is left.
+
+        Raises
+        ------
+        VibroimpactError
+            When a chunk cannot be computed or written.
+        """
+        while self._hand_out():
+            ended = self._pool.next_finished()
+            asked = self._in_flight.pop(ended.ticket)
+            if ended.worker_lost:
+                self._lost(asked)
+            elif ended.error is not None:
+                raise ended.error
+            else:
+                self._ended(asked, ended.result)
+
+    def _hand_out(self) -> bool:
+        """Give the workers enough to do; return whether there was anything."""
+        while len(self._in_flight) < self._schedule.most_in_flight and (chunk := self._schedule.next_chunk()):
+            self._submit(chunk)
+        if not self._in_flight and self._suspects:
+            self._alone = self._suspects.pop()
+            self._submit(self._alone)
+        return bool(self._in_flight)
+
+    def _submit(self, chunk: Chunk) -> None:
+        self._in_flight[self._pool.submit(run_chunk, self._work, chunk)] = chunk
+
+    def _ended(self, asked: Chunk, result: ChunkResult) -> None:
+        self._schedule.finished(asked, result)
+        self._done(result)
+
+    def _lost(self, asked: Chunk) -> None:
+        if asked is self._alone:
+            self._ended(asked, self._tried_alone(asked))
+        elif asked.count == 1:
+            self._suspects.append(asked)
+        else:
+            self._schedule.lost(asked)
+
+    def _tried_alone(self, chunk: Chunk) -> ChunkResult:
+        """Run a point whose workers died in a process of its own; where that dies too, its row says so."""
+        if not self._pool.is_local:
+            # This machine may be of another kind than those of the workers.
+            return write_crashed(
+                self._work, chunk, f"{CRASH_MESSAGE}, or its workers were taken away each time"
+            )
+        try:
+            result: ChunkResult = call_alone(run_chunk, self._work, chunk)
+        except ProcessDied as died:
+            return write_crashed(self._work, chunk, f"{CRASH_MESSAGE}: run alone, {died}")
+        return result

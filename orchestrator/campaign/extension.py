@@ -1,0 +1,411 @@
+"""A campaign goes on with another sweep: points whose values are equal are kept, the others are computed.
+
+A row depends on the values of its point alone or, along a continuation axis, on those of the points before it.
+So a run of the new scene is one of the old scene when the two scenes with the values of that run in them are the
+same, bit for bit; along a branch, when that holds for all runs before it too. The rows of such runs are kept in one
+file in the folder of parts, `kept-HASH.nc`, on the coordinates of the new sweep.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import (
+    Outcome,
+    Part,
+    merge_datasets,
+    read_flat,
+    read_part,
+    take_runs,
+    write_dataset,
+)
+from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
+from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, State
+from vibroimpact.orchestrator.campaign.manifest import (
+    Manifest,
+    differences,
+    flat_scene,
+    scene_hash,
+    write_manifest,
+)
+from vibroimpact.orchestrator.campaign.parts import (
+    NO_RUNS,
+    Note,
+    StoredPart,
+    empty_part,
+    list_parts,
+    own_files,
+)
+from vibroimpact.orchestrator.campaign.provenance import provenance
+from vibroimpact.orchestrator.run.dataset import coordinate_names, stored_samples, with_constants_of
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, SweepAxis, run_count
+
+Runs = NDArray[np.int64]
+
+SHORTEST_STRETCH = 64
+"""Kept runs of a sweep without branches that are worth an interruption of a chunk; the worker leaves fewer out."""
+
+
+def kept_path(folder: Path, scene_hash: str) -> Path:
+    """Return the file of the kept rows of a campaign that was extended; it is there only then."""
+    return folder / f"kept-{scene_hash[:16]}.nc"
+
+
+# ---- which runs are the same ----
+
+
+def other_differences(old: Scene, new: Scene) -> list[str]:
+    """Return in words what differs between two scenes beside the values that they sweep."""
+    axes = {axis.key: axis for axis in (*old.sweep, *new.sweep)}
+    shared = {axis.key for axis in old.sweep} & {axis.key for axis in new.sweep}
+    try:
+        values = {
+            key: axis.values[0] if key in shared else _alone(old, new, key) for key, axis in axes.items()
+        }
+    except UsageError:
+        # A swept key that the other scene does not give: nothing says what it was.
+        return differences(flat_scene(old), flat_scene(new))
+    one, other = (_without_sweep(scene, values) for scene in (old, new))
+    return differences(one, other)
+
+
+def _alone(old: Scene, new: Scene, key: str) -> float:
+    """Return the number that a key has in the scene that does not sweep it."""
+    return (new if any(axis.key == key for axis in old.sweep) else old).value(key)
+
+
+def _without_sweep(scene: Scene, values: Mapping[str, float]) -> dict[str, Any]:
+    """Return a scene at one point of its sweep, flat, without the sweep and the units of swept keys."""
+    point = scene.with_values({axis.key: values[axis.key] for axis in scene.sweep})
+    units = tuple(f"general.units.{key}" for key in values)
+    return {
+        key: value
+        for key, value in flat_scene(point).items()
+        if not key.startswith("sweep.") and key not in units
+    }
+
+
+def same_runs(old: Scene, new: Scene) -> Runs:
+    """Return which run of an old scene each run of a new one is.
+
+    Parameters
+    ----------
+    old, new : Scene
+        Scenes that differ in what they sweep only: `other_differences`.
+
+    Returns
+    -------
+    ndarray of int, shape (run,)
+        -1 where it is none of them.
+    """
+    was, now = _Layout(old.sweep), _Layout(new.sweep)
+    if was.carried_key != now.carried_key:
+        return np.full(now.size, -1, dtype=np.int64)
+    found = np.zeros(now.shape, dtype=np.int64)
+    missing = np.zeros(now.shape, dtype=np.bool_)
+    for axis, stride in was.spanning():
+        place = now.place_of(axis.key)
+        values = (new.value(axis.key),) if place is None else now.axes[place].values
+        index = _places(values, axis.values)
+        column = index if place is None else index.reshape(now.along(place))
+        found += stride * column
+        missing |= column < 0
+    for axis, _ in now.spanning():
+        if was.place_of(axis.key) is None:
+            index = _places(axis.values, (old.value(axis.key),))
+            missing |= index.reshape(now.along(now.place_of(axis.key))) < 0
+    if now.carried is not None and was.carried is not None:
+        index = _along_branches(was.carried, now.carried)
+        found += index
+        missing |= index < 0
+    return np.where(missing, -1, found).reshape(-1)
+
+
+class _Layout:
+    """How the runs of a sweep lie: spanning axes in their order, then direction and place along a branch."""
+
+    def __init__(self, sweep: Sequence[SweepAxis]) -> None:
+        self.carried = next((axis for axis in sweep if axis.continuation), None)
+        self.axes = tuple(axis for axis in sweep if axis is not self.carried)
+        lengths = [len(axis.values) for axis in self.axes]
+        branches = (
+            () if self.carried is None else (len(DIRECTIONS[self.carried.path]), len(self.carried.values))
+        )
+        self.shape = (*lengths, *branches)
+        self.size = run_count(sweep)
+
+    @property
+    def carried_key(self) -> str | None:
+        return None if self.carried is None else self.carried.key
+
+    def spanning(self) -> Iterator[tuple[SweepAxis, int]]:
+        """Yield the spanning axes, each with the distance in runs between two neighbours along it."""
+        for place, axis in enumerate(self.axes):
+            yield axis, math.prod(self.shape[place + 1 :])
+
+    def place_of(self, key: str) -> int | None:
+        return next((place for place, axis in enumerate(self.axes) if axis.key == key), None)
+
+    def along(self, place: int | None) -> tuple[int, ...]:
+        """Return the shape of an array along one dimension that is broadcast along the others."""
+        return tuple(length if other == place else 1 for other, length in enumerate(self.shape))
+
+
+def _places(values: Sequence[float], among: Sequence[float]) -> Runs:
+    """Return where each value is among others, bit for bit; -1: nowhere."""
+    known = {value.hex(): place for place, value in enumerate(among)}
+    return np.array([known.get(value.hex(), -1) for value in values], dtype=np.int64)
+
+
+def _along_branches(was: SweepAxis, now: SweepAxis) -> Runs:
+    """Return the old place, along branches of both directions, of each new one; -1 from the first other value on."""
+    old_directions = DIRECTIONS[was.path]
+    rows = []
+    for direction in DIRECTIONS[now.path]:
+        index = np.full(len(now.values), -1, dtype=np.int64)
+        if direction in old_directions:
+            step = -1 if direction == "down" else 1
+            pairs = zip(now.values[::step], was.values[::step], strict=False)
+            equal = [one.hex() == other.hex() for one, other in pairs]
+            length = equal.index(False) if False in equal else len(equal)
+            index[:length] = np.arange(length) + old_directions.index(direction) * len(was.values)
+        rows.append(index)
+    return np.array(rows)
+
+
+# ---- their rows ----
+
+
+def kept_rows(old: Scene, new: Scene, rows: xr.Dataset) -> xr.Dataset:
+    """Return the rows of an old campaign that a new one keeps.
+
+    Parameters
+    ----------
+    old, new : Scene
+    rows : xarray.Dataset
+        What was computed of the old campaign, in run order; not necessarily all of it.
+
+    Returns
+    -------
+    xarray.Dataset
+        One-dimensional, with the run indices and the coordinates of the new campaign.
+    """
+    wanted = same_runs(old, new)
+    known = rows.run_index.values.astype(np.int64)
+    place = np.searchsorted(known, wanted).clip(max=known.size - 1)
+    there = (wanted >= 0) & (known[place] == wanted)
+    if any(axis.continuation for axis in new.sweep):
+        branches = there.reshape(-1, _Layout(new.sweep).shape[-1])
+        there = np.logical_and.accumulate(branches, axis=1).reshape(-1)
+    runs = np.flatnonzero(there)
+    return _on_new_coordinates(take_runs(rows, place[runs]), old, new, runs)
+
+
+def _on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) -> xr.Dataset:
+    """Return rows as the new scene's own runs would have them: names, attributes and coordinates."""
+    like = empty_part(new)
+    values: dict[str, NDArray[Any]] = {"run_index": runs.astype(np.int32), **_coordinates(new, runs)}
+    sampled = dict(zip(stored_samples(new), stored_samples(old), strict=True))
+    variables: dict[str, Any] = {}
+    for name, variable in like.variables.items():
+        source = sampled.get(str(name), str(name))
+        if name not in values and source in rows.variables:
+            values[str(name)] = rows.variables[source].values
+        if str(name) in values:
+            variables[str(name)] = (variable.dims, values[str(name)], variable.attrs)
+    if "loop_residual" in rows.variables:
+        variables["loop_residual"] = rows.variables["loop_residual"]
+    coords = {str(name): variables.pop(str(name)) for name in like.coords}
+    return _without_empty_periods(xr.Dataset(variables, coords=coords, attrs=like.attrs))
+
+
+def _coordinates(scene: Scene, runs: Runs) -> dict[str, NDArray[np.float64]]:
+    """Return the swept values of runs, by the name of the coordinate."""
+    layout, names = _Layout(scene.sweep), coordinate_names(scene)
+    places = np.unravel_index(runs, layout.shape) if layout.shape else ()
+    found = {
+        names[axis.key]: np.array(axis.values)[place]
+        for axis, place in zip(layout.axes, places, strict=False)
+    }
+    if layout.carried is not None:
+        values, ways = np.array(layout.carried.values), DIRECTIONS[layout.carried.path]
+        travelled = np.array([values[::-1] if way == "down" else values for way in ways])
+        found[names[layout.carried.key]] = travelled[places[-2], places[-1]]
+    return found
+
+
+def _without_empty_periods(rows: xr.Dataset) -> xr.Dataset:
+    """Cut off the periods that no run has: the runs that had them are not among these."""
+    tables = [v.values for v in rows.variables.values() if v.dims == ("run", "period")]
+    if not tables:
+        return rows
+    filled = np.any([np.isfinite(table).any(axis=0) for table in tables], axis=0)
+    return rows.isel(period=slice(0, int(np.flatnonzero(filled).max(initial=-1)) + 1))
+
+
+# ---- going on from them ----
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """Rows of a campaign that come from an earlier sweep.
+
+    Attributes
+    ----------
+    path : Path
+    runs : ndarray of int, shape (run,)
+        Ascending.
+    stretches : list of StoredPart
+        Neighbouring runs that chunks go round, with the state that the run after them starts from.
+    """
+
+    path: Path
+    runs: Runs
+    stretches: list[StoredPart]
+
+
+def read_kept(path: Path, scene: Scene) -> Kept:
+    """Read which rows are kept.
+
+    Raises
+    ------
+    DatasetError
+        When the file is damaged.
+    """
+    rows = read_flat(path)
+    runs = rows.run_index.values.astype(np.int64)
+    layout = _Layout(scene.sweep)
+    chained = layout.carried is not None
+    ends = np.flatnonzero(np.diff(runs) != 1) + 1
+    stretches = []
+    for first, stop in pairwise([0, *ends.tolist(), runs.size]):
+        if not chained and stop - first < SHORTEST_STRETCH:
+            continue
+        last = int(runs[stop - 1])
+        branch = last // layout.shape[-1] if chained else 0
+        # The branch of the last run begins here, or with the stretch.
+        begin = max(first, stop - 1 - last % layout.shape[-1]) if chained else first
+        carried = _carried(rows, begin, stop) if chained else None
+        stretches.append(StoredPart(path, Chunk(branch, int(runs[first]), last + 1), carried))
+    return Kept(path, runs, stretches)
+
+
+def _carried(rows: xr.Dataset, begin: int, stop: int) -> State | None:
+    """Return the state that the runs from the beginning of a branch hand on, as `chunks.run_points` finds it."""
+    if "final_state" in rows.variables:
+        states = rows.final_state.values[begin:stop]
+    else:
+        columns = (rows.final_displacement.values, rows.final_velocity.values)
+        states = np.stack([column[begin:stop] for column in columns], axis=1)
+    outcome = rows.outcome.values[begin:stop]
+    # A run that was marked for its values has handed on its state; one that failed has none.
+    usable = np.isin(outcome, [*CARRYING, Outcome.error]) & np.isfinite(states).all(axis=1)
+    return tuple(states[np.flatnonzero(usable)[-1]].tolist()) if usable.any() else None
+
+
+class EarlierSweep:
+    """A campaign that was started with another sweep of the same scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        The one it was started with.
+    manifest : Manifest
+    home : Path
+        Its folder.
+    note : callable
+        Told in words what is kept.
+    """
+
+    def __init__(self, scene: Scene, manifest: Manifest, home: Path, note: Note) -> None:
+        self._scene = scene
+        self._manifest = manifest
+        self._home = home
+        self._folder = home / "parts"
+        self._note = note
+
+    def hand_over(self, new: Scene, runs: int) -> bool:
+        """Make the folder one of a new sweep; returns False where nothing of the old one is in it.
+
+        The folder belongs to the old sweep until the new manifest is there, and nothing is removed before.
+        """
+        rows = self._rows()
+        if rows is not None:
+            kept = kept_rows(self._scene, new, rows)
+            count, left = kept.sizes["run"], rows.sizes["run"] - kept.sizes["run"]
+            if not count:
+                return False
+            if left:
+                self._store(rows, left)
+            hashed = scene_hash(new)
+            write_dataset(kept.assign_attrs(scene_hash=hashed), kept_path(self._folder, hashed))
+            self._note(f"{count} of {runs} points are kept from the earlier sweep.")
+        outdated = own_files(self._folder)
+        write_manifest(self._home / "campaign.json", new, self._manifest.identity, runs)
+        for path in outdated:
+            if path != kept_path(self._folder, scene_hash(new)):
+                path.unlink(missing_ok=True)
+        return True
+
+    def _rows(self) -> xr.Dataset | None:
+        """Return what was computed, one-dimensional; None where nothing was."""
+        target = self._home / "dataset.nc"
+        if target.exists() and is_of(read_finished(target).attrs, self._manifest, self._scene):
+            return read_flat(target)
+        path = kept_path(self._folder, self._manifest.scene_hash)
+        kept = [path] if path.exists() else []
+        runs = read_kept(path, self._scene).runs if kept else NO_RUNS
+        parts = list_parts(self._folder, self._manifest.scene_hash, self._note, runs)
+        paths = kept + [part.path for part in parts]
+        return merge_datasets(paths) if paths else None
+
+    def _store(self, rows: xr.Dataset, left: int) -> None:
+        """Keep the points that the new sweep does not have where they can be opened."""
+        path = self._home / f"earlier-{self._manifest.scene_hash[:8]}.nc"
+        attributed = rows.assign_attrs(provenance(self._scene, self._manifest.identity))
+        write_dataset(with_constants_of(attributed, self._scene), path)
+        self._note(f"{left} points of the earlier sweep are not in this one; they stay in {path.name}.")
+
+
+def scene_of_manifest(manifest: Manifest, like: Scene) -> Scene | None:
+    """Return the scene that a campaign was started with; None where it cannot be read any more.
+
+    Files that it names are looked for where those of `like` are.
+    """
+    try:
+        scene = parse_scene(manifest.scene_text, like.source)
+    except VibroimpactError:
+        return None
+    # A key that came after the campaign was started has its default.
+    known = flat_scene(scene) | dict(manifest.scene)
+    return None if differences(known, flat_scene(scene)) else scene
+
+
+def read_finished(path: Path) -> Part:
+    """Read what the dataset of a campaign says of itself.
+
+    Raises
+    ------
+    DatasetError
+        When it is damaged.
+    """
+    try:
+        return read_part(path)
+    except DatasetError as error:
+        raise DatasetError(f"{error} Delete {path} to compute the campaign again.") from error
+
+
+def is_of(attrs: Mapping[str, Any], manifest: Manifest, scene: Scene) -> bool:
+    """Whether a dataset is that of a campaign: another one is of the sweep before it was extended."""
+    own = (manifest.scene_hash, scene_hash(scene))
+    return attrs.get("scene_hash", manifest.scene_hash) in own

@@ -1,0 +1,225 @@
+"""`campaign.json`: what a campaign folder was started with, so that it is only ever resumed with the same.
+
+A resumed campaign is bit-identical to an uninterrupted one. That holds only for the same scene, the same
+components, the same way of running and the same instruction set; anything else is refused here.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.orchestrator.campaign.chunks import RunnerIdentity
+from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+
+FORMAT = 2
+_FORMATS = (1, FORMAT)
+"""Format 1, of version 0.1, has no hash of itself, and its title counts in `scene_hash`."""
+NO_EFFECT = ("title",)
+"""Keys that no result depends on: a campaign goes on when they change."""
+_LONGEST = 60  # characters of a value in a message
+_MOST_DIFFERENCES = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Manifest:
+    """What a campaign was started with.
+
+    Attributes
+    ----------
+    scene : dict
+        Every number and word of the scene by its key; comments and layout of the file do not count.
+    scene_hash : str
+        SHA-256 of what counts of `scene`; every part of the campaign says it.
+    scene_text : str
+        The TOML text.
+    runs : int
+        Runs of the campaign.
+    identity : RunnerIdentity
+        What ran.
+    """
+
+    scene: Mapping[str, Any]
+    scene_hash: str
+    scene_text: str
+    runs: int
+    identity: RunnerIdentity
+
+
+def flat_scene(scene: Scene) -> dict[str, Any]:
+    """Return a scene as one value for each key, in a fixed order.
+
+    Examples
+    --------
+    >>> from vibroimpact.orchestrator.scene import parse_scene
+    >>> text = "[body]\\nmass = 2  # heavy\\nstiffness = 1\\n[record]\\nrecorded_time = 5"
+    >>> flat_scene(parse_scene(text, "free.toml"))["body.mass"]
+    2.0
+    """
+    document = scene.model_dump(mode="json", by_alias=True, exclude={"source", "text"})
+    document["stop"] = document.pop("stops")
+    document["sweep"] = {
+        axis["key"]: {"values": axis["values"], "path": axis["path"], "place": place}
+        for place, axis in enumerate(document["sweep"], start=1)
+    }
+    return dict(sorted(_flat("", document)))
+
+
+def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _flat(f"{key}.{name}" if key else name, inner)
+    elif isinstance(value, list) and any(isinstance(item, dict) for item in value):
+        for number, inner in enumerate(value, start=1):
+            yield from _flat(f"{key}[{number}]", inner)
+    elif value is not None:
+        yield key, value
+
+
+def scene_hash(scene: Scene) -> str:
+    """Return the SHA-256 of a scene: the same for two files that differ in comments, layout and title only."""
+    counting = {key: value for key, value in flat_scene(scene).items() if key not in NO_EFFECT}
+    return _hash_of(counting)
+
+
+def _hash_of(content: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+
+def holds_scene(attrs: Mapping[str, Any], scene: Scene) -> bool:
+    """Whether the global attributes of a dataset are of one made from a scene: equal but for comments and layout."""
+    text = str(attrs.get("scene", ""))
+    try:
+        return bool(text) and (
+            text == scene.text or scene_hash(parse_scene(text, scene.source)) == scene_hash(scene)
+        )
+    except SceneError:
+        return False
+
+
+def write_manifest(path: Path, scene: Scene, identity: RunnerIdentity, runs: int) -> None:
+    """Write the manifest of a campaign that begins, whole or not at all."""
+    content = {
+        "format": FORMAT,
+        "scene_hash": scene_hash(scene),
+        "runs": runs,
+        "execution": identity.execution,
+        "instruction_set": identity.instruction_set,
+        "fmu_hashes": dict(identity.fmu_hashes),
+        "versions": versions(),
+        "git_commit": git_commit(),
+        "scene": flat_scene(scene),
+        "scene_text": scene.text,
+    }
+    content["sha256"] = _hash_of(content)
+    write_atomically(path, json.dumps(content, indent=1).encode())
+
+
+def read_manifest(path: Path) -> Manifest | None:
+    """Read the manifest of a folder; None when there is none.
+
+    Raises
+    ------
+    UsageError
+        When the file is damaged or of another format.
+    """
+    try:
+        content = json.loads(path.read_bytes())
+        if content["format"] not in _FORMATS:
+            raise UsageError(
+                f"{path}: expected format {FORMAT}, got {content['format']}. Use another folder."
+            )
+        return _checked(content)
+    except FileNotFoundError:
+        return None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise UsageError(
+            f"{path}: expected the manifest of a campaign, got a damaged file ({error}). "
+            "Put a copy of it back, or use another folder."
+        ) from error
+
+
+def _checked(content: dict[str, Any]) -> Manifest:
+    """Return what a manifest says, if it is what was once written.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError, AttributeError
+        When it is not.
+    """
+    recorded = content.pop("sha256", None)
+    if recorded is None and content["format"] == 1:
+        recorded, content_hash = content["scene_hash"], _hash_of(content["scene"])
+    else:
+        content_hash = _hash_of(content)
+    if recorded != content_hash:
+        raise ValueError("its content is not the one whose SHA-256 it has")
+    identity = RunnerIdentity(content["execution"], content["instruction_set"], dict(content["fmu_hashes"]))
+    return Manifest(
+        dict(content["scene"]), content["scene_hash"], content["scene_text"], int(content["runs"]), identity
+    )
+
+
+def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
+    """Return in words what differs between two flat scenes in what results depend on."""
+    keys = sorted((old.keys() | new.keys()) - set(NO_EFFECT))
+    return [
+        f"{key} was {_shown(old.get(key))}, is {_shown(new.get(key))}"
+        for key in keys
+        # as text -0.0 is not 0.0
+        if json.dumps(old.get(key)) != json.dumps(new.get(key))
+    ]
+
+
+def refuse_other_scene(path: Path, different: Sequence[str]) -> NoReturn:
+    """Refuse to go on with another scene than the one the campaign was started with.
+
+    Raises
+    ------
+    UsageError
+        With what differs, the first few.
+    """
+    shown = "; ".join(different[:_MOST_DIFFERENCES])
+    hidden = len(different) - _MOST_DIFFERENCES
+    more = f"; and {hidden} more" if hidden > 0 else ""
+    raise UsageError(
+        f"{path.parent}: expected the scene that this campaign was started with, got a changed one: "
+        f"{shown}{more}. Choose another folder with -o, or restore the scene to resume."
+    )
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return "absent"
+    if isinstance(value, list) and len(value) > 3:
+        return f"{len(value)} values from {value[0]} to {value[-1]}"
+    text = json.dumps(value)
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+
+
+def refuse_other_runner(path: Path, manifest: Manifest, identity: RunnerIdentity) -> None:
+    """Refuse to mix results of different components, ways of running or instruction sets.
+
+    Raises
+    ------
+    UsageError
+        With what differs.
+    """
+    now, old = _facts(identity), _facts(manifest.identity)
+    different = "; ".join(differences(old, now))
+    if different:
+        raise UsageError(
+            f"{path.parent}: expected the components and machine that this campaign was started with: "
+            f"{different}. Results of two kinds are never mixed: choose another folder with -o."
+        )
+
+
+def _facts(identity: RunnerIdentity) -> dict[str, Any]:
+    return dict(_flat("", asdict(identity)))

@@ -1,0 +1,185 @@
+"""The parts of a campaign on the disk: which are there, which are sound, and how they become one dataset.
+
+Resuming a campaign is listing its parts. A part is whole or not there at all, because it is renamed into
+place, and ends with the SHA-256 of its content; a file that is damaged all the same is found before it is opened,
+and its points are computed again.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import (
+    Outcome,
+    check,
+    merge_datasets,
+    read_flat,
+    read_part,
+    refuse_unlike,
+    write_dataset,
+)
+from vibroimpact.analysis.files.fingerprints import has_recorded_hash
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.orchestrator.campaign.chunks import (
+    CARRIED,
+    CARRIED_STATE,
+    Chunk,
+    State,
+    carried_state,
+    dataset_of,
+    points_of,
+)
+from vibroimpact.orchestrator.run.dataset import with_constants_of
+from vibroimpact.orchestrator.run.empty_record import empty_record
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.sweep import expand
+
+_PART = r"branch-(\d{6,})_runs-(\d{10,})-(\d{10,})\.nc"
+_KEPT = r"kept-[0-9a-f]{16}\.nc"
+_NAME = re.compile(_PART)
+_OWN = re.compile(rf"{_PART}|{_KEPT}")
+# As `analysis.atomic` names them.
+_TEMPORARY = re.compile(
+    rf"\.({_PART}|{_KEPT}|(dataset|earlier-[0-9a-f]{{8}})\.nc|campaign\.json)\.\d+\.[0-9a-f]{{8}}\.tmp"
+)
+NO_RUNS = np.empty(0, dtype=np.int64)
+
+Note = Callable[[str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class StoredPart:
+    """A sound part: its chunk, the state that the next run of its branch starts from, and its number of rows."""
+
+    path: Path
+    chunk: Chunk
+    carried: State | None
+    rows: int = 0
+
+
+def list_parts(
+    folder: Path, scene_hash: str, note: Note, kept: NDArray[np.int64] = NO_RUNS
+) -> list[StoredPart]:
+    """Return the sound parts in a folder, in run order; what is of no use is removed.
+
+    A part of version 0.1 has no hash: it is read and checked as a whole.
+
+    Parameters
+    ----------
+    folder : Path
+    scene_hash : str
+        Hash of the scene the parts must come from.
+    note : callable
+        Told in words of each part that has to be computed again.
+    kept : ndarray of int, shape (run,)
+        Runs that no part holds, because they are kept elsewhere; see `extension`.
+    """
+    sound: list[StoredPart] = []
+    for path, chunk in _named_parts(folder):
+        # Two parts of the same runs hold the same rows; one is enough.
+        if sound and sound[-1].chunk.stop > chunk.first:
+            path.unlink()
+            continue
+        try:
+            sound.append(_read(path, chunk, scene_hash, kept))
+        except DatasetError as error:
+            path.unlink()
+            note(f"{path.name} was damaged and is removed; its {chunk.count} points come again: {error}")
+    return sound
+
+
+def own_files(folder: Path) -> list[Path]:
+    """Return the files of a campaign in its folder of parts; whatever else lies there is somebody else's."""
+    return [path for path in folder.iterdir() if _OWN.fullmatch(path.name) and path.is_file()]
+
+
+def remove_temporary_files(folder: Path) -> None:
+    """Remove what a writer of a campaign that was killed left behind."""
+    for path in folder.iterdir():
+        if _TEMPORARY.fullmatch(path.name):
+            path.unlink(missing_ok=True)
+
+
+def remove_parts(folder: Path) -> None:
+    """Remove the parts of a campaign that is complete, and their folder if nothing else is in it."""
+    if not folder.is_dir():
+        return
+    remove_temporary_files(folder)
+    for path in own_files(folder):
+        path.unlink(missing_ok=True)
+    # It may be a link to a folder elsewhere, or hold what is somebody else's: both stay.
+    with suppress(OSError):
+        folder.rmdir()
+
+
+def _named_parts(folder: Path) -> list[tuple[Path, Chunk]]:
+    found = []
+    for path in own_files(folder):
+        match = _NAME.fullmatch(path.name)
+        if match is not None:
+            branch, first, stop = map(int, match.groups())
+            found.append((path, Chunk(branch, first, stop)))
+    return sorted(found, key=lambda item: (item[1].first, -item[1].stop))
+
+
+def _read(path: Path, chunk: Chunk, scene_hash: str, kept: NDArray[np.int64]) -> StoredPart:
+    part = read_part(path)
+    runs = np.arange(chunk.first, chunk.stop)
+    if not np.array_equal(part.run_index, runs[~np.isin(runs, kept)]):
+        raise DatasetError(f"{path}: expected runs {chunk.first} to {chunk.stop - 1}, got others.")
+    if part.attrs.get("scene_hash") != scene_hash:
+        raise DatasetError(f"{path}: expected a part of this scene, got one of another.")
+    if not has_recorded_hash(path):
+        check(read_flat(path))
+    return StoredPart(path, chunk, carried_state(part.attrs), part.run_index.size)
+
+
+def compact(parts: Sequence[Path], target: Path, scene: Scene, attrs: Mapping[str, Any]) -> xr.Dataset:
+    """Write the rows of all parts as one dataset, whole or not at all, with the numbers that the scene does not sweep.
+
+    Returns
+    -------
+    xarray.Dataset
+        What was written.
+
+    Raises
+    ------
+    DatasetError
+        When a part cannot be read or joined with the others; `unfit_parts` finds out which.
+    OSError
+        When the dataset cannot be written.
+    """
+    dataset = merge_datasets(parts)
+    # Those of the first part: what they say of it is not true of all runs.
+    own = (*CARRIED, CARRIED_STATE, "scene_hash")
+    dataset.attrs = {name: value for name, value in dataset.attrs.items() if name not in own} | dict(attrs)
+    dataset = with_constants_of(dataset, scene)
+    write_dataset(dataset, target)
+    return dataset
+
+
+def unfit_parts(parts: Iterable[Path], scene: Scene) -> Iterator[tuple[Path, str]]:
+    """Yield the parts that cannot be read, or that are no parts of a scene, each with the reason."""
+    like = empty_part(scene)
+    for path in parts:
+        try:
+            part = read_flat(path)
+            check(part)
+            refuse_unlike(str(path), part, "this scene", like)
+        except DatasetError as error:
+            yield path, str(error)
+
+
+def empty_part(scene: Scene) -> xr.Dataset:
+    """Return the dataset of one run of a scene that has no results: its names, dimensions and attributes."""
+    point = points_of(expand(scene), Chunk(0, 0, 1))
+    return dataset_of(scene, point, [empty_record(scene, Outcome.error, "", 0.0)], {})

@@ -1,0 +1,64 @@
+"""Where a dataset comes from: the attributes that let someone else make it again."""
+
+from __future__ import annotations
+
+import json
+import platform
+import subprocess
+from functools import lru_cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.orchestrator.campaign.chunks import RunnerIdentity
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.summary import in_one_line
+
+_PACKAGES = ("vibroimpact", "numpy", "fmpy", "xarray", "netCDF4", "dask", "distributed")
+_GIT_SECONDS = 5.0
+
+
+def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
+    """Return the global attributes of a dataset made from a scene."""
+    return {
+        "title": scene.title or Path(scene.source).stem,
+        "source": f"vibroimpact {versions()['vibroimpact']}, scene {Path(scene.source).name}",
+        "scene": scene.text,
+        "versions": json.dumps(versions()),
+        "fmu_hashes": json.dumps(dict(identity.fmu_hashes), sort_keys=True),
+        "git_commit": git_commit(),
+        "seed": "none: nothing in the scene is random",
+        "execution": identity.execution,
+        "engine": in_one_line(scene),
+        "instruction_set": identity.instruction_set,
+    }
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that results may depend on."""
+    found = {"python": platform.python_version()}
+    for package in _PACKAGES:
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            found[package] = "unknown"
+    return found
+
+
+@lru_cache(maxsize=1)
+def git_commit() -> str:
+    """Return the commit of the checkout this package runs from, `-dirty` when changed; else `unknown`."""
+    here = Path(__file__).resolve()
+    # A virtual environment may lie inside a checkout of something else: only our own tracked file counts.
+    if _git("ls-files", "--error-unmatch", here.name) is None:
+        return "unknown"
+    return _git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*") or "unknown"
+
+
+def _git(*arguments: str) -> str | None:
+    command = ["git", "-C", str(Path(__file__).resolve().parent), *arguments]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_GIT_SECONDS, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return None
+    return done.stdout.strip()

@@ -1,0 +1,55 @@
+"""Do the workers see the folder that the campaign writes to? Asked by a file, not by its name."""
+
+from __future__ import annotations
+
+import secrets
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vibroimpact.fmus.errors import UsageError
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.campaign.cluster import WorkerPool
+
+
+def answer_question(folder: str, name: str) -> str:
+    """Read a question in a folder and leave an answer beside it; runs on a worker.
+
+    Returns
+    -------
+    str
+        Name of the answer; empty when the worker does not see the question or cannot write.
+    """
+    answer = f".answer-{name}-{secrets.token_hex(8)}"
+    try:
+        if Path(folder, f".question-{name}").read_text(encoding="ascii") != name:
+            return ""
+        Path(folder, answer).write_text(name, encoding="ascii")
+    except OSError:
+        return ""
+    return answer
+
+
+def refuse_blind_workers(pool: WorkerPool, folder: Path) -> None:
+    """Refuse workers that do not read and write the same folder as this process.
+
+    Raises
+    ------
+    UsageError
+        With the addresses of the workers that do not see it.
+    """
+    name = secrets.token_hex(16)
+    question = folder / f".question-{name}"
+    question.write_text(name, encoding="ascii")
+    try:
+        answers = pool.call_everywhere(answer_question, str(folder), name)
+    finally:
+        question.unlink()
+    blind = [address for address, answer in answers.items() if not (answer and (folder / answer).exists())]
+    for answer in filter(None, answers.values()):
+        (folder / answer).unlink(missing_ok=True)
+    if blind:
+        raise UsageError(
+            f"{folder}: expected a folder that every worker reads and writes, got {len(blind)} that do not: "
+            f"{', '.join(sorted(blind)[:5])}. Choose a folder on a shared file system with -o."
+        )

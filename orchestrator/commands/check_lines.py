@@ -1,0 +1,125 @@
+"""What `vibroimpact check` says of a scene without problems: what runs, and what it would cost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.campaign import SceneCost
+from vibroimpact.orchestrator.campaign.check import (
+    BYTES_BESIDE,
+    COPIES_IN_CAMPAIGN,
+    COPIES_IN_RUN,
+    MOST_TRIAL_SECONDS,
+    Trial,
+)
+from vibroimpact.orchestrator.campaign.cluster import processor_count
+from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.summary import effects, engine, laws
+
+_WIDTH = 10
+_DURATIONS = (
+    (1e-3, "us", 1e6),
+    (1.0, "ms", 1e3),
+    (120.0, "s", 1.0),
+    (7200.0, "min", 1 / 60),
+    (172800.0, "h", 1 / 3600),
+)
+
+
+def engine_lines(scene: Scene) -> Iterator[str]:
+    """Yield the lines that say what runs, which need no trial."""
+    return _aligned(_what_runs(scene))
+
+
+def cost_lines(scene: Scene, cost: SceneCost) -> Iterator[str]:
+    """Yield the lines that say what it costs."""
+    return _aligned(_what_it_costs(scene, cost))
+
+
+def _aligned(told: Iterator[tuple[str, str]]) -> Iterator[str]:
+    return (f"  {name:<{_WIDTH}}{text}" for name, text in told)
+
+
+def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:
+    yield "engine", engine(scene)
+    if scene.stops:
+        yield "stops", ", ".join(f"{stop} {law}" for stop, law in laws(scene).items())
+    known = effects(scene)
+    yield "effects", ", ".join(name for name, there in known.items() if there and name != "stops") or "none"
+    yield "without", ", ".join(name for name, there in known.items() if not there)
+
+
+def _what_it_costs(scene: Scene, cost: SceneCost) -> Iterator[tuple[str, str]]:
+    yield "points", _points(cost)
+    yield "trial", f"none: {cost.untried}" if cost.trial is None else _trial(cost.trial)
+    refused = _refused(scene)
+    if refused or cost.trial is not None:
+        yield "run", refused or _time(cost) + _memory(cost, COPIES_IN_RUN)
+    if cost.trial is None:
+        return
+    if cost.points > 1:
+        workers = min(processor_count(), cost.branches)
+        on = f" on {workers} worker{'s' if workers > 1 else ''} and some seconds to start"
+        yield "campaign", _time(cost, workers) + on + _memory(cost, COPIES_IN_CAMPAIGN)
+    if not cost.trial.given_up:
+        yield "dataset", f"about {size(cost.trial.size * cost.points + BYTES_BESIDE)}"
+
+
+def _points(cost: SceneCost) -> str:
+    if cost.branches == cost.points:
+        return f"{cost.points}"
+    each = cost.points // cost.branches
+    chains = f"in {cost.branches} branches of {each}" if cost.branches > 1 else "in one branch"
+    return f"{cost.points} {chains}, along which each starts where the one before ended"
+
+
+def _trial(trial: Trial) -> str:
+    at = ", ".join(f"{key} = {value:.12g}" for key, value in trial.values.items())
+    where = f"one point was computed{f', {at}' if at else ''}: "
+    if trial.given_up:
+        return f"{where}given up after {duration(MOST_TRIAL_SECONDS)}"
+    if trial.message:
+        said = " ".join(trial.message.split())
+        return f"{where}outcome {trial.outcome.name} after {duration(trial.seconds)}, {said}"
+    found = "1 impact" if trial.impacts == 1 else f"{trial.impacts} impacts"
+    alike = "; what follows takes all points to be like it" if at else ""
+    return f"{where}{duration(trial.seconds)}, {found}, {size(trial.size)} of results{alike}"
+
+
+def _refused(scene: Scene) -> str:
+    try:
+        refuse_large_results(scene)
+    except UsageError as refused:
+        return f"refused: {str(refused).removeprefix(f'{scene.source}: ')}"
+    return ""
+
+
+def _time(cost: SceneCost, workers: int = 1) -> str:
+    seconds = cost.seconds(workers)
+    assert seconds is not None
+    given_up = cost.trial is not None and cost.trial.given_up
+    return f"{'more than' if given_up else 'about'} {duration(seconds)}"
+
+
+def _memory(cost: SceneCost, copies: int) -> str:
+    if cost.trial is None or cost.trial.given_up:
+        return ""
+    return f"; at its end {size(copies * cost.points * cost.trial.size)} of memory for results"
+
+
+def duration(seconds: float) -> str:
+    """Return a wall time as a person reads it, with two digits.
+
+    >>> duration(2.34e-3), duration(59.6), duration(5000.0), duration(4e6)
+    ('2.3 ms', '60 s', '83 min', '46 days')
+    """
+    for below, unit, factor in _DURATIONS:
+        if seconds < below:
+            return f"{_two_digits(seconds * factor)} {unit}"
+    return f"{_two_digits(seconds / 86400)} days"
+
+
+def _two_digits(number: float) -> str:
+    return f"{number:.0f}" if number >= 9.95 else f"{number:.2g}"

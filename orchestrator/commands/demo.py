@@ -1,0 +1,95 @@
+"""`vibroimpact demo`: a scene file becomes a campaign, a dataset, a figure and numbers to check."""
+
+from __future__ import annotations
+
+import time
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from vibroimpact.analysis.dataset import open_dataset
+from vibroimpact.analysis.landmarks import Reading, bifurcation_readings
+from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
+from vibroimpact.orchestrator.campaign.progress import shown_progress
+from vibroimpact.orchestrator.scene import Scene, load_scene
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SCENE = "demo_scene.toml"
+STEPS_ALLOWED = 2.0
+"""How far a reading may lie from the exact value, in steps of the sweep."""
+
+
+def run_demo(output: Path) -> None:
+    """Run the packaged bifurcation scene into a folder and say what was done and read.
+
+    Parameters
+    ----------
+    output : Path
+        Folder for the campaign and the figure.
+
+    Raises
+    ------
+    CampaignError
+        When a reading is not within `STEPS_ALLOWED` of its exact value.
+    """
+    console = Terminal(soft_wrap=True)
+    began = time.perf_counter()
+    with resources.as_file(resources.files("vibroimpact.orchestrator.commands") / SCENE) as path:
+        scene = load_scene(path)
+    console.print(f"Scene: {scene.title}; {len(scene.sweep[0].values)} frequencies, up and down.")
+    with shown_progress() as progress:
+        report = run_campaign(scene, output, progress=progress)
+    console.print(_told(report, scene))
+    with open_dataset(report.dataset) as dataset:
+        figure = _draw(dataset, output / "bifurcation.png")
+        readings = bifurcation_readings(dataset)
+    console.print(_table(readings))
+    for reading in readings:
+        console.print(f"  {reading.name}: {reading.how}.")
+    console.print(f"Dataset: {report.dataset}\nFigure:  {figure.absolute()}")
+    console.print(f"Everything together took {time.perf_counter() - began:.1f} s.")
+    _refuse_far_readings(readings)
+
+
+def _told(report: CampaignReport, scene: Scene) -> str:
+    if not report.chunks:
+        return f"All {report.runs} points were there already; delete the folder to compute them again."
+    periods = (scene.record.transient_periods or 0) + (scene.record.recorded_periods or 0)
+    return (
+        f"{report.runs - report.resumed} points of {periods} forcing periods each, computed by "
+        f"{report.workers} workers in {report.compute_seconds:.1f} s."
+    )
+
+
+def _draw(dataset: xr.Dataset, path: Path) -> Path:
+    from vibroimpact.analysis import figures
+
+    figures.save(figures.draw(dataset, "bifurcation"), path)
+    return path
+
+
+def _table(readings: list[Reading]) -> Table:
+    table = Table(title="Angular frequencies read off the dataset", title_justify="left", box=SIMPLE_HEAD)
+    table.add_column("what")
+    for heading in ("read", "exact", "grid steps apart"):
+        table.add_column(heading, justify="right")
+    for reading in readings:
+        steps = f"{abs(reading.steps):.2f}"
+        table.add_row(reading.name, f"{reading.value:.6f}", f"{reading.exact:.6f}", steps)
+    return table
+
+
+def _refuse_far_readings(readings: list[Reading]) -> None:
+    far = [reading.name for reading in readings if abs(reading.steps) > STEPS_ALLOWED]
+    if far:
+        raise CampaignError(
+            f"demo: expected every reading within {STEPS_ALLOWED:.0f} steps of its exact value, "
+            f"got more for {', '.join(far)}."
+        )

@@ -1,0 +1,336 @@
+"""The command `vibroimpact replay`."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vibroimpact.analysis.dataset.outputs import FORCE_HELP
+from vibroimpact.fmus.terminal import Terminal, say
+
+if TYPE_CHECKING:
+    from vibroimpact.analysis.replay.trust import Verdict
+    from vibroimpact.orchestrator.replay import Replayer, ReplayFit
+    from vibroimpact.orchestrator.replay.output import Replayed
+    from vibroimpact.orchestrator.scene import Scene
+
+
+def register(app: typer.Typer) -> None:
+    """Add the command to the command line."""
+    app.command("replay")(replay)
+
+
+def replay(
+    scene: Annotated[Path, typer.Argument(help=r"Scene file (TOML) with a \[replay] table.")],
+    recordings: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Recordings to replay, and to fit to; left out, those that the scene names."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc); of a campaign its folder.")
+    ] = None,
+    fit: Annotated[
+        str | None, typer.Option(help="Numbers of the scene to fit: body.damping_ratio,sensor.gain")
+    ] = None,
+    score: Annotated[
+        list[Path] | None, typer.Option(help="Recording to score that was not fitted on; may be repeated.")
+    ] = None,
+    save_scene: Annotated[
+        Path | None,
+        typer.Option(
+            help="Scene to write with the numbers found (.toml); one that is there only with --force."
+        ),
+    ] = None,
+    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
+    execution: Annotated[
+        str | None,
+        typer.Option(help="auto, fused, or coupled (a Replay FMU drives); else as the scene says."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes of a campaign.", min=1)] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Dask scheduler of a campaign.")] = None,
+    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
+) -> None:
+    """Drive a scene by recorded channels and compare its motion with what was measured.
+
+    One recording, or several with --fit and --score, make a dataset. A folder as output makes a campaign over all
+    recordings and the grid that the scene sweeps, on many workers; the same command resumes it.
+
+    Example: vibroimpact replay examples/recordings/board.toml a0.nc -o fit.nc --fit body.damping_ratio --score a1.nc
+    """
+    from vibroimpact.analysis.dataset.outputs import refuse_folder, refuse_outputs, refuse_overwriting
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.campaign.manifest import holds_scene
+    from vibroimpact.orchestrator.scene import load_scene
+
+    loaded = load_scene(scene)
+    if output is not None and output.suffix == ".nc":
+        refuse_outputs([scene, *(recordings or []), *(score or [])], output, figure)
+        named = with_recordings(loaded, recordings or [])
+        refuse_overwriting(output, force, lambda there: holds_scene(there, named))
+        if save_scene is not None:
+            refuse_outputs([scene, *(recordings or []), *(score or [])], save_scene, ending=".toml")
+            _refuse_saving(save_scene, fit, force)
+    if output is None:
+        raise UsageError(
+            "--output: expected a dataset (.nc) or the folder of a campaign, got nothing. Add -o."
+        )
+    if output.name.lower().endswith(".nc") and output.suffix != ".nc":
+        raise UsageError(
+            f"{output}: expected a dataset NAME.nc or the folder of a campaign, got neither. Choose another name."
+        )
+    if output.suffix != ".nc":
+        refuse_folder(output)
+        _refuse_with_campaign(fit, score, save_scene, figure, execution)
+        _campaign(with_recordings(loaded, recordings or []), output, workers, scheduler)
+        return
+    if workers is not None or scheduler is not None:
+        raise UsageError("--workers, --scheduler: expected the folder of a campaign as output, got a file.")
+    if any(axis.key != "replay.recording" for axis in loaded.sweep):
+        raise UsageError(
+            f"{scene}: sweep: expected no sweep for one dataset. Give a folder with -o for a campaign."
+        )
+    if figure is not None and loaded.replay is not None and not loaded.replay.compare:
+        raise UsageError(
+            f"--figure: expected a scene that compares something, got {scene} without. Add compare."
+        )
+    _to_dataset(
+        *(loaded, recordings or [], score or [], output, fit, save_scene, figure),
+        execution or loaded.execution.how,
+    )
+
+
+def _refuse_with_campaign(*others: object) -> None:
+    from vibroimpact.fmus.errors import UsageError
+
+    if any(other is not None for other in others):
+        raise UsageError(
+            "--output: expected a dataset (.nc) beside --fit, --score, --save-scene, --figure or --execution, "
+            "got a folder. Campaigns replay; they do not fit."
+        )
+
+
+def _refuse_saving(path: Path, fit: str | None, force: bool) -> None:
+    from vibroimpact.fmus.errors import UsageError
+
+    if fit is None:
+        raise UsageError(
+            "--save-scene: expected --fit beside it, got nothing to save. Name numbers to be found."
+        )
+    if path.exists() and not force:
+        raise UsageError(
+            f"{path}: expected a new file, got one that is there. Choose another name, or overwrite it with --force."
+        )
+
+
+def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:
+    """Return a scene that names recordings, as if its file did: workers read them by themselves.
+
+    Raises
+    ------
+    UsageError
+        The scene names recordings too, or there are none.
+    """
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.replay.replayer import replay_table
+    from vibroimpact.orchestrator.scene import parse_scene
+    from vibroimpact.orchestrator.scene.text import text_with_values
+
+    there = replay_table(scene).recordings
+    if there and recordings:
+        raise UsageError(
+            f"{scene.source}: replay.recordings: expected recordings in the scene or on the command line, got both."
+        )
+    if not recordings:
+        if not there:
+            raise UsageError(
+                f"{scene.source}: expected a recording to replay, got none. Name one after the scene."
+            )
+        return scene
+    named = [str(path.absolute()) for path in recordings]
+    return parse_scene(text_with_values(scene.text, {}, named), scene.source)
+
+
+def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
+    from vibroimpact.orchestrator.campaign.progress import shown_progress
+    from vibroimpact.orchestrator.commands.campaign import tell
+
+    if workers is not None and scheduler is not None:
+        raise UsageError(
+            "--workers and --scheduler: expected one of them, got both. A scheduler has its own workers."
+        )
+    try:
+        with shown_progress() as progress:
+            report = run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)
+    except CampaignInterrupted as interrupted:
+        say(str(interrupted), err=True)
+        raise typer.Exit(130) from None
+    tell(report)
+
+
+def _to_dataset(
+    scene: Scene,
+    recordings: Sequence[Path],
+    scored: Sequence[Path],
+    output: Path,
+    fit: str | None,
+    save_scene: Path | None,
+    figure: Path | None,
+    execution: str,
+) -> None:
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.replay.output import replay_dataset
+
+    began = time.perf_counter()
+    paths = _paths(with_recordings(scene, recordings))
+    if scored and fit is None:
+        raise UsageError(
+            "--score: expected --fit beside it: a recording is scored with numbers fitted on others."
+        )
+    _refuse_scoring_fitted(paths, scored)
+    console = Terminal()
+    with ExitStack() as stack:
+        fitted, verdict, replays = _replays(stack, scene, paths, scored, fit, execution)
+        _print(console, replays, fitted, verdict)
+        dataset = replay_dataset(replays, fitted, verdict)
+        _write(dataset, output, figure)
+        if save_scene is not None and fitted is not None:
+            _save_scene(scene, fitted, [path.name for path in paths], save_scene)
+            console.print(f"Scene with the numbers found written to {save_scene}.", soft_wrap=True)
+    console.print(f"{output} in {time.perf_counter() - began:.1f} s", soft_wrap=True)
+
+
+def _refuse_scoring_fitted(paths: Sequence[Path], scored: Sequence[Path]) -> None:
+    """Refuse a recording to be scored that is fitted too: it would earn a trust that it cannot give."""
+    from vibroimpact.fmus.errors import UsageError
+
+    fitted = {path.resolve() for path in paths}
+    for path in scored:
+        if path.resolve() in fitted:
+            raise UsageError(
+                f"--score: expected a recording that is not fitted, got {path}, which is. Score another one."
+            )
+
+
+def _paths(scene: Scene) -> list[Path]:
+    from vibroimpact.orchestrator.replay.replayer import recording_of, replay_table
+
+    return [recording_of(scene, number) for number in range(1, len(replay_table(scene).recordings) + 1)]
+
+
+def _replays(
+    stack: ExitStack,
+    scene: Scene,
+    paths: Sequence[Path],
+    scored: Sequence[Path],
+    fit: str | None,
+    execution: str,
+) -> tuple[ReplayFit | None, Verdict | None, list[Replayed]]:
+    from vibroimpact.analysis.replay.trust import trust
+    from vibroimpact.orchestrator.replay import compare_motion, opened_replays, scores_of
+    from vibroimpact.orchestrator.replay.fit import fit_keys
+    from vibroimpact.orchestrator.replay.output import Replayed
+    from vibroimpact.orchestrator.replay.replayer import is_linear
+
+    keys = fit_keys(scene, fit) if fit is not None else ()
+    # a number that the scene leaves at its default counts as written from now on
+    scene = scene.with_values({key: scene.value(key) for key in keys})
+    replayers = stack.enter_context(opened_replays(scene, [*paths, *scored], execution))
+    found = _fitted(replayers[: len(paths)], keys) if keys else None
+    numbers = found.numbers if found is not None else None
+    replays = []
+    for place, replayer in enumerate(replayers):
+        motion = replayer.simulate(numbers)
+        use = "replayed" if found is None else ("fitted" if place < len(paths) else "scored")
+        replays.append(Replayed(replayer, motion, compare_motion(replayer, motion), use))
+    if not any(replay.comparisons for replay in replays):
+        return found, None, replays
+    fitted = len(paths) if found is not None else 0
+    scores = scores_of(replayers, [replay.comparisons for replay in replays], fitted)
+    verdict = trust(
+        *(scores.fitted, scores.others, scores.without_dynamics),
+        held=scores.held,
+        linear=is_linear(scene.with_values(numbers or {})),
+    )
+    return found, replace(verdict, reasons=(*verdict.reasons, *scores.remarks)), replays
+
+
+def _fitted(replayers: Sequence[Replayer], keys: Sequence[str]) -> ReplayFit:
+    """Fit with a line that says how far it is."""
+    from vibroimpact.orchestrator.replay import fit_replay
+
+    console = Terminal(stderr=True)
+    with console.status("fitting") as status:
+        return fit_replay(
+            replayers,
+            keys,
+            told=lambda count, error: status.update(
+                f"fitting: {count} simulations, error {100 * error:.3g} %"
+            ),
+        )
+
+
+def _print(
+    console: Terminal, replays: Sequence[Replayed], fit: ReplayFit | None, verdict: Verdict | None
+) -> None:
+    from rich.table import Table
+
+    from vibroimpact.analysis.replay.table import print_comparison
+
+    if verdict is not None:
+        console.print(verdict.words, soft_wrap=True, style="bold")
+        for reason in verdict.beside:
+            console.print(f"  also: {reason}", soft_wrap=True)
+    if fit is not None:
+        table = Table("number", "found", "standard error", "began with", title="Fit", title_justify="left")
+        for key, value, error, start in zip(fit.keys, fit.values, fit.standard_error, fit.start, strict=True):
+            table.add_row(key, f"{value:.6g}", f"{error:.2g}", f"{start:.6g}")
+        console.print(table)
+        for line in fit.remarks:
+            console.print(f"  {line}", soft_wrap=True)
+    for replay in replays:
+        console.print(f"{replay.name} ({replay.use})", style="bold")
+        for line in (*replay.replayer.remarks, *replay.motion.warnings):
+            console.print(f"  {line}", soft_wrap=True)
+        if replay.comparisons:
+            print_comparison(console, replay.comparisons)
+
+
+def _save_scene(scene: Scene, fit: ReplayFit, recordings: Sequence[str], path: Path) -> None:
+    from vibroimpact.analysis.dataset.outputs import writing
+    from vibroimpact.analysis.files.atomic import write_atomically
+    from vibroimpact.orchestrator.replay.output import fitted_scene_text
+    from vibroimpact.orchestrator.scene import parse_scene
+
+    text = fitted_scene_text(scene, fit, recordings, path.parent)
+    parse_scene(text, str(path))  # a number found may break a rule between two keys
+    with writing(path):
+        write_atomically(path, text.encode())
+
+
+def _write(dataset: object, output: Path, figure: Path | None) -> None:
+    import xarray as xr
+
+    from vibroimpact.analysis.dataset.results import write_results
+    from vibroimpact.fmus.errors import UsageError
+
+    assert isinstance(dataset, xr.Dataset)
+    try:
+        write_results(dataset, output, kind="replay")
+        if figure is not None:
+            from vibroimpact.analysis import figures
+            from vibroimpact.analysis.figures.replay import draw_replay
+
+            figures.save(draw_replay(dataset), figure)
+    except OSError as error:
+        raise UsageError(
+            f"{error.filename or output}: expected a place where a file can be written, got "
+            f"{error.strerror or error}. Choose another."
+        ) from error

@@ -1,0 +1,192 @@
+"""Notes that outlive a process: which FMI call is under way, at what time, and the last log lines.
+
+They lie in a file that two processes map. When an FMU takes its process down, or hangs, the other process reads
+what it was doing. The call is noted either before every call, which is exact and takes a quarter of the time of
+an impact, or by looking at the frames of the running thread now and then, which tells what hangs and costs nothing.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import mmap
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from vibroimpact.orchestrator.fmi.instance import Instance, Wrapper
+from vibroimpact.orchestrator.fmi.library import Function
+from vibroimpact.orchestrator.fmi.log import RING_SIZE, LogTail
+from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.importer.wiring import CallList
+
+MOST_COMPONENTS = 32
+MOST_CALLS = 4096
+NAME_LENGTH = 96
+#: What is noted of a component whose FMU is being loaded, in place of a function.
+LOADING = "loading"
+#: FMI's functions by the methods of an instance that call them.
+METHODS = {
+    "step": "DoStep",
+    "_instantiate": "Instantiate",
+    "enter_initialization": "EnterInitializationMode",
+    "exit_initialization": "ExitInitializationMode",
+    "reset": "Reset",
+    "terminate": "Terminate",
+    "free": "FreeInstance",
+    "save": "GetFMUState",
+    "restore": "SetFMUState",
+}
+
+
+class _Notes(ctypes.Structure):
+    _fields_ = [
+        ("call", ctypes.c_int64),  # 1-based; 0: none yet
+        ("time", ctypes.c_double),
+        ("calls", ctypes.c_int64),
+        ("components", ctypes.c_int64),
+        ("names", (ctypes.c_char * NAME_LENGTH) * MOST_CALLS),
+        ("owners", ctypes.c_int32 * MOST_CALLS),
+    ]
+
+
+SIZE = ctypes.sizeof(_Notes) + MOST_COMPONENTS * RING_SIZE
+
+
+class Breadcrumbs:
+    """The notes of one process, mapped from a file of `SIZE` bytes.
+
+    Parameters
+    ----------
+    path : Path
+        The file; made with `create`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        with path.open("r+b") as file:
+            self._memory = mmap.mmap(file.fileno(), SIZE)
+        self._notes = _Notes.from_buffer(self._memory)
+        self._known: dict[str, int] = {}
+        self._numbers: dict[tuple[str, str], int] = {}
+        self._tails: dict[int, LogTail] = {}
+
+    @staticmethod
+    def create(path: Path) -> None:
+        """Make an empty file of notes."""
+        path.write_bytes(bytes(SIZE))
+
+    # ---- written by the process that runs FMUs ----
+
+    def log(self, component: str) -> LogTail:
+        """Return a log tail for a component that both processes see: the same one for each of its instances.
+
+        It is asked for just before the component's FMU is loaded, which is noted.
+        """
+        index = self._known.setdefault(component, len(self._known))
+        self._notes.components = len(self._known)
+        self._notes.call = self._register(component, LOADING)
+        return self._tail(index)
+
+    def _tail(self, index: int) -> LogTail:
+        place = min(index, MOST_COMPONENTS - 1)
+        if place not in self._tails:
+            start = ctypes.sizeof(_Notes) + place * RING_SIZE
+            self._tails[place] = LogTail(memoryview(self._memory)[start : start + RING_SIZE])
+        return self._tails[place]
+
+    def wrap(self, component: str) -> Wrapper:
+        """Return what wraps the functions of a component: each call is noted before it is made."""
+
+        def wrapper(name: str, function: Function) -> Function:
+            number = self._register(component, name)
+            return (
+                self._noting_step(number, function)
+                if name.endswith("DoStep")
+                else self._noting(number, function)
+            )
+
+        return wrapper
+
+    def _register(self, component: str, name: str) -> int:
+        notes = self._notes
+        known = self._numbers.get((component, name))
+        if known is not None:
+            return known
+        index = min(int(notes.calls), MOST_CALLS - 1)
+        notes.names[index].value = f"{component}\n{name}".encode()[: NAME_LENGTH - 1]
+        notes.owners[index] = self._known.get(component, 0)
+        notes.calls = self._numbers[component, name] = index + 1
+        return index + 1
+
+    def _noting(self, number: int, function: Function) -> Function:
+        notes = self._notes
+
+        def noted(*arguments: Any) -> Any:
+            notes.call = number
+            return function(*arguments)
+
+        return noted
+
+    def _noting_step(self, number: int, function: Function) -> Function:
+        notes = self._notes
+
+        def noted(instance: Any, time: Any, *rest: Any) -> Any:
+            notes.call = number
+            notes.time = time.value
+            return function(instance, time, *rest)
+
+        return noted
+
+    def note_frame(self, frame: FrameType | None) -> None:
+        """Note the FMI call that a thread is in, as its frames show it; without one the notes stay as they are."""
+        while frame is not None:
+            found = _call_in(frame)
+            if found is not None:
+                instance, function = found
+                number = self._register(instance.name, instance.prefix + function)
+                self._notes.time = _time_of(instance, function)
+                self._notes.call = number
+                return
+            frame = frame.f_back
+
+    # ---- read by the other process ----
+
+    def begin(self) -> None:
+        """Forget what the point before did: its last call, its time and its log lines."""
+        self._notes.call = 0
+        self._notes.time = math.nan
+        for index in range(int(self._notes.components)):
+            self._tail(index).take()
+
+    def last_call(self) -> tuple[str, str, float]:
+        """Return instance, function and time (s) of the last call noted; empty names when there is none."""
+        index = int(self._notes.call) - 1
+        if index < 0:
+            return "", "", math.nan
+        instance, _, function = self._notes.names[index].value.decode("utf-8", "replace").partition("\n")
+        return instance, function, float(self._notes.time)
+
+    def last_lines(self) -> tuple[str, ...]:
+        """Return the last log lines of the component of the last call."""
+        index = int(self._notes.call) - 1
+        return self._tail(self._notes.owners[index]).take() if index >= 0 else ()
+
+
+def _time_of(instance: Instance, function: str) -> float:
+    """Time of a call, s; NaN for one before which no run has begun."""
+    if function == METHODS["_instantiate"]:
+        return math.nan
+    return instance.step_start if function == METHODS["step"] else instance.time
+
+
+def _call_in(frame: FrameType) -> tuple[Instance, str] | None:
+    """Instance and function of the FMI call that a frame makes, if it makes one."""
+    owner, method = frame.f_locals.get("self"), frame.f_code.co_name
+    if isinstance(owner, Instance) and method in METHODS:
+        return owner, METHODS[method]
+    if isinstance(owner, VariableGroup) and method in ("get", "set"):
+        return owner.instance, method.capitalize() + owner.name
+    if isinstance(owner, CallList):
+        found = owner.find(frame.f_locals.get("call"))
+        return (found.instance, found.function) if found is not None else None
+    return None

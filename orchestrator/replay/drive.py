@@ -1,0 +1,161 @@
+"""From a recorded channel to what drives a body: SI values without offset and gaps, linear between the samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.recording import Channel, Quality
+from vibroimpact.analysis.recording.units import measured_unit, unit_label
+from vibroimpact.fmus.errors import DatasetError
+
+Floats = NDArray[np.float64]
+
+#: Parts that a channel is cut into to find its quietest.
+QUIET_PARTS = 20
+#: Steps of one replay: a minute or more of processor time.
+MOST_STEPS = 10**7
+#: SI units of what can be driven.
+DRIVEN_UNITS = {"base_acceleration": "m s-2", "force": "N"}
+
+
+@dataclass(frozen=True, slots=True)
+class DriveSignal:
+    """What drives a body.
+
+    Attributes
+    ----------
+    time : ndarray, shape (sample,)
+        s, on the clock of its channel.
+    values : ndarray, shape (sample,)
+        m/s^2 or N; offset taken off, gaps bridged by straight lines.
+    bridged : ndarray of bool, shape (sample,)
+        Where a gap was bridged: what follows from it is a guess.
+    offset : float
+        What was taken off, in the unit of the channel.
+    remarks : tuple of str
+        What a reader must know.
+    """
+
+    time: Floats
+    values: Floats
+    bridged: NDArray[np.bool_]
+    offset: float
+    remarks: tuple[str, ...]
+
+
+def drive_of(channel: Channel, drive: str, offset: float | None = None) -> DriveSignal:
+    """Return what a channel drives a body with.
+
+    Parameters
+    ----------
+    channel : Channel
+    drive : str
+        `base_acceleration` or `force`.
+    offset : float or None
+        Taken off every sample, in the unit of the channel; None for `quiet_level`.
+
+    Raises
+    ------
+    DatasetError
+        The channel measures something else, or has less than two samples.
+    """
+    expected, unit = DRIVEN_UNITS[drive], measured_unit(channel.unit)
+    if unit.si not in (expected, "1"):
+        raise DatasetError(
+            f"{channel.name}: expected a channel in {expected} to drive {drive}, got {channel.unit}. "
+            "Import it with the unit it has, or name another channel."
+        )
+    known = np.isfinite(channel.values)
+    if np.count_nonzero(known) < 2:
+        raise DatasetError(f"{channel.name}: expected at least two samples to drive a body, got fewer.")
+    if offset is None:
+        # what was simulated has no offset to be taken off
+        offset = 0.0 if channel.attrs.get("role") == "simulated" else quiet_level(channel.values[known])
+    level = offset
+    values = np.interp(channel.time, channel.time[known], channel.values[known]) - level
+    return DriveSignal(
+        channel.time, values * unit.factor, ~known, level, tuple(_remarks(channel, level, ~known))
+    )
+
+
+def _remarks(channel: Channel, level: float, bridged: NDArray[np.bool_]) -> list[str]:
+    remarks = []
+    if level:
+        offset = f"{level:.6g}" + ("" if channel.unit == "1" else f" {unit_label(channel.unit)}")
+        remarks.append(f"{channel.name}: an offset of {offset} was taken off")
+    if bridged.any():
+        remarks.append(f"{channel.name}: {int(bridged.sum())} missing samples were bridged by straight lines")
+    clipped = int(np.count_nonzero(channel.quality & Quality.clipped))
+    if clipped:
+        remarks.append(f"{channel.name}: {clipped} samples are clipped, and drive the body with too little")
+    return remarks
+
+
+def quiet_level(values: Floats) -> float:
+    """Return the level of a signal where nothing happens: the median of its quietest part.
+
+    The signal is cut into `QUIET_PARTS` equal parts; the quietest has the least median distance from its median.
+    A signal that never rests (of a shaker) has the middle of its whole instead: its quietest part is no quieter
+    than a third of all of it.
+
+    Examples
+    --------
+    >>> pulse = 0.25 + np.exp(-(((np.arange(1000) - 300) / 40.0) ** 2))
+    >>> round(quiet_level(pulse), 9)
+    0.25
+    """
+    parts = np.array_split(values, min(QUIET_PARTS, len(values)))
+    spreads = [float(np.median(np.abs(part - np.median(part)))) for part in parts]
+    whole = float(np.sqrt(np.mean((values - np.mean(values)) ** 2)))
+    quietest = int(np.argmin(spreads))
+    if spreads[quietest] > whole / 3.0:
+        return float(np.mean(values))
+    return float(np.median(parts[quietest]))
+
+
+def step_instants(signal_time: Floats, finest: float, end: float) -> Floats:
+    """Return the instants to step through: every sample of the drive, with steps no longer than `finest`.
+
+    Parameters
+    ----------
+    signal_time : ndarray, shape (sample,)
+        Instants of the drive's samples, s: its slope changes there.
+    finest : float
+        Longest step, s, for motion that is compared with a faster channel.
+    end : float
+        Where to stop, s; beyond the last sample the steps are `finest` or the drive's last, whichever is shorter.
+
+    Raises
+    ------
+    DatasetError
+        There would be more than `MOST_STEPS`: clocks that are far apart, or a hole of hours.
+
+    Examples
+    --------
+    >>> step_instants(np.array([0.0, 1.0, 3.0]), 1.0, 4.0).tolist()
+    [0.0, 1.0, 2.0, 3.0, 4.0]
+    """
+    steps = np.diff(signal_time)
+    length = min(finest, float(steps[-1]))
+    shares = np.maximum(1.0, np.ceil(steps / finest * (1.0 - 1e-9)))
+    beyond = max(0.0, float(np.ceil((end - signal_time[-1]) / length * (1.0 - 1e-9))))
+    if float(np.sum(shares)) + beyond > MOST_STEPS:
+        raise DatasetError(
+            f"replay: expected at most {MOST_STEPS:g} steps, got {float(np.sum(shares)) + beyond:g} of {finest:g} s "
+            f"from {signal_time[0]:g} to {max(end, float(signal_time[-1])):g} s. "
+            "Look at the instants of the channels, or give replay.stop."
+        )
+    parts = shares.astype(np.int64)
+    within = np.concatenate(
+        [
+            start + step * np.arange(count) / count
+            for start, step, count in zip(signal_time[:-1], steps, parts, strict=True)
+        ]
+        + [signal_time[-1:]]
+    )
+    after = signal_time[-1] + length * np.arange(1, int(beyond) + 1)
+    instants: Floats = np.concatenate([within, after])
+    return instants

@@ -1,0 +1,126 @@
+"""Replays as points of a campaign: over recordings, and over the grid that the scene sweeps."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import platform
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.analysis.recording import open_signals
+from vibroimpact.analysis.replay.comparison import Comparison
+from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.orchestrator.replay.replayer import Motion, Replayer, named, recording_of, replay_table
+from vibroimpact.orchestrator.replay.scoring import compare_motion
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
+
+
+class ReplayRunner:
+    """Runs the replays of one scene; each recording is opened once in a process.
+
+    Parameters
+    ----------
+    scene : Scene
+        With `[replay]` and at least one recording in it.
+    execution : str
+        `auto`, `fused` or `coupled`.
+
+    Attributes
+    ----------
+    execution, instruction_set
+        As of `runner.PointRunner`.
+    fmu_hashes : dict of str to str
+        SHA-256 of each component's FMU and of each recording: a campaign never mixes two versions of either.
+    """
+
+    def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
+        self.execution = "fused" if execution == "auto" else execution
+        self.instruction_set = platform.machine()
+        self._scene = scene
+        count = max(1, len(replay_table(scene).recordings))
+        self._paths = [recording_of(scene, number) for number in range(1, count + 1)]
+        recordings = {f"recording {path.name}": _sha256(path) for path in self._paths}
+        self._replayers: dict[int, Replayer] = {}
+        self.fmu_hashes = recordings | self._replayer(1).hashes
+
+    def _replayer(self, number: int) -> Replayer:
+        if number not in self._replayers:
+            path = self._paths[number - 1]
+            try:
+                self._replayers[number] = Replayer(self._scene, open_signals(path), execution=self.execution)
+            except DatasetError as problem:
+                raise named(problem, path) from problem
+        return self._replayers[number]
+
+    def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
+        """Replay one recording with the values of one point.
+
+        Raises
+        ------
+        VibroimpactError
+            The recording cannot be read or compared, or the body refuses its parameters.
+        """
+        began = time.perf_counter()
+        replayer = self._replayer(int(values.get(RECORDING_KEY, 1.0)))
+        numbers = {key: value for key, value in values.items() if key != RECORDING_KEY}
+        motion = replayer.simulate(numbers)
+        comparisons = compare_motion(replayer, motion)
+        return self._record(replayer, motion, comparisons, time.perf_counter() - began)
+
+    def _record(
+        self, replayer: Replayer, motion: Motion, comparisons: list[Comparison], seconds: float
+    ) -> RunRecord:
+        displacement, velocity, state = replayer.final_state()
+        # what was not scored is the same for all points; an alignment that is doubtful is not
+        doubts = [f"{c.measured.name}: {text}" for c in comparisons for text in c.alignment.remarks]
+        told = [*motion.warnings, *doubts]
+        impacts = self._scene.record.impacts
+        return RunRecord(
+            outcome=Outcome.ok,
+            message="; ".join(told),
+            periods=None,
+            impacts=motion.impacts if impacts else None,
+            sticks=motion.sticks if impacts else None,
+            samples=None,
+            final_displacement=displacement,
+            final_velocity=velocity,
+            final_phase=math.nan,
+            seconds=seconds,
+            final_state=state,
+            scores=np.array([_score_row(comparison) for comparison in comparisons]) if comparisons else None,
+        )
+
+    def close(self) -> None:
+        """Free the components."""
+        for replayer in self._replayers.values():
+            replayer.close()
+
+
+def _score_row(comparison: Comparison) -> tuple[float, ...]:
+    """Return the columns `analysis.schema.SCORE_COLUMNS` of one comparison."""
+    alignment = comparison.alignment
+    difference = comparison.simulated_frequency.frequency - comparison.measured_frequency.frequency
+    return (
+        comparison.variance,
+        comparison.gain,
+        alignment.lag,
+        alignment.lag_error,
+        float(alignment.polarity),
+        difference,
+    )
+
+
+def _sha256(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise UsageError(
+            f"{path}: expected a recording that can be read, got: {error.strerror or error}. "
+            "Make one with `vibroimpact import`."
+        ) from error

@@ -1,0 +1,18 @@
+"""One point of a scene, simulated in this process, and the dataset of such runs."""
+
+from __future__ import annotations
+
+from vibroimpact.orchestrator.run.dataset import dataset_of_runs
+from vibroimpact.orchestrator.run.general import GeneralRunner
+from vibroimpact.orchestrator.run.opening import Runner, open_runner
+from vibroimpact.orchestrator.run.point import PointRunner
+from vibroimpact.orchestrator.run.session import Session
+
+__all__ = [
+    "GeneralRunner",
+    "PointRunner",
+    "Runner",
+    "Session",
+    "dataset_of_runs",
+    "open_runner",
+]

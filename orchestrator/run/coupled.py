@@ -1,0 +1,178 @@
+"""A short-form scene with every component its own FMU: the body, and one ImpactStop for each stop (`coupled`).
+
+The same interface as `body_driver.BodyDriver`, so that a run does not know which of the two carries it.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping, Sequence
+
+from vibroimpact.fmus import fmu_path
+from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.importer.component import Value, description_of
+from vibroimpact.orchestrator.importer.events import Event, StepWatcher
+from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, Exchange
+from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached, RecordedBody
+
+#: Impacts between two emptyings of the body's record: one impact writes at most two rows, of room for 512.
+IMPACTS_PER_BLOCK = 200
+#: Communication steps between two looks at the clock.
+STEPS_PER_LOOK = 100
+BODY = "body"
+#: Contact laws by their numbers in the FMUs. A body leaves those of its stops to them: an impulse, or a force.
+RESTITUTION, EXTERNAL, EXTERNAL_FORCE = 1, 5, 6
+COMPLIANT = (2, 3, 4)
+#: What of a contact port is its stop's own too.
+LAW_PARAMETERS = ("position", "restitution", "yield_velocity", "stiffness", "damping", "exponent")
+ANSWERS = ("applied_restitution", "applied_force", "applied_stiffness", "applied_damping")
+
+
+def stop_name(k: int) -> str:
+    """Name of the component of stop `k` (1-based)."""
+    return f"stop{k}"
+
+
+def connections_of(stops: int) -> list[ConnectionSpec]:
+    """Return the connections between a body and its stops."""
+    found = []
+    for k in range(1, stops + 1):
+        port, stop = f"contact[{k}]", stop_name(k)
+        found += [
+            ConnectionSpec((BODY, f"{port}.{name}"), (stop, name)) for name in ("displacement", "velocity")
+        ]
+        found += [ConnectionSpec((stop, name), (BODY, f"{port}.{name}")) for name in ANSWERS]
+    return found
+
+
+def body_integers(integers: Mapping[str, int]) -> dict[str, int]:
+    """Return a body's integer parameters for stops that are FMUs of their own: their laws become external."""
+
+    def law_of(law: int) -> int:
+        if law in COMPLIANT:
+            return EXTERNAL_FORCE
+        return EXTERNAL if law == RESTITUTION else law
+
+    return {name: law_of(v) if name.endswith("].law") else v for name, v in integers.items()}
+
+
+class CoupledDriver(RecordedBody):
+    """Drives a body and its stops through whole runs.
+
+    Parameters
+    ----------
+    floats, integers : mapping
+        Parameters of the body, as for `BodyDriver`, with the laws of its stops as they are in a scene: each stop
+        gets its own, and the body is told that they are external. Numbers of laws that are external already stay.
+    stops : int
+        Number of stops.
+    macro_step : float
+        Longest communication step, s.
+    exchange : str
+        How values are exchanged; the contacts do not depend on it.
+    body : str
+        Name of the body's FMU: `Oscillator`, `Chain` or `Beam`.
+    others, connections : sequences
+        Further components, such as a Replay, and how they are connected to the body.
+    """
+
+    def __init__(
+        self,
+        floats: Mapping[str, float],
+        integers: Mapping[str, int],
+        stops: int,
+        *,
+        macro_step: float = math.inf,
+        exchange: Exchange = "gauss_seidel",
+        body: str = "Oscillator",
+        others: Sequence[ComponentSpec] = (),
+        connections: Sequence[ConnectionSpec] = (),
+    ) -> None:
+        self._limit = integers["impact_limit"]
+        own = {name: value for name, value in integers.items() if name != "impact_limit"}
+        self._stops = [self._stop(k, own) for k in range(1, stops + 1)]
+        specs = [ComponentSpec(BODY, fmu_path(body), body_integers(own)), *self._stops, *others]
+        joined = [*connections_of(stops), *connections]
+        self.importer = Importer(specs, joined, macro_step=macro_step, exchange=exchange)
+        self.importer.on_event = self._count_event
+        self.importer.on_pause = self._make_room
+        self.importer.watchers.append(StepWatcher(self._look_at_clock, lambda time, end: None))
+        self._stop_floats = self._stop_parameters(floats)
+        super().__init__(self._group)
+        self._deadline = math.inf
+        self._events = self._steps = 0
+
+    @staticmethod
+    def _stop(k: int, integers: Mapping[str, int]) -> ComponentSpec:
+        """A stop with its law and side."""
+        law, side = integers.get(f"contact[{k}].law", RESTITUTION), integers.get(f"contact[{k}].side", 1)
+        known = law if law in (RESTITUTION, *COMPLIANT) else RESTITUTION
+        return ComponentSpec(stop_name(k), fmu_path("ImpactStop"), {"law": known, "side": side})
+
+    def _stop_parameters(self, floats: Mapping[str, float]) -> dict[tuple[str, str], str]:
+        """Parameters of the stops, with the names of the body's parameters that they come from."""
+        known = {v.name for v in description_of(fmu_path("ImpactStop")).modelVariables}
+        ports = [(stop.name, f"contact[{k}]") for k, stop in enumerate(self._stops, 1)]
+        return {
+            (stop, name): f"{port}.{name}"
+            for stop, port in ports
+            for name in LAW_PARAMETERS
+            if f"{port}.{name}" in floats and name in known
+        }
+
+    def _group(self, kind: str, names: Sequence[str], size: int | None = None) -> VariableGroup:
+        body = self.importer.components[BODY]
+        references = [body.variables[name].valueReference for name in names]
+        return body.instance.group(kind, references, size=size)
+
+    @property
+    def hashes(self) -> dict[str, str]:
+        """SHA-256 of each component's FMU."""
+        return {name: component.sha256 for name, component in self.importer.components.items()}
+
+    @property
+    def time(self) -> float:
+        """The time reached, s."""
+        return self.importer.time
+
+    def begin(self, floats: Mapping[str, float], deadline: float | None) -> None:
+        """Start a run at time 0 with these parameters; it may take `deadline` seconds of wall time."""
+        self._deadline = math.inf if deadline is None else time.perf_counter() + deadline
+        self._events = self._steps = 0
+        self.rows.blocks = []
+        values: dict[tuple[str, str], Value] = {(BODY, name): value for name, value in floats.items()}
+        values |= {target: floats[source] for target, source in self._stop_floats.items()}
+        self.importer.begin(0.0, values)
+        self._warnings = self.importer.components[BODY].instance.log.take()
+
+    def advance(self, end: float) -> None:
+        """Advance to time `end`, s."""
+        self.importer.advance(end)
+        self.take_rows()
+
+    def _make_room(self) -> None:
+        """Empty the record; the body pauses when it is full, and after some hundredths of a second of work."""
+        self.take_rows()
+        self._refuse_late()
+
+    def _look_at_clock(self, step_start: float) -> None:
+        self._steps += 1
+        if self._steps % STEPS_PER_LOOK == 0:
+            self._refuse_late()
+
+    def _refuse_late(self) -> None:
+        if time.perf_counter() > self._deadline:
+            raise DeadlineReached
+
+    def _count_event(self, event: Event) -> None:
+        self._events += 1
+        if self._events % IMPACTS_PER_BLOCK == 0:
+            self._make_room()
+        if self._events > self._limit:
+            raise ImpactLimitReached
+
+    def close(self) -> None:
+        """Free the components."""
+        self.importer.free()

@@ -1,0 +1,169 @@
+"""The dataset of runs: what a scene says of names, units and groups, handed to the dataset's writer."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset import (
+    RESERVED_NAMES,
+    Direction,
+    RunRecord,
+    build_dataset,
+    file_names,
+    with_constants,
+)
+from vibroimpact.orchestrator.run.empty_record import sample_variables
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.keys import coordinate_name, parse_key
+from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
+
+EXTREMA = ("displacement_max", "displacement_min")
+STROBE = ("strobe_displacement", "strobe_velocity")
+FORCING_UNITS = {"force": "N", "base_acceleration": "m s-2", "uniform": "N m-1", "mode": "N"}
+
+
+def dataset_of_runs(
+    scene: Scene,
+    values: Sequence[Mapping[str, float]],
+    directions: Sequence[Direction],
+    indices: Sequence[int],
+    records: Sequence[RunRecord],
+    attrs: Mapping[str, Any],
+) -> xr.Dataset:
+    """Return the one-dimensional dataset of runs.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene they belong to.
+    values : sequence of mapping
+        Swept values of each run, by key.
+    directions, indices : sequence
+        Direction of the sweep and place in the campaign of each run.
+    records : sequence of RunRecord
+        What became of each.
+    attrs : mapping
+        Attributes of the file.
+    """
+    names = coordinate_names(scene)
+    dataset = build_dataset(
+        records,
+        coordinates={
+            name: np.array([point[key] for point in values], dtype=np.float64) for key, name in names.items()
+        },
+        direction=directions,
+        run_index=np.array(indices),
+        sample_variables=sample_variables(scene),
+        units=scene.units,
+        attrs=attrs,
+        unit_of=_units(scene, names),
+        omit=_omitted(scene),
+        event_components=[c.name for c in scene.general.components] if scene.general is not None else (),
+        connections=_energy_connections(scene),
+        compared=compared_names(scene),
+    )
+    return _described(dataset, scene, names)
+
+
+def _described(dataset: xr.Dataset, scene: Scene, names: Mapping[str, str]) -> xr.Dataset:
+    for file, long_name in _long_names(scene, names).items():
+        dataset[file].attrs["long_name"] = long_name
+    return dataset
+
+
+def with_constants_of(dataset: xr.Dataset, scene: Scene) -> xr.Dataset:
+    """Return the dataset of a scene's runs with what the scene does not sweep as scalar coordinates."""
+    constants = scene.constants()
+    names = constant_names(scene, constants)
+    named = {file: constants[key] for key, file in names.items()}
+    return _described(with_constants(dataset, named, unit_of=_units(scene, names)), scene, names)
+
+
+def constant_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
+    """Return the name in the file of each key that is not swept: named as if swept, beside those that are."""
+    every = [*keys, *(axis.key for axis in scene.sweep)]
+    short = {key: coordinate_name(key, every) for key in keys}
+    twice = Counter(short.values())
+    taken = RESERVED_NAMES | set(coordinate_names(scene).values()) | set(stored_samples(scene))
+    wanted = [name if twice[name] == 1 else key for key, name in short.items()]
+    return dict(zip(short, file_names(wanted, taken), strict=True))
+
+
+def coordinate_names(scene: Scene) -> dict[str, str]:
+    """Return the name that each swept key has in the file, by key."""
+    keys = [axis.key for axis in scene.sweep]
+    return dict(zip(keys, file_names([scene.sweep_coordinate_name(key) for key in keys]), strict=True))
+
+
+def stored_samples(scene: Scene) -> tuple[str, ...]:
+    """Return the name that each sampled variable has in the file, in the order of the scene."""
+    return file_names(sample_variables(scene), RESERVED_NAMES | set(coordinate_names(scene).values()))
+
+
+def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
+    """Units that the names do not say."""
+    if scene.general is not None:
+        units = {**scene.general.start_units, **scene.general.units}
+        stored = {file: units[key] for key, file in names.items() if key in units}
+        return units | stored if scene.units == "SI" else stored
+    if scene.units != "SI":
+        return {}
+    swept = {file: unit for key, file in names.items() if (unit := _unit_of_key(scene, key))}
+    forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
+    return forcing | swept
+
+
+def _unit_of_key(scene: Scene, key: str) -> str | None:
+    """Return the unit of a swept key where it depends on its table; None where the name says it."""
+    if key == RECORDING_KEY:
+        return "1"
+    if key == "forcing.amplitude" and scene.forcing is not None:
+        return FORCING_UNITS[scene.forcing.kind]
+    parts = parse_key(key)
+    if parts is None or parts.place is None:
+        return None
+    law = scene.stops[parts.place].law
+    if law == "hunt_crossley" and parts.name == "damping":
+        return "s m-1"
+    # UDUNITS has no broken exponents, and a wrong unit would be worse than none
+    return "1" if parts.name == "stiffness" and law in ("hertz", "hunt_crossley") else None
+
+
+def _long_names(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
+    """Names of swept keys whose unit cannot be said otherwise."""
+    if scene.general is not None or scene.units != "SI":
+        return {}
+    exponents = {"hertz": "1.5", "hunt_crossley": "exponent"}
+    found = {}
+    for key, file in names.items():
+        parts = parse_key(key)
+        law = scene.stops[parts.place].law if parts is not None and parts.place is not None else ""
+        if parts is not None and parts.name == "stiffness" and law in exponents:
+            found[file] = f"{file.replace('_', ' ')} in N/m^{exponents[law]}"
+    return found
+
+
+def _omitted(scene: Scene) -> tuple[str, ...]:
+    record = scene.record
+    return (() if record.extrema else EXTREMA) + (() if record.strobe else STROBE)
+
+
+def compared_names(scene: Scene) -> tuple[str, ...]:
+    """Return the names of what a replay compares."""
+    if scene.replay is None:
+        return ()
+    return tuple(f"{pair.simulated} ~ {pair.measured}" for pair in scene.replay.compare)
+
+
+def _energy_connections(scene: Scene) -> tuple[str, ...]:
+    if scene.general is None:
+        return ()
+    # only general scenes need FMPy, which takes long to import
+    from vibroimpact.orchestrator.importer.energy import force_connections
+
+    return force_connections(scene.general.components, scene.general.connections)

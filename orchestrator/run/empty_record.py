@@ -1,0 +1,56 @@
+"""The record of a run that has no results, with the groups that its scene asks for, all empty."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vibroimpact.analysis.dataset import (
+    IMPACT_COLUMNS,
+    PERIOD_COLUMNS,
+    STICK_COLUMNS,
+    Outcome,
+    RunRecord,
+)
+from vibroimpact.orchestrator.run.parameters.body import state_variables
+from vibroimpact.orchestrator.scene import Scene
+
+
+def sample_variables(scene: Scene) -> tuple[str, ...]:
+    """Return the names of the variables that the scene samples."""
+    if scene.general is not None:
+        return scene.general.variables if scene.general.rate is not None else ()
+    return scene.record.time_series.variables if scene.record.time_series else ()
+
+
+def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -> RunRecord:
+    """Return a record without results.
+
+    Parameters
+    ----------
+    scene : Scene
+        Says which groups the record has.
+    outcome, message
+        How the run ended, and why.
+    seconds : float
+        Wall time it took, s.
+    """
+    record, names = scene.record, sample_variables(scene)
+    general = scene.general is not None
+    states = state_variables(scene)
+    periods = scene.period is not None and (record.extrema or record.strobe) and not general
+    return RunRecord(
+        outcome=outcome,
+        message=message,
+        periods=np.empty((0, len(PERIOD_COLUMNS))) if periods else None,
+        impacts=np.empty((0, len(IMPACT_COLUMNS))) if record.impacts and not general else None,
+        sticks=np.empty((0, len(STICK_COLUMNS))) if record.impacts and not general else None,
+        samples=np.empty((0, 1 + len(names))) if names else None,
+        final_displacement=math.nan,
+        final_velocity=math.nan,
+        final_phase=math.nan,
+        seconds=seconds,
+        final_state=np.full(len(states), math.nan) if states else None,
+        events=np.empty((0, 3)) if record.impacts and general else None,
+    )

@@ -1,0 +1,91 @@
+"""One body FMU of ours driven alone: its contacts are resolved inside its own long steps (`fused`)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from vibroimpact.fmus import fmu_path
+from vibroimpact.fmus.archive import unpack
+from vibroimpact.orchestrator.fmi.instance import DISCARD
+from vibroimpact.orchestrator.fmi.instance3 import Instance3
+from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.importer.component import description_of
+from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached, RecordedBody
+
+
+class BodyDriver(RecordedBody):
+    """Drives one instance of a body FMU (FMI 3.0), which is used again for every run.
+
+    Parameters
+    ----------
+    floats : mapping of str to float
+        Real parameters of the first run; later runs may change their values, not their names.
+    integers : mapping of str to int
+        Integer and enumeration parameters, the same for all runs.
+    body : str
+        Name of the FMU: `Oscillator`, `Chain` or `Beam`.
+    """
+
+    def __init__(
+        self, floats: Mapping[str, float], integers: Mapping[str, int], body: str = "Oscillator"
+    ) -> None:
+        path = fmu_path(body, "3.0")
+        self.fmu = unpack(path)
+        self._references = {v.name: v.valueReference for v in description_of(path).modelVariables}
+        self.instance = Instance3(self.fmu, "body", early_return=True)
+        super().__init__(self._group)
+        self._floats = self._group("Float64", tuple(floats))
+        self._float_names = tuple(floats)
+        self._integers = self._group("Int64", tuple(integers))
+        self._integers.values[:] = list(integers.values())
+        self._deadline = np.inf
+
+    def _group(self, kind: str, names: Sequence[str], size: int | None = None) -> VariableGroup:
+        return self.instance.group(kind, [self._references[name] for name in names], size=size)
+
+    @property
+    def time(self) -> float:
+        """The time reached, s."""
+        return self.instance.time
+
+    @property
+    def hashes(self) -> dict[str, str]:
+        """SHA-256 of the body's FMU."""
+        return {"body": self.fmu.sha256}
+
+    def begin(self, floats: Mapping[str, float], deadline: float | None) -> None:
+        """Start a run at time 0 with these parameters; it may take `deadline` seconds of wall time."""
+        self._deadline = np.inf if deadline is None else time.perf_counter() + deadline
+        self.rows.blocks = []
+        instance = self.instance
+        instance.reset()
+        self._floats.values[:] = [floats[name] for name in self._float_names]
+        self._floats.set()
+        self._integers.set()
+        instance.enter_initialization(0.0)
+        instance.exit_initialization()
+        self._warnings = instance.log.take()
+
+    def advance(self, end: float) -> None:
+        """Advance to time `end`, s.
+
+        The body ends a step early when its record is full, and after some hundredths of a second of work: then
+        rows are taken, and the clock and signals are heard.
+        """
+        instance = self.instance
+        while instance.time < end:
+            if time.perf_counter() > self._deadline:
+                raise DeadlineReached
+            if instance.step(instance.time, end - instance.time) == DISCARD:
+                raise ImpactLimitReached
+            if instance.returned_early:
+                self.take_rows()
+            else:
+                instance.time = end
+
+    def close(self) -> None:
+        """Free the instance."""
+        self.instance.free()

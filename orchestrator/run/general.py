@@ -1,0 +1,267 @@
+"""Runs the points of a general scene: any FMUs, coupled by the importer."""
+
+from __future__ import annotations
+
+import math
+import platform
+import time
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.fmus.errors import ComponentError, SceneError
+from vibroimpact.orchestrator.fmi.instance import Wrapper
+from vibroimpact.orchestrator.fmi.log import LogTail
+from vibroimpact.orchestrator.importer.component import Value
+from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
+from vibroimpact.orchestrator.importer.events import Event, StepWatcher
+from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.sampling import Sampler
+from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached, in_time_order
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene
+
+#: Communication steps between two looks at the clock, for a run with a deadline.
+STEPS_PER_LOOK = 100
+
+
+def component_variable(name: str) -> tuple[str, str]:
+    """Split `component.variable` at its first dot."""
+    component, _, variable = name.partition(".")
+    return component, variable
+
+
+class GeneralRunner:
+    """Runs points of one general scene in this process, with component instances that are used again.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with components.
+    execution : str
+        `coupled`, or `auto`, which takes it.
+    log, wrap : callable or None
+        Given a component's name: where its log lines go, and what wraps the functions of its FMU.
+
+    Attributes
+    ----------
+    execution, instruction_set : str
+        `coupled`; machine architecture.
+    fmu_hashes : dict of str to str
+        SHA-256 of each component's FMU.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        *,
+        execution: str = "auto",
+        log: Callable[[str], LogTail] | None = None,
+        wrap: Callable[[str], Wrapper] | None = None,
+    ) -> None:
+        if execution not in ("auto", "coupled") or scene.general is None:
+            problem = (
+                f'{scene.source}: execution.how: expected "coupled" for a general scene, got "{execution}".'
+            )
+            raise SceneError([problem])
+        self.execution = "coupled"
+        self.instruction_set = platform.machine()
+        self._scene = scene
+        self._log, self._wrap = log, wrap
+        self._build(scene.general)
+        self.fmu_hashes = {name: c.sha256 for name, c in self._importer.components.items()}
+        self._events: list[tuple[float, int, int]] = []
+        self._recording = False
+        self._deadline = math.inf
+
+    def _build(self, general: GeneralScene) -> None:
+        """Make the importer with all that watches it."""
+        self._importer = Importer(
+            general.components,
+            general.connections,
+            general.events,
+            exchange=general.exchange,
+            macro_step=general.macro_step,
+            log=self._log,
+            wrap=self._wrap,
+        )
+        self._names = tuple(self._importer.components)
+        self._importer.on_event = self._note_event
+        self._importer.on_pause = self._refuse_late
+        self._importer.watchers.append(StepWatcher(self._look_at_clock, lambda time, end: None))
+        self._energy = InterfaceEnergy(self._importer, general.connections)
+        self._sampler = self._make_sampler(general)
+        self._broken = False
+
+    def _make_sampler(self, general: GeneralScene) -> Sampler | None:
+        if general.rate is None or not general.variables:
+            return None
+        return Sampler(self._importer, [component_variable(name) for name in general.variables], general.rate)
+
+    @property
+    def connection_names(self) -> tuple[str, ...]:
+        """The force-displacement connections whose energy residual is recorded."""
+        return self._energy.names
+
+    @property
+    def component_names(self) -> tuple[str, ...]:
+        """The components, in the order that events name them by."""
+        return self._names
+
+    def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
+        """Run one point from the scene's start values; a general scene carries no state over.
+
+        Raises
+        ------
+        ComponentError
+            A component fails; the error names instance, function and time.
+        """
+        began = time.perf_counter()
+        scene = self._scene.with_values(values) if values else self._scene
+        if self._broken:
+            self._rebuild()
+        self._broken = True  # until this run ends well: after an error FMI allows little but to free
+        try:
+            outcome, message = self._run(scene)
+        except ComponentError as error:
+            if not error.function.endswith("Reset"):
+                raise
+            self._rebuild()  # the end of the run before has failed: no fault of this one
+            outcome, message = self._run(scene)
+        self._broken = False
+        return self._record(outcome, message, time.perf_counter() - began)
+
+    def _rebuild(self) -> None:
+        """Make all components anew."""
+        assert self._scene.general is not None  # the constructor refuses any other
+        self._importer.free()
+        self._build(self._scene.general)
+
+    def _run(self, scene: Scene) -> tuple[Outcome, str]:
+        general, record, execution = scene.general, scene.record, scene.execution
+        assert general is not None  # the constructor refuses any other
+        self._deadline = math.inf if execution.deadline is None else time.perf_counter() + execution.deadline
+        self._limit, self._seen, self._steps = execution.impact_limit, 0, 0
+        self._events, self._recording = [], False
+        self._importer.keeps_start = False
+        for component in self._importer.components.values():
+            component.instance.log.take()  # what it said in the point before is no reason for this one's end
+        self._set_gains(general)
+        end = record.transient_time + record.recorded_time
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused at the end
+                self._importer.begin(0.0, _start_values(general))
+                self._energy.begin(general.connections)
+                self._importer.advance(record.transient_time)
+                self._recording = True
+                if self._sampler is not None:
+                    self._sampler.begin(record.transient_time, end)
+                self._importer.advance(end)
+        except ImpactLimitReached:
+            return (
+                Outcome.impact_limit,
+                f"impact_limit: {self._limit} events at time {self._importer.time:.17g}",
+            )
+        except DeadlineReached:
+            text = f"deadline: {execution.deadline} s passed at time {self._importer.time:.17g}"
+            return Outcome.timeout, text
+        self._refuse_not_finite()
+        return Outcome.ok, "; ".join(self._remarks())
+
+    def _remarks(self) -> list[str]:
+        """What a reader of the results must know of a run that went well."""
+        remarks = [
+            f"{watch.component.name}.{watch.event.variable}: its events accumulated at time {watch.last_time:.17g}; "
+            "those after it are not located"
+            for watch in self._importer.watches
+            if watch.accumulated
+        ]
+        remarks += [
+            f"{name} changed the rounding of numbers in its process; it was set back after each of its steps"
+            for name, component in self._importer.components.items()
+            if component.instance.changed_rounding
+        ]
+        if self._importer.wants_to_end:
+            remarks.append(f"a component asked for the end at time {self._importer.time:.17g}")
+            if self._importer.overrun > self._importer.time:
+                remarks.append(
+                    f"others, which could not be taken back, had been stepped to {self._importer.overrun:.17g}"
+                )
+        return remarks
+
+    def _set_gains(self, general: GeneralScene) -> None:
+        changed = False
+        for transfer in (*self._importer.transfers, *self._importer.loops.transfers):
+            for connection in general.connections:
+                if transfer.carries(connection) and transfer.gain_of(connection) != connection.gain:
+                    transfer.set_gain(connection, connection.gain)
+                    changed = True
+        if changed:
+            self._importer.plan_moves()
+
+    def _refuse_not_finite(self) -> None:
+        """A component that answers NaN is broken: say which and when, where samples show it."""
+        if self._sampler is None:
+            return
+        rows = self._sampler.rows
+        bad = np.argwhere(~np.isfinite(rows))
+        if len(bad):
+            row, column = bad[0]
+            name = self._scene.general.variables[column - 1] if self._scene.general is not None else ""
+            raise ComponentError(
+                f"{name}: expected a finite value, got {rows[row, column]} at time {rows[row, 0]:.17g}.",
+                instance=component_variable(name)[0],
+                time=float(rows[row, 0]),
+            )
+
+    # ---- what happens during a run ----
+
+    def _note_event(self, event: Event) -> None:
+        self._seen += 1
+        if self._seen > self._limit:
+            raise ImpactLimitReached
+        if self._recording:
+            self._events.append((event.time, event.index, self._names.index(event.component) + 1))
+
+    def _look_at_clock(self, step_start: float) -> None:
+        self._steps += 1
+        if self._steps % STEPS_PER_LOOK == 0:
+            self._refuse_late()
+
+    def _refuse_late(self) -> None:
+        if time.perf_counter() > self._deadline:
+            raise DeadlineReached
+
+    def _record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
+        general = self._scene.general
+        assert general is not None
+        return RunRecord(
+            outcome=outcome,
+            message=message,
+            periods=None,
+            impacts=None,
+            sticks=None,
+            samples=self._sample_rows(),
+            final_displacement=math.nan,
+            final_velocity=math.nan,
+            final_phase=math.nan,
+            seconds=seconds,
+            events=in_time_order(np.array(self._events, dtype=np.float64).reshape(-1, 3))
+            if self._scene.record.impacts
+            else None,
+            energy_residual=self._energy.residuals() if self._energy.names else None,
+            loop_residual=self._importer.loops.residual if self._importer.loops.names else None,
+        )
+
+    def _sample_rows(self) -> NDArray[np.float64] | None:
+        return None if self._sampler is None else self._sampler.rows
+
+    def close(self) -> None:
+        """Free the components."""
+        self._importer.free()
+
+
+def _start_values(general: GeneralScene) -> dict[tuple[str, str], Value]:
+    return {(c.name, name): value for c in general.components for name, value in c.parameters.items()}

@@ -1,0 +1,1 @@
+"""From a scene to the parameters of the FMU of its body."""

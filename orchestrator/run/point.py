@@ -1,0 +1,251 @@
+"""Runs the points of a scene: one point in, one `RunRecord` out.
+
+`fused` execution: the contact law runs inside the body FMU, and one step covers as many periods as the scene
+lets pass unrecorded. `coupled`: each stop is an FMU of its own, and the importer carries every contact between them.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+import time
+from array import array
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.fmus.errors import ComponentError, SceneError
+from vibroimpact.orchestrator.run.coupled import CoupledDriver
+from vibroimpact.orchestrator.run.fused import BodyDriver
+from vibroimpact.orchestrator.run.parameters.body import (
+    FMU_NAMES,
+    float_parameters,
+    integer_parameters,
+    state_variables,
+)
+from vibroimpact.orchestrator.run.record import (
+    ROW_PERIOD,
+    DeadlineReached,
+    ImpactLimitReached,
+    RecordedBody,
+)
+from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.models import OscillatorBody
+
+TWO_PI = 2.0 * math.pi
+
+
+class PointRunner:
+    """Runs points of one scene in this process, with component instances that are used again.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene; swept keys take their values from each point.
+    execution : str
+        `fused`, `coupled`, or `auto`, which takes `fused`.
+
+    Attributes
+    ----------
+    execution : str
+        What runs: `fused` or `coupled`.
+    instruction_set : str
+        Machine architecture the components are compiled for.
+    fmu_hashes : dict of str to str
+        SHA-256 of each component's FMU, by instance.
+    """
+
+    def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
+        self.execution = "fused" if execution == "auto" else execution
+        self.instruction_set = platform.machine()
+        self._scene = scene
+        self._plan = TimeSeriesPlan(scene)
+        self._driver = driver_of(scene, self.execution)
+        self._driver.watch(
+            contacts=len(scene.stops),
+            sampled=self._plan.variables,
+            state=state_variables(scene),
+            energies=self._plan.energies,
+            slowest=not isinstance(scene.body, OscillatorBody),
+        )
+        self.fmu_hashes = self._driver.hashes
+
+    def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
+        """Run one point.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values of the swept keys.
+        start : tuple of float or None
+            State carried over at forcing phase 0, see `body_parameters.float_parameters`; None for the
+            scene's start state.
+
+        Raises
+        ------
+        ComponentError
+            The body refuses its parameters or fails.
+        """
+        began = time.perf_counter()
+        scene = self._scene.with_values(values) if values else self._scene
+        run = _Run(scene, self._driver, self._plan, start)
+        outcome, message = run.run()
+        message = message or "; ".join(self._driver.warnings)
+        return run.record(outcome, message, time.perf_counter() - began)
+
+    def close(self) -> None:
+        """Free the components."""
+        self._driver.close()
+
+
+def driver_of(scene: Scene, execution: str) -> RecordedBody:
+    """Return what drives a scene's body: fused, or coupled to its stops."""
+    floats, integers = float_parameters(scene, None), integer_parameters(scene)
+    fmu = FMU_NAMES[scene.body.kind]
+    if execution == "fused":
+        return BodyDriver(floats, integers, fmu)
+    if execution == "coupled":
+        step = scene.execution.macro_step
+        return CoupledDriver(
+            floats,
+            integers,
+            len(scene.stops),
+            macro_step=math.inf if step is None else step,
+            exchange=scene.execution.exchange,
+            body=fmu,
+        )
+    raise SceneError([f'{scene.source}: execution.how: expected "fused" or "coupled", got "{execution}".'])
+
+
+class _Run:
+    """One run: when its recording begins and ends, and what it records."""
+
+    def __init__(
+        self, scene: Scene, driver: RecordedBody, plan: TimeSeriesPlan, start: tuple[float, ...] | None
+    ) -> None:
+        self.scene = scene
+        self.driver = driver
+        self.plan = plan
+        self.parameters = float_parameters(scene, start)
+        self.samples = array("d")
+        self.begin_time, self.end_time = self._window()
+
+    def _window(self) -> tuple[float, float]:
+        """Start and end of the recording, s; those of a forced scene are at forcing phase 0."""
+        record, period = self.scene.record, self.scene.period
+        if period is None:
+            return record.transient_time, record.transient_time + record.recorded_time
+        phase = self.parameters["forcing.phase"] % TWO_PI
+        lag = phase / self.parameters["forcing.angular_frequency"]
+        first = record.transient_periods + (1 if phase > 0.0 else 0)
+        return first * period - lag, (first + record.recorded_periods) * period - lag
+
+    def run(self) -> tuple[Outcome, str]:
+        """Run to the end; returns how that went."""
+        execution, driver = self.scene.execution, self.driver
+        driver.begin(self.parameters, execution.deadline)
+        try:
+            driver.advance(self.begin_time)
+            self._begin_recording()
+            self._advance_sampling()
+            driver.advance(self.end_time)
+        except ImpactLimitReached:
+            limit = f"{execution.impact_limit} impacts, touch-downs and rests"
+            return Outcome.impact_limit, f"impact_limit: {limit} at time {driver.time:.17g}"
+        except DeadlineReached:
+            return Outcome.timeout, f"deadline: {execution.deadline} s passed at time {driver.time:.17g}"
+        return (Outcome.stuck, "") if self._rests_for_ever() else (Outcome.ok, "")
+
+    def _begin_recording(self) -> None:
+        record = self.scene.record
+        periods = self.scene.period is not None and (record.extrema or record.strobe)
+        self.driver.record(impacts=record.impacts, extrema=record.extrema, periods=periods)
+
+    # ---- time series ----
+
+    def _advance_sampling(self) -> None:
+        series = self.scene.record.time_series
+        if series is None:
+            return
+        count = math.floor((self.end_time - self.begin_time) * series.rate * (1.0 + 1e-12)) + 1
+        for i in range(count):
+            self.driver.advance(min(self.begin_time + i / series.rate, self.end_time))
+            row = self.plan.row(self.driver.sampled(), self.scene.forcing, self._angle())
+            self.samples.extend((self.driver.time, *row))
+
+    def _angle(self) -> float:
+        """Phase angle of the forcing at the present time, rad."""
+        if self.scene.forcing is None:
+            return 0.0
+        return self.scene.forcing.angular_frequency * self.driver.time + self.parameters["forcing.phase"]
+
+    # ---- what was recorded ----
+
+    def _rests_for_ever(self) -> bool:
+        """Does the body rest on a stop for good?
+
+        An oscillator: no phase of the force can lift it. A structure, whose other modes go on: an observation.
+        The contact force has not reached zero over the whole recording or, without a period, over one of the
+        slowest mode, within which every mode of the held body has pulled at its strongest.
+        """
+        resting = self.driver.sticks_open()
+        if not resting:
+            return False
+        if isinstance(self.scene.body, OscillatorBody):
+            return self._is_pressed(self.scene.body, resting[0][0])
+        slowest = self.driver.slowest() if self.scene.period is None else 0.0
+        long_enough = TWO_PI / slowest if slowest > 0.0 else self.end_time - self.begin_time
+        return self.driver.time - min(start for _, start in resting) >= long_enough
+
+    def _is_pressed(self, body: OscillatorBody, contact: int) -> bool:
+        stop = self.scene.stops[contact - 1]
+        sign = 1.0 if stop.side == "upper" else -1.0
+        amplitude = self.parameters.get("forcing.amplitude", 0.0)
+        spring = -sign * body.stiffness * stop.position
+        if self.scene.period is None:
+            return True
+        return spring > abs(amplitude)
+
+    def record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
+        """Return the record of the run."""
+        self.driver.take_rows()
+        wanted = self.scene.record.impacts
+        displacement, velocity = self.driver.observed()
+        if not math.isfinite(displacement):
+            where = f"displacement: expected a finite number, got {displacement}"
+            raise ComponentError(f"body: {where} at time {self.driver.time:.17g}.", instance="body")
+        return RunRecord(
+            outcome=outcome,
+            message=message,
+            periods=self._period_rows(),
+            impacts=self.driver.impacts() if wanted else None,
+            sticks=self.driver.sticks() if wanted else None,
+            samples=self._sample_rows(),
+            final_displacement=displacement,
+            final_velocity=velocity,
+            final_phase=self._final_phase(outcome),
+            seconds=seconds,
+            final_state=self.driver.whole_state(),
+        )
+
+    def _final_phase(self, outcome: Outcome) -> float:
+        if self.scene.period is None:
+            return math.nan
+        if outcome in (Outcome.ok, Outcome.stuck):
+            return 0.0  # runs end at forcing phase 0, exactly
+        angle = self.parameters["forcing.angular_frequency"] * self.driver.time
+        return (angle + self.parameters["forcing.phase"]) % TWO_PI
+
+    def _period_rows(self) -> NDArray[np.float64] | None:
+        if self.scene.period is None or not (self.scene.record.extrema or self.scene.record.strobe):
+            return None
+        return self.driver.rows.of_kind(ROW_PERIOD)[:, 1:6]
+
+    def _sample_rows(self) -> NDArray[np.float64] | None:
+        series = self.scene.record.time_series
+        if series is None:
+            return None
+        return np.array(self.samples).reshape(-1, 1 + len(series.variables))

@@ -1,0 +1,71 @@
+"""How much memory the results of a scene take, known before anything is computed."""
+
+from __future__ import annotations
+
+from vibroimpact.analysis.dataset import PERIOD_COLUMNS
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.run.empty_record import sample_variables
+from vibroimpact.orchestrator.run.parameters.body import state_variables
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.sweep import run_count
+
+MOST_BYTES = 10**9
+"""Results that are kept in memory at once; arranging and writing them takes up to four times as much."""
+
+_RUN_BYTES = 1000
+_NUMBER_BYTES = 8
+_SIZES = ("B", "kB", "MB", "GB", "TB", "PB")
+
+
+def bytes_of_a_run(scene: Scene) -> int:
+    """Return the size of what one run records, but for impacts, whose number nobody knows before."""
+    record, general = scene.record, scene.general
+    periods = record.recorded_periods if (record.extrema or record.strobe) and general is None else 0
+    samples = round(_sampling_rate(scene) * _recorded_seconds(scene))
+    numbers = periods * len(PERIOD_COLUMNS) + samples * (1 + len(sample_variables(scene)))
+    return _RUN_BYTES + _NUMBER_BYTES * (numbers + len(state_variables(scene)))
+
+
+def _sampling_rate(scene: Scene) -> float:
+    if scene.general is not None:
+        return (scene.general.rate or 0.0) if scene.general.variables else 0.0
+    return scene.record.time_series.rate if scene.record.time_series is not None else 0.0
+
+
+def _recorded_seconds(scene: Scene) -> float:
+    if scene.period is None:
+        return scene.record.recorded_time
+    return scene.record.recorded_periods * scene.period
+
+
+def size(count: float) -> str:
+    """Return a number of bytes as a person reads it.
+
+    >>> size(999), size(157e6), size(2.34e12)
+    ('999 B', '157 MB', '2.3 TB')
+    """
+    power = 0
+    while count >= 999.5 and power < len(_SIZES) - 1:
+        count, power = count / 1000, power + 1
+    return f"{count:.{0 if count >= 9.95 or power == 0 else 1}f} {_SIZES[power]}"
+
+
+def refuse_large_results(scene: Scene) -> None:
+    """Refuse a scene whose results do not fit into the memory of one process.
+
+    Raises
+    ------
+    UsageError
+        With the size and what to do.
+    """
+    runs, each = run_count(scene.sweep), bytes_of_a_run(scene)
+    if runs * each <= MOST_BYTES:
+        return
+    if runs == 1 or each > MOST_BYTES:
+        todo = "Record fewer periods, or sample fewer variables, more slowly or for a shorter time."
+    else:
+        todo = "Use `vibroimpact campaign`, which keeps each point on the disk as soon as it is computed."
+    raise UsageError(
+        f"{scene.source}: expected results of at most {size(MOST_BYTES)}, which `vibroimpact run` keeps in memory, "
+        f"got {size(runs * each)} of {runs} {'run' if runs == 1 else 'runs'}. {todo}"
+    )

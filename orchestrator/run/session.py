@@ -1,0 +1,232 @@
+"""An opened scene that can be stepped: inputs in, outputs out; replays and plants of a rig are made of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
+from vibroimpact.orchestrator.run.coupled import CoupledDriver
+from vibroimpact.orchestrator.run.parameters.body import (
+    FMU_NAMES,
+    float_parameters,
+    integer_parameters,
+    state_variables,
+)
+from vibroimpact.orchestrator.run.point import driver_of
+from vibroimpact.orchestrator.run.record import RecordedBody
+from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
+from vibroimpact.orchestrator.scene import Scene
+
+Floats = NDArray[np.float64]
+INPUTS = ("force", "base_acceleration")
+"""Inputs of the bodies, each with its slope over a step: `force_rate` and `base_acceleration_rate`."""
+
+
+class Session:
+    """A scene of the short form, opened: it goes on from step to step until it is closed.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene with a body.
+    outputs : sequence of str
+        What each step answers, in the names of a time series: `displacement`, `contact_force[1]`, ...
+    execution : str
+        `auto`, `fused` or `coupled`.
+    others, connections : sequences
+        Further components, connected to the body; such a session is coupled.
+
+    Attributes
+    ----------
+    outputs : tuple of str
+    time : float
+        The time reached, s.
+
+    Examples
+    --------
+    >>> from vibroimpact.orchestrator.scene import parse_scene
+    >>> text = "[body]\\nmass = 1\\nstiffness = 0\\n[record]\\nrecorded_time = 1"
+    >>> with Session(parse_scene(text, "free.toml"), ["velocity"]) as session:
+    ...     session.begin()
+    ...     session.advance(2.0, {"force": (3.0, 0.0)})
+    {'velocity': 6.0}
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        outputs: Sequence[str] = ("displacement", "velocity"),
+        *,
+        execution: str = "auto",
+        others: Sequence[ComponentSpec] = (),
+        connections: Sequence[ConnectionSpec] = (),
+    ) -> None:
+        self._scene = scene
+        self._plan = TimeSeriesPlan(scene, outputs)
+        self.outputs = self._plan.names
+        wanted = "fused" if execution == "auto" and not others else execution
+        self.execution = "coupled" if others else wanted
+        self._driver = _coupled(scene, others, connections) if others else driver_of(scene, self.execution)
+        self._driver.watch(
+            contacts=len(scene.stops),
+            sampled=self._plan.variables,
+            state=state_variables(scene),
+            energies=self._plan.energies,
+        )
+        self._input_names = tuple(n for name in INPUTS if self._has(name) for n in (name, f"{name}_rate"))
+        self._inputs = self._driver.inputs(self._input_names)
+
+    def _has(self, name: str) -> bool:
+        # a chain takes a force on each of its masses
+        return name != "force" or self._scene.body.kind != "chain"
+
+    @property
+    def time(self) -> float:
+        """The time reached, s."""
+        return self._driver.time
+
+    @property
+    def hashes(self) -> dict[str, str]:
+        """SHA-256 of each component's FMU."""
+        return self._driver.hashes
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the body said when the run began."""
+        return self._driver.warnings
+
+    def begin(
+        self, values: Mapping[str, float] | None = None, start: tuple[float, ...] | None = None
+    ) -> None:
+        """Begin at time 0, from the scene's start state or a carried one.
+
+        Parameters
+        ----------
+        values : mapping of str to float, optional
+            Values of keys of the scene, such as `body.damping_ratio`, from now on.
+        start : tuple of float, optional
+            State to start from, see `body_parameters.float_parameters`.
+
+        Raises
+        ------
+        ComponentError
+            The body refuses its parameters.
+        """
+        scene = self._scene.with_values(values) if values else self._scene
+        self._forcing = scene.forcing
+        self._parameters = float_parameters(scene, start)
+        self._driver.begin(self._parameters, scene.execution.deadline)
+        self._driver.record(impacts=True, extrema=False, periods=False)
+
+    def advance(
+        self, duration: float, inputs: Mapping[str, tuple[float, float]] | None = None
+    ) -> dict[str, float]:
+        """Advance by `duration` s and return the outputs then.
+
+        Parameters
+        ----------
+        duration : float
+            s, > 0.
+        inputs : mapping of str to (float, float), optional
+            Value at the start of the step and slope over it, of `force` (N) and `base_acceleration`
+            (m/s^2); those left out keep their last value, with no slope.
+        """
+        buffer = self._inputs.values
+        buffer[1::2] = 0.0
+        for name, (value, slope) in (inputs or {}).items():
+            if name not in self._input_names:
+                known = ", ".join(self._input_names[::2])
+                raise UsageError(f"{name}: expected an input of the body ({known}), got another name.")
+            place = self._input_names.index(name)
+            buffer[place : place + 2] = value, slope
+        self._inputs.set()
+        self._driver.advance(self._driver.time + duration)
+        return dict(zip(self.outputs, self.sample(), strict=True))
+
+    def sample(self) -> Sequence[float]:
+        """Return the outputs now, in the order of `outputs`."""
+        angle = 0.0
+        if self._forcing is not None:
+            angle = self._forcing.angular_frequency * self.time + self._parameters["forcing.phase"]
+        return self._plan.row(self._driver.sampled(), self._forcing, angle)
+
+    def follow(self, times: Floats, name: str | None = None, values: Floats | None = None) -> Floats:
+        """Go through all instants with an input that is linear between them; return the outputs at each.
+
+        Parameters
+        ----------
+        times : ndarray, shape (step + 1,)
+            s from the session's time 0, ascending; the first is now.
+        name : str or None
+            The input that follows `values`; None for none.
+        values : ndarray, shape (step + 1,)
+            Its values at the instants.
+
+        Returns
+        -------
+        ndarray, shape (step + 1, outputs)
+        """
+        rows = np.empty((len(times), len(self.outputs)))
+        driver, group = self._driver, self._inputs
+        buffer = group.values
+        place = None if name is None else self._input_names.index(name)
+        slopes = np.zeros(len(times)) if values is None else np.append(np.diff(values) / np.diff(times), 0.0)
+        plain = self._plan.is_plain(self._forcing)
+        for i, time in enumerate(times.tolist()):
+            driver.advance(time)
+            if place is not None and values is not None:
+                buffer[place], buffer[place + 1] = values[i], slopes[i]
+                group.set()
+            rows[i] = driver.sampled() if plain else self.sample()
+        return rows
+
+    def impacts(self) -> Floats:
+        """Return the impacts so far, shape (impact, 7): columns `analysis.schema.IMPACT_COLUMNS`."""
+        return self._driver.impacts()
+
+    def sticks(self) -> Floats:
+        """Return the sticks so far, shape (stick, 3): start, end (NaN: not ended), contact."""
+        return self._driver.sticks()
+
+    def observed(self) -> tuple[float, float]:
+        """Return displacement (m) and velocity (m/s) of the observed point."""
+        return self._driver.observed()
+
+    def whole_state(self) -> Floats | None:
+        """Return the whole state of a chain or beam, see `body_parameters.state_variables`."""
+        return self._driver.whole_state()
+
+    def close(self) -> None:
+        """Free the components."""
+        self._driver.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _coupled(
+    scene: Scene, others: Sequence[ComponentSpec], connections: Sequence[ConnectionSpec]
+) -> RecordedBody:
+    step = scene.execution.macro_step
+    return CoupledDriver(
+        float_parameters(scene, None),
+        integer_parameters(scene),
+        len(scene.stops),
+        macro_step=math.inf if step is None else step,
+        exchange=scene.execution.exchange,
+        body=FMU_NAMES[scene.body.kind],
+        others=others,
+        connections=connections,
+    )

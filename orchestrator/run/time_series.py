@@ -1,0 +1,83 @@
+"""The time series of a scene of the short form: which variables of the FMU it takes, and what they become."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.models import Forcing
+from vibroimpact.orchestrator.scene.sampled_names import fmu_variables, follow_energies, forced_mass
+
+
+class TimeSeriesPlan:
+    """What a scene samples.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene of the short form.
+    names : sequence of str, optional
+        What is sampled, in place of what the scene's `record.time_series` names.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The sampled variables, as the scene names them; empty without a time series.
+    variables : tuple of str
+        The variables of the body's FMU that they are made of, each once.
+    energies : bool
+        Whether the body must follow its energies for them.
+    """
+
+    def __init__(self, scene: Scene, names: Sequence[str] | None = None) -> None:
+        series = scene.record.time_series
+        asked = series.variables if series is not None else ()
+        self.names: tuple[str, ...] = asked if names is None else tuple(names)
+        parts = [fmu_variables(name, len(scene.stops)) for name in self.names]
+        self.variables = tuple(dict.fromkeys(variable for part in parts for variable in part))
+        self.energies = scene.body.kind != "oscillator" and follow_energies(self.names)
+        # a beam knows that its base moves; the others see it as forces on their masses only
+        self._relative = scene.body.kind != "beam"
+        self._columns = [[self.variables.index(variable) for variable in part] for part in parts]
+
+    def is_plain(self, forcing: Forcing | None) -> bool:
+        """Whether the sampled variables are those of the FMU, one by one: nothing is left for `row` to do."""
+        return forcing is None and self._columns == [[place] for place in range(len(self.names))]
+
+    def row(self, values: NDArray[np.float64], forcing: Forcing | None, angle: float) -> Sequence[float]:
+        """Return the sampled variables at one instant.
+
+        Parameters
+        ----------
+        values : ndarray, shape (variables,)
+            What the FMU says.
+        forcing : Forcing or None
+            What drives the body.
+        angle : float
+            Its phase angle now, rad.
+        """
+        cosine = math.cos(angle) if forcing is not None else 0.0
+        driven = forcing is not None and forcing.kind == "base_acceleration"
+        base = forcing.scalar_amplitude * cosine if forcing and driven and self._relative else 0.0
+        row = []
+        for name, columns in zip(self.names, self._columns, strict=True):
+            value = math.fsum(values[column] for column in columns)
+            if name.startswith("forcing"):
+                value = _amplitude(forcing, name) * cosine
+            elif name.startswith("acceleration"):
+                value += base
+            row.append(value)
+        return row
+
+
+def _amplitude(forcing: Forcing | None, name: str) -> float:
+    if forcing is None:
+        return 0.0
+    mass = forced_mass(name)
+    if mass is not None and isinstance(forcing.amplitude, tuple):
+        return forcing.amplitude[mass - 1]
+    return forcing.scalar_amplitude

@@ -1,0 +1,1 @@
+"""Scenes of `[component.NAME]` tables: any FMUs, their connections and events."""

@@ -1,0 +1,208 @@
+"""The components of a general scene: from `[component.NAME]` to an FMU file and the facts of it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.fmus import components, fmu_path
+from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.orchestrator.scene.general.component_facts import (
+    ComponentFacts,
+    VariableFacts,
+    component_facts,
+)
+from vibroimpact.orchestrator.scene.general.models import ComponentTable
+from vibroimpact.orchestrator.scene.general.start_values import Misfit, StartValue, typed_value
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.table_reader import read_table
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
+
+
+@dataclass(frozen=True, slots=True)
+class DraftComponent:
+    """A component on its way; `facts` is None where its FMU cannot be read, and then nothing is said of it.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the scene.
+    fmu : Path or None
+        Its FMU file.
+    shipped : bool
+        Whether it is one of this package.
+    facts : ComponentFacts or None
+        What its description says.
+    parameters : mapping of str to StartValue
+        The valid ones of its start values.
+    """
+
+    name: str
+    fmu: Path | None = None
+    shipped: bool = False
+    facts: ComponentFacts | None = None
+    parameters: Mapping[str, StartValue] | None = None
+
+
+def read_components(raw: object, folder: Path, problems: list[Problem]) -> dict[str, DraftComponent]:
+    """Return the components of a document by name; what is wrong with them joins the problems.
+
+    Parameters
+    ----------
+    raw : object
+        What the document has under `component`.
+    folder : Path
+        The folder of the scene file, from which FMU paths count.
+    problems : list of Problem
+        Grows.
+    """
+    if not isinstance(raw, dict) or not raw:
+        got = "nothing" if raw in (None, {}) else quoted(raw)
+        hint = 'Write [component.ball] and below it fmu = "ball.fmu".'
+        problems.append(Problem("component", "one [component.NAME] table for each FMU", got, hint))
+        return {}
+    return {name: _read_component(name, table, folder, problems) for name, table in raw.items()}
+
+
+def _read_component(name: str, raw: object, folder: Path, problems: list[Problem]) -> DraftComponent:
+    path = ("component", name)
+    if not _NAME.fullmatch(name):
+        hint = "A component is named in keys such as ball.h, where a dot ends its name."
+        problems.append(Problem(key_path(path), "a name of letters, digits and _", quoted(name), hint))
+    table = read_table(ComponentTable, raw, path, problems)
+    if table is None:
+        return DraftComponent(name)
+    shipped = not _is_file_name(table.fmu)
+    where = key_path((*path, "fmu"))
+    fmu = _shipped_fmu(table, path, problems) if shipped else _fmu_file(table, path, folder, problems)
+    facts = _facts(fmu, where, problems) if fmu else None
+    parameters = _parameters(table.parameters, path, facts, problems) if facts else None
+    return DraftComponent(name, fmu, shipped, facts, parameters)
+
+
+def _is_file_name(text: str) -> bool:
+    return text.lower().endswith(".fmu")
+
+
+def _shipped_fmu(table: ComponentTable, path: tuple[str, ...], problems: list[Problem]) -> Path | None:
+    where = key_path((*path, "fmu"))
+    if table.fmu not in components():
+        expected = "a path that ends in .fmu, or the name of a shipped component"
+        problems.append(
+            Problem(where, expected, quoted(table.fmu), partial(nearest, table.fmu, components()))
+        )
+        return None
+    fmi = table.fmi or "3.0"
+    try:
+        return fmu_path(table.fmu, fmi)
+    except ComponentFileError:
+        hint = "Run `python -m vibroimpact.fmus.build`."
+        expected = f"{table.fmu} built for FMI {fmi}"
+        problems.append(Problem(where, expected, "no FMU", hint))
+        return None
+
+
+def _fmu_file(
+    table: ComponentTable, path: tuple[str, ...], folder: Path, problems: list[Problem]
+) -> Path | None:
+    if table.fmi is not None:
+        hint = "The file itself says which version it is: remove fmi."
+        got = f"fmi = {quoted(table.fmi)} beside a file"
+        problems.append(
+            Problem(key_path((*path, "fmi")), "fmi beside the name of a shipped component only", got, hint)
+        )
+    file = (folder / table.fmu).absolute()
+    where = key_path((*path, "fmu"))
+    try:
+        if file.is_file():
+            return file
+    except OSError as error:  # a name too long, a folder without rights
+        problems.append(Problem(where, "a readable FMU file", f"an error: {error.strerror}"))
+        return None
+    found = (f"the folder {file}", "") if file.is_dir() else (f"no file {file}", _file_hint(file))
+    problems.append(Problem(where, "an FMU file", *found))
+    return None
+
+
+def _file_hint(file: Path) -> str:
+    """Return the nearest FMU of the folder that is meant."""
+    folder = file.parent
+    if not folder.is_dir():
+        return f"There is no folder {folder}."
+    near = get_close_matches(file.name, sorted(entry.name for entry in folder.glob("*.fmu")), n=1)
+    return f"Did you mean {near[0]}?" if near else "Paths count from the folder of the scene file."
+
+
+def _facts(fmu: Path, where: str, problems: list[Problem]) -> ComponentFacts | None:
+    try:
+        facts = component_facts(fmu)
+    except ComponentFileError as error:
+        message = " ".join(str(error).split()).rstrip(".")
+        problems.append(Problem(where, "an intact FMU", f"an error: {message}"))
+        return None
+    if not facts.co_simulation:
+        other = "scheduled execution" if facts.scheduled else "model exchange"
+        hint = f"Export it for co-simulation: {other} is not available in this version."
+        problems.append(Problem(where, "an FMU for co-simulation", f"{facts.file} for {other} only", hint))
+    return facts
+
+
+def _parameters(
+    raw: Mapping[str, object], path: tuple[str, ...], facts: ComponentFacts, problems: list[Problem]
+) -> dict[str, StartValue]:
+    typed: dict[str, StartValue] = {}
+    for name, value in raw.items():
+        place = (*path, "parameters", name)
+        found = list(_start_problems(name, value, key_path(place), facts))
+        if not found:
+            fitted = typed_value(facts.variables[name], value)
+            if isinstance(fitted, Misfit):
+                found = [Problem(key_path(place), fitted.expected, quoted(value), fitted.hint)]
+            else:
+                typed[name] = fitted
+        problems += found
+    return typed
+
+
+def _start_problems(name: str, value: object, where: str, facts: ComponentFacts) -> Iterator[Problem]:
+    variable = facts.variables.get(name)
+    if variable is None:
+        hint = _quotes_hint(name, value) or partial(nearest, name, settable_names(facts))
+        yield Problem(where, f"a variable of {facts.file}", quoted(name), hint)
+    else:
+        yield from start_problems(variable, where)
+
+
+def _quotes_hint(name: str, value: Any) -> str:
+    """Return the advice for a dotted name that TOML took for a table."""
+    words = [name]
+    while isinstance(value, dict) and value:
+        word, value = next(iter(value.items()))
+        words.append(word)
+    return f"Put the whole name in quotes: {quoted('.'.join(words))}." if len(words) > 1 else ""
+
+
+def start_problems(variable: VariableFacts, where: str) -> Iterator[Problem]:
+    """Yield why a variable cannot be given a start value."""
+    if not variable.settable:
+        hint = "Parameters, inputs and start states have one."
+        yield Problem(where, "a variable with a start value", _described(variable), hint)
+    elif variable.kind in ("binary", "clock") or not variable.scalar:
+        yield Problem(where, "a number, true or false, or text", _described(variable))
+
+
+def settable_names(facts: ComponentFacts) -> list[str]:
+    """Return the names of the variables of an FMU that have a start value."""
+    return [name for name, variable in facts.variables.items() if variable.settable]
+
+
+def _described(variable: VariableFacts) -> str:
+    shape = variable.type if variable.scalar else f"array of {variable.type}"
+    constant = "constant " if variable.variability == "constant" else ""
+    return f"the {constant}{variable.causality} {variable.name} ({shape})"

@@ -1,0 +1,291 @@
+"""Rules of a general scene against the model descriptions of its FMUs.
+
+Each rule yields the problems that it finds, and looks only at parts that are valid by themselves: nothing is
+said of the variables of an FMU that cannot be read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from vibroimpact.orchestrator.scene.general.component_facts import (
+    NUMERIC_KINDS,
+    ComponentFacts,
+    VariableFacts,
+)
+from vibroimpact.orchestrator.scene.general.components import DraftComponent
+from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
+from vibroimpact.orchestrator.scene.keys import dataset_name
+from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN, Execution
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.unit_check import (
+    Unit,
+    agree,
+    gain_unit_between,
+    parse_unit,
+    product_agrees,
+)
+
+MOST_STEPS_PER_RUN = 10**10
+#: Inputs of a body's contact port by which another component answers its contact.
+ANSWERS = ("applied_restitution", "applied_force")
+SOURCES = ("output", "local", "parameter", "calculatedParameter")
+
+
+@dataclass(frozen=True, slots=True)
+class GeneralDraft:
+    """A general scene on its way: the document, and what of it is valid by itself (else None)."""
+
+    document: Mapping[str, Any]
+    components: Mapping[str, DraftComponent]
+    connections: tuple[ConnectionTable | None, ...]
+    events: tuple[EventTable | None, ...]
+    record: GeneralRecord | None
+    execution: Execution | None
+
+    def facts(self, reference: str) -> ComponentFacts | None:
+        """Return the facts of the component that a reference names; None when they are not known."""
+        component = self.components.get(split(reference)[0])
+        return component.facts if component else None
+
+    def variable(self, reference: str) -> VariableFacts | None:
+        """Return the variable that `COMPONENT.VARIABLE` names; None when it is not known."""
+        facts = self.facts(reference)
+        return facts.variables.get(split(reference)[1]) if facts else None
+
+
+def split(reference: str) -> tuple[str, str]:
+    """Take `COMPONENT.VARIABLE` apart at its first dot.
+
+    Examples
+    --------
+    >>> split("body.contact[1].velocity")
+    ('body', 'contact[1].velocity')
+    """
+    component, _, variable = reference.partition(".")
+    return component, variable
+
+
+def general_problems(draft: GeneralDraft) -> list[Problem]:
+    """Return everything that is wrong between the tables of a general scene and its FMUs."""
+    rules = (
+        _connections_join_what_there_is,
+        _inputs_have_one_source,
+        _events_watch_what_there_is,
+        _records_what_there_is,
+        _samples_fit,
+        _runs_coupled,
+        _exchange_has_a_step,
+    )
+    return [problem for rule in rules for problem in rule(draft)]
+
+
+def reference_problem(draft: GeneralDraft, where: str, reference: str) -> Problem | None:
+    """Return why `COMPONENT.VARIABLE` names nothing of this scene; None when it may."""
+    component, variable = split(reference)
+    if not draft.components:
+        return None  # a scene without components is told only that
+    if not variable:
+        hint = 'For example "ball.h"; the component ends at the first dot.'
+        return Problem(where, "a variable COMPONENT.VARIABLE", quoted(reference), hint)
+    if component not in draft.components:
+        near = partial(nearest, component, draft.components)
+        return Problem(where, "a component of this scene before the first dot", quoted(reference), near)
+    facts = draft.facts(reference)
+    if facts is None or variable in facts.variables:
+        return None
+    near = partial(nearest, variable, facts.variables, f"{component}.")
+    return Problem(where, f"a variable of {facts.file} after {component}.", quoted(reference), near)
+
+
+def _connections_join_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
+    for place, connection in enumerate(draft.connections):
+        if connection is None:
+            continue
+        ends = {"from": connection.source, "to": connection.target}
+        wrong = [_end_problem(draft, place, end, reference) for end, reference in ends.items()]
+        yield from (problem for problem in wrong if problem)
+        gain, gain_problem = _gain_unit(connection, place)
+        yield from gain_problem
+        source, target = draft.variable(connection.source), draft.variable(connection.target)
+        if source and target and not any(wrong):
+            yield from _type_problems(connection, place, source, target)
+            if not gain_problem:
+                yield from _unit_problems(connection, place, gain, source, target)
+
+
+def _end_problem(draft: GeneralDraft, place: int, end: str, reference: str) -> Problem | None:
+    where = key_path(("connection", place, end))
+    problem = reference_problem(draft, where, reference)
+    variable = draft.variable(reference)
+    if problem or variable is None:
+        return problem
+    got = f"the {variable.causality} {reference}"
+    if end == "to" and variable.causality != "input":
+        hint = "Start values go into the parameters of the component."
+        return Problem(where, "an input", got, hint if variable.causality == "parameter" else "")
+    if end == "from" and variable.causality not in SOURCES:
+        is_input = variable.causality == "input"
+        hint = "Connect the output that feeds it." if is_input else ""
+        return Problem(where, "an output, a local variable or a parameter", got, hint)
+    if variable.kind not in NUMERIC_KINDS or not variable.scalar:
+        shape = variable.type if variable.scalar else f"array of {variable.type}"
+        return Problem(where, "a number, or true or false", f"the {shape} {reference}")
+    return None
+
+
+def _gain_unit(connection: ConnectionTable, place: int) -> tuple[Unit | None, list[Problem]]:
+    if connection.gain_unit is None:
+        return None, []
+    unit = parse_unit(connection.gain_unit)
+    if unit:
+        return unit, []
+    where = key_path(("connection", place, "gain_unit"))
+    hint = "Join symbols by dots, write exponents directly behind them, divide by one symbol or parenthesis."
+    expected = 'a product of SI units such as "N.s/m", "kg.m2/s2" or "1"'
+    return None, [Problem(where, expected, quoted(connection.gain_unit), hint)]
+
+
+def _type_problems(
+    connection: ConnectionTable, place: int, source: VariableFacts, target: VariableFacts
+) -> Iterator[Problem]:
+    where = key_path(("connection", place))
+    if source.kind != target.kind:
+        got = f"{source.type} ({connection.source}) to {target.type} ({connection.target})"
+        yield Problem(where, "two variables of one type", got)
+    elif source.kind != "real" and connection.gain != 1.0:
+        got = f"{quoted(connection.gain)} between {source.type} variables"
+        yield Problem(f"{where}.gain", "a gain between real numbers only", got, "Remove gain.")
+
+
+def _unit_problems(
+    connection: ConnectionTable, place: int, gain: Unit | None, source: VariableFacts, target: VariableFacts
+) -> Iterator[Problem]:
+    if source.unit is None or target.unit is None:
+        return
+    ends = f"{source.unit_name} ({connection.source})", f"{target.unit_name} ({connection.target})"
+    suggested = gain_unit_between(source.unit, target.unit)
+    hint = f'Give the gain with its unit: gain_unit = "{suggested}".' if suggested else ""
+    where = key_path(("connection", place))
+    if gain is None:
+        if not agree(source.unit, target.unit):
+            got = f"{ends[0]} to {ends[1]}"
+            yield Problem(where, "the same unit at both ends", got, hint)
+    elif not product_agrees(source.unit, gain, target.unit):
+        expected = f"a unit that turns {ends[0]} into {ends[1]}"
+        yield Problem(f"{where}.gain_unit", expected, quoted(connection.gain_unit), hint)
+
+
+def _inputs_have_one_source(draft: GeneralDraft) -> Iterator[Problem]:
+    first: dict[tuple[str, int], int] = {}
+    for place, connection in enumerate(draft.connections):
+        variable = draft.variable(connection.target) if connection else None
+        if connection is None or variable is None or variable.causality != "input":
+            continue
+        # aliases are one input, whatever its name
+        other = first.setdefault((split(connection.target)[0], variable.reference), place)
+        if other != place:
+            where = key_path(("connection", place, "to"))
+            got = f"{quoted(connection.target)}, which connection[{other + 1}] feeds already"
+            yield Problem(where, "an input of its own for each connection", got, "Remove one of them.")
+
+
+def _events_watch_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
+    for place, event in enumerate(draft.events):
+        if event is None:
+            continue
+        where = key_path(("event", place, "watch"))
+        problem = reference_problem(draft, where, event.watch)
+        variable, facts = draft.variable(event.watch), draft.facts(event.watch)
+        if problem:
+            yield problem
+        if variable is None or facts is None:
+            continue
+        if variable.kind != "real" or variable.variability != "continuous" or not variable.scalar:
+            got = f"the {variable.variability} {variable.type} {event.watch}"
+            yield Problem(where, "a continuous real number", got, "A crossing needs values on both sides.")
+        if not facts.restorable:
+            hint = "A crossing is found by going back to the state before the step."
+            got = f"{facts.file}, which does not have canGetAndSetFMUState"
+            yield Problem(where, "an FMU whose state can be kept and restored", got, hint)
+        force = _contact_answer(draft, split(event.watch)[0])
+        if facts.event_mode and force is not None:
+            hint = (
+                "A watched component runs without event mode and early return, which a contact with another "
+                "component needs. Watch a component that takes no part in a contact."
+            )
+            yield Problem(where, "a component without a contact", f"one that {force} answers", hint)
+
+
+def _contact_answer(draft: GeneralDraft, component: str) -> str | None:
+    """Return the output that answers a contact of this component; None where none does."""
+    for connection in draft.connections:
+        if connection is None or split(connection.target)[0] != component:
+            continue
+        port, _, answer = split(connection.target)[1].rpartition(".")
+        facts = draft.facts(connection.target)
+        if answer in ANSWERS and facts is not None and f"{port}.law" in facts.variables:
+            return connection.source
+    return None
+
+
+def _records_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
+    record = draft.record
+    if record is None:
+        return
+    for place, reference in enumerate(record.variables):
+        where = key_path(("record", "variables", place))
+        problem = reference_problem(draft, where, reference)
+        variable = draft.variable(reference)
+        if problem:
+            yield problem
+        elif dataset_name(reference) in map(dataset_name, record.variables[:place]):
+            hint = f"It would be a second {dataset_name(reference)} in the dataset."
+            yield Problem(where, "each variable once", quoted(reference), hint)
+        elif variable and (variable.kind not in NUMERIC_KINDS or not variable.scalar):
+            shape = variable.type if variable.scalar else f"array of {variable.type}"
+            yield Problem(where, "a variable that is one number", f"the {shape} {reference}")
+    if record.variables and record.rate is None:
+        hint = "Add rate = ... to [record]: samples per unit of time."
+        yield Problem("record.rate", "a number > 0 beside variables", "nothing", hint)
+    if record.rate is not None and not record.variables:
+        hint = 'Add variables = ["COMPONENT.VARIABLE"] to [record], or remove rate.'
+        yield Problem("record.variables", "variables beside a rate", "none", hint)
+
+
+def _samples_fit(draft: GeneralDraft) -> Iterator[Problem]:
+    if draft.record and draft.record.rate is not None:
+        samples = draft.record.rate * draft.record.recorded_time
+        if samples > MOST_SAMPLES_PER_RUN:
+            hint = "Lower the rate or the recorded time."
+            expected = f"at most {MOST_SAMPLES_PER_RUN} samples per run"
+            yield Problem("record.rate", expected, f"{samples:.3g}", hint)
+
+
+def _runs_coupled(draft: GeneralDraft) -> Iterator[Problem]:
+    if draft.execution and draft.execution.contact_tolerance is not None:
+        hint = "Give it to the component: parameters = { contact_tolerance = 1e-8 }."
+        got = quoted(draft.execution.contact_tolerance)
+        yield Problem("execution.contact_tolerance", "no contact_tolerance in a general scene", got, hint)
+    if draft.execution and draft.execution.how == "fused":
+        hint = "Only the short form ([body] and [[stop]]) runs fused."
+        yield Problem("execution.how", '"auto" or "coupled" in a general scene', '"fused"', hint)
+
+
+def _exchange_has_a_step(draft: GeneralDraft) -> Iterator[Problem]:
+    if draft.execution is None:
+        return
+    step = draft.execution.macro_step
+    if step is None:
+        if draft.connections:
+            hint = "Add macro_step = ... to [execution]: the time between two exchanges of values."
+            expected = "a number > 0 where components are connected"
+            yield Problem("execution.macro_step", expected, "nothing", hint)
+    elif draft.record:
+        steps = (draft.record.transient_time + draft.record.recorded_time) / step
+        if steps > MOST_STEPS_PER_RUN:
+            expected = f"at most {MOST_STEPS_PER_RUN} steps per run"
+            yield Problem("execution.macro_step", expected, f"{steps:.3g}", "Make it longer.")

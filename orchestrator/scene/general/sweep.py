@@ -1,0 +1,140 @@
+"""The sweep of a general scene: over start values of any component, and over gains of connections."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Any
+
+from vibroimpact.orchestrator.scene.general.component_facts import VariableFacts
+from vibroimpact.orchestrator.scene.general.components import settable_names, start_problems
+from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, reference_problem, split
+from vibroimpact.orchestrator.scene.general.scene import gain_place
+from vibroimpact.orchestrator.scene.general.start_values import Misfit, swept_value
+from vibroimpact.orchestrator.scene.keys import coordinate_name
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
+from vibroimpact.orchestrator.scene.sweep import SweepAxis
+from vibroimpact.orchestrator.scene.sweep_table import read_axis, sweep_entries
+
+
+def read_general_sweep(draft: GeneralDraft) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
+    """Read the sweep of a general scene.
+
+    Returns
+    -------
+    axes : tuple of SweepAxis
+        The axes without a problem, in the order of the file.
+    problems : list of Problem
+        Everything that is wrong with the others, and between them.
+    """
+    entries, problems = sweep_entries(draft.document)
+    axes: list[SweepAxis] = []
+    for key, entry in entries.items():
+        found = list(_key_problems(key, entry, draft))
+        if not found:
+            axis, found = read_axis(key, entry)
+            found += _axis_problems(axis, draft) if axis else []
+            axes += [axis] if axis and not found else []
+        problems += found
+    return tuple(axes), problems + sweep_problems(axes) + list(_names_differ(axes))
+
+
+def _key_problems(key: str, entry: object, draft: GeneralDraft) -> Iterator[Problem]:
+    where = key_path(("sweep", key))
+    hint = _quotes_hint(key, entry, draft)
+    if hint:
+        yield Problem(where, "a start value or a gain of this scene", quoted(key), hint)
+    elif _names_a_connection(key, draft):
+        yield from _gain_problems(key, where, draft)
+    else:
+        yield from _start_value_problems(key, where, draft)
+
+
+def _names_a_connection(key: str, draft: GeneralDraft) -> bool:
+    table = split(key)[0]
+    return table.partition("[")[0] == "connection" and table not in draft.components
+
+
+def _quotes_hint(key: str, entry: Any, draft: GeneralDraft) -> str:
+    """Return the advice for a key without quotes, which TOML took for tables in each other."""
+    if "." in key or key not in draft.components or not isinstance(entry, dict) or not entry:
+        return ""
+    words = [key]
+    while isinstance(entry, dict) and len(entry) == 1:
+        word, entry = next(iter(entry.items()))
+        words += [] if word == "values" else [word]
+    return f"Put the whole key in quotes: {quoted('.'.join(words))}." if len(words) > 1 else ""
+
+
+def _gain_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Problem]:
+    place, count = gain_place(key), len(draft.connections)
+    if place is None or place >= count:
+        has = f"Indices start at 1 and this scene has {count} [[connection]]"
+        hint = f'{has}: for example "connection[1].gain".'
+        yield Problem(where, "the gain of a connection", quoted(key), hint)
+        return
+    connection = draft.connections[place]
+    source = draft.variable(connection.source) if connection else None
+    if source and source.kind != "real":
+        got = f"one between {source.type} variables"
+        yield Problem(where, "the gain of a connection of real numbers", got)
+
+
+def _start_value_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Problem]:
+    problem = reference_problem(draft, where, key)
+    facts, variable = draft.facts(key), draft.variable(key)
+    if problem:
+        component, name = split(key)
+        near = (
+            partial(nearest, name, settable_names(facts), f"{component}.") if facts and name else problem.hint
+        )
+        yield Problem(where, problem.expected, problem.got, near)
+    elif variable:
+        found = list(start_problems(variable, where))
+        yield from found
+        if not found and variable.kind in ("boolean", "text"):
+            yield Problem(where, "a number", f"the {variable.type} {key}", "Run a scene for each value.")
+
+
+def _axis_problems(axis: SweepAxis, draft: GeneralDraft) -> list[Problem]:
+    if axis.continuation:
+        where = key_path(("sweep", axis.key, "path"))
+        hint = "What a general scene carries from point to point is not known: every point starts anew."
+        return [Problem(where, '"independent" in a general scene', quoted(axis.path), hint)]
+    variable = draft.variable(axis.key)
+    return list(_value_problems(axis, variable)) if variable else []
+
+
+def _value_problems(axis: SweepAxis, variable: VariableFacts) -> Iterator[Problem]:
+    for value in axis.values:
+        fitted = swept_value(variable, value)
+        if isinstance(fitted, Misfit):
+            yield Problem(key_path(("sweep", axis.key)), fitted.expected, quoted(value), fitted.hint)
+            return
+
+
+def _names_differ(axes: list[SweepAxis]) -> Iterator[Problem]:
+    keys = [axis.key for axis in axes]
+    named: dict[str, str] = {}
+    for key in keys:
+        name = coordinate_name(key, keys)
+        other = named.setdefault(name, key)
+        if other != key:
+            hint = f"Both would be the coordinate {name} of the dataset: rename a component."
+            yield Problem(key_path(("sweep", key)), f"a name of its own beside {other}", quoted(key), hint)
+
+
+def swept_units(axes: tuple[SweepAxis, ...], draft: GeneralDraft) -> Mapping[str, str]:
+    """Return the unit of each swept key as its description or connection writes it; `1` where it has none."""
+    return {axis.key: unit_of_key(axis.key, draft) for axis in axes}
+
+
+def unit_of_key(key: str, draft: GeneralDraft) -> str:
+    """Return the unit of a start value or gain as its description or connection writes it; `1` where it has none."""
+    variable = draft.variable(key)
+    if variable:
+        return variable.unit_name or "1"
+    place = gain_place(key)
+    connection = draft.connections[place] if place is not None else None
+    return (connection.gain_unit if connection else None) or "1"

@@ -1,0 +1,174 @@
+"""Rules of a body and of what acts on it: arrays of one size, points that are there, names that it knows."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from difflib import get_close_matches
+
+from vibroimpact.orchestrator.scene.draft import Draft
+from vibroimpact.orchestrator.scene.models import BeamBody, Body, ChainBody, Forcing
+from vibroimpact.orchestrator.scene.places import moves
+from vibroimpact.orchestrator.scene.problems import Problem, nearest, quoted
+from vibroimpact.orchestrator.scene.sampled_names import sampled_names
+
+AMPLITUDE_KEYS = ("frequency_slope", "damping_slope", "damping_reciprocal")
+SECTION_KEYS = ("width", "thickness", "youngs_modulus", "density")
+RIGIDITY_KEYS = ("flexural_rigidity", "mass_per_length")
+FREQUENCY_KEYS = ("frequency", "mass_per_length")
+
+
+def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
+    """Elements and start states of a chain count as its masses do, those of a beam as its modes."""
+    body = draft.body
+    if isinstance(body, ChainBody):
+        for key in ("stiffnesses", "dampings", "displacement_start", "velocity_start"):
+            yield from _size_problem(f"body.{key}", getattr(body, key), body.size, "mass")
+    if isinstance(body, BeamBody):
+        for key in ("damping_ratio", *AMPLITUDE_KEYS):
+            yield from _size_problem(f"body.{key}", getattr(body, key), body.size, "mode")
+        for key in ("displacement_start", "velocity_start"):
+            given = len(getattr(body, key))
+            if given > body.size:
+                expected = f"at most {body.size} numbers, one for each mode"
+                yield Problem(f"body.{key}", expected, f"an array of {given}", "Those left out are 0.")
+
+
+def _size_problem(key: str, value: object, size: int, of: str) -> Iterator[Problem]:
+    if isinstance(value, tuple) and len(value) not in (size, 0):
+        hint = f"This scene has {size} {of}{'' if size == 1 else 'es' if of == 'mass' else 's'}."
+        expected = f"an array of {size}, one number for each {of}"
+        yield Problem(key, expected, f"an array of {len(value)}", hint)
+
+
+def beam_is_given_once(draft: Draft) -> Iterator[Problem]:
+    """Rigidity and mass follow from the section and the material, or are given themselves."""
+    if not isinstance(draft.body, BeamBody):
+        return
+    written = draft.written("body")
+    section = [key for key in SECTION_KEYS if key in written]
+    by_frequency = "frequency" in written
+    way_without_section = FREQUENCY_KEYS if by_frequency else RIGIDITY_KEYS
+    rigidity = [key for key in ("frequency", *RIGIDITY_KEYS) if key in written]
+    ways = f"{', '.join(SECTION_KEYS)}, or {' and '.join(RIGIDITY_KEYS)}, or {' and '.join(FREQUENCY_KEYS)}"
+    if by_frequency and "flexural_rigidity" in written:
+        yield Problem("body", ways, "frequency beside flexural_rigidity", "Remove one of them.")
+        return
+    if section and rigidity:
+        got = f"{', '.join(section)} beside {', '.join(rigidity)}"
+        yield Problem("body", ways, got, "Remove those of one way.")
+        return
+    way, given = (way_without_section, rigidity) if rigidity else (SECTION_KEYS, section)
+    missing = [key for key in way if key not in given]
+    if missing:
+        yield Problem("body", ways, ", ".join(given) or "neither", f"Add {', '.join(missing)}.")
+
+
+def observed_point_is_there(draft: Draft) -> Iterator[Problem]:
+    """The mass or the point whose displacement is recorded is one of the body."""
+    body = draft.body
+    if isinstance(body, ChainBody) and (body.observed_mass or 1) > body.size:
+        yield _no_such_mass("body.observed_mass", body, body.observed_mass or 0)
+    if "sensor" not in draft.document or body is None:
+        return
+    if not isinstance(body, BeamBody):
+        if "location" in draft.written("sensor"):
+            hint = "Remove it" + (
+                "; observed_mass in [body] says which mass." if isinstance(body, ChainBody) else "."
+            )
+            yield Problem(
+                "sensor.location", "a location in a scene of a beam", f"one beside {body.NAME}", hint
+            )
+        return
+    span = draft.span("sensor.location")
+    yield from fixed_point_problems("sensor.location", body, span)
+
+
+def fixed_point_problems(key: str, body: BeamBody, span: tuple[float, float] | None) -> Iterator[Problem]:
+    """Yield the problem of a point that does not move, of a location or the ends of its sweep."""
+    for location in dict.fromkeys(span or ()):
+        if not moves(body, location):
+            end = "clamped end" if location == 0.0 else "supported far end"
+            expected = f"a point where a {body.boundary} beam moves"
+            yield Problem(key, expected, quoted(location), f"{quoted(location)} is the {end}.")
+
+
+def _no_such_mass(key: str, body: ChainBody, number: int) -> Problem:
+    return Problem(
+        key, f"a mass of the chain, 1 to {body.size}", str(number), "Masses count from the ground."
+    )
+
+
+def forcing_suits_the_body(draft: Draft) -> Iterator[Problem]:
+    """A body can be forced in this way, with one amplitude or one for each mass."""
+    body, forcing = draft.body, draft.forcing
+    if body is None or forcing is None:
+        return
+    if forcing.kind in ("uniform", "mode") and not isinstance(body, BeamBody):
+        expected = f'"force" or "base_acceleration" for {body.NAME}'
+        yield Problem("forcing.kind", expected, quoted(forcing.kind), "It is a load of a beam.")
+        return
+    yield from _amplitude_problems(body, forcing)
+    yield from _place_problems(draft, body, forcing)
+
+
+def _amplitude_problems(body: Body, forcing: Forcing) -> Iterator[Problem]:
+    array = isinstance(forcing.amplitude, tuple)
+    if isinstance(body, ChainBody) and forcing.kind == "force":
+        if array:
+            yield from _size_problem("forcing.amplitude", forcing.amplitude, body.size, "mass")
+        elif body.size > 1:
+            expected = f"an array of {body.size}, one amplitude for each mass"
+            hint = f"A force on the last mass alone: amplitude = {[0] * (body.size - 1) + [1]}."
+            hint = hint if body.size <= 4 else "Write 0 for each mass that is not forced."
+            yield Problem("forcing.amplitude", expected, quoted(forcing.amplitude), hint)
+    elif array:
+        assert isinstance(forcing.amplitude, tuple)
+        what = f"{body.NAME} under {forcing.kind}"
+        got = f"an array of {len(forcing.amplitude)}"
+        yield Problem("forcing.amplitude", f"one number for {what}", got, "Write the number alone.")
+
+
+def _place_problems(draft: Draft, body: Body, forcing: Forcing) -> Iterator[Problem]:
+    """Yield what is wrong with `location` and `mode`, each for one kind of load of a beam."""
+    for key, kind in (("location", "force"), ("mode", "mode")):
+        wanted = isinstance(body, BeamBody) and forcing.kind == kind
+        if key in draft.written("forcing") and not wanted:
+            got = f"it beside {body.NAME} under {forcing.kind}"
+            yield Problem(f"forcing.{key}", f'{key} for a beam with kind = "{kind}"', got, f"Remove {key}.")
+    if not isinstance(body, BeamBody):
+        return
+    if forcing.kind == "force":
+        yield from fixed_point_problems("forcing.location", body, draft.span("forcing.location"))
+    elif forcing.kind == "mode" and not 1 <= (forcing.mode or 0) <= body.size:
+        hint = "The load has the shape of this mode."
+        hint = hint if forcing.mode else f"Add mode = ... to [forcing]. {hint}"
+        expected = f"a mode of the beam, 1 to {body.size}"
+        yield Problem("forcing.mode", expected, quoted(forcing.mode), hint)
+
+
+def sampled_variables_are_known(draft: Draft) -> Iterator[Problem]:
+    """A time series names variables that this body has, each once."""
+    series = draft.record.time_series if draft.record else None
+    if series is None or draft.body is None:
+        return
+    known = sampled_names(draft.body, len(draft.stops), draft.forcing)
+    for place, name in enumerate(series.variables, start=1):
+        if name not in known:
+            near = get_close_matches(name, known, n=1)
+            hint = f'Did you mean "{near[0]}"?' if near else nearest(name, known)
+            yield Problem(f"record.time_series.variables[{place}]", "a variable name", quoted(name), hint)
+    for name, times in Counter(series.variables).items():
+        if times > 1:
+            yield Problem(
+                "record.time_series.variables", "each variable once", f"{quoted(name)} {times} times"
+            )
+
+
+BODY_RULES = (
+    arrays_have_one_size,
+    beam_is_given_once,
+    observed_point_is_there,
+    forcing_suits_the_body,
+    sampled_variables_are_known,
+)

@@ -1,0 +1,98 @@
+"""Rules of `[replay]`: channels that are named, variables that the body has; recordings as an axis of the sweep."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from difflib import get_close_matches
+
+from vibroimpact.orchestrator.scene.draft import Draft
+from vibroimpact.orchestrator.scene.models import ChainBody
+from vibroimpact.orchestrator.scene.problems import Problem, nearest, quoted
+from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
+from vibroimpact.orchestrator.scene.sampled_names import sampled_names
+from vibroimpact.orchestrator.scene.sweep import SweepAxis
+
+SENSOR = "sensor."
+_OWNERS = ("body.", "oscillator.", "chain.", "beam.")
+
+
+def plain_variable(simulated: str) -> tuple[str, bool]:
+    """Return the variable that a compared name means, and whether it is a reading of `[sensor]`.
+
+    Examples
+    --------
+    >>> plain_variable("beam.sensor.acceleration"), plain_variable("displacement")
+    (('acceleration', True), ('displacement', False))
+    """
+    name = next(
+        (simulated.removeprefix(owner) for owner in _OWNERS if simulated.startswith(owner)), simulated
+    )
+    return (name.removeprefix(SENSOR), True) if name.startswith(SENSOR) else (name, False)
+
+
+def recording_axis(replay: Replay | None) -> tuple[SweepAxis, ...]:
+    """Return the axis that goes through the recordings; none where there is one, or they are not named."""
+    if replay is None or len(replay.recordings) < 2:
+        return ()
+    return (SweepAxis(RECORDING_KEY, tuple(float(n) for n in range(1, len(replay.recordings) + 1))),)
+
+
+def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:
+    """A replay drives, compares, or both; what drives has a channel."""
+    replay = draft.replay
+    if replay is None:
+        return
+    if replay.drive is None and not replay.compare:
+        hint = 'Add drive = "base_acceleration" and from = "CHANNEL", or compare = [...].'
+        yield Problem("replay", "something to drive or to compare", "neither", hint)
+    if (replay.drive is None) != (replay.channel is None):
+        key, other = ("from", "drive") if replay.channel is None else ("drive", "from")
+        yield Problem(
+            f"replay.{key}", f"{key} beside {other}", "nothing", f"Add {key} = ..., or remove {other}."
+        )
+    if replay.drive == "force" and isinstance(draft.body, ChainBody):
+        hint = "A force on one mass is not replayed yet; the base's acceleration is."
+        yield Problem("replay.drive", '"base_acceleration" for a chain', '"force"', hint)
+    spans = [("replay.peaks", replay.peaks)] if replay.peaks is not None else []
+    spans += [(f"replay.windows[{place}]", span) for place, span in enumerate(replay.windows, start=1)]
+    for where, span in spans:
+        if span[1] <= span[0]:
+            yield Problem(
+                where, "a span [start, stop] that ends after its start", f"{span[0]:g} to {span[1]:g}"
+            )
+    if replay.start is not None and replay.stop is not None and replay.stop <= replay.start:
+        yield Problem("replay.stop", "a time after replay.start", quoted(replay.stop))
+
+
+def compared_variables_are_known(draft: Draft) -> Iterator[Problem]:
+    """Each simulated name is one that a time series of this scene could have; each pair is there once."""
+    if draft.replay is None or draft.body is None:
+        return
+    known = sampled_names(draft.body, len(draft.stops), draft.forcing)
+    seen: set[tuple[str, str]] = set()
+    for place, compared in enumerate(draft.replay.compare, start=1):
+        variable, is_reading = plain_variable(compared.simulated)
+        where = f"replay.compare[{place}].simulated"
+        if variable not in known:
+            near = get_close_matches(variable, known, n=1)
+            hint = f'Did you mean "{near[0]}"?' if near else nearest(variable, known)
+            yield Problem(where, "a variable of the body", quoted(compared.simulated), hint)
+        elif is_reading and draft.sensor is None and "sensor" not in draft.document:
+            hint = "Add [sensor], or leave `sensor.` out of the name."
+            yield Problem(where, "a scene with [sensor]", quoted(compared.simulated), hint)
+        if (compared.simulated, compared.measured) in seen:
+            yield Problem(f"replay.compare[{place}]", "each pair once", "it again", "Remove it.")
+        seen.add((compared.simulated, compared.measured))
+
+
+def no_record_beside_replay(draft: Draft) -> Iterator[Problem]:
+    """The recording says how long a replay lasts."""
+    if draft.replay is None:
+        return
+    for key in ("transient_periods", "recorded_periods", "transient_time", "recorded_time", "time_series"):
+        if key in draft.written("record"):
+            hint = "The recording says how long it lasts and at which rate; replay.start and stop cut it."
+            yield Problem(f"record.{key}", "none beside [replay]", "one", hint)
+
+
+REPLAY_RULES = (replay_has_something_to_do, compared_variables_are_known, no_record_beside_replay)

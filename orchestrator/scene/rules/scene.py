@@ -1,0 +1,171 @@
+"""Rules between the fields and tables of a scene; each rule yields the problems that it finds.
+
+A rule looks only at parts that are valid by themselves, so that one mistake is reported once. Swept keys
+count with their lowest and highest value: the axes of a sweep span all combinations, so a rule that holds at
+the worst corner holds everywhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from vibroimpact.orchestrator.scene.draft import FREQUENCY_KEYS, Draft
+from vibroimpact.orchestrator.scene.keys import START_STATE
+from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN, OscillatorBody
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
+from vibroimpact.orchestrator.scene.rules.body import BODY_RULES
+from vibroimpact.orchestrator.scene.rules.replay import REPLAY_RULES
+from vibroimpact.orchestrator.scene.rules.stop import STOP_RULES
+from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
+
+MOST_POINTS = 10**8
+PERIOD_KEYS = ("transient_periods", "recorded_periods")
+TIME_KEYS = ("transient_time", "recorded_time")
+COUPLING_KEYS = ("macro_step", "exchange", "guard")
+
+
+def rule_problems(draft: Draft) -> list[Problem]:
+    """Return everything that is wrong between the tables of a scene."""
+    rules = (
+        _damping_is_given_once,
+        _damping_ratio_has_a_spring,
+        _frequency_is_given_once,
+        _units_agree,
+        *BODY_RULES,
+        *STOP_RULES,
+        *REPLAY_RULES,
+        _record_counts_what_there_is,
+        _samples_fit,
+        _coupling_is_asked_for,
+    )
+    return [problem for rule in rules for problem in rule(draft)] + sweep_problems(draft.axes)
+
+
+def _coupling_is_asked_for(draft: Draft) -> Iterator[Problem]:
+    execution = draft.written("execution")
+    how = execution.get("how", "auto")
+    if how not in ("auto", "fused"):
+        return
+    for key in COUPLING_KEYS:
+        if key in execution:
+            hint = f'Remove {key}, or run the scene coupled: how = "coupled".'
+            yield Problem(f"execution.{key}", 'how = "coupled" beside it', f"how = {quoted(how)}", hint)
+
+
+def _damping_is_given_once(draft: Draft) -> Iterator[Problem]:
+    body = draft.written("body")
+    if body.get("kind", "oscillator") == "oscillator" and {"damping", "damping_ratio"} <= body.keys():
+        yield Problem(
+            "body.damping", "damping or damping_ratio", "both", f"Remove one{_swept_counts(draft)}."
+        )
+
+
+def _damping_ratio_has_a_spring(draft: Draft) -> Iterator[Problem]:
+    body, stiffness = draft.body, draft.span("body.stiffness")
+    ratio = body.damping_ratio if isinstance(body, OscillatorBody) else None
+    if ratio is not None and stiffness and stiffness[0] == 0.0:
+        hint = "The ratio is to 2 sqrt(stiffness mass); give damping instead."
+        yield Problem(
+            "body.damping_ratio", "a stiffness > 0 beside a damping_ratio", "a stiffness of 0", hint
+        )
+
+
+def _frequency_is_given_once(draft: Draft) -> Iterator[Problem]:
+    if "forcing" not in draft.document:
+        return
+    given = FREQUENCY_KEYS & draft.written("forcing").keys()
+    if len(given) == 2:
+        expected = "angular_frequency (rad/s) or frequency (Hz)"
+        yield Problem("forcing.frequency", expected, "both", f"Remove one{_swept_counts(draft)}.")
+    if not given and isinstance(draft.document["forcing"], dict):
+        hint = "Add angular_frequency = ... to [forcing], in rad/s; 0 makes a constant force."
+        yield Problem("forcing.angular_frequency", "a number >= 0", "nothing", hint)
+
+
+def _swept_counts(draft: Draft) -> str:
+    return "; a swept key counts as given" if draft.axes else ""
+
+
+def _units_agree(draft: Draft) -> Iterator[Problem]:
+    if draft.header and draft.header.units == "nondimensional" and "frequency" in draft.written("forcing"):
+        hint = 'Hz is an SI unit: give angular_frequency in radians per unit of time, or units = "SI".'
+        yield Problem("forcing.frequency", "no frequency in Hz in a nondimensional scene", "one", hint)
+
+
+def _record_counts_what_there_is(draft: Draft) -> Iterator[Problem]:
+    span = draft.angular_frequency_span()
+    if span is None:
+        return
+    if span[0] == 0.0 < span[1]:
+        hint = "A constant force has no period to count; run it as a scene of its own."
+        yield Problem("sweep", "frequencies that are all > 0, or all 0", "0 among others", hint)
+        return
+    forced = span[0] > 0.0
+    right, wrong = (PERIOD_KEYS, TIME_KEYS) if forced else (TIME_KEYS, PERIOD_KEYS)
+    yield from _wrong_durations(draft, right, wrong, forced)
+    yield from _missing_duration(draft, right[1], wrong[1])
+
+
+def _missing_duration(draft: Draft, right: str, wrong: str) -> Iterator[Problem]:
+    raw = draft.document.get("record")
+    if raw is None and ("body" not in draft.document or "replay" in draft.document):
+        return  # a file without the main table is told only that
+    if raw is None or (isinstance(raw, dict) and right not in raw and wrong not in raw):
+        unit = "a whole number of forcing periods" if right in PERIOD_KEYS else "a number > 0 (time)"
+        yield Problem(f"record.{right}", unit, "nothing", f"Add {right} = ... to [record].")
+
+
+def _wrong_durations(
+    draft: Draft, right: tuple[str, ...], wrong: tuple[str, ...], forced: bool
+) -> Iterator[Problem]:
+    reason = "A forced scene counts forcing periods" if forced else "A scene without a period counts time"
+    for key, instead in zip(wrong, right, strict=True):
+        value = draft.written("record").get(key)
+        if value is not None:
+            scene = "a forced scene" if forced else "an unforced scene"
+            yield Problem(
+                f"record.{key}",
+                f"{instead} in {scene}",
+                f"{key} = {quoted(value)}",
+                f"{reason}: give {instead}.",
+            )
+
+
+def _samples_fit(draft: Draft) -> Iterator[Problem]:
+    span = draft.angular_frequency_span()
+    if span is None or draft.record is None or draft.record.time_series is None:
+        return
+    forced = span[0] > 0.0
+    duration = (
+        draft.record.recorded_periods * 2.0 * math.pi / span[0] if forced else draft.record.recorded_time
+    )
+    samples = draft.record.time_series.rate * duration
+    if samples > MOST_SAMPLES_PER_RUN:
+        hint = f"Lower the rate or the recorded {'periods' if forced else 'time'}."
+        yield Problem(
+            "record.time_series.rate",
+            f"at most {MOST_SAMPLES_PER_RUN} samples per run",
+            f"{samples:.3g}",
+            hint,
+        )
+
+
+def sweep_problems(axes: Sequence[SweepAxis]) -> list[Problem]:
+    """Return what is wrong between the axes of a sweep, of any form of scene."""
+    return list(_sweep_fits(axes))
+
+
+def _sweep_fits(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
+    count = run_count(axes)
+    if count > MOST_POINTS:
+        yield Problem("sweep", f"at most {MOST_POINTS} points in all", str(count), "Lower points of an axis.")
+    carried = [axis.key for axis in axes if axis.continuation]
+    if len(carried) > 1:
+        hint = 'Make the others "independent": they span the branches.'
+        yield Problem("sweep", "at most one key with a path up, down or up-down", ", ".join(carried), hint)
+    for key in carried:
+        if key.partition("[")[0] in START_STATE:  # an element of it too
+            where = key_path(("sweep", key, "path"))
+            hint = "Along a continuation each point starts from the state of the one before."
+            yield Problem(where, '"independent" for a start state', "a continuation", hint)

@@ -1,0 +1,179 @@
+"""Rules of stops: where they are on the body, that they leave room, and that motion starts on their free side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+from vibroimpact.orchestrator.scene.draft import Draft
+from vibroimpact.orchestrator.scene.models import (
+    BODY_MODELS,
+    BeamBody,
+    Body,
+    ChainBody,
+    KelvinVoigtStop,
+    OscillatorBody,
+    RestitutionStop,
+    Stop,
+)
+from vibroimpact.orchestrator.scene.places import stop_location, stop_mass
+from vibroimpact.orchestrator.scene.problems import Problem, quoted
+from vibroimpact.orchestrator.scene.rules.body import fixed_point_problems
+
+
+def stops_are_few(draft: Draft) -> Iterator[Problem]:
+    """A body has so many contact ports."""
+    most = _most_stops(draft)
+    if len(draft.stops) > most:
+        yield Problem("stop", f"at most {most} stops", str(len(draft.stops)), "Remove [[stop]] tables.")
+
+
+def _most_stops(draft: Draft) -> int:
+    kind = str(draft.written("body").get("kind", "oscillator"))
+    return BODY_MODELS.get(kind, OscillatorBody).MOST_STOPS
+
+
+def stops_are_on_the_body(draft: Draft) -> Iterator[Problem]:
+    """A stop of a chain limits a mass, one of a beam a point that moves."""
+    if draft.body is None:
+        return
+    for number, stop in enumerate(draft.stops, start=1):
+        if stop is not None:
+            yield from _place_problems(draft, draft.body, stop, f"stop[{number}]")
+
+
+def _place_problems(draft: Draft, body: Body, stop: Stop, where: str) -> Iterator[Problem]:
+    if stop.mass is not None and not isinstance(body, ChainBody):
+        hint = "Say where on the beam by location." if isinstance(body, BeamBody) else "Remove mass."
+        yield Problem(f"{where}.mass", "mass for a chain", f"it beside {body.NAME}", hint)
+    if stop.location is not None and not isinstance(body, BeamBody):
+        hint = "Say which mass by mass." if isinstance(body, ChainBody) else "Remove location."
+        yield Problem(f"{where}.location", "location for a beam", f"it beside {body.NAME}", hint)
+    if isinstance(body, ChainBody) and stop_mass(body, stop) > body.size:
+        expected = f"a mass of the chain, 1 to {body.size}"
+        yield Problem(f"{where}.mass", expected, str(stop.mass), "Masses count from the ground.")
+    if isinstance(body, BeamBody):
+        span = draft.span(f"{where}.location")
+        if span is None and body.boundary != "clamped-free":
+            hint = f"Add location = ... to [[stop]]: the far end of a {body.boundary} beam does not move."
+            yield Problem(f"{where}.location", "a number between 0 and 1", "nothing", hint)
+        yield from fixed_point_problems(f"{where}.location", body, span)
+
+
+def stops_leave_room(draft: Draft) -> Iterator[Problem]:
+    """Of two stops at one place, one is above and one below the motion, or the nearer one yields."""
+    if draft.body is None or len(draft.stops) > _most_stops(draft):
+        return
+    for first, second in combinations(range(len(draft.stops)), 2):
+        one, other = draft.stops[first], draft.stops[second]
+        if one is None or other is None or _place(draft.body, one) != _place(draft.body, other):
+            continue
+        if one.side == other.side:
+            yield from _same_side_problems(draft, first, second, one.side)
+        else:
+            upper, lower = (first, second) if one.side == "upper" else (second, first)
+            yield from _room_problems(draft, upper, lower)
+
+
+def _place(body: Body, stop: Stop) -> float:
+    """Return what tells the places of two stops on a body apart."""
+    if isinstance(body, ChainBody):
+        return stop_mass(body, stop)
+    return stop_location(stop) if isinstance(body, BeamBody) else 0.0
+
+
+def _same_side_problems(draft: Draft, first: int, second: int, side: str) -> Iterator[Problem]:
+    if not isinstance(draft.body, OscillatorBody) and not _hides(draft, first, second):
+        return
+    hint = "Motion never reaches the farther of two stops on one side: remove it."
+    if isinstance(draft.body, OscillatorBody):
+        expected, got = "one upper and one lower stop", f"two {side} stops"
+    else:
+        expected = f"another place or side than that of stop[{first + 1}]"
+        got = f"two {side} stops at one place, the nearer one rigid"
+    yield Problem(f"stop[{second + 1}].side", expected, got, hint)
+
+
+def _hides(draft: Draft, first: int, second: int) -> bool:
+    """Whether one of two stops on one side is rigid and, at the worst, the nearer one."""
+    for near, far in ((first, second), (second, first)):
+        stop = draft.stops[near]
+        if not isinstance(stop, RestitutionStop):
+            continue
+        rigid, other = _position(draft, near), _position(draft, far)
+        if rigid[0] <= other[1] if stop.side == "upper" else rigid[1] >= other[0]:
+            return True
+    return False
+
+
+def _room_problems(draft: Draft, upper: int, lower: int) -> Iterator[Problem]:
+    lowest_upper, highest_lower = _position(draft, upper)[0], _position(draft, lower)[1]
+    if lowest_upper <= highest_lower:
+        expected = f"the upper stop[{upper + 1}] above the lower stop[{lower + 1}]"
+        got = f"upper {quoted(lowest_upper)} and lower {quoted(highest_lower)}{draft.worst('stop')}"
+        yield Problem(
+            f"stop[{upper + 1}].position", expected, got, "Leave room for motion between the stops."
+        )
+
+
+def _position(draft: Draft, index: int) -> tuple[float, float]:
+    span = draft.span(f"stop[{index + 1}].position")
+    assert span is not None
+    return span
+
+
+def start_is_on_the_free_side(draft: Draft) -> Iterator[Problem]:
+    """No rigid stop is passed at the start; one that yields may be pressed in.
+
+    Of a beam that starts bent the displacement at a stop is known to its FMU alone, which refuses it then.
+    """
+    for index, stop in enumerate(draft.stops):
+        if not isinstance(stop, RestitutionStop):
+            continue
+        key, start = _start(draft, stop)
+        if start is None:
+            continue
+        upper = stop.side == "upper"
+        limit, displacement = (
+            (_position(draft, index)[0], start[1]) if upper else (_position(draft, index)[1], start[0])
+        )
+        if displacement > limit if upper else displacement < limit:
+            relation = "<=" if upper else ">="
+            expected = (
+                f"a start on the free side of stop[{index + 1}] (displacement {relation} {quoted(limit)})"
+            )
+            got = f"{quoted(displacement)}{draft.worst('stop', 'body.displacement_start')}"
+            yield Problem(key, expected, got, "Start on the stop or away from it, or move the stop.")
+
+
+def _start(draft: Draft, stop: Stop) -> tuple[str, tuple[float, float] | None]:
+    """Return the key of the start displacement at a stop, and its lowest and highest value."""
+    body, key = draft.body, "body.displacement_start"
+    if isinstance(body, OscillatorBody):
+        return key, draft.span(key)
+    if body is None or not body.displacement_start:
+        return key, None if body is None else (0.0, 0.0)
+    if isinstance(body, BeamBody):
+        return key, None
+    element = f"{key}[{stop_mass(body, stop)}]"
+    return element, draft.span(element)
+
+
+def a_surface_that_lags_is_fused(draft: Draft) -> Iterator[Problem]:
+    """Where a stop's surface is after separation only the body knows: an ImpactStop FMU has no state."""
+    if draft.written("execution").get("how") != "coupled":
+        return
+    for number, stop in enumerate(draft.stops, start=1):
+        key = f"stop[{number}].relaxation_time"
+        if isinstance(stop, KelvinVoigtStop) and (draft.span(key) or (0.0, 0.0))[1] > 0.0:
+            hint = 'Run it fused: how = "fused", or relaxation_time = 0.'
+            yield Problem(key, 'a surface that relaxes at once beside how = "coupled"', "a time", hint)
+
+
+STOP_RULES = (
+    stops_are_few,
+    stops_are_on_the_body,
+    stops_leave_room,
+    start_is_on_the_free_side,
+    a_surface_that_lags_is_fused,
+)

@@ -1,0 +1,260 @@
+"""Scene files: what is simulated, what is recorded and what is swept.
+
+`load_scene` reads a TOML file into a frozen `Scene` or raises one `SceneError` with everything that is wrong.
+The keys are described in `docs/scene.md`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from itertools import chain
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, field_serializer
+
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.orchestrator.scene.changes import changed_document
+from vibroimpact.orchestrator.scene.file import parse_toml, read_text
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene
+from vibroimpact.orchestrator.scene.keys import (
+    Key,
+    coordinate_name,
+    number_of,
+    numbers_of,
+    numeric_key,
+    replacement,
+)
+from vibroimpact.orchestrator.scene.models import Body, Execution, Forcing, Record, Sensor, Stop
+from vibroimpact.orchestrator.scene.problems import lines_of
+from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
+from vibroimpact.orchestrator.scene.sweep import SweepAxis
+from vibroimpact.orchestrator.scene.tables import read_tables
+
+__all__ = ["Scene", "load_scene", "parse_scene"]
+
+
+class Scene(BaseModel):
+    """A validated scene; it never changes, `with_values` makes another.
+
+    Attributes
+    ----------
+    source : str
+        Where the scene came from, for messages.
+    text : str
+        The TOML text, for provenance.
+    title : str
+        What the scene is called; may be empty.
+    units : {"SI", "nondimensional"}
+        The meaning of all numbers.
+    body : OscillatorBody, ChainBody or BeamBody
+        The body that moves; a general scene has none.
+    general : GeneralScene or None
+        What a scene of `[component.NAME]` tables asks of the importer; None in the short form.
+    forcing : Forcing or None
+        What drives it; None without a `[forcing]` table.
+    stops : tuple of RestitutionStop, KelvinVoigtStop, HertzStop or HuntCrossleyStop
+        The stops in the order of the file.
+    sensor : Sensor or None
+        Where a beam is observed; None without a `[sensor]` table.
+    replay : Replay or None
+        Recorded channels that drive the body and that its motion is compared with; None without `[replay]`.
+    record : Record
+        What is recorded; periods in a forced scene, times in any other. In a general scene `impacts` says
+        whether located events are recorded.
+    sweep : tuple of SweepAxis
+        The swept keys in the order of the file; see `vibroimpact.orchestrator.scene.sweep.expand`.
+    execution : Execution
+        How the points run.
+    """
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+    source: str
+    text: str = Field(repr=False)
+    title: str
+    units: Literal["SI", "nondimensional"]
+    body_given: Body | None = Field(alias="body")
+    forcing: Forcing | None
+    stops: tuple[Stop, ...]
+    sensor: Sensor | None = None
+    record: Record
+    sweep: tuple[SweepAxis, ...]
+    execution: Execution
+    general: GeneralScene | None = None
+    replay: Replay | None = None
+
+    @field_serializer("general")
+    def _without_folders(self, general: GeneralScene | None) -> dict[str, Any] | None:
+        """Leave the folders of FMU files out, so that a scene is the same wherever it lies."""
+        if general is None:
+            return None
+        document = asdict(general)
+        for component in document["components"]:
+            component["fmu"] = component["fmu"].name
+        del document["start_units"]  # they follow from the FMUs
+        return document
+
+    @property
+    def body(self) -> Body:
+        """The body of a scene of the short form.
+
+        Raises
+        ------
+        UsageError
+            For a general scene.
+        """
+        if self.body_given is None:
+            raise UsageError(f"{self.source}: body: expected a scene with [body], got a general scene.")
+        return self.body_given
+
+    @property
+    def period(self) -> float | None:
+        """Forcing period 2 pi / angular_frequency; None unforced and under a constant force."""
+        if self.forcing is None or self.forcing.angular_frequency == 0.0:
+            return None
+        return 2.0 * math.pi / self.forcing.angular_frequency
+
+    def value(self, key: str) -> float:
+        """Return the number that a key such as `stop[1].position` has in this scene.
+
+        Raises
+        ------
+        UsageError
+            When the scene has no such number.
+        """
+        if self.general is not None:
+            return self.general.value(key)
+        parts = numeric_key(key)
+        return self._number(key, parts, self._numbered_tables().get(_slot(parts)))
+
+    def _number(self, key: str, parts: Key, owner: BaseModel | None) -> float:
+        number = number_of(owner, parts)
+        if number is None:
+            raise UsageError(f"{self.source}: {key}: expected a number of this scene, got nothing.")
+        return number
+
+    def with_values(self, values: Mapping[str, float]) -> Scene:
+        """Return this scene with other numbers, without validating it again.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            New values of sweepable keys. Values of the scene's own sweep are known to be valid; others are
+            the caller's responsibility. An angular_frequency replaces a frequency that the scene gives, and
+            a damping its damping_ratio; and the other way round.
+
+        Examples
+        --------
+        >>> text = "[body]\\nmass = 1\\nstiffness = 1\\n[record]\\nrecorded_time = 5"
+        >>> parse_scene(text, "free.toml").with_values({"body.mass": 2.0}).body.mass
+        2.0
+        """
+        if self.general is not None:
+            return self.model_copy(update={"general": self.general.with_values(values)})
+        tables = self._numbered_tables()
+        for key, value in values.items():
+            if key == RECORDING_KEY:  # which recording is replayed: no number of any table
+                continue
+            parts = numeric_key(key)
+            owner = tables.get(_slot(parts))
+            if owner is None:
+                raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent table.")
+            if parts.element is not None:
+                self._number(key, parts, owner)
+            tables[_slot(parts)] = owner.model_copy(update=replacement(owner, parts, value))
+        stops = tuple(tables[place] for place in range(len(self.stops)))
+        changed = {name: tables[name] for name in ("forcing", "sensor")}
+        return self.model_copy(update={"body_given": tables["body"], "stops": stops, **changed})
+
+    def constants(self) -> dict[str, float]:
+        """Return the numbers that a sweep could vary and this one does not, by key, defaults too."""
+        if self.general is not None:
+            numbers = self.general.numbers()
+        else:
+            tables = ((_table_name(slot), owner) for slot, owner in self._numbered_tables().items())
+            numbers = chain.from_iterable(
+                numbers_of(owner, name) for name, owner in tables if owner is not None
+            )
+        swept = {axis.key for axis in self.sweep}
+        return {key: value for key, value in numbers if key not in swept}
+
+    def sweep_coordinate_name(self, key: str) -> str:
+        """Return the name that a swept key has as a coordinate of the dataset."""
+        return coordinate_name(key, [axis.key for axis in self.sweep])
+
+    def _numbered_tables(self) -> dict[str | int, BaseModel | None]:
+        """Return the tables that hold numbers; a stop has its 0-based place for a name."""
+        tables: dict[str | int, BaseModel | None] = dict(enumerate(self.stops))
+        return tables | {"body": self.body_given, "forcing": self.forcing, "sensor": self.sensor}
+
+
+def _slot(key: Key) -> str | int:
+    return key.table if key.place is None else key.place
+
+
+def _table_name(slot: str | int) -> str:
+    return f"stop[{slot + 1}]" if isinstance(slot, int) else slot
+
+
+def load_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
+    """Read a scene file.
+
+    Parameters
+    ----------
+    path : path-like
+        A TOML file, UTF-8, at most 1 MiB.
+    changes : sequence of str
+        `KEY=VALUE`, made before anything is checked: see `scene_changes.changed_document`.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the file, each on one line.
+    """
+    source = str(path)
+    return parse_scene(read_text(Path(path), source), source, changes)
+
+
+def parse_scene(text: str, source: str, changes: Sequence[str] = ()) -> Scene:
+    """Read a scene from TOML text.
+
+    Parameters
+    ----------
+    text : str
+        The TOML text.
+    source : str
+        The name of the text in messages, usually its file.
+    changes : sequence of str
+        `KEY=VALUE`; the text of the scene is then one that says the same as the changed tables.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the text, each on one line.
+    """
+    document, changed = changed_document(parse_toml(text, source), changes)
+    tables, problems = read_tables(document, Path(source).parent)
+    if tables is None:
+        raise SceneError(lines_of(problems, source, changed))
+    if changed:
+        text = tomli_w.dumps(document)
+    return Scene(
+        source=source,
+        text=text,
+        title=tables.header.title,
+        units=tables.header.units,
+        body=tables.body,
+        forcing=tables.forcing,
+        stops=tables.stops,
+        sensor=tables.sensor,
+        record=tables.record,
+        sweep=tables.sweep,
+        execution=tables.execution,
+        general=tables.general,
+        replay=tables.replay,
+    )

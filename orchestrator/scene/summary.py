@@ -1,0 +1,99 @@
+"""What runs a scene, in words: the engine, the laws of its stops, the effects that it calls for and the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from vibroimpact.orchestrator.scene.models import ChainBody, OscillatorBody, RestitutionStop
+from vibroimpact.orchestrator.scene.sampled_names import follow_energies
+from vibroimpact.orchestrator.scene.scene import Scene
+
+_DAMPING = ("damping", "dampings", "damping_ratio", "far_damping")
+_AMPLITUDE = ("frequency_slope", "damping_slope", "damping_reciprocal")
+
+
+def engine(scene: Scene) -> str:
+    """Return what follows the motion.
+
+    Examples
+    --------
+    >>> from vibroimpact.orchestrator.scene.scene import parse_scene
+    >>> text = "[body]\\nmass = 1\\nstiffness = 1\\n[record]\\nrecorded_time = 5"
+    >>> engine(parse_scene(text, "free.toml"))
+    'fused: Oscillator, one mass, closed form between impacts'
+    """
+    if scene.general is not None:
+        names = ", ".join(component.name for component in scene.general.components)
+        step = f"{scene.general.macro_step:g} {'s' if scene.units == 'SI' else 'units of time'}"
+        return f"coupled: {names}; {scene.general.exchange} exchange every {step}"
+    if scene.replay is not None:
+        return f"replay from sample to sample: {_body(scene)}"
+    if scene.execution.how == "coupled":
+        return f"coupled: {_body(scene)}{'; an ImpactStop for each stop' if scene.stops else ''}"
+    return f"fused: {_body(scene)}"
+
+
+def _body(scene: Scene) -> str:
+    body = scene.body
+    if isinstance(body, OscillatorBody):
+        if all(isinstance(stop, RestitutionStop) for stop in scene.stops):
+            return "Oscillator, one mass, closed form between impacts"
+        return "Oscillator, one mass, as a structure because a stop yields"
+    kind, parts = ("Chain", "masses") if isinstance(body, ChainBody) else ("Beam", "modes")
+    return f"{kind}, a structure of {body.size} {parts if body.size > 1 else parts.removesuffix('s')}"
+
+
+def laws(scene: Scene) -> dict[str, str]:
+    """Return the contact law of each stop of the short form, by the key of the stop."""
+    return {f"stop[{number}]": stop.law for number, stop in enumerate(scene.stops, start=1)}
+
+
+def effects(scene: Scene) -> dict[str, bool]:
+    """Return by its name whether a scene calls for an effect, at one of its points at least."""
+    common = {
+        "time series": _samples(scene),
+        "continuation": any(axis.continuation for axis in scene.sweep),
+        "guard process": scene.general.guard if scene.general is not None else scene.execution.guard,
+    }
+    if scene.general is not None:
+        found = {"connections": bool(scene.general.connections), "watched events": bool(scene.general.events)}
+        return found | common
+    numbers, series = _largest(scene), scene.record.time_series
+    followed = not isinstance(scene.body, OscillatorBody) and series is not None
+    return {
+        "forcing": scene.forcing is not None,
+        "recorded drive": scene.replay is not None and scene.replay.drive is not None,
+        "damping": _acts(numbers, "body", _DAMPING) or getattr(scene.body, "rayleigh", None) is not None,
+        "stops": bool(scene.stops),
+        "restitution that falls with speed": _acts(numbers, "stop", ("yield_velocity",)),
+        "motion that depends on its amplitude": _acts(numbers, "body", _AMPLITUDE),
+        "energies": followed and series is not None and follow_energies(series.variables),
+        **common,
+    }
+
+
+def _samples(scene: Scene) -> bool:
+    if scene.general is not None:
+        return scene.general.rate is not None and bool(scene.general.variables)
+    return scene.record.time_series is not None
+
+
+def _largest(scene: Scene) -> dict[str, float]:
+    """Return the largest magnitude that each number of a scene has over its sweep, by key."""
+    swept = {axis.key: max(max(axis.values), -min(axis.values)) for axis in scene.sweep}
+    return {key: abs(number) for key, number in scene.constants().items()} | swept
+
+
+def _acts(numbers: Mapping[str, float], table: str, words: tuple[str, ...]) -> bool:
+    return any(
+        number > 0.0
+        for key, number in numbers.items()
+        if key.startswith(table) and key.rpartition(".")[2].partition("[")[0] in words
+    )
+
+
+def in_one_line(scene: Scene) -> str:
+    """Return engine, laws and effects as one line."""
+    stops = [f"{stop} {law}" for stop, law in laws(scene).items()]
+    called = [name for name, there in effects(scene).items() if there and name != "stops"]
+    return "; ".join(part for part in (engine(scene), ", ".join(stops), ", ".join(called)) if part)

@@ -1,0 +1,241 @@
+"""The `[sweep]` table of a scene file: which keys it varies, and over which values."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+from typing import Annotated, Any, get_origin
+
+import numpy as np
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from vibroimpact.orchestrator.scene.keys import SWEEPABLE, field_name, parse_key
+from vibroimpact.orchestrator.scene.models import BODY_MODELS, STOP_MODELS, AxisTable, Forcing, Sensor
+from vibroimpact.orchestrator.scene.problems import (
+    Problem,
+    key_path,
+    known_keys,
+    nearest,
+    problems_of,
+    quoted,
+    rule_of,
+    value_problem,
+)
+from vibroimpact.orchestrator.scene.sweep import SweepAxis
+
+_FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
+
+
+def read_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
+    """Read the sweep of a scene file.
+
+    Parameters
+    ----------
+    document : mapping
+        The parsed TOML document; its other tables need not be valid.
+
+    Returns
+    -------
+    axes : tuple of SweepAxis
+        The axes without a problem, in the order of the file.
+    problems : list of Problem
+        Everything that is wrong with the others.
+    """
+    entries, problems = sweep_entries(document)
+    axes: list[SweepAxis] = []
+    known = dict.fromkeys(_sweepable_keys(document))
+    for key, entry in entries.items():
+        found = list(_key_problems(key, entry, document, known))
+        if not found:
+            axis, found = read_axis(key, entry)
+            found += _value_problems(axis, document) if axis else []
+            axes += [axis] if axis and not found else []
+        problems += found
+    return tuple(axes), problems
+
+
+def sweep_entries(document: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Problem]]:
+    """Return the entries of the sweep of any form of scene, and what is wrong with the table itself."""
+    table = document.get("sweep", {})
+    if isinstance(table, dict):
+        return table, []
+    return {}, [Problem("sweep", "a table", quoted(table), f"Write [sweep] and below it KEY = {_FORMS}.")]
+
+
+def _key_problems(
+    text: str, entry: object, document: Mapping[str, Any], known: Mapping[str, None]
+) -> Iterator[Problem]:
+    if text not in known:
+        where, expected = key_path(("sweep", text)), "a numeric key of this scene"
+        hint = partial(_key_hint, text, entry, document, list(known))
+        yield Problem(where, expected, quoted(text), hint)
+
+
+def _sweepable_keys(document: Mapping[str, Any]) -> list[str]:
+    """Return the keys that a sweep of this scene may vary; a table that is absent has none."""
+    return [key for name, table in _tables(document) for key in _keys_in(name, table)]
+
+
+def _tables(document: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the tables with numbers, an array `stop` as `stop[1]`, `stop[2]`, ..."""
+    for name in ("body", "forcing", "sensor"):
+        if name in document:
+            yield name, document[name]
+    for number in range(1, _stop_count(document) + 1):
+        yield f"stop[{number}]", document["stop"][number - 1]
+
+
+def _keys_in(name: str, table: Any) -> Iterator[str]:
+    model = _model_of(name, table)
+    for word in SWEEPABLE[name.partition("[")[0]]:
+        if model is not None and word not in known_keys(model):
+            continue
+        written = table.get(word) if isinstance(table, dict) else None
+        if isinstance(written, list):
+            yield from (f"{name}.{word}[{number}]" for number in range(1, len(written) + 1))
+        elif model is None or not _is_array(model, word):
+            yield f"{name}.{word}"
+
+
+def _model_of(name: str, table: Any) -> type[BaseModel] | None:
+    """Return the model of a table; None where the word that chooses it is not known."""
+    written = table if isinstance(table, dict) else {}
+    if name == "body":
+        return BODY_MODELS.get(str(written.get("kind", "oscillator")))
+    if name.startswith("stop"):
+        return STOP_MODELS.get(str(written.get("law", "restitution")))
+    return Forcing if name == "forcing" else Sensor
+
+
+def _is_array(model: type[BaseModel], word: str) -> bool:
+    """Whether a key takes an array and nothing else."""
+    return get_origin(model.model_fields[field_name(model, word)].annotation) is tuple
+
+
+def _stop_count(document: Mapping[str, Any]) -> int:
+    stops = document.get("stop", [])
+    return len(stops) if isinstance(stops, list) else 0
+
+
+def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list[str]) -> str:
+    if isinstance(entry, dict) and text in SWEEPABLE and entry:
+        return f'Put the whole key in quotes: "{text}.{next(iter(entry))}".'
+    table = text.partition(".")[0].partition("[")[0]
+    if table == "stop" and table in document:
+        key, count = parse_key(text), _stop_count(document)
+        if key is None or key.place is None or key.place >= count:
+            return f'Indices start at 1 and this scene has {count} [[stop]]: for example "stop[1].position".'
+    if table in SWEEPABLE and table not in document:
+        return f"This scene has no {'[[stop]]' if table == 'stop' else f'[{table}]'}."
+    return _element_hint(text, document, known) or _nearest_key(text, known)
+
+
+def _nearest_key(text: str, known: list[str]) -> str:
+    """Return advice for a key of a table that is there: the nearest of that table's, or all of them."""
+    where, _, name = text.rpartition(".")
+    names = [key.rpartition(".")[2] for key in known if key.rpartition(".")[0] == where]
+    return nearest(name, names, f"{where}.") if names else nearest(text, known)
+
+
+def _element_hint(text: str, document: Mapping[str, Any], known: list[str]) -> str:
+    """Return the advice for a key whose table is there: of an array, an element is swept."""
+    where, _, name = text.rpartition(".")
+    model = next((_model_of(own, table) for own, table in _tables(document) if own == where), None)
+    word = name.partition("[")[0]
+    if model is None or word not in known_keys(model):
+        return ""
+    if word not in SWEEPABLE[where.partition("[")[0]]:
+        return f"{text} is part of the structure of the scene and cannot be swept."
+    elements = [key for key in known if key.startswith(f"{where}.{word}[")]
+    if elements:
+        return f'It is an array of {len(elements)}: sweep an element of it, such as "{elements[0]}".'
+    if "[" in name or _is_array(model, word):
+        return f"Write {word} as an array first, then its elements can be swept."
+    return ""
+
+
+def read_axis(key: str, entry: object) -> tuple[SweepAxis | None, list[Problem]]:
+    """Return the axis of one entry of a sweep, or what is wrong with its values and path."""
+    path = ("sweep", key)
+    if not isinstance(entry, dict):
+        return None, [Problem(key_path(path), "a table", quoted(entry), f"Write {_FORMS}.")]
+    try:
+        table = AxisTable.model_validate(entry)
+    except ValidationError as error:
+        return None, problems_of(error, AxisTable, path)
+    problem = _form_problem(key, table)
+    if problem:
+        return None, [problem]
+    values = table.values if table.values is not None else _range_values(table)
+    problem = _distinct_problem(key, values)
+    if problem:
+        return None, [problem]
+    ordered = values if table.path == "independent" else tuple(sorted(values))
+    return SweepAxis(key, ordered, table.path), []
+
+
+def _form_problem(key: str, table: AxisTable) -> Problem | None:
+    """Return what is wrong with the combination of start, stop, points and values."""
+    ends = {"start": table.start, "stop": table.stop, "points": table.points}
+    given = [name for name, value in ends.items() if value is not None]
+    where = key_path(("sweep", key))
+    if table.values is not None:
+        if given:
+            return Problem(
+                where, "start, stop and points, or values", "both", f"Remove values or {_and(given)}."
+            )
+        return None
+    if len(given) < len(ends):
+        missing = [name for name in ends if name not in given]
+        return Problem(where, _FORMS, _and(given) or "neither", f"Add {_and(missing)}.")
+    if table.points == 1 and table.start != table.stop:
+        hint = "One point cannot be at both ends; make stop equal to start, or give values."
+        return Problem(key_path(("sweep", key, "points")), "a whole number >= 2", "1", hint)
+    return None
+
+
+def _and(words: list[str]) -> str:
+    return " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
+
+
+def _range_values(table: AxisTable) -> tuple[float, ...]:
+    assert table.start is not None
+    assert table.stop is not None
+    assert table.points is not None
+    # Halved ends keep the span of the range finite for any two finite numbers; scaling by 2 is exact.
+    return tuple((2.0 * np.linspace(table.start / 2.0, table.stop / 2.0, table.points)).tolist())
+
+
+def _distinct_problem(key: str, values: tuple[float, ...]) -> Problem | None:
+    value, times = Counter(values).most_common(1)[0]
+    if times == 1:
+        return None
+    hint = "Each point is run once: remove the repeated value or lower points."
+    return Problem(
+        key_path(("sweep", key)), "values that differ from each other", f"{quoted(value)} {times} times", hint
+    )
+
+
+def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Problem]:
+    """Return the swept value that breaks the rule of its field.
+
+    All rules of sweepable fields are intervals, so the lowest and the highest value speak for the rest.
+    """
+    key = parse_key(axis.key)
+    assert key is not None
+    where = key.table if key.place is None else f"{key.table}[{key.place + 1}]"
+    model = next(_model_of(name, table) for name, table in _tables(document) if name == where)
+    if model is None:
+        return []
+    field = model.model_fields[field_name(model, key.name)]
+    annotated: Any = Annotated
+    rule = TypeAdapter(annotated[(field.annotation, *field.metadata)])
+    for value in (min(axis.values), max(axis.values)):
+        try:
+            rule.validate_python(value if key.element is None else (value,), strict=True)
+        except ValidationError:
+            problem = value_problem(("sweep", axis.key), field, value)
+            return [problem if key.element is None else replace(problem, expected=rule_of(field).item)]
+    return []
