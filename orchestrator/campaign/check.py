@@ -7,13 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
-from vibroimpact.orchestrator.campaign.chunks import (
-    DEFAULT_RUNNER,
-    BranchPoint,
-    dataset_of,
-    open_runner,
-    run_point,
-)
+from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, BranchPoint, dataset_of, run_point
+from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.run.result_size import MOST_BYTES, bytes_of_a_run, size
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import Point, run_count
@@ -135,7 +130,7 @@ def _tried(scene: Scene) -> Trial:
     deadline = min(MOST_TRIAL_SECONDS, scene.execution.deadline or math.inf)
     limited = parse_scene(scene.text, scene.source, [f"execution.deadline={deadline}"])
     point = Point(0, {axis.key: axis.values[len(axis.values) // 2] for axis in scene.sweep})
-    runner = open_runner(limited, DEFAULT_RUNNER)
+    runner = named_runner(limited, DEFAULT_RUNNER)
     try:
         record = run_point(limited, runner, point, None)
         if record.seconds < LONG_ENOUGH:

@@ -7,14 +7,13 @@ never depends on how the runs were cut into chunks.
 
 from __future__ import annotations
 
-import importlib
 import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -29,7 +28,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
-from vibroimpact.orchestrator.run import dataset_of_runs
+from vibroimpact.orchestrator.run import Runner, dataset_of_runs, named_runner
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Point, expand
@@ -46,28 +45,6 @@ CARRYING = (Outcome.ok, Outcome.stuck)
 
 State = tuple[float, ...]
 """Displacement (m) and velocity (m/s) of an oscillator; of a structure N displacements, then N velocities."""
-
-
-class Runner(Protocol):
-    """Runs the points of one scene; see `vibroimpact.orchestrator.run.point.PointRunner`."""
-
-    @property
-    def execution(self) -> str:
-        """Which way of running the scene it uses."""
-
-    @property
-    def instruction_set(self) -> str:
-        """The instruction set of the machine code it runs."""
-
-    @property
-    def fmu_hashes(self) -> Mapping[str, str]:
-        """Content hash of each FMU it loaded."""
-
-    def run(self, values: Mapping[str, float], start: State | None) -> RunRecord:
-        """Run one point from a carried state, or from the scene's own start state."""
-
-    def close(self) -> None:
-        """Free the components."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,18 +143,10 @@ class _Opened:
     runner: Runner
 
 
-def open_runner(scene: Scene, dotted: str) -> Runner:
-    """Build the runner of a scene from its class, given as `module:name`."""
-    module, _, name = dotted.partition(":")
-    factory = getattr(importlib.import_module(module), name)
-    runner: Runner = factory(scene, execution=scene.execution.how)
-    return runner
-
-
 @lru_cache(maxsize=1)
 def _opened(scene_text: str, source: str, runner: str) -> _Opened:
     scene = parse_scene(scene_text, source)
-    return _Opened(scene, expand(scene), open_runner(scene, runner))
+    return _Opened(scene, expand(scene), named_runner(scene, runner))
 
 
 def identify(runner: Runner) -> RunnerIdentity:

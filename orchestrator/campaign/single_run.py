@@ -15,13 +15,13 @@ from vibroimpact.orchestrator.campaign.chunks import (
     Runner,
     dataset_of,
     identify,
-    open_runner,
     points_of,
     run_points,
     tally,
 )
 from vibroimpact.orchestrator.campaign.progress import Progress, Silence
 from vibroimpact.orchestrator.campaign.provenance import provenance
+from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.run.dataset import with_constants_of
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
@@ -61,7 +61,7 @@ def run_scene(
     target = Path(path)
     refuse_large_results(scene)
     _refuse_unwritable(target)
-    opened = open_runner(scene, runner)
+    opened = named_runner(scene, runner)
     try:
         points = _all_points(scene)
         # A dataset that cannot be made is found out before an hour of work, not after it.

@@ -1,4 +1,4 @@
-"""The process that `guard` lets points run in, since they may take it down. `guard_supervisor` forks it."""
+"""The process that `guard` lets points run in, since they may take it down. `supervisor` forks it."""
 
 from __future__ import annotations
 

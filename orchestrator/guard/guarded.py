@@ -6,7 +6,7 @@ must be noted before it is made: that is done from the first crash on.
 
 A point is repeated once, in a new process, where its loss may be no fault of its own: a crash in a process that has
 run other points, or of which nobody knows the call; a hang in a call that puts an end to the point before. If it then
-goes well, the result counts. What an FMU starts ends with the child (`guard_supervisor`).
+goes well, the result counts. What an FMU starts ends with the child (`supervisor`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Stands between a guard and the process that runs FMUs, so that nothing an FMU has started outlives it.
 
-Started as `python -m`, it forks before anything of size is imported. The fork runs the points (`guard_child`) in a
+Started as `python -m`, it forks before anything of size is imported. The fork runs the points (`child`) in a
 process group of its own; the supervisor runs no code of an FMU, so none can take it down. When the fork ends, or the
 guard closes its pipe, dies, or says so, the supervisor kills all that is left and ends as the fork has ended.
 

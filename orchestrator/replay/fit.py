@@ -310,7 +310,7 @@ class _Fit:
         return with_chosen(solution.x)
 
     def covariance(self, values: Floats, comparisons: Sequence[Sequence[Comparison]]) -> Floats:
-        """Return the covariance of the numbers, see `replay_covariance`."""
+        """Return the covariance of the numbers, see `covariance`."""
         residuals = self.residuals(values, comparisons)
         slopes = self._slopes(values, comparisons)
         self.refuse_alike(slopes)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from vibroimpact.orchestrator.run.dataset import dataset_of_runs
 from vibroimpact.orchestrator.run.general import GeneralRunner
-from vibroimpact.orchestrator.run.opening import Runner, open_runner
+from vibroimpact.orchestrator.run.opening import Runner, named_runner, open_runner
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.run.session import Session
 
@@ -14,5 +14,6 @@ __all__ = [
     "Runner",
     "Session",
     "dataset_of_runs",
+    "named_runner",
     "open_runner",
 ]

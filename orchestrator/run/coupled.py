@@ -1,6 +1,6 @@
 """A short-form scene with every component its own FMU: the body, and one ImpactStop for each stop (`coupled`).
 
-The same interface as `body_driver.BodyDriver`, so that a run does not know which of the two carries it.
+The same interface as `fused.BodyDriver`, so that a run does not know which of the two carries it.
 """
 
 from __future__ import annotations

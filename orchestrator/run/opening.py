@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping
-from typing import Any, Protocol, cast
+from collections.abc import Mapping
+from typing import Protocol
 
 from vibroimpact.analysis.dataset import RunRecord
 from vibroimpact.orchestrator.fmi.instance import LogOf, WrapOf
@@ -17,17 +17,25 @@ REPLAY_RUNNER = "vibroimpact.orchestrator.replay.runner:ReplayRunner"
 
 
 class Runner(Protocol):
-    """Runs the points of one scene in this process."""
+    """Runs the points of one scene."""
 
-    execution: str
-    instruction_set: str
-    fmu_hashes: dict[str, str]
+    @property
+    def execution(self) -> str:
+        """Which way of running the scene it uses."""
+
+    @property
+    def instruction_set(self) -> str:
+        """The instruction set of the machine code it runs."""
+
+    @property
+    def fmu_hashes(self) -> Mapping[str, str]:
+        """Content hash of each FMU it loaded."""
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
-        """Run one point."""
+        """Run one point from a carried state, or from the scene's own start state."""
 
     def close(self) -> None:
-        """Free what it holds."""
+        """Free the components."""
 
 
 def open_runner(
@@ -43,12 +51,13 @@ def open_runner(
     if scene.general is not None:
         return GeneralRunner(scene, execution=execution, log=log, wrap=wrap)
     if scene.replay is not None:
-        return cast(Runner, named(REPLAY_RUNNER)(scene, execution=execution))
+        return named_runner(scene, REPLAY_RUNNER, execution)
     return PointRunner(scene, execution=execution)
 
 
-def named(dotted: str) -> Callable[..., Any]:
-    """Return what `module:name` stands for."""
+def named_runner(scene: Scene, dotted: str, execution: str | None = None) -> Runner:
+    """Return the runner of a scene whose class is given as `module:name`, so that a worker can find it by itself."""
     module, _, name = dotted.partition(":")
-    found: Callable[..., Any] = getattr(importlib.import_module(module), name)
-    return found
+    make = getattr(importlib.import_module(module), name)
+    runner: Runner = make(scene, execution=execution or scene.execution.how)
+    return runner

@@ -81,7 +81,7 @@ class PointRunner:
         values : mapping of str to float
             Values of the swept keys.
         start : tuple of float or None
-            State carried over at forcing phase 0, see `body_parameters.float_parameters`; None for the
+            State carried over at forcing phase 0, see `parameters.body.float_parameters`; None for the
             scene's start state.
 
         Raises

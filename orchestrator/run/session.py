@@ -112,7 +112,7 @@ class Session:
         values : mapping of str to float, optional
             Values of keys of the scene, such as `body.damping_ratio`, from now on.
         start : tuple of float, optional
-            State to start from, see `body_parameters.float_parameters`.
+            State to start from, see `parameters.body.float_parameters`.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class Session:
         return self._driver.observed()
 
     def whole_state(self) -> Floats | None:
-        """Return the whole state of a chain or beam, see `body_parameters.state_variables`."""
+        """Return the whole state of a chain or beam, see `parameters.body.state_variables`."""
         return self._driver.whole_state()
 
     def close(self) -> None:

@@ -1,7 +1,7 @@
 """The tables of a scene file as frozen pydantic models.
 
 Each field says three things in one place: its constraints, its `Rule` in words (for messages), and its
-default. Rules between fields or tables are in `scene_rules`. Another kind of body or contact law becomes
+default. Rules between fields or tables are in `rules`. Another kind of body or contact law becomes
 one more model here and one more entry in `BODY_MODELS` or `STOP_MODELS`.
 """
 

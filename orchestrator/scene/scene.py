@@ -209,7 +209,7 @@ def load_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
     path : path-like
         A TOML file, UTF-8, at most 1 MiB.
     changes : sequence of str
-        `KEY=VALUE`, made before anything is checked: see `scene_changes.changed_document`.
+        `KEY=VALUE`, made before anything is checked: see `changes.changed_document`.
 
     Raises
     ------

@@ -8,7 +8,8 @@ import time
 from pathlib import Path
 
 from vibroimpact.fmus.errors import ComponentError, SceneError
-from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, open_runner
+from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
+from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
@@ -55,7 +56,7 @@ def _run(text: str, path: Path) -> str | None:
 
 
 def _run_first(scene: Scene) -> None:
-    runner = open_runner(scene, DEFAULT_RUNNER)
+    runner = named_runner(scene, DEFAULT_RUNNER)
     try:
         runner.run(expand(scene)[0].points[0].values if scene.sweep else {}, None)
     finally:

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.terminal import printable
-from vibroimpact.orchestrator.campaign.chunks import Chunk, open_runner, points_of, run_point
+from vibroimpact.orchestrator.campaign.chunks import Chunk, points_of, run_point
+from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.run.result_size import bytes_of_a_run
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
@@ -139,7 +140,7 @@ def run_shortly(scene: Scene) -> str | None:
         limited = parse_scene(text, scene.source)
     except SceneError:  # written in a way that takes no further table
         return None
-    runner = open_runner(limited, "vibroimpact.orchestrator.guard.guarded:make_runner")
+    runner = named_runner(limited, "vibroimpact.orchestrator.guard.guarded:make_runner")
     try:
         (place,) = points_of(
             expand(limited) if run_count(limited.sweep) < 10_000 else (), Chunk(0, 0, 1)

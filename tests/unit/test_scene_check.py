@@ -199,7 +199,7 @@ def test_ctrl_c_during_the_trial_frees_what_was_loaded(
         def close(self) -> None:
             freed.append(self)
 
-    monkeypatch.setattr(scene_check, "open_runner", lambda *_: Hanging())
+    monkeypatch.setattr(scene_check, "named_runner", lambda *_: Hanging())
     scene_file.write_text(frequency_text(3))
     assert in_this_process("check", scene_file).returncode == 130
     assert freed
