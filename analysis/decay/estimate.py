@@ -1,10 +1,14 @@
-"""A number with its doubt."""
+"""A number with its doubt, and such numbers as a dataset."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+import xarray as xr
 from scipy.stats import t as student
+
+from vibroimpact.analysis.files.estimate_table import estimate_table
 
 CONFIDENCE = 0.95
 
@@ -38,3 +42,16 @@ class Estimate:
         """
         half = float(student.ppf(0.5 + CONFIDENCE / 2, self.degrees_of_freedom)) * self.standard_error
         return self.value - half, self.value + half
+
+
+def table_of(estimates: Mapping[str, Mapping[str, Estimate]]) -> xr.Dataset:
+    """Return estimates by method, then quantity, on these dimensions; see `estimate_table`."""
+    units: dict[str, str] = {}
+    for found in estimates.values():
+        for name, item in found.items():
+            units.setdefault(name, item.unit)
+    cells = {
+        method: {name: (item.value, item.standard_error, *item.interval) for name, item in found.items()}
+        for method, found in estimates.items()
+    }
+    return estimate_table(cells, units, CONFIDENCE)

@@ -11,13 +11,12 @@ import xarray as xr
 
 from vibroimpact.analysis.decay.backbone import Backbone, backbone
 from vibroimpact.analysis.decay.decrement import Decrement, logarithmic_decrement
-from vibroimpact.analysis.decay.estimate import Estimate
+from vibroimpact.analysis.decay.estimate import Estimate, table_of
 from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponential
 from vibroimpact.analysis.decay.law_choice import LawChoice, choose_law
 from vibroimpact.analysis.decay.law_fit import CUBIC, LawFit
 from vibroimpact.analysis.decay.laws import ALL_LAWS, COULOMB, QUADRATIC, VISCOUS, DampingLaw, spoken
 from vibroimpact.analysis.decay.samples import DecaySamples
-from vibroimpact.analysis.decay.tables import table_of
 from vibroimpact.fmus.errors import EstimationError
 
 T = TypeVar("T")

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.decay.estimate import Estimate
+from vibroimpact.analysis.decay.estimate import Estimate, table_of
 from vibroimpact.analysis.decay.frequency_response import FrequencyResponse
 from vibroimpact.analysis.decay.resonance import Resonance
-from vibroimpact.analysis.decay.tables import table_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Estimates as a dataset and as tables that people read."""
+"""Estimates as tables that people read."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
-from vibroimpact.analysis.decay.estimate import CONFIDENCE, Estimate
+from vibroimpact.analysis.decay.estimate import Estimate
 from vibroimpact.analysis.decay.laws import spoken
-from vibroimpact.analysis.files.estimate_table import estimate_table
 from vibroimpact.analysis.recording.units import unit_label
 
 if TYPE_CHECKING:
@@ -29,19 +27,6 @@ METHOD_WORDS = {
     "response": "frequency response",
     "half_power": "half-power bandwidth",
 }
-
-
-def table_of(estimates: Mapping[str, Mapping[str, Estimate]]) -> xr.Dataset:
-    """Return estimates by method, then quantity, on these dimensions; see `estimate_table`."""
-    units: dict[str, str] = {}
-    for found in estimates.values():
-        for name, item in found.items():
-            units.setdefault(name, item.unit)
-    cells = {
-        method: {name: (item.value, item.standard_error, *item.interval) for name, item in found.items()}
-        for method, found in estimates.items()
-    }
-    return estimate_table(cells, units, CONFIDENCE)
 
 
 def shown(value: float, error: float) -> tuple[str, str]:

@@ -5,15 +5,19 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from vibroimpact.orchestrator.fmi.instance import Instance
-
 Call = Callable[[], int]
+
+
+class Owner(Protocol):
+    """What variables belong to: an instance."""
+
+    def check(self, status: int, function: str) -> None:
+        """Raise where a call ended with worse than a warning."""
 
 
 class VariableGroup:
@@ -21,7 +25,7 @@ class VariableGroup:
 
     Attributes
     ----------
-    instance : Instance
+    instance : Owner
         The instance that they belong to.
     name : str
         FMI's name of their type, in the version of the instance.
@@ -40,7 +44,7 @@ class VariableGroup:
         pointer: ctypes.c_void_p,
         references: Sequence[int],
         values: NDArray[Any],
-        owner: Instance,
+        owner: Owner,
         *,
         with_value_count: bool,
     ) -> None:

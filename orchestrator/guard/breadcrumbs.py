@@ -185,7 +185,8 @@ def _call_in(frame: FrameType) -> tuple[Instance, str] | None:
     if isinstance(owner, Instance) and method in METHODS:
         return owner, METHODS[method]
     if isinstance(owner, VariableGroup) and method in ("get", "set"):
-        return owner.instance, method.capitalize() + owner.name
+        instance = owner.instance
+        return (instance, method.capitalize() + owner.name) if isinstance(instance, Instance) else None
     if isinstance(owner, CallList):
         found = owner.find(frame.f_locals.get("call"))
         return (found.instance, found.function) if found is not None else None

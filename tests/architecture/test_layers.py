@@ -1,5 +1,7 @@
+import ast
 import subprocess
 import sys
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -10,6 +12,31 @@ def test_each_layer_imports_only_those_below_it_and_each_heavy_dependency_has_on
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert result.returncode == 0, result.stdout + result.stderr
     assert " 0 broken" in result.stdout
+
+
+def test_no_module_imports_one_that_imports_it_not_even_for_its_types() -> None:
+    modules = {}
+    for package in ("fmus", "analysis", "orchestrator", "hardware"):
+        for path in (ROOT / package).rglob("*.py"):
+            name = ".".join(("vibroimpact", *path.relative_to(ROOT).with_suffix("").parts))
+            modules[name.removesuffix(".__init__")] = path
+    graph = {name: imported(path) & set(modules) - {name} for name, path in modules.items()}
+    assert sum(map(len, graph.values())) > 1000
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        raise AssertionError(" imports ".join(error.args[1])) from None
+
+
+def imported(path: Path) -> set[str]:
+    """Return the modules that a file imports, and what could be modules."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    return found
 
 
 def test_the_build_of_the_fmus_starts_without_a_single_installed_package() -> None:
