@@ -13,7 +13,7 @@ PYTHON := $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 endif
 BIN := $(VENV)/bin
 NATIVE := $(shell find fmus/native -name '*.c' -o -name '*.h' -o -name '*.toml' -o -name '*.md') \
-	$(wildcard fmus/description/*.py) fmus/build.py fmus/compiler.py
+	$(wildcard fmus/packaging/description/*.py) fmus/packaging/build.py fmus/packaging/compiler.py
 # tests side by side, four at most, as many start processes of their own; `make test PARALLEL=` runs them one by one
 PARALLEL ?= -n logical --maxprocesses 4 --dist worksteal
 SETUP := pyproject.toml hatch_build.py
@@ -91,5 +91,5 @@ $(VENV)/lint.stamp: $(SETUP) | $(BIN)/python
 
 # the installation builds the FMUs; only an edit of the C makes them again
 $(VENV)/fmus.stamp: $(NATIVE) | $(VENV)/demo.stamp
-	$(BIN)/python -m vibroimpact.fmus.build
+	$(BIN)/python -m vibroimpact.fmus.packaging.build
 	@touch $@

@@ -22,14 +22,14 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
     def dependencies(self) -> list[str]:
         """Ask for a compiler only where there is none."""
         self._make_importable()
-        from vibroimpact.fmus.compiler import has_compiler
+        from vibroimpact.fmus.packaging.compiler import has_compiler
 
         return [] if has_compiler() else [ZIG]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile the FMUs: into the wheel, or into the checkout for an editable install."""
         self._make_importable()
-        from vibroimpact.fmus.build import BUILT, build
+        from vibroimpact.fmus.packaging.build import BUILT, build
 
         # strict is for the project's own machines: a newer compiler's new warning must not stop a user
         if version == "editable":

@@ -52,7 +52,7 @@ def fmu_path(name: str, fmi: str = "3.0") -> Path:
     path = _package() / "built" / FOLDERS[fmi] / f"{component_name(name)}.fmu"
     if not path.is_file():
         raise ComponentFileError(
-            f"{path}: expected a built FMU, got none. Run `python -m vibroimpact.fmus.build`."
+            f"{path}: expected a built FMU, got none. Run `python -m vibroimpact.fmus.packaging.build`."
         )
     return path
 

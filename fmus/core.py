@@ -75,7 +75,7 @@ def core_library() -> ctypes.CDLL:
     except OSError as error:
         raise ComponentError(
             f"{path.name}: expected the built core library, got: {error}. "
-            "Run `python -m vibroimpact.fmus.build`."
+            "Run `python -m vibroimpact.fmus.packaging.build`."
         ) from error
     pair, number = ctypes.POINTER(ctypes.c_double), ctypes.c_double
     library.vi_door_flow.argtypes = [

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from oscillator_fmu import OscillatorFmu
 
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.archive import unpack
+from vibroimpact.fmus.packaging.archive import unpack
 
 
 @cache

@@ -12,10 +12,10 @@ import uuid
 from functools import cache
 from pathlib import Path
 
-from vibroimpact.fmus.build import fmi_headers
-from vibroimpact.fmus.compiler import compile_library
-from vibroimpact.fmus.fmu_zip import write_fmu
-from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.packaging.build import fmi_headers
+from vibroimpact.fmus.packaging.compiler import compile_library
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 
 SOURCES = Path(__file__).with_name("fmus")
 #: The C file of each model; those with a description of a version can be made in that version.

@@ -16,7 +16,7 @@ from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription, read_model_description
 
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.archive import unpack
+from vibroimpact.fmus.packaging.archive import unpack
 
 VERSIONS = ("3.0", "2.0")
 RESTITUTION, EXTERNAL = 1, 5

@@ -9,7 +9,7 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.replay_fmu import ReplaySignal
+from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal
 
 INTERVAL = 1.0 / 3000.0
 COUNT = 600

@@ -14,7 +14,7 @@ from vibroimpact.fmus.terminal import say
 
 if TYPE_CHECKING:
     from vibroimpact.analysis.recording import Channel, Recording
-    from vibroimpact.fmus.replay_fmu import ReplaySignal
+    from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal
 
 #: A time axis that calls itself even is played as such where no instant is off by more than this part of the interval.
 EVEN = 0.01
@@ -42,7 +42,7 @@ def replay(
     """
     from vibroimpact.analysis.dataset.outputs import refuse_outputs
     from vibroimpact.analysis.recording import open_signals
-    from vibroimpact.fmus.replay_fmu import build_replay
+    from vibroimpact.fmus.packaging.replay_fmu import build_replay
 
     refuse_outputs([recording], output, ending=".fmu")
     source = open_signals(recording, run)
@@ -74,7 +74,7 @@ def replay_signal(channel: Channel, *, si: bool = False) -> ReplaySignal:
     import numpy as np
 
     from vibroimpact.analysis.recording.units import measured_unit
-    from vibroimpact.fmus.replay_fmu import ReplaySignal
+    from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal
 
     unit = measured_unit(channel.unit)
     values, name = (channel.si(), unit.si) if si else (channel.values, unit.cf)

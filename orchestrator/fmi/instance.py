@@ -12,8 +12,8 @@ from typing import Any, ClassVar, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.archive import UnpackedFmu
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.fmus.packaging.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.library import Function, Library
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.fmi.rounding import is_usual, set_usual

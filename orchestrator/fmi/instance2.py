@@ -8,7 +8,7 @@ from collections.abc import Callable
 from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
 from pathlib import Path
 
-from vibroimpact.fmus.archive import UnpackedFmu
+from vibroimpact.fmus.packaging.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, WARNING, Instance, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
 from vibroimpact.orchestrator.fmi.rounding import HALF, ONE, SMALL, TINY

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from ctypes import c_bool, c_char_p, c_double, c_size_t, c_uint16, c_uint32, c_void_p
 from functools import partial
 
-from vibroimpact.fmus.archive import UnpackedFmu
+from vibroimpact.fmus.packaging.archive import UnpackedFmu
 from vibroimpact.orchestrator.fmi.instance import DISCARD, Instance, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail, callback
 from vibroimpact.orchestrator.fmi.rounding import HALF, ONE, SMALL, TINY

@@ -8,8 +8,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.fmus.archive import UnpackedFmu, binary_path
 from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.packaging.archive import UnpackedFmu, binary_path
 
 Function = Callable[..., Any]
 

@@ -9,9 +9,9 @@ from ctypes import c_void_p
 from functools import lru_cache
 from pathlib import Path
 
-from vibroimpact.fmus.archive import unpack
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
-from vibroimpact.fmus.fmpy_door import ModelDescription, ModelVariable, read_description
+from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, ModelVariable, read_description
 from vibroimpact.orchestrator.fmi.instance import DISCARD, Wrapper
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3

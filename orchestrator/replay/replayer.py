@@ -157,7 +157,7 @@ class Replayer:
 
     def _component(self, path: Path) -> tuple[list[ComponentSpec], list[ConnectionSpec]]:
         """Make the Replay FMU of the drive, on the simulation's own clock."""
-        from vibroimpact.fmus.replay_fmu import ReplaySignal, build_replay  # pythonfmu is an extra
+        from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay  # pythonfmu is an extra
 
         assert self.drive is not None
         assert self._values is not None

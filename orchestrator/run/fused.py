@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.archive import unpack
+from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.orchestrator.fmi.instance import DISCARD
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.variables import VariableGroup

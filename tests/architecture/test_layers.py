@@ -44,7 +44,7 @@ def test_the_build_of_the_fmus_starts_without_a_single_installed_package() -> No
     code = (
         "import sys, types; namespace = types.ModuleType('vibroimpact'); "
         f"namespace.__path__ = [{str(ROOT)!r}]; sys.modules['vibroimpact'] = namespace; "
-        "import vibroimpact.fmus.build, vibroimpact.fmus.compiler"
+        "import vibroimpact.fmus.packaging.build, vibroimpact.fmus.packaging.compiler"
     )
     result = subprocess.run([sys.executable, "-S", "-E", "-c", code], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr

@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 # Run as scripts of their own, before or without the command line.
-SCRIPTS = ("fmus/build.py", "fmus/load_check.py")
+SCRIPTS = ("fmus/packaging/build.py", "fmus/packaging/load_check.py")
 WRITES = re.compile(
     r"typer\.(?:echo|secho)\(|\bConsole\(|^\s*print\((?!printable\()|sys\.std(?:out|err)\.write", re.MULTILINE
 )

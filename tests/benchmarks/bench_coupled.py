@@ -35,7 +35,7 @@ from fmu_factory import bouncing_ball
 
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.archive import unpack
+from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.guard import make_runner
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy

@@ -29,9 +29,9 @@ from bench_structure import PERIOD, SETTLING, beam, restitution
 
 from vibroimpact.analysis.files.fingerprints import matches_recorded_hash
 from vibroimpact.fmus import core, structure
-from vibroimpact.fmus.build import NATIVE
-from vibroimpact.fmus.compiler import compile_library
 from vibroimpact.fmus.core import Oscillator, motion
+from vibroimpact.fmus.packaging.build import NATIVE
+from vibroimpact.fmus.packaging.compiler import compile_library
 from vibroimpact.fmus.structure import Structure
 from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.campaign.chunks import Work, get_ready, run_chunk

@@ -382,7 +382,7 @@ deadline = 1.0
 
 def test_a_law_in_python_that_never_answers_is_told_as_the_call_that_hangs(tmp_path: Path) -> None:
     pytest.importorskip("pythonfmu")
-    from vibroimpact.fmus.python_fmus import build_user_contact_law
+    from vibroimpact.fmus.packaging.python_fmus import build_user_contact_law
 
     before = living_children()
     (tmp_path / "law.py").write_text(HANGING_LAW, encoding="utf-8")

@@ -497,7 +497,7 @@ def test_a_law_in_python_gives_the_impacts_of_the_same_law_in_the_exact_flow(
     tmp_path: Path, version: str, macro_step: float, first: str
 ) -> None:
     pytest.importorskip("pythonfmu")
-    from vibroimpact.fmus.python_fmus import build_user_contact_law
+    from vibroimpact.fmus.packaging.python_fmus import build_user_contact_law
 
     (tmp_path / "law.py").write_text(LAW, encoding="utf-8")
     law: Callable[[float, float], float] = runpy.run_path(str(tmp_path / "law.py"))["contact_law"]

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from vibroimpact.fmus.build import NATIVE, fmi_headers
-from vibroimpact.fmus.compiler import LANGUAGE, WARNINGS, find_compiler
+from vibroimpact.fmus.packaging.build import NATIVE, fmi_headers
+from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, find_compiler
 
 HERE = Path(__file__).parent
 SANITIZERS = ("address", "undefined")

@@ -14,10 +14,10 @@ from unittest.mock import patch
 from command_line import in_this_process
 
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.archive import binary_path, unpack
 from vibroimpact.fmus.errors import ComponentFileError
-from vibroimpact.fmus.fmpy_door import read_description
-from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.packaging.archive import binary_path, unpack
+from vibroimpact.fmus.packaging.fmpy_door import read_description
+from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 
 SAMPLE = 80
 SECONDS = 20.0

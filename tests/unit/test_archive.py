@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from vibroimpact.fmus import archive
-from vibroimpact.fmus.archive import binary_path, platforms, unpack
 from vibroimpact.fmus.errors import ComponentFileError
-from vibroimpact.fmus.fmpy_door import read_description
-from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.packaging import archive
+from vibroimpact.fmus.packaging.archive import binary_path, platforms, unpack
+from vibroimpact.fmus.packaging.fmpy_door import read_description
+from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="{t}">
@@ -80,7 +80,7 @@ def test_a_cache_with_a_file_missing_is_repaired(tmp_path: Path) -> None:
 def test_many_processes_may_unpack_the_same_fmu_at_once(tmp_path: Path, cache: Path) -> None:
     path = written(tmp_path / "M.fmu", {BINARY: b"x" * 3_000_000})
     code = (
-        "import sys; from pathlib import Path; from vibroimpact.fmus.archive import *; "
+        "import sys; from pathlib import Path; from vibroimpact.fmus.packaging.archive import *; "
         "assert binary_path(unpack(Path(sys.argv[1]))).stat().st_size == 3_000_000"
     )
     running = [subprocess.Popen([sys.executable, "-c", code, str(path)]) for _ in range(6)]
@@ -101,7 +101,7 @@ def test_another_process_does_not_believe_the_cache_either(tmp_path: Path) -> No
     library.write_bytes(b"evil")
     os.utime(library, ns=(before.st_atime_ns, before.st_mtime_ns))
     code = (
-        "import sys; from pathlib import Path; from vibroimpact.fmus.archive import binary_path, unpack\n"
+        "import sys; from pathlib import Path; from vibroimpact.fmus.packaging.archive import binary_path, unpack\n"
         "assert binary_path(unpack(Path(sys.argv[1]))).read_bytes() == b'code'"
     )
     assert subprocess.run([sys.executable, "-c", code, str(fmu.source)]).returncode == 0

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from vibroimpact.fmus import build as building
 from vibroimpact.fmus import components
-from vibroimpact.fmus.build import CORE_LIBRARY, NATIVE, build, fingerprint, is_current, main
-from vibroimpact.fmus.compiler import compile_library, find_compiler
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.fmus.platform_names import library_suffix
+from vibroimpact.fmus.packaging import build as building
+from vibroimpact.fmus.packaging.build import CORE_LIBRARY, NATIVE, build, fingerprint, is_current, main
+from vibroimpact.fmus.packaging.compiler import compile_library, find_compiler
+from vibroimpact.fmus.packaging.platform_names import library_suffix
 
 
 @pytest.fixture

@@ -7,9 +7,10 @@ from xml.etree import ElementTree
 import pytest
 from fmpy.validation import validate_fmu
 
-from vibroimpact.fmus.build import NATIVE, fmi_headers, read_components, update_readmes
-from vibroimpact.fmus.compiler import find_compiler
-from vibroimpact.fmus.description import (
+from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.packaging.build import NATIVE, fmi_headers, read_components, update_readmes
+from vibroimpact.fmus.packaging.compiler import find_compiler
+from vibroimpact.fmus.packaging.description import (
     Component,
     c_header,
     fmi2_xml,
@@ -19,7 +20,6 @@ from vibroimpact.fmus.description import (
     readme_table,
     with_table,
 )
-from vibroimpact.fmus.errors import ComponentFileError
 
 SMALL = """
 [component]

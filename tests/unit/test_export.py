@@ -12,12 +12,12 @@ from oscillator_fmu import LOGGER2, VERSIONS
 from typer.testing import CliRunner
 
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.archive import UnpackedFmu, unpack
-from vibroimpact.fmus.check import check_fmu
 from vibroimpact.fmus.commands import commands
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.export import SIZES_MEMBER, export_fmu
-from vibroimpact.fmus.fmpy_door import read_description
+from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
+from vibroimpact.fmus.packaging.check import check_fmu
+from vibroimpact.fmus.packaging.export import SIZES_MEMBER, export_fmu
+from vibroimpact.fmus.packaging.fmpy_door import read_description
 
 BODIES = {"Beam": "modes", "Chain": "masses"}
 SIZES = [(1, 0), (3, 1), (64, 8)]

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from vibroimpact.fmus import component_name, components, fmu_path
-from vibroimpact.fmus.archive import unpack
-from vibroimpact.fmus.build import is_current
-from vibroimpact.fmus.check import check_fmu
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
-from vibroimpact.fmus.export import export_fmu
-from vibroimpact.fmus.fmpy_door import read_description, validate
-from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.build import is_current
+from vibroimpact.fmus.packaging.check import check_fmu
+from vibroimpact.fmus.packaging.export import export_fmu
+from vibroimpact.fmus.packaging.fmpy_door import read_description, validate
+from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 
 VERSIONS = ("2.0", "3.0")
 SUFFIX = library_suffix()
@@ -47,7 +47,7 @@ def test_every_fmu_of_the_package_passes(name: str, fmi: str) -> None:
 
 
 def test_the_built_fmus_belong_to_the_present_sources() -> None:
-    assert is_current(), "run `python -m vibroimpact.fmus.build`"
+    assert is_current(), "run `python -m vibroimpact.fmus.packaging.build`"
 
 
 def test_a_misspelt_capability_is_found_though_the_schema_lets_it_pass(tmp_path: Path) -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
-from vibroimpact.fmus.archive import unpack
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, SceneError
+from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.orchestrator.fmi import rounding
 from vibroimpact.orchestrator.guard import make_runner
 from vibroimpact.orchestrator.run import GeneralRunner

@@ -610,7 +610,7 @@ def test_a_component_that_is_not_built_says_how_to_build_it(
     (problem,) = problems_of('[component.a]\nfmu = "Oscillator"\n[record]\nrecorded_time = 1')
     assert problem == (
         "component.a.fmu: expected Oscillator built for FMI 3.0, got no FMU. "
-        "Run `python -m vibroimpact.fmus.build`."
+        "Run `python -m vibroimpact.fmus.packaging.build`."
     )
 
 

@@ -14,7 +14,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, fmi2Component
 from fmpy.fmi3 import FMU3Slave
 
-from vibroimpact.fmus.check import check_fmu
+from vibroimpact.fmus.packaging.check import check_fmu
 
 WRITERS = {
     "BouncingBall": fmu_factory.bouncing_ball,

@@ -15,7 +15,7 @@ from oscillator_fmu import EXTERNAL, LOWER, VERSIONS, OscillatorFmu, forced, sim
 from tolerance import ORBIT, PARTITION, ROUNDING
 
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.archive import binary_path, unpack
+from vibroimpact.fmus.packaging.archive import binary_path, unpack
 
 SCENE = {**forced(), **stop(1.0)}
 MODES = [("2.0", False, False)] + [

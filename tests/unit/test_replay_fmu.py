@@ -29,10 +29,10 @@ from replay_records import (
 from tolerance import ROUNDING
 
 from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording, TimeAxis, write_recording
-from vibroimpact.fmus.check import check_fmu
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.fmpy_door import read_description, validate
-from vibroimpact.fmus.replay_fmu import REPLAY, ReplaySignal, build_replay
+from vibroimpact.fmus.packaging.check import check_fmu
+from vibroimpact.fmus.packaging.fmpy_door import read_description, validate
+from vibroimpact.fmus.packaging.replay_fmu import REPLAY, ReplaySignal, build_replay
 from vibroimpact.orchestrator.commands.cli import main
 
 pytest.importorskip("pythonfmu")

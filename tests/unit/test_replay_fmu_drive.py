@@ -14,7 +14,7 @@ from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.core import Oscillator, flow
 from vibroimpact.fmus.errors import SceneError
-from vibroimpact.fmus.replay_fmu import build_replay
+from vibroimpact.fmus.packaging.replay_fmu import build_replay
 from vibroimpact.fmus.structure import Modes, Stop, Structure
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.importer.component import kind_of

@@ -22,10 +22,10 @@ from fmpy.fmi2 import (
     free,
 )
 
-from vibroimpact.fmus.check import check_fmu
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
-from vibroimpact.fmus.fmpy_door import read_description, validate
-from vibroimpact.fmus.python_fmus import USER_CONTACT_LAW, build_user_contact_law
+from vibroimpact.fmus.packaging.check import check_fmu
+from vibroimpact.fmus.packaging.fmpy_door import read_description, validate
+from vibroimpact.fmus.packaging.python_fmus import USER_CONTACT_LAW, build_user_contact_law
 
 pytest.importorskip("pythonfmu")
 

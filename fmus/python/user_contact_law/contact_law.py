@@ -1,6 +1,6 @@
 """A contact law of one's own: copy this file, change the function, make it an FMU.
 
-vibroimpact.fmus.python_fmus.build_user_contact_law("contact_law.py", "my_law.fmu")
+vibroimpact.fmus.packaging.python_fmus.build_user_contact_law("contact_law.py", "my_law.fmu")
 """
 
 

@@ -11,8 +11,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
-from vibroimpact.fmus.archive import content_hash
-from vibroimpact.fmus.fmpy_door import ModelDescription, read_description
+from vibroimpact.fmus.packaging.archive import content_hash
+from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, read_description
 from vibroimpact.orchestrator.scene.unit_check import BASE_UNITS, Unit, unit_of
 
 Kind = Literal["real", "integer", "enumeration", "boolean", "text", "binary", "clock"]

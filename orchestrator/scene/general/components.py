@@ -102,7 +102,7 @@ def _shipped_fmu(table: ComponentTable, path: tuple[str, ...], problems: list[Pr
     try:
         return fmu_path(table.fmu, fmi)
     except ComponentFileError:
-        hint = "Run `python -m vibroimpact.fmus.build`."
+        hint = "Run `python -m vibroimpact.fmus.packaging.build`."
         expected = f"{table.fmu} built for FMI {fmi}"
         problems.append(Problem(where, expected, "no FMU", hint))
         return None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element, SubElement
 
-from vibroimpact.fmus.description.model import Component, Enumeration, Variable
-from vibroimpact.fmus.description.xml_text import (
+from vibroimpact.fmus.packaging.description.model import Component, Enumeration, Variable
+from vibroimpact.fmus.packaging.description.xml_text import (
     add_log_categories_and_experiment,
     add_units,
     head_attributes,

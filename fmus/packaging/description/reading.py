@@ -14,7 +14,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.fmus.description.model import (
+from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.packaging.description.model import (
     DEFAULT_INITIAL,
     Component,
     Enumeration,
@@ -23,7 +24,6 @@ from vibroimpact.fmus.description.model import (
     Variable,
     plural,
 )
-from vibroimpact.fmus.errors import ComponentFileError
 
 #: Namespace of the tokens: a uuid5 of the bytes of variables.toml in it, so equal files have equal tokens.
 TOKEN_NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "vibroimpact")

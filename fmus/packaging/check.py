@@ -14,10 +14,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
-from vibroimpact.fmus.archive import INTERFACES, UnpackedFmu, binary_path, platforms, unpack
 from vibroimpact.fmus.errors import ComponentFileError
-from vibroimpact.fmus.fmpy_door import schema_folder, validate
-from vibroimpact.fmus.platform_names import SUFFIXES
+from vibroimpact.fmus.packaging.archive import INTERFACES, UnpackedFmu, binary_path, platforms, unpack
+from vibroimpact.fmus.packaging.fmpy_door import schema_folder, validate
+from vibroimpact.fmus.packaging.platform_names import SUFFIXES
 from vibroimpact.fmus.python_child import python_command
 from vibroimpact.fmus.safe_xml import root_of
 
@@ -99,7 +99,7 @@ def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
         "resources": str(fmu.resources),
         "any_token": _takes_any_token(fmu),
     }
-    command = python_command("-m", "vibroimpact.fmus.load_check", json.dumps(facts))
+    command = python_command("-m", "vibroimpact.fmus.packaging.load_check", json.dumps(facts))
     try:
         result = subprocess.run(command, capture_output=True, text=True, timeout=LOADING_LIMIT)
     except subprocess.TimeoutExpired:

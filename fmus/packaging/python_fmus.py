@@ -20,11 +20,11 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
-from vibroimpact.fmus.fmu_zip import write_fmu
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.python_child import python_command
 from vibroimpact.fmus.si_units import SiUnit
 
-SOURCES = Path(__file__).with_name("python")
+SOURCES = Path(__file__).parents[1] / "python"
 USER_CONTACT_LAW = SOURCES / "user_contact_law"
 #: What the user's file is called inside the FMU.
 LAW_FILE = "contact_law.py"

@@ -11,8 +11,8 @@ import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable, ValidationError, read_model_description
 from fmpy.validation import validate_fmu
 
-from vibroimpact.fmus.archive import unpack
 from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.packaging.archive import unpack
 
 __all__ = ["ModelDescription", "ModelVariable", "read_description", "schema_folder", "validate"]
 

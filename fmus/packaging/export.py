@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from vibroimpact.fmus import component_name, fmu_path
-from vibroimpact.fmus.build import read_components
-from vibroimpact.fmus.description import Component, fmi2_xml, fmi3_xml, plural
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.fmu_zip import write_fmu
+from vibroimpact.fmus.packaging.build import read_components
+from vibroimpact.fmus.packaging.description import Component, fmi2_xml, fmi3_xml, plural
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 
 #: The member that says how many of each repeated block the description has: lines such as `modes 8`.
 SIZES_MEMBER = "resources/sizes.txt"

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from vibroimpact.fmus.description.model import Component, Number, Unit, Variable
+from vibroimpact.fmus.packaging.description.model import Component, Number, Unit, Variable
 
 LOG_CATEGORIES = {
     "logStatusError": "Why a call failed",

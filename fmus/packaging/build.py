@@ -1,4 +1,4 @@
-"""Builds every component into FMUs for this machine: `python -m vibroimpact.fmus.build`.
+"""Builds every component into FMUs for this machine: `python -m vibroimpact.fmus.packaging.build`.
 
 Each folder of `native/` with a `variables.toml` is a component. Its library holds the shared core, both FMI
 adapters and its own C files; FMI's headers come from the FMPy package. Imports the standard library only
@@ -17,8 +17,9 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from vibroimpact.fmus.compiler import LANGUAGE, WARNINGS, compile_library
-from vibroimpact.fmus.description import (
+from vibroimpact.fmus.errors import ComponentError, VibroimpactError
+from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, compile_library
+from vibroimpact.fmus.packaging.description import (
     Component,
     c_header,
     fmi2_xml,
@@ -27,13 +28,13 @@ from vibroimpact.fmus.description import (
     read_component,
     with_table,
 )
-from vibroimpact.fmus.errors import ComponentError, VibroimpactError
-from vibroimpact.fmus.fmu_zip import write_fmu
-from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 
 HERE = Path(__file__).resolve().parent
-NATIVE = HERE / "native"
-BUILT = HERE / "built"
+PACKAGE = HERE.parent
+NATIVE = PACKAGE / "native"
+BUILT = PACKAGE / "built"
 VERSIONS = {"fmi3": "3.0", "fmi2": "2.0"}
 CORE_LIBRARY = "libvibroimpact_core"
 #: In arrays of one element gcc warns of loops over the others, though they never run.
@@ -183,7 +184,7 @@ def _readme(component: Component) -> Path:
 
 def _licence() -> bytes:
     # beside the sources in a checkout, inside the package when installed
-    places = (HERE.parent / "LICENSE", HERE / "LICENSE")
+    places = (PACKAGE.parent / "LICENSE", PACKAGE / "LICENSE")
     return next(path for path in places if path.is_file()).read_bytes()
 
 
@@ -200,7 +201,7 @@ def _replace(source: Path, target: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Build from the command line; return the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m vibroimpact.fmus.build", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m vibroimpact.fmus.packaging.build", description=__doc__)
     parser.add_argument("--output", type=Path, default=BUILT, help="folder to fill (default: %(default)s)")
     parser.add_argument(
         "--check", action="store_true", help="build nothing; exit 1 if something is out of date"
@@ -218,7 +219,7 @@ def _check(output: Path) -> int:
     if not is_current(output):
         stale.append(str(output))
     for path in stale:
-        print(f"{path}: out of date. Run `python -m vibroimpact.fmus.build`.", file=sys.stderr)
+        print(f"{path}: out of date. Run `python -m vibroimpact.fmus.packaging.build`.", file=sys.stderr)
     return 1 if stale else 0
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from vibroimpact.fmus.description.model import Component, Variable
-from vibroimpact.fmus.description.xml_text import literal
 from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.packaging.description.model import Component, Variable
+from vibroimpact.fmus.packaging.description.xml_text import literal
 
 BEGIN = "<!-- variables: generated from variables.toml -->"
 END = "<!-- end of variables -->"

@@ -4,10 +4,10 @@ Both modelDescription.xml files, the C header with the value references, and the
 README come from the same file. Imports the standard library only: the package's own build uses it.
 """
 
-from vibroimpact.fmus.description.c_header import c_header, header_name
-from vibroimpact.fmus.description.fmi2_xml import fmi2_xml
-from vibroimpact.fmus.description.fmi3_xml import fmi3_xml
-from vibroimpact.fmus.description.model import (
+from vibroimpact.fmus.packaging.description.c_header import c_header, header_name
+from vibroimpact.fmus.packaging.description.fmi2_xml import fmi2_xml
+from vibroimpact.fmus.packaging.description.fmi3_xml import fmi3_xml
+from vibroimpact.fmus.packaging.description.model import (
     Component,
     Enumeration,
     EnumerationItem,
@@ -15,8 +15,8 @@ from vibroimpact.fmus.description.model import (
     Variable,
     plural,
 )
-from vibroimpact.fmus.description.reading import read_component
-from vibroimpact.fmus.description.readme_table import readme_table, with_table
+from vibroimpact.fmus.packaging.description.reading import read_component
+from vibroimpact.fmus.packaging.description.readme_table import readme_table, with_table
 
 __all__ = [
     "Component",

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibroimpact.fmus.errors import ComponentError, UsageError
-from vibroimpact.fmus.python_fmus import SOURCES, PythonFmu, make_fmu, require_pythonfmu
+from vibroimpact.fmus.packaging.python_fmus import SOURCES, PythonFmu, make_fmu, require_pythonfmu
 from vibroimpact.fmus.si_units import SiUnit, si_unit
 
 REPLAY = SOURCES / "replay"

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.fmus.platform_names import library_suffix, system
+from vibroimpact.fmus.packaging.platform_names import library_suffix, system
 from vibroimpact.fmus.python_child import python_command
 
 #: Chosen by the user; if it does not work that is an error, not a reason to take another.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vibroimpact.fmus.description.model import Component, Variable
+from vibroimpact.fmus.packaging.description.model import Component, Variable
 
 C_TYPES = {"Float64": "VI_FLOAT64", "Int64": "VI_INT64", "Boolean": "VI_BOOLEAN", "Enumeration": "VI_INT64"}
 

@@ -24,7 +24,7 @@ from pathlib import Path, PurePosixPath
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.file_state import FileState, file_state, is_settled
-from vibroimpact.fmus.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
 from vibroimpact.fmus.private_folder import (
     CACHE_VARIABLE,
     UnsafeFolderError,

@@ -1,6 +1,6 @@
 """Loads the binary of an FMU and reports what is wrong with it.
 
-Run as `python -m vibroimpact.fmus.load_check FACTS`, in a process of its own, since the code of a broken FMU
+Run as `python -m vibroimpact.fmus.packaging.load_check FACTS`, in a process of its own, since the code of a broken FMU
 may do anything. FACTS is a JSON object; the last line printed is a JSON list of problems.
 """
 
@@ -15,7 +15,7 @@ from ctypes import CDLL, CFUNCTYPE, POINTER, Structure, c_bool, c_char_p, c_int,
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.fmus.build import fmi_headers
+from vibroimpact.fmus.packaging.build import fmi_headers
 
 EXPORTED = {"2": r"FMI2_Export\s+fmi2\w+TYPE\s+(fmi2\w+);", "3": r"FMI3_Export\s+fmi3\w+TYPE\s+(fmi3\w+);"}
 #: FMI 3.0 wants all functions in every FMU, FMI 2.0 only those of the interfaces that it has.
