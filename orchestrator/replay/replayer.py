@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.importer.specification import ComponentSpec, Conne
 from vibroimpact.orchestrator.replay.covariance import drawn_noise, quiet_noise
 from vibroimpact.orchestrator.replay.drive import DriveSignal, drive_of, step_instants
 from vibroimpact.orchestrator.run import Session
-from vibroimpact.orchestrator.run.parameters.beam import AMPLITUDE_KEYS
+from vibroimpact.orchestrator.run.parameters import AMPLITUDE_KEYS
 from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.replay_models import Compared, Replay

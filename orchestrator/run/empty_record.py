@@ -13,7 +13,7 @@ from vibroimpact.analysis.dataset import (
     Outcome,
     RunRecord,
 )
-from vibroimpact.orchestrator.run.parameters.body import state_variables
+from vibroimpact.orchestrator.run.parameters import state_variables
 from vibroimpact.orchestrator.scene import Scene
 
 

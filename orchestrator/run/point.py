@@ -19,7 +19,7 @@ from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.run.coupled import CoupledDriver
 from vibroimpact.orchestrator.run.fused import BodyDriver
-from vibroimpact.orchestrator.run.parameters.body import (
+from vibroimpact.orchestrator.run.parameters import (
     FMU_NAMES,
     float_parameters,
     integer_parameters,
@@ -81,7 +81,7 @@ class PointRunner:
         values : mapping of str to float
             Values of the swept keys.
         start : tuple of float or None
-            State carried over at forcing phase 0, see `parameters.body.float_parameters`; None for the
+            State carried over at forcing phase 0, see `parameters.float_parameters`; None for the
             scene's start state.
 
         Raises

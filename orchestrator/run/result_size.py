@@ -5,7 +5,7 @@ from __future__ import annotations
 from vibroimpact.analysis.dataset import PERIOD_COLUMNS
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.empty_record import sample_variables
-from vibroimpact.orchestrator.run.parameters.body import state_variables
+from vibroimpact.orchestrator.run.parameters import state_variables
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import run_count
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.run.coupled import CoupledDriver
-from vibroimpact.orchestrator.run.parameters.body import (
+from vibroimpact.orchestrator.run.parameters import (
     FMU_NAMES,
     float_parameters,
     integer_parameters,
@@ -112,7 +112,7 @@ class Session:
         values : mapping of str to float, optional
             Values of keys of the scene, such as `body.damping_ratio`, from now on.
         start : tuple of float, optional
-            State to start from, see `parameters.body.float_parameters`.
+            State to start from, see `parameters.float_parameters`.
 
         Raises
         ------
@@ -200,7 +200,7 @@ class Session:
         return self._driver.observed()
 
     def whole_state(self) -> Floats | None:
-        """Return the whole state of a chain or beam, see `parameters.body.state_variables`."""
+        """Return the whole state of a chain or beam, see `parameters.state_variables`."""
         return self._driver.whole_state()
 
     def close(self) -> None:

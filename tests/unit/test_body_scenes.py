@@ -11,7 +11,7 @@ from vibroimpact.fmus.modes import beam_modes
 from vibroimpact.orchestrator.campaign.chunks import carried_attributes, carried_state
 from vibroimpact.orchestrator.run import dataset_of_runs
 from vibroimpact.orchestrator.run.empty_record import empty_record
-from vibroimpact.orchestrator.run.parameters.body import float_parameters, integer_parameters, state_variables
+from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.models import BeamBody, ChainBody, KelvinVoigtStop
 

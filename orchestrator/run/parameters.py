@@ -1,0 +1,275 @@
+"""From a scene to its body's FMU: which one, its parameters, and the state that a continuation carries."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, cast
+
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.models import (
+    BeamBody,
+    ChainBody,
+    Forcing,
+    OscillatorBody,
+    RestitutionStop,
+    Stop,
+)
+from vibroimpact.orchestrator.scene.places import (
+    forcing_location,
+    observed_location,
+    observed_mass,
+    stop_location,
+    stop_mass,
+)
+
+if TYPE_CHECKING:
+    from vibroimpact.fmus.modes import Boundary
+
+FMU_NAMES = {"oscillator": "Oscillator", "chain": "Chain", "beam": "Beam"}
+LAW_NUMBERS = {"none": 0, "restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossley": 4}
+SIDE_NUMBERS = {"upper": 1, "lower": 2}
+#: Parameters of contact laws; each has some of them.
+_OF_A_LAW = (
+    "restitution",
+    "yield_velocity",
+    "stiffness",
+    "damping",
+    "exponent",
+    "relaxation_time",
+)
+BOUNDARY_NUMBERS = {"clamped-free": 1, "clamped-clamped": 2, "clamped-pinned": 3, "pinned-pinned": 4}
+FORCING_NUMBERS = {"force": 1, "uniform": 2, "mode": 3, "base_acceleration": 4}
+PROJECTION_NUMBERS = {"variational": 1, "collocation": 2}
+AMPLITUDE_KEYS = ("frequency_slope", "damping_slope", "damping_reciprocal")
+_GIVEN = (
+    *("width", "thickness", "youngs_modulus", "density"),
+    *("flexural_rigidity", "mass_per_length"),
+)
+
+
+def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str, float]:
+    """Return the real parameters of the body's FMU, by variable name, SI.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene of the short form.
+    start : tuple of float or None
+        State carried over from the run before, at forcing phase 0: of an oscillator displacement (m) and
+        velocity (m/s), else the values of `state_variables`. What lies beyond a rigid stop (the stop moved)
+        is put on it, at rest. None: the scene's own start.
+    """
+    parameters = _own_floats(scene) | contact_floats(scene)
+    if scene.forcing is not None:
+        parameters["forcing.angular_frequency"] = scene.forcing.angular_frequency
+        parameters["forcing.phase"] = scene.forcing.phase
+    if scene.execution.contact_tolerance is not None:
+        parameters["contact_tolerance"] = scene.execution.contact_tolerance
+    if start is not None:
+        parameters |= _carried(scene, start)
+        if scene.period is not None:
+            parameters["forcing.phase"] = 0.0
+    return parameters
+
+
+def _own_floats(scene: Scene) -> dict[str, float]:
+    body = scene.body
+    if isinstance(body, OscillatorBody):
+        return oscillator_floats(body, scene)
+    return chain_floats(body, scene) if isinstance(body, ChainBody) else beam_floats(body, scene)
+
+
+def _carried(scene: Scene, start: tuple[float, ...]) -> dict[str, float]:
+    if isinstance(scene.body, OscillatorBody):
+        return oscillator_start(scene, start)
+    # what finds the shapes of a beam takes time to load, and only a continuation of structures needs it
+    from vibroimpact.orchestrator.run.carried_state import on_free_side
+
+    names = _start_variables(scene)
+    return dict(zip(names, on_free_side(scene, scene.body, start), strict=True))
+
+
+def integer_parameters(scene: Scene) -> dict[str, int]:
+    """Return the integer and enumeration parameters of the body's FMU."""
+    parameters = {"impact_limit": scene.execution.impact_limit}
+    if isinstance(scene.body, ChainBody):
+        parameters |= chain_integers(scene.body, scene)
+    elif isinstance(scene.body, BeamBody):
+        parameters |= beam_integers(scene.body, scene)
+    return parameters | contact_integers(scene)
+
+
+def state_variables(scene: Scene) -> tuple[str, ...]:
+    """Return the outputs that are the whole state of a structure: displacements, then velocities.
+
+    Of a chain those of its masses, of a beam those of its modes. Empty for an oscillator, whose state is that
+    of the observed point, and for a general scene.
+    """
+    body = scene.body_given
+    if body is None or isinstance(body, OscillatorBody):
+        return ()
+    kind = "" if isinstance(body, ChainBody) else "modal_"
+    numbers = range(1, body.size + 1)
+    return tuple(f"{kind}{name}[{i}]" for name in ("displacement", "velocity") for i in numbers)
+
+
+def _start_variables(scene: Scene) -> tuple[str, ...]:
+    return tuple(name.replace("[", "_start[") for name in state_variables(scene))
+
+
+def contact_floats(scene: Scene) -> dict[str, float]:
+    """Return the real parameters of all contact ports, by variable name, SI."""
+    parameters: dict[str, float] = {}
+    for k, stop in enumerate(scene.stops, start=1):
+        port = f"contact[{k}]"
+        parameters[f"{port}.position"] = stop.position
+        parameters |= {f"{port}.{name}": value for name, value in _law_floats(stop).items()}
+        if isinstance(scene.body, BeamBody):
+            parameters[f"{port}.location"] = stop_location(stop)
+    return parameters
+
+
+def _law_floats(stop: Stop) -> dict[str, float]:
+    """Return the numbers of the law of a stop."""
+    return {name: getattr(stop, name) for name in _OF_A_LAW if hasattr(stop, name)}
+
+
+def contact_integers(scene: Scene) -> dict[str, int]:
+    """Return the integer and enumeration parameters of all contact ports."""
+    parameters: dict[str, int] = {}
+    for k, stop in enumerate(scene.stops, start=1):
+        port = f"contact[{k}]"
+        parameters[f"{port}.law"] = LAW_NUMBERS[stop.law]
+        parameters[f"{port}.side"] = SIDE_NUMBERS[stop.side]
+        if isinstance(scene.body, ChainBody):
+            parameters[f"{port}.mass_number"] = stop_mass(scene.body, stop)
+    return parameters
+
+
+def oscillator_floats(body: OscillatorBody, scene: Scene) -> dict[str, float]:
+    """Return the real parameters of the Oscillator, by variable name, SI."""
+    parameters = {
+        "mass": body.mass,
+        "damping": body.damping,
+        "stiffness": body.stiffness,
+        "displacement_start": body.displacement_start,
+        "velocity_start": body.velocity_start,
+    }
+    for key in ("frequency_slope", "damping_slope", "damping_reciprocal"):
+        if key in body.model_fields_set:
+            parameters[f"amplitude.{key}"] = getattr(body, key)
+    if scene.forcing is not None:
+        # a base that accelerates is an inertial force on the relative coordinate
+        scale = 1.0 if scene.forcing.kind == "force" else -body.mass
+        parameters["forcing.amplitude"] = scale * scene.forcing.scalar_amplitude
+    return parameters
+
+
+def oscillator_start(scene: Scene, state: tuple[float, ...]) -> dict[str, float]:
+    """Return the start state that continues from a displacement (m) and a velocity (m/s).
+
+    A displacement beyond a rigid stop (the stop moved) is put on it, at rest; a compliant one is pressed in.
+    """
+    displacement, velocity = state
+    for stop in scene.stops:
+        sign = 1.0 if stop.side == "upper" else -1.0
+        if isinstance(stop, RestitutionStop) and sign * (displacement - stop.position) > 0.0:
+            displacement, velocity = stop.position, 0.0
+    return {"displacement_start": displacement, "velocity_start": velocity}
+
+
+def numbered(name: str, values: Sequence[float]) -> dict[str, float]:
+    """Return values by the variable names `name[1]`, `name[2]`, ...
+
+    >>> numbered("mass", (1.0, 2.0))
+    {'mass[1]': 1.0, 'mass[2]': 2.0}
+    """
+    return {f"{name}[{number}]": value for number, value in enumerate(values, start=1)}
+
+
+def each(values: float | tuple[float, ...], count: int) -> tuple[float, ...]:
+    """Return one number for each of `count`: as given, one for all, or 0 for those at the end left out.
+
+    >>> each(2.0, 3), each((1.0,), 3)
+    ((2.0, 2.0, 2.0), (1.0, 0.0, 0.0))
+    """
+    if not isinstance(values, tuple):
+        return (values,) * count
+    return values + (0.0,) * (count - len(values))
+
+
+def chain_floats(body: ChainBody, scene: Scene) -> dict[str, float]:
+    """Return the real parameters of the Chain, by variable name, SI."""
+    parameters = {"far_stiffness": body.far_stiffness, "far_damping": body.far_damping}
+    parameters |= numbered("mass", body.masses)
+    parameters |= numbered("stiffness", each(body.stiffnesses, body.size))
+    parameters |= numbered("damping", each(body.dampings, body.size))
+    parameters |= numbered("displacement_start", each(body.displacement_start, body.size))
+    parameters |= numbered("velocity_start", each(body.velocity_start, body.size))
+    if scene.forcing is not None:
+        parameters |= numbered("forcing.amplitude", _amplitudes(body, scene.forcing))
+    return parameters
+
+
+def _amplitudes(body: ChainBody, forcing: Forcing) -> tuple[float, ...]:
+    """Return the amplitude of the force on each mass, N."""
+    if forcing.kind == "base_acceleration":
+        # a base that accelerates is an inertial force on each relative coordinate
+        return tuple(-mass * forcing.scalar_amplitude for mass in body.masses)
+    return each(forcing.amplitude, body.size)
+
+
+def chain_integers(body: ChainBody, scene: Scene) -> dict[str, int]:
+    """Return the integer parameters of the Chain."""
+    return {"masses": body.size, "observed_mass": observed_mass(body, scene.stops)}
+
+
+def beam_floats(body: BeamBody, scene: Scene) -> dict[str, float]:
+    """Return the real parameters of the Beam, by variable name, SI."""
+    parameters = {"length": body.length, "poisson_ratio": body.poisson_ratio}
+    parameters |= {name: getattr(body, name) for name in _GIVEN if getattr(body, name) is not None}
+    if body.frequency is not None:
+        parameters["flexural_rigidity"] = rigidity_of_frequency(body)
+    parameters |= numbered("damping_ratio", each(body.damping_ratio, body.size))
+    for key in AMPLITUDE_KEYS:
+        if key in body.model_fields_set:  # an effect that the scene does not name is not even told to the FMU
+            parameters |= numbered(f"amplitude.{key}", each(getattr(body, key), body.size))
+    if body.rayleigh is not None:
+        parameters["rayleigh.mass"] = body.rayleigh.mass
+        parameters["rayleigh.stiffness"] = body.rayleigh.stiffness
+    parameters |= numbered("modal_displacement_start", each(body.displacement_start, body.size))
+    parameters |= numbered("modal_velocity_start", each(body.velocity_start, body.size))
+    parameters["sensor_location"] = observed_location(body, scene.stops, scene.sensor)
+    parameters["forcing_location"] = forcing_location(body, scene.forcing)
+    if scene.forcing is not None:
+        parameters["forcing.amplitude"] = scene.forcing.scalar_amplitude
+    return parameters
+
+
+def rigidity_of_frequency(body: BeamBody) -> float:
+    """Return the flexural rigidity, N m^2, that gives a beam its first natural frequency (thesis eq. 7.16).
+
+    w_1 = (xi_1 / length)^2 sqrt(rigidity / mass_per_length), xi_1 the first eigenvalue of its boundary.
+    """
+    from vibroimpact.fmus.modes import beam_modes  # loads numpy and the core; few scenes need it
+
+    assert body.frequency is not None
+    assert body.mass_per_length is not None
+    eigenvalue = float(beam_modes(cast("Boundary", body.boundary.replace("-", "_")), 1).eigenvalues[0])
+    angular = 2.0 * math.pi * body.frequency
+    return body.mass_per_length * (angular * (body.length / eigenvalue) ** 2) ** 2
+
+
+def beam_integers(body: BeamBody, scene: Scene) -> dict[str, int]:
+    """Return the integer and enumeration parameters of the Beam."""
+    parameters = {
+        "modes": body.modes,
+        "boundary": BOUNDARY_NUMBERS[body.boundary],
+        "impact_projection": PROJECTION_NUMBERS[body.impact_projection],
+    }
+    if scene.forcing is not None:
+        parameters["forcing.kind"] = FORCING_NUMBERS[scene.forcing.kind]
+        if scene.forcing.mode is not None:
+            parameters["forcing.mode"] = scene.forcing.mode
+    return parameters

@@ -1,1 +1,0 @@
-"""From a scene to the parameters of the FMU of its body."""
