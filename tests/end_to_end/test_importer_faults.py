@@ -117,7 +117,7 @@ def living_children() -> list[psutil.Process]:
     return [
         p
         for p in psutil.Process().children()
-        if p.status() != psutil.STATUS_ZOMBIE and "guard_supervisor" in words(p)
+        if p.status() != psutil.STATUS_ZOMBIE and "vibroimpact.orchestrator.guard.supervisor" in words(p)
     ]
 
 

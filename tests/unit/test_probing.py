@@ -180,7 +180,8 @@ def test_a_killed_program_leaves_no_process_that_reads(tmp_path: Path, reader: C
     path = tmp_path / "file.nc"
     path.write_bytes(b"a damaged file")
     code = (
-        "import sys; from pathlib import Path; from vibroimpact.analysis import open_dataset, probing\n"
+        "import sys; from pathlib import Path; from vibroimpact.analysis import open_dataset\n"
+        "from vibroimpact.analysis.files import probing\n"
         "probing._CHILD = Path(sys.argv[1]); open_dataset(sys.argv[2])"
     )
     program = subprocess.Popen([sys.executable, "-c", code, str(probing._CHILD), str(path)])
