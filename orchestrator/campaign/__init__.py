@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.campaign.campaign import CampaignInterrupted, CampaignReport, run_campaign
-from vibroimpact.orchestrator.campaign.check import SceneCost, cost_of
-from vibroimpact.orchestrator.campaign.single_run import run_scene
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.campaign.campaign import CampaignInterrupted, CampaignReport, run_campaign
+    from vibroimpact.orchestrator.campaign.check import SceneCost, cost_of
+    from vibroimpact.orchestrator.campaign.single_run import run_scene
 
 __all__ = [
     "CampaignInterrupted",
@@ -14,3 +18,11 @@ __all__ = [
     "run_campaign",
     "run_scene",
 ]
+_HOMES = {"run_scene": "single_run", "cost_of": "check", "SceneCost": "check"}
+
+
+def __getattr__(name: str) -> Any:
+    # Dask takes a tenth of a second to load, and a run without workers does not need it.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES.get(name, 'campaign')}"), name)

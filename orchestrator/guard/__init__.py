@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.guard.guarded import GuardedRunner, make_runner
+import importlib
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "GuardedRunner",
-    "make_runner",
-]
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.guard.guarded import GuardedRunner, make_runner
+
+__all__ = ["GuardedRunner", "make_runner"]
+
+
+def __getattr__(name: str) -> Any:
+    # The supervisor comes through this door, and forks: nothing that may start a thread is loaded before.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.guarded"), name)

@@ -4,6 +4,8 @@ import sys
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -48,3 +50,18 @@ def test_the_build_of_the_fmus_starts_without_a_single_installed_package() -> No
     )
     result = subprocess.run([sys.executable, "-S", "-E", "-c", code], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
+
+
+@pytest.mark.parametrize(
+    ("module", "not_loaded"),
+    [
+        # a fork of a process with threads may hang: the supervisor of guarded points forks
+        ("vibroimpact.orchestrator.guard.supervisor", ("numpy", "pydantic", "vibroimpact.analysis")),
+        # a tenth of a second that a run without workers does not need
+        ("vibroimpact.orchestrator.campaign.single_run", ("dask", "distributed")),
+    ],
+)
+def test_what_starts_light_loads_nothing_heavy(module: str, not_loaded: tuple[str, ...]) -> None:
+    code = f"import sys, {module}; print([name for name in {not_loaded!r} if name in sys.modules])"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == "[]\n"

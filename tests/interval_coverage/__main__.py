@@ -6,6 +6,7 @@ import json
 import multiprocessing
 import os
 import sys
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
@@ -13,42 +14,55 @@ from rich.console import Console
 from soak._journal import ROOT, state_of_the_code
 
 from interval_coverage._asked import asked
-from interval_coverage._table import Line, shares, table_of
+from interval_coverage._table import Line, again, shares, table_of, thin
 
 SEED, RECORDS = 7, 300
+DRAWS = 7
+"""Further draws of the noise of records whose cell of the table has few intervals."""
+Place = tuple[int, int]
+"""Case, and draw of its noise."""
 
 
 def main() -> int:
-    """Ask all records that the journal does not hold, and print the table."""
+    """Ask all that the journal does not hold, further noises where a cell has few intervals, and print the table."""
     seed, count = int(os.environ.get("SEED") or SEED), int(os.environ.get("RECORDS") or RECORDS)
     console = Console(width=110)
     path = ROOT / "results" / "coverage" / f"seed-{seed}-{state_of_the_code()}.jsonl"
     path.parent.mkdir(parents=True, exist_ok=True)
-    lines = {case: line for case, line in read(path).items() if case < count}
+    lines = {place: line for place, line in read(path).items() if place[0] < count}
     console.print(f"seed {seed}, {count} records, journal {path.relative_to(ROOT)} ({len(lines)} there)")
-    waiting = [case for case in range(count) if case not in lines]
     with multiprocessing.get_context("spawn").Pool(os.cpu_count()) as pool, path.open("a") as journal:
-        for line in pool.imap_unordered(partial(asked, seed=seed), waiting):
-            print(json.dumps(line), file=journal, flush=True)
-            lines[line["case"]] = line
-            if len(lines) % 10 == 0:
-                console.print(f"{len(lines)} of {count}")
-    found = shares(list(lines.values()))
+
+        def ask(places: Iterable[Place]) -> None:
+            waiting = [place for place in places if place not in lines]
+            for line in pool.imap_unordered(partial(asked, seed=seed), waiting):
+                print(json.dumps(line), file=journal, flush=True)
+                lines[line["case"], line["draw"]] = line
+                if len(lines) % 10 == 0:
+                    console.print(f"{len(lines)} answers, {count} records")
+
+        ask((case, 0) for case in range(count))
+        cases = sorted(
+            {case for found in thin(lines.values()).values() for case in found if count >= RECORDS}
+        )
+        ask((case, draw) for case in cases for draw in range(1, DRAWS + 1))
+    first = [line for line in lines.values() if not line["draw"]]
+    found = [*shares(first), *(again(list(lines.values()), DRAWS) if count >= RECORDS else [])]
     console.print(table_of(found))
     missed = [one.what for one in found if one.missed]
     console.print(f"{len(missed)} targets missed")
     return int(bool(missed))
 
 
-def read(path: Path) -> dict[int, Line]:
-    """Return the whole lines of a journal by case; one that was cut off is asked again."""
+def read(path: Path) -> dict[Place, Line]:
+    """Return the whole lines of a journal by case and draw; one that was cut off is asked again."""
     if not path.exists():
         return {}
     text = path.read_text(encoding="utf-8")
     whole = text[: text.rfind("\n") + 1]
     if whole != text:
         path.write_text(whole, encoding="utf-8")
-    return {line["case"]: line for line in map(json.loads, whole.splitlines())}
+    return {(line["case"], line["draw"]): line for line in map(json.loads, whole.splitlines())}
 
 
 if __name__ == "__main__":

@@ -28,14 +28,16 @@ def estimates_of(one: Record) -> ImpactEstimates:
     return estimate_impacts(channel, Forcing(one.truth["angular_frequency"]), known, methods=METHODS)
 
 
-def asked(case: int, seed: int) -> dict[str, Any]:
-    """Return the line of the journal for a case.
+def asked(place: tuple[int, int], seed: int) -> dict[str, Any]:
+    """Return the line of the journal for a case and a draw of its noise.
 
     `sure` holds, for each method without a doubt, [value, standard error, low, high, truth] by quantity.
     """
-    one, begin = record(case, seed), time.process_time()
+    case, draw = place
+    one, begin = record(case, seed, draw), time.process_time()
     line: dict[str, Any] = {
         "case": case,
+        "draw": draw,
         "spoil": one.spoil,
         "known": one.known,
         "noise": one.noise,

@@ -52,17 +52,18 @@ class Record:
     flight_samples: float
 
 
-def record(case: int, seed: int) -> Record:
-    """Return one record; the same for the same case and seed."""
+def record(case: int, seed: int, draw: int = 0) -> Record:
+    """Return one record; the same for the same case and seed, and of one motion for all draws of its noise."""
     rng = np.random.default_rng([seed, case])
     spoil = SPOILS[(case // SPOILED_EVERY) % len(SPOILS)] if case % SPOILED_EVERY == SPOILED_EVERY - 1 else ""
     while True:
-        found = _drawn(rng, KNOWN[(case + case // SPOILED_EVERY) % len(KNOWN)], spoil)
+        noise = np.random.default_rng([seed, case, draw]) if draw else rng
+        found = _drawn(rng, KNOWN[(case + case // SPOILED_EVERY) % len(KNOWN)], spoil, noise)
         if found is not None:
             return found
 
 
-def _drawn(rng: np.random.Generator, known: str, spoil: str) -> Record | None:
+def _drawn(rng: np.random.Generator, known: str, spoil: str, noises: np.random.Generator) -> Record | None:
     """Return a record, None where the motion hardly hits the stop."""
     natural, deflection = _log(rng, 10.0, 1000.0), _log(rng, 0.1, 10.0)
     ratio, damping = _log(rng, 0.7, 4.0), _log(rng, 0.02, 0.15)
@@ -80,7 +81,7 @@ def _drawn(rng: np.random.Generator, known: str, spoil: str) -> Record | None:
     sign, offset = rng.choice([-1.0, 1.0]), rng.uniform(-2.0, 2.0) * deflection
     noise = _log(rng, 1e-3, 5e-2)
     peak = float(np.max(np.abs(motion[1:])))
-    values = sign * motion[1:] + offset + noise * peak * rng.standard_normal(len(time))
+    values = sign * motion[1:] + offset + noise * peak * noises.standard_normal(len(time))
     turned = body.phase + frequency * begin + (0.0 if sign > 0.0 else math.pi)
     truth = {
         "restitution": restitution,

@@ -16,6 +16,8 @@ ANSWERED, ANSWERED_GOOD, FLAGGED = 0.70, 0.90, 0.90
 GOOD_NOISE, GOOD_FLIGHT = 0.02, 12
 # A share misses its target when this chance, or less, would bring it so far off were the target just met.
 CHANCE = 0.01
+FEWEST = 60
+"""Intervals below which a cell of the table says little: chance alone moves its share more than the target is wide."""
 
 Line = dict[str, Any]
 
@@ -67,6 +69,28 @@ def _held(clean: Iterable[Line]) -> Iterable[Share]:
     for method, name in sorted(counts, key=lambda key: (METHODS.index(key[0]), key[1])):
         held = counts[method, name]
         yield Share(f"{method}: {name}", sum(held), len(held), *HELD)
+
+
+def thin(lines: Iterable[Line]) -> dict[tuple[str, str], list[int]]:
+    """Return the cells of few intervals, by method and quantity, with the cases that they come from."""
+    cases: dict[tuple[str, str], list[int]] = {}
+    for line in lines:
+        if line["spoil"] or line["draw"]:
+            continue
+        for method, values in line["sure"].items():
+            for name in values:
+                cases.setdefault((method, name), []).append(line["case"])
+    return {cell: found for cell, found in cases.items() if len(found) < FEWEST}
+
+
+def again(lines: Sequence[Line], draws: int) -> list[Share]:
+    """Return the shares of the thin cells with further draws of the noise of each of their records."""
+    found = []
+    for (method, name), cases in thin(lines).items():
+        asked = [line["sure"].get(method, {}).get(name) for line in lines if line["case"] in cases]
+        held = [low <= truth <= high for _, _, low, high, truth in filter(None, asked)]
+        found.append(Share(f"{method}: {name}, {draws + 1} noises of each", sum(held), len(held), *HELD))
+    return found
 
 
 def _can_answer(method: str) -> Callable[[Line], bool]:

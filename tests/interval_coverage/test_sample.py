@@ -2,11 +2,12 @@
 
 from functools import cache
 
+import numpy as np
 import pytest
 
 from interval_coverage._asked import asked
 from interval_coverage._records import SPOILS, record
-from interval_coverage._table import HELD, Share, shares
+from interval_coverage._table import FEWEST, HELD, Share, shares, thin
 
 SEED = 1
 PLAIN = (0, 2, 14, 16, 20, 24, 30, 34)
@@ -15,7 +16,7 @@ SPOILED = {11: "second mode", 35: "dry friction", 47: "speed-dependent restituti
 
 @cache
 def line(case):
-    return asked(case, SEED)
+    return asked((case, 0), SEED)
 
 
 @pytest.mark.parametrize("case", SPOILED)
@@ -40,6 +41,11 @@ def test_a_record_is_the_same_for_the_same_case_and_seed():
     assert one.truth == other.truth
     assert (one.values == other.values).all()
     assert record(20, SEED + 1).truth != one.truth
+    again = record(20, SEED, 1)
+    assert again.truth == one.truth
+    assert np.std(again.values - one.values) == pytest.approx(
+        np.sqrt(2.0) * one.noise * np.max(np.abs(one.values - one.truth["offset"])), rel=0.1
+    )
     assert set(SPOILED.values()) == set(SPOILS)
 
 
@@ -48,6 +54,13 @@ def test_a_record_is_the_same_for_the_same_case_and_seed():
 )
 def test_a_share_misses_its_target_only_beyond_chance(hits, missed):
     assert Share("intervals", hits, 100, *HELD).missed is missed
+
+
+def test_cells_of_few_intervals_are_asked_again_and_told_apart():
+    sure = {"weak_form": {"phase": [0.0, 1.0, -1.0, 1.0, 0.5]}}
+    many = [{"case": case, "draw": 0, "spoil": "", "sure": sure} for case in range(FEWEST)]
+    assert thin(many) == {}
+    assert thin(many[1:]) == {("weak_form", "phase"): list(range(1, FEWEST))}
 
 
 def test_intervals_that_hold_too_often_miss_their_target_too():
