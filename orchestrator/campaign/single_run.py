@@ -12,7 +12,6 @@ from vibroimpact.orchestrator.campaign.chunks import (
     DEFAULT_RUNNER,
     BranchPoint,
     Chunk,
-    Runner,
     dataset_of,
     identify,
     points_of,
@@ -21,7 +20,7 @@ from vibroimpact.orchestrator.campaign.chunks import (
 )
 from vibroimpact.orchestrator.campaign.progress import Progress, Silence
 from vibroimpact.orchestrator.campaign.provenance import provenance
-from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.run import Runner, named_runner
 from vibroimpact.orchestrator.run.dataset import with_constants_of
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
