@@ -65,3 +65,12 @@ def test_what_starts_light_loads_nothing_heavy(module: str, not_loaded: tuple[st
     code = f"import sys, {module}; print([name for name in {not_loaded!r} if name in sys.modules])"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert result.stdout == "[]\n"
+
+
+def test_every_benchmark_starts() -> None:
+    """Nothing else of the tests runs them: a name that has moved would be found by the next person who measures."""
+    folder = ROOT / "tests" / "benchmarks"
+    names = sorted(path.stem for path in folder.glob("bench_*.py"))
+    code = f"import sys; sys.path.insert(0, {str(folder)!r}); import {', '.join(names)}"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr

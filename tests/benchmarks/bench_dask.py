@@ -24,7 +24,8 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
-from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, get_ready, open_runner, points_of, run_chunk
+from vibroimpact.orchestrator.campaign.chunks import Chunk, Work, get_ready, points_of, run_chunk
+from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
@@ -91,7 +92,7 @@ def _bare_process(
 
 def _points_only(work: Work) -> Task:
     scene = parse_scene(work.scene_text, work.source)
-    branches, runner = expand(scene), open_runner(scene, work.runner)
+    branches, runner = expand(scene), named_runner(scene, work.runner)
 
     def run(chunk: Chunk) -> None:
         for place in points_of(branches, chunk):
