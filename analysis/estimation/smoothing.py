@@ -24,8 +24,6 @@ _GAUSS_POINTS = 6
 _WINDOWS = (4.0, 2.0, 1.0, 0.75, 0.5, 0.35, 0.25, 0.18, 0.125, 0.09, 0.06)
 _SAMPLES_PER_COEFFICIENT = 2.0
 _FLIGHTS_TRIED = 5
-# Weight of what a window smooths away beside what noise leaves: the first is known as well as the fitted motion only.
-_PRICE = 3.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +72,7 @@ def smoother(signal: Signal, flight: Flight, window: float) -> Smoother:
 def choose_window(
     motion: Signal, flights: Sequence[Flight], fine: float, fastest: float, noise: float
 ) -> float:
-    """Return the window (s) with the smallest error of the slopes at the ends of flights.
+    """Return the window (s) with the smallest mean square error of the slopes at the ends of flights.
 
     The motion without noise says what a window smooths away: were it chosen from the samples, their noise would choose
     the window that suits it, and no draw of other noise would show what that does to the answer.
@@ -107,7 +105,7 @@ def choose_window(
                 break
             weights = _end_slopes(smoother(motion, flight, window))
             wrong = weights @ motion.values[flight.index] - slopes
-            cost += float(np.sum((_PRICE * wrong) ** 2) + noise**2 * np.sum(weights**2))
+            cost += float(np.sum(wrong**2) + noise**2 * np.sum(weights**2))
         else:
             costs[window] = cost
     if not costs:
