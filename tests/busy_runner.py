@@ -43,7 +43,7 @@ class BusyRunner:
     def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
         """Run one point: a contraction towards a point that the swept values decide."""
         began = time.perf_counter()
-        scene = self.scene.with_values(values)
+        scene = self.scene.at(values)
         burn(scene.body.mass)
         displacement, velocity = start if start is not None else (scene.body.displacement_start, 0.0)
         target = self.target(scene, values)
@@ -86,7 +86,7 @@ class BrittleRunner(BusyRunner):
 
     def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
         """Run one point, or raise."""
-        if self.scene.with_values(values).value("forcing.amplitude") < 0:
+        if self.scene.at(values).value("forcing.amplitude") < 0:
             raise ComponentError("oscillator: the step failed; expected a step that ends, got none.")
         return super().run(values, start)
 
@@ -96,7 +96,7 @@ class DeadlyRunner(BusyRunner):
 
     def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
         """Run one point, or die."""
-        if self.scene.with_values(values).value("forcing.amplitude") < 0:
+        if self.scene.at(values).value("forcing.amplitude") < 0:
             os.kill(os.getpid(), signal.SIGKILL)
         return super().run(values, start)
 
@@ -106,7 +106,7 @@ class HuntedRunner(BusyRunner):
 
     def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
         """Run one point, or die."""
-        if self.scene.with_values(values).value("forcing.amplitude") < 0 and _is_worker():
+        if self.scene.at(values).value("forcing.amplitude") < 0 and _is_worker():
             os.kill(os.getpid(), signal.SIGKILL)
         return super().run(values, start)
 

@@ -86,7 +86,7 @@ def _alone(old: Scene, new: Scene, key: str) -> float:
 
 def _without_sweep(scene: Scene, values: Mapping[str, float]) -> dict[str, Any]:
     """Return a scene at one point of its sweep, flat, without the sweep and the units of swept keys."""
-    point = scene.with_values({axis.key: values[axis.key] for axis in scene.sweep})
+    point = scene.at({axis.key: values[axis.key] for axis in scene.sweep})
     units = tuple(f"general.units.{key}" for key in values)
     return {
         key: value

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from contextlib import ExitStack
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,7 +15,7 @@ from vibroimpact.fmus.terminal import Terminal, say
 
 if TYPE_CHECKING:
     from vibroimpact.analysis.replay.trust import Verdict
-    from vibroimpact.orchestrator.replay import Replayer, ReplayFit
+    from vibroimpact.orchestrator.replay import ReplayFit
     from vibroimpact.orchestrator.replay.output import Replayed
     from vibroimpact.orchestrator.scene import Scene
 
@@ -66,6 +65,7 @@ def replay(
     from vibroimpact.analysis.dataset.outputs import refuse_folder, refuse_outputs, refuse_overwriting
     from vibroimpact.fmus.errors import UsageError
     from vibroimpact.orchestrator.campaign.manifest import holds_scene
+    from vibroimpact.orchestrator.replay.replaying import with_recordings
     from vibroimpact.orchestrator.scene import load_scene
 
     loaded = load_scene(scene)
@@ -91,18 +91,11 @@ def replay(
         return
     if workers is not None or scheduler is not None:
         raise UsageError("--workers, --scheduler: expected the folder of a campaign as output, got a file.")
-    if any(axis.key != "replay.recording" for axis in loaded.sweep):
-        raise UsageError(
-            f"{scene}: sweep: expected no sweep for one dataset. Give a folder with -o for a campaign."
-        )
     if figure is not None and loaded.replay is not None and not loaded.replay.compare:
         raise UsageError(
             f"--figure: expected a scene that compares something, got {scene} without. Add compare."
         )
-    _to_dataset(
-        *(loaded, recordings or [], score or [], output, fit, save_scene, figure),
-        execution or loaded.execution.how,
-    )
+    _to_dataset(loaded, recordings or [], score or [], output, fit, save_scene, figure, execution)
 
 
 def _refuse_with_campaign(*others: object) -> None:
@@ -126,34 +119,6 @@ def _refuse_saving(path: Path, fit: str | None, force: bool) -> None:
         raise UsageError(
             f"{path}: expected a new file, got one that is there. Choose another name, or overwrite it with --force."
         )
-
-
-def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:
-    """Return a scene that names recordings, as if its file did: workers read them by themselves.
-
-    Raises
-    ------
-    UsageError
-        The scene names recordings too, or there are none.
-    """
-    from vibroimpact.fmus.errors import UsageError
-    from vibroimpact.orchestrator.replay.replayer import replay_table
-    from vibroimpact.orchestrator.scene import parse_scene
-    from vibroimpact.orchestrator.scene.text import text_with_values
-
-    there = replay_table(scene).recordings
-    if there and recordings:
-        raise UsageError(
-            f"{scene.source}: replay.recordings: expected recordings in the scene or on the command line, got both."
-        )
-    if not recordings:
-        if not there:
-            raise UsageError(
-                f"{scene.source}: expected a recording to replay, got none. Name one after the scene."
-            )
-        return scene
-    named = [str(path.absolute()) for path in recordings]
-    return parse_scene(text_with_values(scene.text, {}, named), scene.source)
 
 
 def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
@@ -183,98 +148,32 @@ def _to_dataset(
     fit: str | None,
     save_scene: Path | None,
     figure: Path | None,
-    execution: str,
+    execution: str | None,
 ) -> None:
-    from vibroimpact.fmus.errors import UsageError
-    from vibroimpact.orchestrator.replay.output import replay_dataset
+    from vibroimpact.orchestrator.replay.replaying import replay_scene
 
     began = time.perf_counter()
-    paths = _paths(with_recordings(scene, recordings))
-    if scored and fit is None:
-        raise UsageError(
-            "--score: expected --fit beside it: a recording is scored with numbers fitted on others."
-        )
-    _refuse_scoring_fitted(paths, scored)
+    with _fitting(fit) as told:
+        whole = replay_scene(scene, recordings, fit=fit, score=scored, execution=execution, told=told)
     console = Terminal()
-    with ExitStack() as stack:
-        fitted, verdict, replays = _replays(stack, scene, paths, scored, fit, execution)
-        _print(console, replays, fitted, verdict)
-        dataset = replay_dataset(replays, fitted, verdict)
-        _write(dataset, output, figure)
-        if save_scene is not None and fitted is not None:
-            _save_scene(scene, fitted, [path.name for path in paths], save_scene)
-            console.print(f"Scene with the numbers found written to {save_scene}.", soft_wrap=True)
+    _print(console, whole.replays, whole.fit, whole.verdict)
+    _write(whole.dataset, output, figure)
+    if save_scene is not None and whole.fit is not None:
+        _save_scene(
+            scene, whole.fit, [replay.name for replay in whole.replays if replay.use == "fitted"], save_scene
+        )
+        console.print(f"Scene with the numbers found written to {save_scene}.", soft_wrap=True)
     console.print(f"{output} in {time.perf_counter() - began:.1f} s", soft_wrap=True)
 
 
-def _refuse_scoring_fitted(paths: Sequence[Path], scored: Sequence[Path]) -> None:
-    """Refuse a recording to be scored that is fitted too: it would earn a trust that it cannot give."""
-    from vibroimpact.fmus.errors import UsageError
-
-    fitted = {path.resolve() for path in paths}
-    for path in scored:
-        if path.resolve() in fitted:
-            raise UsageError(
-                f"--score: expected a recording that is not fitted, got {path}, which is. Score another one."
-            )
-
-
-def _paths(scene: Scene) -> list[Path]:
-    from vibroimpact.orchestrator.replay.replayer import recording_of, replay_table
-
-    return [recording_of(scene, number) for number in range(1, len(replay_table(scene).recordings) + 1)]
-
-
-def _replays(
-    stack: ExitStack,
-    scene: Scene,
-    paths: Sequence[Path],
-    scored: Sequence[Path],
-    fit: str | None,
-    execution: str,
-) -> tuple[ReplayFit | None, Verdict | None, list[Replayed]]:
-    from vibroimpact.analysis.replay.trust import trust
-    from vibroimpact.orchestrator.replay import compare_motion, opened_replays, scores_of
-    from vibroimpact.orchestrator.replay.fit import fit_keys
-    from vibroimpact.orchestrator.replay.output import Replayed
-    from vibroimpact.orchestrator.replay.replayer import is_linear
-
-    keys = fit_keys(scene, fit) if fit is not None else ()
-    # a number that the scene leaves at its default counts as written from now on
-    scene = scene.with_values({key: scene.value(key) for key in keys})
-    replayers = stack.enter_context(opened_replays(scene, [*paths, *scored], execution))
-    found = _fitted(replayers[: len(paths)], keys) if keys else None
-    numbers = found.numbers if found is not None else None
-    replays = []
-    for place, replayer in enumerate(replayers):
-        motion = replayer.simulate(numbers)
-        use = "replayed" if found is None else ("fitted" if place < len(paths) else "scored")
-        replays.append(Replayed(replayer, motion, compare_motion(replayer, motion), use))
-    if not any(replay.comparisons for replay in replays):
-        return found, None, replays
-    fitted = len(paths) if found is not None else 0
-    scores = scores_of(replayers, [replay.comparisons for replay in replays], fitted)
-    verdict = trust(
-        *(scores.fitted, scores.others, scores.without_dynamics),
-        held=scores.held,
-        linear=is_linear(scene.with_values(numbers or {})),
-    )
-    return found, replace(verdict, reasons=(*verdict.reasons, *scores.remarks)), replays
-
-
-def _fitted(replayers: Sequence[Replayer], keys: Sequence[str]) -> ReplayFit:
-    """Fit with a line that says how far it is."""
-    from vibroimpact.orchestrator.replay import fit_replay
-
-    console = Terminal(stderr=True)
-    with console.status("fitting") as status:
-        return fit_replay(
-            replayers,
-            keys,
-            told=lambda count, error: status.update(
-                f"fitting: {count} simulations, error {100 * error:.3g} %"
-            ),
-        )
+@contextmanager
+def _fitting(fit: str | None) -> Iterator[Callable[[int, float], None]]:
+    """Show a line that says how far a fit is."""
+    if fit is None:
+        yield lambda count, error: None
+        return
+    with Terminal(stderr=True).status("fitting") as status:
+        yield lambda count, error: status.update(f"fitting: {count} simulations, error {100 * error:.3g} %")
 
 
 def _print(

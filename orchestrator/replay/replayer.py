@@ -203,7 +203,7 @@ class Replayer:
         ComponentError
             The body refuses its parameters, or fails.
         """
-        scene = self.scene.with_values(values) if values else self.scene
+        scene = self.scene.at(values) if values else self.scene
         session = self._session
         session.begin(values)
         try:

@@ -119,7 +119,7 @@ class GeneralRunner:
             A component fails; the error names instance, function and time.
         """
         began = time.perf_counter()
-        scene = self._scene.with_values(values) if values else self._scene
+        scene = self._scene.at(values) if values else self._scene
         if self._broken:
             self._rebuild()
         self._broken = True  # until this run ends well: after an error FMI allows little but to free

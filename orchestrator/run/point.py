@@ -90,7 +90,7 @@ class PointRunner:
             The body refuses its parameters or fails.
         """
         began = time.perf_counter()
-        scene = self._scene.with_values(values) if values else self._scene
+        scene = self._scene.at(values) if values else self._scene
         run = _Run(scene, self._driver, self._plan, start)
         outcome, message = run.run()
         message = message or "; ".join(self._driver.warnings)

@@ -119,7 +119,7 @@ class Session:
         ComponentError
             The body refuses its parameters.
         """
-        scene = self._scene.with_values(values) if values else self._scene
+        scene = self._scene.at(values) if values else self._scene
         self._forcing = scene.forcing
         self._parameters = float_parameters(scene, start)
         self._driver.begin(self._parameters, scene.execution.deadline)

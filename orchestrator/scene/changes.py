@@ -1,4 +1,4 @@
-"""Changes of a scene that a command line asks for, `--set KEY=VALUE`; they are made before the scene is checked."""
+"""Changes of a scene, asked for by `--set KEY=VALUE` or from Python; they are made before the scene is checked."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ _PART = re.compile(
     r"""\s*(?P<name>[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')\s*(?P<places>(?:\[[1-9][0-9]{0,8}\]\s*)*)"""
 )
 _FORM = "KEY=VALUE, the key as messages write it (stop[1].restitution=0.8)"
+_KEY_FORM = "a key as messages write it, such as stop[1].restitution"
 _VALUE = "a TOML value: a number, true, false, text, an array or a table"
 _VALUE_HINT = "Numbers are written like 0.5; text that does not begin with a letter goes in double quotes."
 _SWEPT_HINT = (
@@ -72,24 +73,61 @@ def changed_document(
     >>> changed_document({"stop": [{"law": "hertz"}]}, ["stop[1].law=restitution", "body.mass=2"])
     ({'stop': [{'law': 'restitution'}], 'body': {'mass': 2}}, ('stop[1].law', 'body.mass'))
     """
-    changed = deepcopy(dict(document))
     problems, changes = [], []
     for text in texts:
         try:
-            change = _read(text)
-            _make(changed, change)
-            changes.append(change)
+            changes.append(_read(text))
         except _NoChange as refused:
             problems.append(refused.problem)
-    _leave_out_alternatives(changed, changes)
-    problems += [problem for change in changes for problem in _without_effect(changed, change)]
+    return _changed(document, changes, problems, CHANGES), tuple(change.key for change in changes)
+
+
+def changed_values(document: Mapping[str, Any], values: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Return a document with other values, by key as messages write it; else as `changed_document`.
+
+    Raises
+    ------
+    SceneError
+        With all changes that cannot be made.
+    """
+    problems, changes = [], []
+    for key, value in values.items():
+        path, rest = _path(key) if isinstance(key, str) else ((), "")
+        if not path or rest:
+            problems.append(Problem("", _KEY_FORM, quoted(key)))
+        else:
+            changes.append(Change(path, value))
+    return _changed(document, changes, problems, source)
+
+
+def _changed(
+    document: Mapping[str, Any], changes: Sequence[Change], problems: list[Problem], source: str
+) -> dict[str, Any]:
+    """Make all changes of a copy."""
+    changed, made = deepcopy(dict(document)), []
+    for change in changes:
+        try:
+            _make(changed, change)
+            made.append(change)
+        except _NoChange as refused:
+            problems.append(refused.problem)
+    _leave_out_alternatives(changed, made)
+    problems += [problem for change in made for problem in _without_effect(changed, change)]
     if problems:
-        raise SceneError(list(dict.fromkeys(problem.line(CHANGES) for problem in problems)))
-    return changed, tuple(change.key for change in changes)
+        raise SceneError(list(dict.fromkeys(problem.line(source) for problem in problems)))
+    return changed
 
 
 def _read(text: str) -> Change:
     """Take `KEY=VALUE` apart."""
+    path, rest = _path(text)
+    if not path or not rest.startswith("="):
+        raise _NoChange(Problem("", _FORM, quoted(text)))
+    return Change(path, _value(key_path(path), rest[1:].strip()))
+
+
+def _path(text: str) -> tuple[Path, str]:
+    """Return the path of the key that a text begins with, and what follows it; no path where there is no key."""
     path: list[str | int] = []
     position = 0
     while match := _PART.match(text, position):
@@ -99,9 +137,9 @@ def _read(text: str) -> Change:
         if text[position : position + 1] != "." or len(path) > MOST_PARTS:
             break
         position += 1
-    if not match or len(path) > MOST_PARTS or text[position : position + 1] != "=":
-        raise _NoChange(Problem("", _FORM, quoted(text)))
-    return Change(tuple(path), _value(key_path(path), text[position + 1 :].strip()))
+    if not match or len(path) > MOST_PARTS:
+        return (), text
+    return tuple(path), text[position:]
 
 
 def _value(key: str, text: str) -> Any:

@@ -1,17 +1,25 @@
-"""From a path to the TOML document in it; everything that can be wrong with a file is a `SceneError`."""
+"""From a path, or from tables of Python, to a TOML document; everything that can be wrong with it is a `SceneError`."""
 
 from __future__ import annotations
 
 import stat
+from collections.abc import Mapping, Sequence
+from datetime import date, time
 from difflib import get_close_matches
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import tomli_w
+
 from vibroimpact.fmus import safe_toml
 from vibroimpact.fmus.errors import SceneError
-from vibroimpact.orchestrator.scene.problems import Problem, syntax_problem
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted, syntax_problem
 
 LARGEST_FILE = 2**20  # bytes; a scene is some hundred lines, and more is most likely another kind of file
+
+_VALUE = "a value that TOML has: a number, True, False, text, a sequence or a mapping"
 
 
 def read_text(path: Path, source: str) -> str:
@@ -43,6 +51,66 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         return safe_toml.parse_toml(text)
     except ValueError as error:
         raise SceneError([syntax_problem(error, text).line(source)]) from None
+
+
+def text_of_tables(tables: Mapping[str, Any], source: str) -> str:
+    """Return the TOML text of the tables of a scene.
+
+    Parameters
+    ----------
+    tables : mapping
+        As TOML has them; numbers and arrays of NumPy or xarray, tuples and paths too.
+    source : str
+        What messages begin with.
+
+    Raises
+    ------
+    SceneError
+        With all values that TOML does not have.
+
+    Examples
+    --------
+    >>> print(text_of_tables({"body": {"masses": np.ones(2)}, "record": {"impacts": True}}, "scene"), end="")
+    [body]
+    masses = [
+        1.0,
+        1.0,
+    ]
+    <BLANKLINE>
+    [record]
+    impacts = true
+    """
+    problems: list[Problem] = []
+    if not isinstance(tables, Mapping):
+        raise SceneError([Problem("", "a mapping of the tables of a scene", quoted(tables)).line(source)])
+    plain = _plain(tables, (), problems)
+    if problems:
+        raise SceneError([problem.line(source) for problem in problems])
+    return tomli_w.dumps(plain)
+
+
+def _plain(value: Any, path: tuple[str | int, ...], problems: list[Problem]) -> Any:
+    """Return a value as TOML has it; what it does not have becomes a problem."""
+    if hasattr(value, "__array__"):
+        value = np.asarray(value).tolist()
+    if len(path) > safe_toml.MOST_PARTS:
+        problems.append(
+            Problem(key_path(path[:4]), f"at most {safe_toml.MOST_PARTS} tables in each other", "more")
+        )
+        return 0
+    if isinstance(value, Mapping):
+        for key in value:
+            if not isinstance(key, str):
+                problems.append(Problem(key_path(path), "keys that are text", quoted(key)))
+        return {key: _plain(of, (*path, key), problems) for key, of in value.items() if isinstance(key, str)}
+    if isinstance(value, Sequence) and not isinstance(value, str | bytes):
+        return [_plain(of, (*path, place), problems) for place, of in enumerate(value)]
+    if isinstance(value, PathLike):
+        return fspath(value)
+    if not isinstance(value, str | bool | int | float | date | time):
+        problems.append(Problem(key_path(path), _VALUE, quoted(value)))
+        return 0
+    return value
 
 
 def _read_bytes(path: Path, source: str) -> bytes:

@@ -18,8 +18,8 @@ import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.orchestrator.scene.changes import changed_document
-from vibroimpact.orchestrator.scene.file import parse_toml, read_text
+from vibroimpact.orchestrator.scene.changes import changed_document, changed_values
+from vibroimpact.orchestrator.scene.file import parse_toml, read_text, text_of_tables
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.keys import (
     Key,
@@ -32,14 +32,14 @@ from vibroimpact.orchestrator.scene.keys import (
 from vibroimpact.orchestrator.scene.models import Body, Execution, Forcing, Record, Sensor, Stop
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
-from vibroimpact.orchestrator.scene.sweep import SweepAxis
+from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
 from vibroimpact.orchestrator.scene.tables import read_tables
 
 __all__ = ["Scene", "load_scene", "parse_scene"]
 
 
 class Scene(BaseModel):
-    """A validated scene; it never changes, `with_values` makes another.
+    """A validated scene; it never changes, `with_values` and `with_sweep` make another.
 
     Attributes
     ----------
@@ -119,6 +119,11 @@ class Scene(BaseModel):
             return None
         return 2.0 * math.pi / self.forcing.angular_frequency
 
+    @property
+    def runs(self) -> int:
+        """How many runs the sweep has; 1 without one."""
+        return run_count(self.sweep)
+
     def value(self, key: str) -> float:
         """Return the number that a key such as `stop[1].position` has in this scene.
 
@@ -138,24 +143,24 @@ class Scene(BaseModel):
             raise UsageError(f"{self.source}: {key}: expected a number of this scene, got nothing.")
         return number
 
-    def with_values(self, values: Mapping[str, float]) -> Scene:
-        """Return this scene with other numbers, without validating it again.
+    def at(self, values: Mapping[str, float]) -> Scene:
+        """Return this scene at a point of its sweep: with other numbers, not validated again, and the text it has.
 
         Parameters
         ----------
         values : mapping of str to float
-            New values of sweepable keys. Values of the scene's own sweep are known to be valid; others are
-            the caller's responsibility. An angular_frequency replaces a frequency that the scene gives, and
-            a damping its damping_ratio; and the other way round.
+            New values of sweepable keys. Values of the scene's own sweep are known to be valid; others are for
+            `with_values`. An angular_frequency replaces a frequency that the scene gives, and a damping its
+            damping_ratio; and the other way round.
 
         Examples
         --------
         >>> text = "[body]\\nmass = 1\\nstiffness = 1\\n[record]\\nrecorded_time = 5"
-        >>> parse_scene(text, "free.toml").with_values({"body.mass": 2.0}).body.mass
+        >>> parse_scene(text, "free.toml").at({"body.mass": 2.0}).body.mass
         2.0
         """
         if self.general is not None:
-            return self.model_copy(update={"general": self.general.with_values(values)})
+            return self.model_copy(update={"general": self.general.at(values)})
         tables = self._numbered_tables()
         for key, value in values.items():
             if key == RECORDING_KEY:  # which recording is replayed: no number of any table
@@ -170,6 +175,116 @@ class Scene(BaseModel):
         stops = tuple(tables[place] for place in range(len(self.stops)))
         changed = {name: tables[name] for name in ("forcing", "sensor")}
         return self.model_copy(update={"body_given": tables["body"], "stops": stops, **changed})
+
+    @classmethod
+    def from_file(cls, path: str | PathLike[str]) -> Scene:
+        """Read a scene file (TOML, UTF-8, at most 1 MiB).
+
+        Raises
+        ------
+        SceneError
+            With all problems of the file, each on one line.
+        """
+        return load_scene(path)
+
+    @classmethod
+    def from_text(cls, text: str, source: str = "scene") -> Scene:
+        """Read a scene from TOML text.
+
+        Parameters
+        ----------
+        text : str
+        source : str
+            The name of the text in messages; files that the scene names count from its folder.
+
+        Raises
+        ------
+        SceneError
+            With all problems of the text, each on one line.
+
+        Examples
+        --------
+        >>> scene = Scene.from_text("[body]\\nmass = 1\\nstiffness = 4\\n[record]\\nrecorded_time = 5")
+        >>> scene.value("body.stiffness")
+        4.0
+        """
+        return parse_scene(text, source)
+
+    @classmethod
+    def from_dict(cls, tables: Mapping[str, Any], source: str = "scene") -> Scene:
+        """Read a scene from the tables of its file; numbers and arrays of NumPy or xarray, tuples and paths will do.
+
+        Parameters
+        ----------
+        tables : mapping
+        source : str
+            The name of the scene in messages; files that it names count from its folder.
+
+        Raises
+        ------
+        SceneError
+            With all problems of the tables, each on one line.
+
+        Examples
+        --------
+        >>> body = {"mass": 1.0, "stiffness": 4.0, "damping_ratio": 0.1}
+        >>> scene = Scene.from_dict({"body": body, "record": {"recorded_time": 5.0}})
+        >>> round(scene.body.damping, 12)
+        0.4
+        """
+        return parse_scene(text_of_tables(tables, source), source)
+
+    def with_values(self, values: Mapping[str, Any]) -> Scene:
+        """Return this scene with other values of some keys, checked as if its file said so.
+
+        Parameters
+        ----------
+        values : mapping
+            By key, as messages write it: `stop[1].restitution`, `record.time_series`, `title`. Of two keys for one
+            thing, such as `damping` and `damping_ratio`, the new one takes the place of the other.
+
+        Raises
+        ------
+        SceneError
+            With all problems, each on one line: also for a key that the scene sweeps.
+
+        Examples
+        --------
+        >>> scene = Scene.from_text("[body]\\nmass = 1\\nstiffness = 4\\n[record]\\nrecorded_time = 5")
+        >>> scene.with_values({"body.mass": 2.0}).body.mass
+        2.0
+        """
+        document = changed_values(parse_toml(self.text, self.source), values, self.source)
+        return self.from_dict(document, self.source)
+
+    def with_sweep(self, axes: Mapping[str, Any]) -> Scene:
+        """Return this scene with another sweep.
+
+        Parameters
+        ----------
+        axes : mapping
+            For each swept key its values, or the table that a file would have: `start`, `stop`, `points`, `path`.
+            No key: no sweep.
+
+        Raises
+        ------
+        SceneError
+            With all problems, each on one line.
+
+        Examples
+        --------
+        >>> scene = Scene.from_text("[body]\\nmass = 1\\nstiffness = 4\\n[record]\\nrecorded_time = 5")
+        >>> scene.with_sweep({"body.damping": [0.1, 0.2], "body.stiffness": {"start": 1, "stop": 4, "points": 4}}).runs
+        8
+        """
+        tables = {key: axis if isinstance(axis, Mapping) else {"values": axis} for key, axis in axes.items()}
+        document = parse_toml(self.text, self.source)
+        document.pop("sweep", None)
+        return self.from_dict(document | ({"sweep": tables} if tables else {}), self.source)
+
+    def to_toml(self) -> str:
+        """Return the text of a scene file that says the same; that of `from_file`, comments and all."""
+        return self.text
 
     def constants(self) -> dict[str, float]:
         """Return the numbers that a sweep could vary and this one does not, by key, defaults too."""

@@ -140,7 +140,7 @@ def test_numbers_come_back_bit_for_bit(
         "stop[1].restitution": restitution,
     }
     assert {key: scene.value(key) for key in numbers} == numbers
-    assert scene.with_values(numbers) == scene
+    assert scene.at(numbers) == scene
     assert scene.body.damping == 2 * ratio * math.sqrt(stiffness * mass)
 
 

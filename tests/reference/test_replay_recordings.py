@@ -32,7 +32,7 @@ SLOPES = ["body.frequency_slope", "body.damping_slope"]
 
 
 def fitted_and_scored(start: dict[str, float], paths: list[Path]) -> tuple[ReplayFit, Comparison, Comparison]:
-    scene = load_scene(EXAMPLES / "board.toml").with_values(start)
+    scene = load_scene(EXAMPLES / "board.toml").at(start)
     with opened_replays(scene, paths) as (own, other):
         fit = fit_replay([own], list(start))
         return fit, fit.comparisons[0][0], compare_motion(other, other.simulate(fit.numbers))[0]

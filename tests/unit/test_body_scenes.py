@@ -408,7 +408,7 @@ def test_elements_and_scalars_of_every_table_are_swept() -> None:
         )
     )
     point = {axis.key: axis.values[1] for axis in scene.sweep}
-    floats = float_parameters(scene.with_values(point), None)
+    floats = float_parameters(scene.at(point), None)
     names = ("mass[2]", "damping[3]", "forcing.amplitude[3]", "contact[1].stiffness", "mass[1]")
     assert [floats[name] for name in names] == [3.0, 0.2, 0.4, 1e5, 1.0]
     assert [scene.sweep_coordinate_name(key) for key in point] == [
@@ -428,7 +428,7 @@ def test_a_beam_is_swept_in_length_damping_ratios_and_locations() -> None:
         "stop[1].location": "contact[1].location",
     }
     scene = scene_of(swept(BEAM, *(f'"{key}" = {{ values = [0.5, 0.7] }}' for key in keys)))
-    floats = float_parameters(scene.with_values(dict.fromkeys(keys, 0.7)), None)
+    floats = float_parameters(scene.at(dict.fromkeys(keys, 0.7)), None)
     assert [floats[name] for name in keys.values()] == [0.7] * 4
     one = changed(BEAM, "damping_ratio = [0.01, 0.02, 0.03]\n", "")
     ratio = scene_of(swept(one, '"body.damping_ratio" = { values = [0.1, 0.2] }'))
@@ -479,7 +479,7 @@ def test_an_element_that_is_not_there_is_misuse() -> None:
         with pytest.raises(UsageError, match="expected"):
             scene_of(CHAIN).value(key)
     with pytest.raises(UsageError, match="expected"):
-        scene_of(CHAIN).with_values({"body.masses[4]": 1.0})
+        scene_of(CHAIN).at({"body.masses[4]": 1.0})
 
 
 # The state that a continuation carries.

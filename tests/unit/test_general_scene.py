@@ -235,14 +235,14 @@ def test_any_start_value_and_any_gain_is_swept() -> None:
 def test_each_point_of_a_sweep_has_its_own_values() -> None:
     scene = parse_scene(SWEPT, "s.toml")
     last = list(expand(scene)[0].points)[-1]
-    general = general_of(scene.with_values(last.values))
+    general = general_of(scene.at(last.values))
     assert general.components[0].parameters["stiffness"] == 4.0
     assert general.components[0].parameters["mass"] == 2.0
     assert general.connections[0].gain == 1.0
     law = general.components[1].parameters["contact[2].law"]
     assert (law, type(law)) == (5, int)
     back = {key: scene.value(key) for key in last.values}
-    assert scene.with_values(last.values).with_values(back) == scene
+    assert scene.at(last.values).at(back) == scene
 
 
 def test_a_swept_start_value_that_is_not_written_has_its_first_value() -> None:
@@ -259,10 +259,10 @@ def test_a_key_without_a_number_is_misuse(key: str) -> None:
     with pytest.raises(UsageError, match="expected"):
         scene.value(key)
     with pytest.raises(UsageError, match="expected"):
-        scene.with_values({key: 1.0})
+        scene.at({key: 1.0})
 
 
-def test_with_values_is_much_faster_than_reading_the_scene_again() -> None:
+def test_a_point_is_much_faster_than_reading_the_scene_again() -> None:
     scene = parse_scene(SWEPT, "s.toml")
 
     def best(action: Callable[[], object]) -> float:
@@ -273,7 +273,7 @@ def test_with_values_is_much_faster_than_reading_the_scene_again() -> None:
             times.append(time.perf_counter() - start)
         return min(times)
 
-    changed = best(lambda: scene.with_values({"a.stiffness": 1.0, "connection[1].gain": 2.0}))
+    changed = best(lambda: scene.at({"a.stiffness": 1.0, "connection[1].gain": 2.0}))
     assert changed * 10 < best(lambda: parse_scene(SWEPT, "s.toml"))
 
 

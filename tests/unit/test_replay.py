@@ -135,7 +135,7 @@ def test_numbers_that_change_the_motion_alike_are_refused(tmp_path: Path) -> Non
 
 def test_the_gain_of_amplitude_dependence_shows_where_there_is_one(tmp_path: Path) -> None:
     truth = {"body.frequency": 823.0, "body.frequency_slope": -200.0}
-    curved = scene(BOARD + "drive_offset = 0.0").with_values(truth)
+    curved = scene(BOARD + "drive_offset = 0.0").at(truth)
     plain = written(
         tmp_path / "drive.nc", channel("base", TIME, pulse(TIME)), channel("board", TIME, pulse(TIME))
     )
@@ -149,7 +149,7 @@ def test_the_gain_of_amplitude_dependence_shows_where_there_is_one(tmp_path: Pat
     linear, bent = ["body.frequency", "body.damping_ratio"], ["body.frequency", "body.frequency_slope"]
     found = []
     for keys in (linear, bent):
-        start = scene().with_values({key: scene().value(key) for key in keys})
+        start = scene().at({key: scene().value(key) for key in keys})
         with opened_replays(start, [path]) as replayers:
             fit = fit_replay(replayers, keys)
         found.append(fit.comparisons[0][0].variance)

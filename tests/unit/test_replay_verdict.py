@@ -90,7 +90,7 @@ def test_linear_is_what_has_no_stops_and_does_not_follow_the_amplitude() -> None
     ]
     texts = (BOARD, *slopes, BOARD + STOP.format(position=1.0))
     assert [is_linear(parse_scene(text, "board.toml")) for text in texts] == [True, True, False, False]
-    followed = parse_scene(BOARD, "board.toml").with_values({"body.damping_reciprocal": 1e-6})
+    followed = parse_scene(BOARD, "board.toml").at({"body.damping_reciprocal": 1e-6})
     assert not is_linear(followed)
 
 

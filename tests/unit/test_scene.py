@@ -160,9 +160,9 @@ def test_a_file_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
 # Values of a scene.
 
 
-def test_with_values_changes_only_what_it_is_given() -> None:
+def test_at_a_point_changes_only_what_it_is_given() -> None:
     scene = scene_of(FORCED)
-    other = scene.with_values({"forcing.angular_frequency": 1.2, "stop[1].position": 2.0, "body.mass": 3.0})
+    other = scene.at({"forcing.angular_frequency": 1.2, "stop[1].position": 2.0, "body.mass": 3.0})
     assert [other.value(key) for key in ("forcing.angular_frequency", "stop[1].position", "body.mass")] == [
         1.2,
         2.0,
@@ -170,12 +170,12 @@ def test_with_values_changes_only_what_it_is_given() -> None:
     ]
     assert scene.value("stop[1].position") == 1.0
     back = {key: scene.value(key) for key in ("forcing.angular_frequency", "stop[1].position", "body.mass")}
-    assert other.with_values(back) == scene
+    assert other.at(back) == scene
 
 
 def test_damping_follows_its_ratio_when_the_stiffness_is_swept() -> None:
     scene = scene_of(forced("damping = 0.1", "damping_ratio = 0.05"))
-    assert scene.with_values({"body.stiffness": 4.0}).body.damping == 2 * 0.05 * 2.0
+    assert scene.at({"body.stiffness": 4.0}).body.damping == 2 * 0.05 * 2.0
 
 
 @pytest.mark.parametrize(
@@ -183,11 +183,11 @@ def test_damping_follows_its_ratio_when_the_stiffness_is_swept() -> None:
     [("body.damping", "body.damping_ratio"), ("forcing.angular_frequency", "forcing.frequency")],
 )
 def test_the_key_set_last_wins_over_its_relative(key: str, other: str) -> None:
-    scene = scene_of(FORCED).with_values({other: 0.3}).with_values({key: 0.7})
+    scene = scene_of(FORCED).at({other: 0.3}).at({key: 0.7})
     assert scene.value(key) == 0.7
 
 
-def test_with_values_is_much_faster_than_reading_the_scene_again() -> None:
+def test_a_point_is_much_faster_than_reading_the_scene_again() -> None:
     scene = scene_of(FORCED)
 
     def best(action: object) -> float:
@@ -199,7 +199,7 @@ def test_with_values_is_much_faster_than_reading_the_scene_again() -> None:
             times.append(time.perf_counter() - start)
         return min(times)
 
-    changed = best(lambda: scene.with_values({"forcing.angular_frequency": 1.0, "stop[1].position": 2.0}))
+    changed = best(lambda: scene.at({"forcing.angular_frequency": 1.0, "stop[1].position": 2.0}))
     assert changed * 3 < best(lambda: scene_of(FORCED))
 
 
@@ -211,7 +211,7 @@ def test_a_key_without_a_number_is_misuse(key: str) -> None:
     with pytest.raises(UsageError, match="expected"):
         scene.value(key)
     with pytest.raises(UsageError, match="expected"):
-        scene.with_values({key: 1.0})
+        scene.at({key: 1.0})
 
 
 def test_a_scene_travels_to_workers_and_cannot_be_changed() -> None:

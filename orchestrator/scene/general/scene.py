@@ -87,7 +87,7 @@ class GeneralScene:
         for number, connection in enumerate(self.connections, start=1):
             yield f"connection[{number}].gain", connection.gain
 
-    def with_values(self, values: Mapping[str, float]) -> GeneralScene:
+    def at(self, values: Mapping[str, float]) -> GeneralScene:
         """Return this scene with other start values and gains, without validating it again.
 
         Raises
