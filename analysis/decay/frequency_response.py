@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 from scipy.signal import csd, get_window, welch
 
 from vibroimpact.analysis.decay.samples import clock_remark
-from vibroimpact.analysis.recording import Channel
+from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import UsageError
 
@@ -74,8 +75,8 @@ class FrequencyResponse:
 
 
 def frequency_response(
-    drive: Channel,
-    response: Channel,
+    drive: Channel | xr.DataArray,
+    response: Channel | xr.DataArray,
     *,
     segment: int | None = None,
     window: str = "bartlett",
@@ -88,7 +89,7 @@ def frequency_response(
 
     Parameters
     ----------
-    drive, response : Channel
+    drive, response : Channel or xarray.DataArray
         Evenly sampled. On different axes the response is taken at the instants of the drive.
     segment : int, optional
         Samples of a segment; by default the power of two that gives eight segments or more. As many as there
@@ -105,6 +106,7 @@ def frequency_response(
     """
     if window not in WINDOWS:
         raise UsageError(f'--window: expected one of {", ".join(WINDOWS)}, got "{window}".')
+    drive, response = channel_of(drive), channel_of(response)
     x, y, interval, remarks = _pair(drive, response, start, stop)
     count = len(x)
     if segment is None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.recording import Channel
+from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.fmus.errors import UsageError
 
 Floats = NDArray[np.float64]
@@ -47,12 +48,14 @@ class DecaySamples:
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
 
-def decay_samples(channel: Channel, start: float | None = None, stop: float | None = None) -> DecaySamples:
+def decay_samples(
+    channel: Channel | xr.DataArray, start: float | None = None, stop: float | None = None
+) -> DecaySamples:
     """Take the window of a channel in which the body decays.
 
     Parameters
     ----------
-    channel : Channel
+    channel : Channel or xarray.DataArray
     start, stop : float or None
         s, both included. Without a start the decay begins at the largest excursion, unless that is within the
         first twentieth of the record: then nothing is cut.
@@ -62,6 +65,7 @@ def decay_samples(channel: Channel, start: float | None = None, stop: float | No
     UsageError
         The window is empty, or holds too few good samples.
     """
+    channel = channel_of(channel)
     time, good = channel.time, channel.good
     if not np.any(good):
         raise UsageError(f"{channel.name}: expected good samples, got none: all are missing or clipped.")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import xarray as xr
 from scipy.stats import chi2
 from scipy.stats import t as student
 
@@ -15,7 +16,7 @@ from vibroimpact.analysis.estimation.checks import check_displacement
 from vibroimpact.analysis.estimation.estimates import Doubt, Estimate, FittedMotion, ImpactEstimates
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.segments import Impact, Segmentation, segment
-from vibroimpact.analysis.recording import Channel
+from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.fmus.errors import EstimationError
 
 FLIGHT_TIMES = "flight_times"
@@ -31,13 +32,17 @@ _LONGER = 1.02
 
 
 def estimate_bounces(
-    channel: Channel, *, side: str | None = None, window: float | None = None, confidence: float = 0.95
+    channel: Channel | xr.DataArray,
+    *,
+    side: str | None = None,
+    window: float | None = None,
+    confidence: float = 0.95,
 ) -> ImpactEstimates:
     """Estimate the restitution of a body that bounces under a constant force, such as its weight.
 
     Parameters
     ----------
-    channel : Channel
+    channel : Channel or xarray.DataArray
         Displacement, in any unit.
     side : str or None
         `upper` or `lower` stop; None: as the signal shows.
@@ -67,6 +72,7 @@ def estimate_bounces(
     >>> round(estimate_bounces(ball).values["flight_times"]["restitution"].value, 4)
     0.8
     """
+    channel = channel_of(channel)
     check_displacement(channel)
     cut = segment(
         channel.time,

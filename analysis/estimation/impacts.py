@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
+import xarray as xr
 from scipy.stats import norm
 
 from vibroimpact.analysis.estimation.checks import check_displacement
@@ -27,7 +28,7 @@ from vibroimpact.analysis.estimation.physics import Forcing, Known, Parameters
 from vibroimpact.analysis.estimation.prepared import Prepared, fitted_motion, prepare
 from vibroimpact.analysis.estimation.remarks import conditioning_of, facts_of, remarks_of
 from vibroimpact.analysis.estimation.trajectory import fit_trajectory
-from vibroimpact.analysis.recording import Channel
+from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
 # A damping ratio of fewer standard errors is not told from restitution or, with more unknowns, from the force.
@@ -42,7 +43,7 @@ _INSTANT_DOUBT = 0.1
 
 
 def estimate_impacts(
-    channel: Channel,
+    channel: Channel | xr.DataArray,
     forcing: Forcing,
     known: Known | None = None,
     *,
@@ -58,7 +59,7 @@ def estimate_impacts(
 
     Parameters
     ----------
-    channel : Channel
+    channel : Channel or xarray.DataArray
         Displacement of the oscillator, in any unit; measured or simulated.
     forcing : Forcing
         What is known of the force, on the channel's clock.
@@ -85,7 +86,7 @@ def estimate_impacts(
     EstimationError
         No impacts were found, or no flight between them follows a forced oscillator.
     """
-    held = known or Known()
+    channel, held = channel_of(channel), known or Known()
     _check(methods, draws, confidence)
     _check_known(held)
     check_displacement(channel)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from vibroimpact.analysis.recording.arrays import array_of, channel_of
 from vibroimpact.analysis.recording.channels import (
     Channel,
     EventTrain,
@@ -19,6 +20,8 @@ __all__ = [
     "Recording",
     "SingleValue",
     "TimeAxis",
+    "array_of",
+    "channel_of",
     "is_recording",
     "open_recording",
     "open_signals",

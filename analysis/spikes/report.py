@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.recording import Channel
+from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.analysis.spikes.contact import Calibration, calibrate, contact_time_measure, impact_velocity
 from vibroimpact.analysis.spikes.identify import Identification, SpikeSettings, identify
@@ -60,7 +60,7 @@ class SpikeReport:
 
 
 def spike_report(
-    channel: Channel, settings: SpikeSettings | None = None, mechanics: Mechanics | None = None
+    channel: Channel | xr.DataArray, settings: SpikeSettings | None = None, mechanics: Mechanics | None = None
 ) -> SpikeReport:
     """Find the spikes of a channel and measure them.
 
@@ -68,7 +68,7 @@ def spike_report(
 
     Parameters
     ----------
-    channel : Channel
+    channel : Channel or xarray.DataArray
         Force, voltage of a load cell, acceleration; any unit.
     settings : SpikeSettings, optional
     mechanics : Mechanics, optional
@@ -80,7 +80,7 @@ def spike_report(
     UsageError
         A setting that does not fit the channel.
     """
-    known = mechanics or Mechanics()
+    channel, known = channel_of(channel), mechanics or Mechanics()
     calibration = None
     if known.known_impulses is not None:
         _expect_volts(channel, "known impulses")
