@@ -33,8 +33,7 @@ demo: $(VENV)/demo.stamp $(VENV)/fmus.stamp ## run the demonstration campaign; l
 
 test: $(VENV)/test.stamp $(VENV)/fmus.stamp sanitize ## run all tests but the benchmarks
 	$(BIN)/python -m pytest --ignore=tests/benchmarks -m "not benchmark" $(PARALLEL)
-	$(BIN)/python -m pytest --doctest-modules --pyargs vibroimpact.fmus vibroimpact.analysis vibroimpact.orchestrator \
-		vibroimpact.hardware
+	$(BIN)/python -m pytest --doctest-modules --pyargs vibroimpact
 
 soak: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run thousands of random cases of each kind; goes on where it ended; SEED= MINUTES= KINDS= CASES=
 	PYTHONPATH=tests $(BIN)/python -m soak

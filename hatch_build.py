@@ -12,7 +12,8 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 PACKAGES = ("fmus", "orchestrator", "analysis", "hardware")
-NAMESPACE = "vibroimpact"
+DOOR = "door"
+PACKAGE = "vibroimpact"
 ZIG = "ziglang>=0.13"
 
 
@@ -38,8 +39,8 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
         else:
             self._built = Path(tempfile.mkdtemp())
             build(self._built, strict=False)
-            build_data["force_include"][str(self._built)] = f"{NAMESPACE}/fmus/built"
-            build_data["force_include"][str(Path(self.root, "LICENSE"))] = f"{NAMESPACE}/fmus/LICENSE"
+            build_data["force_include"][str(self._built)] = f"{PACKAGE}/fmus/built"
+            build_data["force_include"][str(Path(self.root, "LICENSE"))] = f"{PACKAGE}/fmus/LICENSE"
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{_platform()}"
 
@@ -49,20 +50,30 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
             shutil.rmtree(self._built)
 
     def _make_importable(self) -> None:
-        # the folders of the checkout are not yet installed under their namespace
-        namespace = types.ModuleType(NAMESPACE)
-        namespace.__path__ = [self.root]
-        sys.modules[NAMESPACE] = namespace
+        # the folders of the checkout are not yet installed as parts of the package
+        package = types.ModuleType(PACKAGE)
+        package.__path__ = [self.root]
+        sys.modules[PACKAGE] = package
 
 
 def link_packages(root: Path) -> None:
-    """Make `.editable/vibroimpact/<package>` lead to each package's folder."""
-    folder = root / ".editable" / NAMESPACE
+    """Make `.editable/vibroimpact` the package: links to the door's modules and the packages' folders."""
+    folder = root / ".editable" / PACKAGE
     folder.mkdir(parents=True, exist_ok=True)
     for package in PACKAGES:
         link = folder / package
         if not link.exists():
             _link(link, root / package)
+    for module in (root / DOOR).glob("*.py*"):
+        _link_file(folder / module.name, module)
+
+
+def _link_file(link: Path, target: Path) -> None:
+    link.unlink(missing_ok=True)
+    if sys.platform == "win32":
+        link.hardlink_to(target)
+    else:
+        link.symlink_to(Path("../..", DOOR, target.name))
 
 
 def _link(link: Path, target: Path) -> None:

@@ -1,4 +1,4 @@
-"""The physics: FMUs, how they are built, checked and found.
+"""The physics: FMUs, how they are built, checked, found and exported.
 
 >>> from vibroimpact.fmus import components, fmu_path
 >>> "Oscillator" in components()
@@ -9,81 +9,20 @@ True
 
 from __future__ import annotations
 
-import difflib
-import tomllib
-from functools import cache
-from importlib.resources import files
-from pathlib import Path
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from vibroimpact.fmus.packaging.export import export_fmu as export
+    from vibroimpact.fmus.shipped import component_name, components, fmu_path
 
-from vibroimpact.fmus.errors import ComponentFileError
-
-__all__ = ["components", "fmu_path"]
-
-FOLDERS = {"3.0": "fmi3", "2.0": "fmi2"}
+__all__ = ["component_name", "components", "export", "fmu_path"]
 
 
-def components() -> tuple[str, ...]:
-    """Return the names of the components that the package has, built or not."""
-    return tuple(_folders())
+def __getattr__(name: str) -> object:
+    # The installation builds the FMUs before anything that an export needs is installed.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    import importlib
 
-
-def fmu_path(name: str, fmi: str = "3.0") -> Path:
-    """Return the FMU of a component of the package.
-
-    Parameters
-    ----------
-    name : str
-        Name of the component, `Oscillator`, or of its folder, `oscillator`.
-    fmi : str
-        `3.0` or `2.0`.
-
-    Returns
-    -------
-    Path
-        The FMU file.
-
-    Raises
-    ------
-    ComponentFileError
-        There is no such component (the nearest name is offered), or it was not built.
-    """
-    if fmi not in FOLDERS:
-        raise ComponentFileError(f"{name}: expected FMI version {' or '.join(FOLDERS)}, got {fmi!r}.")
-    path = _package() / "built" / FOLDERS[fmi] / f"{component_name(name)}.fmu"
-    if not path.is_file():
-        raise ComponentFileError(
-            f"{path}: expected a built FMU, got none. Run `python -m vibroimpact.fmus.packaging.build`."
-        )
-    return path
-
-
-def component_name(name: str) -> str:
-    """Return a component's name from its name or its folder's, whatever the case.
-
-    Raises
-    ------
-    ComponentFileError
-        There is no such component; the nearest name is offered.
-    """
-    known = {spelling.lower(): own for own, folder in _folders().items() for spelling in (own, folder)}
-    if name.lower() in known:
-        return known[name.lower()]
-    near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.5)
-    hint = f" Did you mean {known[near[0]]}?" if near else ""
-    raise ComponentFileError(f"component: expected one of {', '.join(components())}, got {name!r}.{hint}")
-
-
-def _folders() -> dict[str, str]:
-    described = sorted((_package() / "native").glob("*/variables.toml"))
-    return dict(_name_and_folder(path, path.stat().st_mtime_ns) for path in described)
-
-
-@cache
-def _name_and_folder(path: Path, changed: int) -> tuple[str, str]:
-    # every request for an FMU asks for all names, and reading the tables of variables takes longer than the rest
-    head = tomllib.loads(path.read_text(encoding="utf-8"))["component"]
-    return head["name"], head["folder"]
-
-
-def _package() -> Path:
-    return Path(str(files("vibroimpact.fmus")))
+    if name == "export":
+        return importlib.import_module(f"{__name__}.packaging.export").export_fmu
+    return getattr(importlib.import_module(f"{__name__}.shipped"), name)

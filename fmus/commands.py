@@ -9,13 +9,13 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from vibroimpact.fmus import component_name, components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.archive import platforms, unpack
 from vibroimpact.fmus.packaging.build import BUILT, build, read_components, update_readmes
 from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.python_fmus import build_user_contact_law
+from vibroimpact.fmus.shipped import component_name, components, fmu_path
 from vibroimpact.fmus.terminal import Terminal, say
 
 VERSIONS = ("3.0", "2.0")

@@ -8,15 +8,22 @@ from __future__ import annotations
 from vibroimpact.analysis.figures.style import page_style
 
 # isort: split
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+import numpy.typing as npt
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.kinds import KINDS, View, draw_view
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
-from vibroimpact.analysis.figures.page import COLUMN_WIDTH, label, laid_out, save
+from vibroimpact.analysis.figures.page import COLUMN_WIDTH, drawing_into, label, laid_out, save
 from vibroimpact.analysis.figures.sweeps import largest_impact_velocity
 from vibroimpact.analysis.figures.window import Window
 from vibroimpact.analysis.recording import Recording
+from vibroimpact.fmus.errors import UsageError
 
 __all__ = [
     "COLUMN_WIDTH",
@@ -24,6 +31,7 @@ __all__ = [
     "Figure",
     "convergence",
     "draw",
+    "draw_into",
     "label",
     "largest_impact_velocity",
     "save",
@@ -87,3 +95,48 @@ def draw(
     view = View(run, recording, Window(start, stop, periods))
     with page_style():
         return laid_out(draw_view(data, kind, view), title, width, height)
+
+
+T = TypeVar("T", bound=Axes | Sequence[Axes] | npt.NDArray[Any])
+
+
+def draw_into(
+    axes: T,
+    data: xr.Dataset | Recording,
+    kind: str = "auto",
+    run: int | None = None,
+    *,
+    recording: str | None = None,
+    start: float | None = None,
+    stop: float | None = None,
+    periods: float | None = None,
+) -> T:
+    """Draw into axes that there are already, in the style that they have, and return them.
+
+    Parameters
+    ----------
+    axes : Axes, or sequence or array of Axes
+        As many as the figure has panels, row by row.
+    data, kind, run, recording, start, stop, periods
+        See `draw`.
+
+    Raises
+    ------
+    DatasetError
+        If the data does not hold what the figure shows; with what fits.
+    UsageError
+        If an option does not apply, the window is empty, or the number of axes is not that of the panels.
+
+    Examples
+    --------
+    >>> figure, (left, right) = plt.subplots(1, 2)                                         # doctest: +SKIP
+    >>> draw_into(left, dataset, "portrait", run=3)                                        # doctest: +SKIP
+    """
+    given = [axes] if isinstance(axes, Axes) else list(np.asarray(axes, dtype=object).ravel())
+    if not given or not all(isinstance(one, Axes) for one in given):
+        raise UsageError(
+            f"figure: axes: expected axes of matplotlib, got {type(axes).__name__}. Make some: plt.subplots()."
+        )
+    with drawing_into(given):
+        draw_view(data, kind, View(run, recording, Window(start, stop, periods)))
+    return axes

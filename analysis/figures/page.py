@@ -5,11 +5,16 @@ from __future__ import annotations
 import io
 import os
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
@@ -118,8 +123,61 @@ def unit_symbol(variable: xr.DataArray) -> str:
     return written_unit(str(variable.attrs.get("units", "1")))
 
 
+_GIVEN: ContextVar[list[Axes] | None] = ContextVar("axes that were given", default=None)
+"""Where `canvas` draws, in place of a figure of its own."""
+
+
+@contextmanager
+def drawing_into(axes: list[Axes]) -> Iterator[None]:
+    """Let whatever is drawn meanwhile go into these axes."""
+    token = _GIVEN.set(axes)
+    try:
+        yield
+    finally:
+        _GIVEN.reset(token)
+
+
+class _GivenAxes(Figure):
+    """Stands for the figure of a drawing whose panels are axes of somebody else's figure."""
+
+    def __init__(self, axes: list[Axes]) -> None:
+        super().__init__()
+        self._given = axes
+
+    def subplots(self, nrows: int = 1, ncols: int = 1, *, squeeze: bool = True, **_others: Any) -> Any:
+        """Return the given axes in the shape that is asked for; what they share and how high they are stays."""
+        if len(self._given) != nrows * ncols:
+            raise UsageError(
+                f"figure: axes: expected {nrows * ncols} for the panels of this figure, got {len(self._given)}."
+            )
+        panels = np.array(self._given, dtype=object).reshape(nrows, ncols)
+        return np.squeeze(panels)[()] if squeeze else panels
+
+    def subfigures(self, *_sizes: Any, **_others: Any) -> Any:
+        """Refuse: parts with panels of their own are not axes."""
+        raise UsageError(
+            "figure: axes: expected a kind whose panels are axes, got one that is made of parts. Use draw."
+        )
+
+    def legend(self, *entries: Any, **options: Any) -> Any:
+        """Put the legend above the first panel."""
+        options |= {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.1}
+        first = self._given[0]
+        return first.legend(*(entries or first.get_legend_handles_labels()), **options)
+
+    def suptitle(self, t: str, **options: Any) -> Any:
+        """Leave the title to whose figure it is."""
+        return self._given[0].title
+
+    def align_ylabels(self, axs: Any = None) -> None:
+        """Leave the labels where they are."""
+
+
 def canvas(height_mm: float, width: float = COLUMN_WIDTH) -> Figure:
-    """Return an empty figure that needs no display."""
+    """Return an empty figure that needs no display; or what stands for axes that were given, see `drawing_into`."""
+    given = _GIVEN.get()
+    if given is not None:
+        return _GivenAxes(given)
     figure = Figure(figsize=(width, height_mm * _MM), layout="constrained")
     FigureCanvasAgg(figure)
     return figure

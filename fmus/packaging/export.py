@@ -6,15 +6,16 @@ description has. Contacts that no description mentions keep the law `none`. Valu
 
 from __future__ import annotations
 
+import os
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
-from vibroimpact.fmus import component_name, fmu_path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.build import read_components
 from vibroimpact.fmus.packaging.description import Component, fmi2_xml, fmi3_xml, plural
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.shipped import component_name, fmu_path
 
 #: The member that says how many of each repeated block the description has: lines such as `modes 8`.
 SIZES_MEMBER = "resources/sizes.txt"
@@ -22,7 +23,7 @@ SIZES_MEMBER = "resources/sizes.txt"
 
 def export_fmu(
     name: str,
-    output: Path,
+    output: str | os.PathLike[str],
     *,
     contacts: int | None = None,
     modes: int | None = None,
@@ -36,7 +37,7 @@ def export_fmu(
     ----------
     name : str
         The component.
-    output : Path
+    output : path
         File to write.
     contacts, modes, masses, sensors : int, optional
         How many its description has; all that were compiled in when absent. `modes` of a Beam and `masses` of a
@@ -56,6 +57,7 @@ def export_fmu(
     UsageError
         More of them than were compiled in, a component that has none, or a file that cannot be written.
     """
+    target = Path(output)
     asked = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
     counts = {block: count for block, count in asked.items() if count is not None}
     component = _component(component_name(name))
@@ -69,10 +71,10 @@ def export_fmu(
         lines = (f"{plural(block)} {count}\n" for block, count in counts.items())
         members[SIZES_MEMBER] = "".join(lines).encode("ascii")
     try:
-        write_fmu(output, members)
+        write_fmu(target, members)
     except OSError as error:
-        raise UsageError(f"{output}: expected a file that can be written, got: {error.strerror}.") from error
-    return output
+        raise UsageError(f"{target}: expected a file that can be written, got: {error.strerror}.") from error
+    return target
 
 
 def _component(name: str) -> Component:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -16,15 +17,19 @@ from vibroimpact.hardware.recordings.gaps import AGREEMENT
 from vibroimpact.hardware.recordings.settings import ImportSettings
 from vibroimpact.hardware.recordings.sources import Source, named, read_source, spread
 
+PathLike = str | os.PathLike[str]
+
 
 def import_recording(
-    files: Sequence[Path], settings: ImportSettings | None = None, common: ImportSettings | None = None
+    files: PathLike | Sequence[PathLike],
+    settings: ImportSettings | None = None,
+    common: ImportSettings | None = None,
 ) -> Recording:
     """Read files into one recording.
 
     Parameters
     ----------
-    files : sequence of Path
+    files : path or sequence of path
         Several files become one recording; each has a trigger, and so a time axis, of its own.
     settings : ImportSettings or None
         For all columns of all files together (the command line); it has the last word.
@@ -44,9 +49,10 @@ def import_recording(
         The settings do not fit the files.
     """
     given = settings or ImportSettings()
-    if any(_is_ours(path) for path in files):
-        return _passed_on(files, given)
-    sources = [read_source(path, given, common) for path in files]
+    paths = [Path(one) for one in ([files] if isinstance(files, str | os.PathLike) else files)]
+    if any(_is_ours(path) for path in paths):
+        return _passed_on(paths, given)
+    sources = [read_source(path, given, common) for path in paths]
     spread(sources, given)
     parts = Parts()
     for source in sources:
@@ -55,7 +61,7 @@ def import_recording(
         left_out = [line for line in parts.remarks if "left out" in line]
         besides = f" Besides, {'; '.join(left_out[:3])}." if left_out else ""
         raise DatasetError(
-            f"{files[0]}: expected channels of two samples or more, or instants of events, got none.{besides}"
+            f"{paths[0]}: expected channels of two samples or more, or instants of events, got none.{besides}"
         )
     parts.remark(_of_the_whole(parts))
     return Recording(parts.channels, parts.events, parts.scalars, _provenance(sources, parts))

@@ -28,7 +28,7 @@ from vibroimpact.orchestrator.campaign.chunks import (
     Work,
     get_ready,
 )
-from vibroimpact.orchestrator.campaign.cluster import WorkerPool, open_workers
+from vibroimpact.orchestrator.campaign.cluster import Client, WorkerPool, open_workers
 from vibroimpact.orchestrator.campaign.computation import Computation
 from vibroimpact.orchestrator.campaign.extension import (
     EarlierSweep,
@@ -116,7 +116,7 @@ def run_campaign(
     folder: str | os.PathLike[str],
     *,
     workers: int | None = None,
-    scheduler: str | None = None,
+    scheduler: str | Client | None = None,
     runner: str = DEFAULT_RUNNER,
     progress: Progress | None = None,
 ) -> CampaignReport:
@@ -129,8 +129,8 @@ def run_campaign(
         One campaign, one folder; made when absent.
     workers : int, optional
         Worker processes on this machine; one for each processor by default.
-    scheduler : str, optional
-        Address of a Dask scheduler to use instead.
+    scheduler : str or dask.distributed.Client, optional
+        Address of a Dask scheduler, or a client of one, to use instead.
     runner : str
         The class that runs a point, as `module:name`.
     progress : Progress, optional
@@ -232,7 +232,7 @@ class _Campaign:
             write_dataset(rows.assign_attrs(attributes), self._report.dataset)
             self._progress.note(f"{self._report.dataset} has the title {self._scene.title!r} now.")
 
-    def run(self, workers: int | None, scheduler: str | None) -> CampaignReport:
+    def run(self, workers: int | None, scheduler: str | Client | None) -> CampaignReport:
         """Compute what is left and compact it; parts that turn out unfit are computed again."""
         make_folder(self._parts_folder)
         remove_temporary_files(self._home)
@@ -251,7 +251,7 @@ class _Campaign:
             f"{MOST_ROUNDS} times: {names}"
         )
 
-    def _complete(self, workers: int | None, scheduler: str | None) -> list[Path]:
+    def _complete(self, workers: int | None, scheduler: str | Client | None) -> list[Path]:
         """Compute what no part holds, and return the files that hold all runs."""
         remove_temporary_files(self._parts_folder)
         self._report.chunks.clear()
@@ -289,7 +289,9 @@ class _Campaign:
             "The same command resumes."
         )
 
-    def _compute_on(self, parts: Sequence[StoredPart], workers: int | None, scheduler: str | None) -> None:
+    def _compute_on(
+        self, parts: Sequence[StoredPart], workers: int | None, scheduler: str | Client | None
+    ) -> None:
         try:
             with open_workers(workers=workers, scheduler=scheduler, progress=self._progress) as pool:
                 self._compute_with(pool, parts, shared=scheduler is not None)

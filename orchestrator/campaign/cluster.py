@@ -24,7 +24,8 @@ from types import TracebackType
 from typing import Any, Self
 
 import dask
-from distributed import CancelledError, Client, Future, LocalCluster
+from distributed import CancelledError, Future, LocalCluster
+from distributed import Client as Client
 from distributed.comm.core import CommClosedError
 from distributed.scheduler import KilledWorker
 from distributed.security import Security
@@ -361,7 +362,7 @@ class WorkerPool:
 
 @contextmanager
 def open_workers(
-    *, workers: int | None = None, scheduler: str | None = None, progress: Progress | None = None
+    *, workers: int | None = None, scheduler: str | Client | None = None, progress: Progress | None = None
 ) -> Iterator[WorkerPool]:
     """Open workers for one campaign and leave no process behind, whatever ends it.
 
@@ -369,8 +370,9 @@ def open_workers(
     ----------
     workers : int, optional
         Number of worker processes on this machine; one for each processor by default.
-    scheduler : str, optional
-        Address of a Dask scheduler (`tcp://host:8786`) to use instead; its workers outlive the campaign.
+    scheduler : str or Client, optional
+        Address of a Dask scheduler (`tcp://host:8786`), or a client of one, to use instead; its workers outlive the
+        campaign, and the client stays as it is.
     progress : Progress, optional
         Told of workers that were lost.
 
@@ -391,9 +393,11 @@ def open_workers(
             scratch = stack.enter_context(ScratchFolder("workers"))
             stack.enter_context(dask.config.set({"temporary-directory": scratch.name}))
             connect = partial(_embedded_cluster, workers or processor_count(), Path(scratch.name))
+            where = "this machine"
         else:
-            connect = partial(_remote_cluster, scheduler)
-        pool = stack.enter_context(WorkerPool(connect, scheduler or "this machine", progress or Silence()))
+            address, security = _reached_by(scheduler)
+            connect, where = partial(_remote_cluster, address, security), address
+        pool = stack.enter_context(WorkerPool(connect, where, progress or Silence()))
         pool.wait_for_workers()
         yield pool
 
@@ -405,11 +409,32 @@ def processor_count() -> int:
     return os.cpu_count() or 1
 
 
+def _reached_by(scheduler: str | Client) -> tuple[str, Security | None]:
+    """Return the address of a scheduler, and the certificates of the client that knows it."""
+    if isinstance(scheduler, str):
+        return scheduler, None
+    if not isinstance(scheduler, Client):
+        raise UsageError(
+            f"scheduler: expected an address or a dask.distributed.Client, got {type(scheduler).__name__}."
+        )
+    if scheduler.asynchronous or scheduler.scheduler is None or scheduler.status != "running":
+        raise UsageError(
+            "scheduler: expected a client that is connected and not asynchronous, got another. Make one: Client()."
+        )
+    address = str(scheduler.scheduler.address)
+    if address.startswith("inproc:"):
+        raise UsageError(
+            f"scheduler: expected workers in processes of their own, got threads of this one ({address}). "
+            "Make the client with Client(processes=True), or leave it out."
+        )
+    return address, scheduler.security
+
+
 @contextmanager
-def _remote_cluster(address: str) -> Iterator[_Cluster]:
+def _remote_cluster(address: str, security: Security | None) -> Iterator[_Cluster]:
     expected = f"--scheduler {address}: expected a Dask scheduler that listens there"
     try:
-        security = Security()
+        security = security or Security()
         certified = security.get_connection_args("client")["ssl_context"] is not None
     except OSError as error:
         raise UsageError(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from html import escape
 from typing import TYPE_CHECKING, Protocol, TextIO
 
 from vibroimpact.fmus.terminal import Terminal, printable
@@ -119,6 +120,58 @@ class Bar:
         self._bar.console.print(text)
 
 
+class NotebookBar:
+    """Draws a bar below the cell of a notebook; `show` replaces what is there."""
+
+    def __init__(self, show: Callable[[str], None]) -> None:
+        self._show = show
+        self._total = self._done = self._resumed = 0
+        self._lost, self._notes = "", ""
+        self._began, self._drawn = time.monotonic(), 0.0
+
+    def begin(self, total: int, done: int) -> None:
+        """Show the bar."""
+        self._total, self._done, self._resumed = total, done, done
+        self._began = time.monotonic()
+        self._draw()
+
+    def advance(self, points: int) -> None:
+        """Move the bar when the last drawing is old, and at the end."""
+        self._done += points
+        if time.monotonic() - self._drawn >= 1.0 / REFRESHES_PER_SECOND or self._done == self._total:
+            self._draw()
+
+    def lost_workers(self, count: int) -> None:
+        """Say it behind the bar."""
+        self._lost = lost_text(count)
+
+    def note(self, text: str) -> None:
+        """Write a line below the bar."""
+        self._notes += f"<br>{escape(printable(text))}"
+        self._draw()
+
+    def _draw(self) -> None:
+        self._drawn = time.monotonic()
+        rate = (self._done - self._resumed) / max(self._drawn - self._began, 1e-9)
+        left = (
+            f", {rate:.0f} points/s, {clock((self._total - self._done) / rate)} remaining" if rate > 0 else ""
+        )
+        bar = f'<progress max="{self._total}" value="{self._done}"></progress>'
+        self._show(f"{bar} {self._done} of {self._total} points{left}{self._lost}{self._notes}")
+
+
+def _notebook() -> Callable[[str], None] | None:
+    """Return what shows HTML below the cell that runs; None where no notebook does."""
+    interactive = sys.modules.get("IPython")
+    shell = interactive.get_ipython() if interactive is not None else None
+    if shell is None or not hasattr(shell, "kernel"):
+        return None
+    from IPython.display import HTML, display
+
+    handle = display(HTML(""), display_id=True)
+    return lambda text: handle.update(HTML(text))
+
+
 def lost_text(count: int) -> str:
     """Return what a line of progress says of lost workers.
 
@@ -141,7 +194,11 @@ def clock(seconds: float) -> str:
 
 @contextmanager
 def shown_progress(stream: TextIO | None = None) -> Iterator[Progress]:
-    """Show progress on a stream, standard error by default: a bar in a terminal, else lines."""
+    """Show progress on a stream, standard error by default: a bar in a notebook or a terminal, else lines."""
+    notebook = _notebook() if stream is None else None
+    if notebook is not None:
+        yield NotebookBar(notebook)
+        return
     stream = stream or sys.stderr
     if not stream.isatty():
         yield Lines(stream)

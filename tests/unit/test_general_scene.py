@@ -606,7 +606,7 @@ def test_a_component_that_is_not_built_says_how_to_build_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     package = Path(shutil.copytree(ROOT / "fmus" / "native", tmp_path / "native")).parent
-    monkeypatch.setattr("vibroimpact.fmus._package", lambda: package)
+    monkeypatch.setattr("vibroimpact.fmus.shipped._package", lambda: package)
     (problem,) = problems_of('[component.a]\nfmu = "Oscillator"\n[record]\nrecorded_time = 1')
     assert problem == (
         "component.a.fmu: expected Oscillator built for FMI 3.0, got no FMU. "

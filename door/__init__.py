@@ -1,0 +1,118 @@
+"""Dynamics of things that vibrate and hit stops: scenes, runs and campaigns of them, recordings, estimates, figures.
+
+Everything a command does, in a few lines; names are loaded when they are first used.
+
+Examples
+--------
+>>> import vibroimpact as vi
+>>> body = {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05}
+>>> scene = vi.Scene.from_dict(
+...     {
+...         "body": body,
+...         "forcing": {"amplitude": 1.0, "angular_frequency": 0.9},
+...         "stop": [{"position": 1.0, "law": "restitution", "restitution": 0.7}],
+...         "record": {"transient_periods": 100, "recorded_periods": 50},
+...     }
+... )
+>>> found = vi.run(scene)
+>>> found.vibroimpact.impacts().sizes["impact"]
+50
+"""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is below, a test compares them
+    from vibroimpact import fmus as fmus
+    from vibroimpact.analysis import figures as figures
+    from vibroimpact.analysis.dataset import open_dataset as open_dataset
+    from vibroimpact.analysis.dataset.reading import open_measured as open_measured
+    from vibroimpact.analysis.dataset.results import write_results as write_results
+    from vibroimpact.analysis.decay import curve_of as curve_of
+    from vibroimpact.analysis.decay import decay_samples as decay_samples
+    from vibroimpact.analysis.decay import estimate_decay as estimate_decay
+    from vibroimpact.analysis.decay import fit_resonance as fit_resonance
+    from vibroimpact.analysis.decay import frequency_response as frequency_response
+    from vibroimpact.analysis.estimation import Forcing as Forcing
+    from vibroimpact.analysis.estimation import Known as Known
+    from vibroimpact.analysis.estimation import estimate_bounces as estimate_bounces
+    from vibroimpact.analysis.estimation import estimate_impacts as estimate_impacts
+    from vibroimpact.analysis.estimation import estimate_modes as estimate_modes
+    from vibroimpact.analysis.figures import draw as draw
+    from vibroimpact.analysis.intervals import interval_report as interval_report
+    from vibroimpact.analysis.recording import Channel as Channel
+    from vibroimpact.analysis.recording import Recording as Recording
+    from vibroimpact.analysis.recording import array_of as array_of
+    from vibroimpact.analysis.recording import open_recording as open_recording
+    from vibroimpact.analysis.recording import open_signals as open_signals
+    from vibroimpact.analysis.recording import write_recording as write_recording
+    from vibroimpact.analysis.spikes import Mechanics as Mechanics
+    from vibroimpact.analysis.spikes import SpikeSettings as SpikeSettings
+    from vibroimpact.analysis.spikes import spike_report as spike_report
+    from vibroimpact.fmus.errors import VibroimpactError as VibroimpactError
+    from vibroimpact.hardware.recordings import ImportSettings as ImportSettings
+    from vibroimpact.hardware.recordings import import_recording as import_recording
+    from vibroimpact.orchestrator.scene import Scene as Scene
+    from vibroimpact.simulation import campaign as campaign
+    from vibroimpact.simulation import cost_of as cost_of
+    from vibroimpact.simulation import replay as replay
+    from vibroimpact.simulation import run as run
+
+    __version__: str
+
+_HOMES = {
+    "Channel": "analysis.recording",
+    "Forcing": "analysis.estimation",
+    "ImportSettings": "hardware.recordings",
+    "Known": "analysis.estimation",
+    "Mechanics": "analysis.spikes",
+    "Recording": "analysis.recording",
+    "Scene": "orchestrator.scene",
+    "SpikeSettings": "analysis.spikes",
+    "VibroimpactError": "fmus.errors",
+    "array_of": "analysis.recording",
+    "campaign": "simulation",
+    "cost_of": "simulation",
+    "curve_of": "analysis.decay",
+    "decay_samples": "analysis.decay",
+    "draw": "analysis.figures",
+    "estimate_bounces": "analysis.estimation",
+    "estimate_decay": "analysis.decay",
+    "estimate_impacts": "analysis.estimation",
+    "estimate_modes": "analysis.estimation",
+    "fit_resonance": "analysis.decay",
+    "frequency_response": "analysis.decay",
+    "import_recording": "hardware.recordings",
+    "interval_report": "analysis.intervals",
+    "open_dataset": "analysis.dataset",
+    "open_measured": "analysis.dataset.reading",
+    "open_recording": "analysis.recording",
+    "open_signals": "analysis.recording",
+    "replay": "simulation",
+    "run": "simulation",
+    "spike_report": "analysis.spikes",
+    "write_recording": "analysis.recording",
+    "write_results": "analysis.dataset.results",
+}
+_ROOMS = {"figures": "analysis.figures", "fmus": "fmus"}
+__all__ = [*_HOMES, *_ROOMS, "__version__"]
+
+
+def __getattr__(name: str) -> object:
+    import importlib
+
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("vibroimpact")
+    if name in _ROOMS:
+        return importlib.import_module(f"{__name__}.{_ROOMS[name]}")
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,224 @@
+"""Scenes that run in a notebook or a script: a dataset comes back. The commands stand on the same functions."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from vibroimpact.analysis.dataset import open_dataset
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.campaign import SceneCost, run_campaign, run_scene
+from vibroimpact.orchestrator.campaign import cost_of as scene_cost
+from vibroimpact.orchestrator.campaign.progress import Progress, Silence, shown_progress
+from vibroimpact.orchestrator.replay.replaying import replay_scene
+from vibroimpact.orchestrator.scene import Scene
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.campaign.cluster import Client
+
+SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
+PathLike = str | os.PathLike[str]
+
+
+def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True) -> xr.Dataset:
+    """Run every point of a scene in this process, one after the other.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        A scene, the file of one, or its tables.
+    path : path, optional
+        The dataset to write as well, whole or not at all; one that is there is replaced.
+    progress : bool
+        Show how far it is, where there is more than one point.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `open_dataset` gives it; in memory, without a path.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+    UsageError
+        The dataset cannot be written, or would be larger than memory.
+
+    Examples
+    --------
+    >>> tables = {"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 5.0}}
+    >>> str(run(tables).outcome.item())
+    '0'
+    """
+    chosen = _scene(scene)
+    with _shown(progress) as shown:
+        if path is not None:
+            run_scene(chosen, path, progress=shown)
+            return open_dataset(path)
+        with ScratchFolder("run") as folder:
+            file = Path(folder.name, "run.nc")
+            run_scene(chosen, file, progress=shown)
+            return _in_memory(file)
+
+
+def campaign(
+    scene: SceneLike,
+    folder: PathLike,
+    *,
+    workers: int | None = None,
+    scheduler: str | Client | None = None,
+    progress: bool = True,
+) -> xr.Dataset:
+    """Compute all points of a scene's sweep with many workers; the same call resumes after anything.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+    folder : path
+        One campaign, one folder; made when absent. The dataset is `dataset.nc` in it.
+    workers : int, optional
+        Worker processes on this machine; one for each processor by default.
+    scheduler : str or dask.distributed.Client, optional
+        Workers to use instead: the address of a Dask scheduler, or a client of it.
+    progress : bool
+        Show how far it is.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `open_dataset(folder)` gives it.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+    UsageError
+        The folder cannot be written or belongs to another scene, or nothing listens at `scheduler`.
+    CampaignError
+        The campaign could not finish; the same call resumes it.
+    CampaignInterrupted
+        On Ctrl-C, a KeyboardInterrupt; the same call resumes.
+
+    Examples
+    --------
+    >>> found = campaign("examples/bifurcation.toml", "bifurcation", workers=2)        # doctest: +SKIP
+    >>> found.displacement_range.sel(direction="up")                                   # doctest: +SKIP
+    """
+    _refuse_both(workers, scheduler)
+    with _shown(progress) as shown:
+        report = run_campaign(_scene(scene), folder, workers=workers, scheduler=scheduler, progress=shown)
+    return open_dataset(report.dataset)
+
+
+def replay(
+    scene: SceneLike,
+    recordings: PathLike | Sequence[PathLike] = (),
+    path: PathLike | None = None,
+    *,
+    fit: str | Sequence[str] = (),
+    score: PathLike | Sequence[PathLike] = (),
+    execution: str | None = None,
+) -> xr.Dataset:
+    """Drive a scene by recordings, compare its motion with what was measured, fit numbers of it.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        With `[replay]`.
+    recordings : path or sequence of path
+        Those to replay, and to fit to; none: those that the scene names.
+    path : path, optional
+        The dataset to write as well (.nc).
+    fit : str or sequence of str
+        Numbers of the scene to find, by key: `body.damping_ratio`.
+    score : path or sequence of path
+        Recordings to score that were not fitted on.
+    execution : str, optional
+        `auto`, `fused` or `coupled`; None: as the scene says.
+
+    Returns
+    -------
+    xarray.Dataset
+        Signals, scores, fitted numbers; `attrs["verdict"]` says in words how far the model is to be trusted. A
+        campaign over recordings and a grid of numbers: `campaign(scene, folder)`.
+
+    Raises
+    ------
+    SceneError, UsageError, DatasetError, EstimationError
+        What is wrong with the scene, the request, a recording or the fit.
+
+    Examples
+    --------
+    >>> found = replay("board.toml", "a0.nc", fit=["body.damping_ratio"], score="a1.nc")    # doctest: +SKIP
+    >>> found.attrs["verdict"]                                                             # doctest: +SKIP
+    """
+    keys = fit if isinstance(fit, str) else ",".join(fit)
+    whole = replay_scene(
+        _scene(scene), _paths(recordings), fit=keys or None, score=_paths(score), execution=execution
+    )
+    if path is not None:
+        write_results(whole.dataset, path, kind="replay")
+    return whole.dataset
+
+
+def cost_of(scene: SceneLike) -> SceneCost:
+    """Run one point of a scene and say what all of them would cost, as `vibroimpact check` does.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+
+    Examples
+    --------
+    >>> cost_of({"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 5.0}}).points
+    1
+    """
+    return scene_cost(_scene(scene))
+
+
+def _scene(given: SceneLike) -> Scene:
+    if isinstance(given, Scene):
+        return given
+    if isinstance(given, Mapping):
+        return Scene.from_dict(given)
+    if isinstance(given, str | os.PathLike):
+        return Scene.from_file(given)
+    raise UsageError(
+        f"scene: expected a Scene, the path of one or its tables, got {type(given).__name__}. "
+        "Scene.from_text reads TOML text."
+    )
+
+
+def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
+    several = [given] if isinstance(given, str | os.PathLike) else list(given)
+    return [Path(one) for one in several]
+
+
+def _shown(progress: bool) -> AbstractContextManager[Progress]:
+    return shown_progress() if progress else nullcontext(Silence())
+
+
+def _refuse_both(workers: int | None, scheduler: object) -> None:
+    if workers is not None and scheduler is not None:
+        raise UsageError(
+            "workers and scheduler: expected one of them, got both. A scheduler has its own workers."
+        )
+
+
+def _in_memory(file: Path) -> xr.Dataset:
+    with open_dataset(file) as opened:
+        found = opened.load()
+    found.encoding.clear()
+    return found

@@ -1,0 +1,80 @@
+"""The FMUs that the package brings along: their names, and where they are."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from vibroimpact.fmus.errors import ComponentFileError
+
+FOLDERS = {"3.0": "fmi3", "2.0": "fmi2"}
+
+
+def components() -> tuple[str, ...]:
+    """Return the names of the components that the package has, built or not."""
+    return tuple(_folders())
+
+
+def fmu_path(name: str, fmi: str = "3.0") -> Path:
+    """Return the FMU of a component of the package.
+
+    Parameters
+    ----------
+    name : str
+        Name of the component, `Oscillator`, or of its folder, `oscillator`.
+    fmi : str
+        `3.0` or `2.0`.
+
+    Returns
+    -------
+    Path
+        The FMU file.
+
+    Raises
+    ------
+    ComponentFileError
+        There is no such component (the nearest name is offered), or it was not built.
+    """
+    if fmi not in FOLDERS:
+        raise ComponentFileError(f"{name}: expected FMI version {' or '.join(FOLDERS)}, got {fmi!r}.")
+    path = _package() / "built" / FOLDERS[fmi] / f"{component_name(name)}.fmu"
+    if not path.is_file():
+        raise ComponentFileError(
+            f"{path}: expected a built FMU, got none. Run `python -m vibroimpact.fmus.packaging.build`."
+        )
+    return path
+
+
+def component_name(name: str) -> str:
+    """Return a component's name from its name or its folder's, whatever the case.
+
+    Raises
+    ------
+    ComponentFileError
+        There is no such component; the nearest name is offered.
+    """
+    known = {spelling.lower(): own for own, folder in _folders().items() for spelling in (own, folder)}
+    if name.lower() in known:
+        return known[name.lower()]
+    near = difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.5)
+    hint = f" Did you mean {known[near[0]]}?" if near else ""
+    raise ComponentFileError(f"component: expected one of {', '.join(components())}, got {name!r}.{hint}")
+
+
+def _folders() -> dict[str, str]:
+    described = sorted((_package() / "native").glob("*/variables.toml"))
+    return dict(_name_and_folder(path, path.stat().st_mtime_ns) for path in described)
+
+
+@cache
+def _name_and_folder(path: Path, changed: int) -> tuple[str, str]:
+    # every request for an FMU asks for all names, and reading the tables of variables takes longer than the rest
+    head = tomllib.loads(path.read_text(encoding="utf-8"))["component"]
+    return head["name"], head["folder"]
+
+
+def _package() -> Path:
+    return Path(str(files("vibroimpact.fmus")))

@@ -1,0 +1,182 @@
+"""`import vibroimpact as vi`: what is there, what it loads, and that it does what the commands do."""
+
+from __future__ import annotations
+
+import ast
+import doctest
+import subprocess
+import sys
+from pathlib import Path
+
+import distributed
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+import vibroimpact as vi
+from vibroimpact.orchestrator.campaign.progress import NotebookBar
+
+ROOT = Path(__file__).parents[2]
+DOOR = ROOT / "door" / "__init__.py"
+FREE = {"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 5.0, "extrema": True}}
+FORCED = {
+    "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05},
+    "forcing": {"amplitude": 1.0, "angular_frequency": 0.9},
+    "stop": [{"position": 1.0, "law": "restitution", "restitution": 0.7}],
+    "record": {"transient_periods": 20, "recorded_periods": 10},
+}
+
+
+def declared() -> dict[str, str]:
+    """Return what type checkers see: each name with the module it comes from."""
+    found = {}
+    for node in ast.walk(ast.parse(DOOR.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("vibroimpact"):
+            for alias in node.names:
+                assert alias.asname == alias.name
+                found[alias.name] = node.module
+    return found
+
+
+def test_type_checkers_see_what_is_there():
+    there = declared()
+    assert {*there, "__version__"} == set(vi.__all__) == set(dir(vi))
+    for name, module in there.items():
+        found = getattr(vi, name)
+        home = getattr(sys.modules[module], name)
+        assert found is home
+        assert found.__doc__
+
+
+def test_version_is_that_of_the_package():
+    assert vi.__version__ == __import__("importlib.metadata").metadata.version("vibroimpact")
+    with pytest.raises(AttributeError, match="no attribute 'simulate'"):
+        _ = vi.simulate
+
+
+def test_the_door_loads_nothing_before_it_is_asked():
+    code = (
+        "import sys; import vibroimpact as vi; dir(vi); "
+        "print([name for name in ('numpy', 'xarray', 'dask', 'pydantic', 'typing') if name in sys.modules])"
+    )
+    result = subprocess.run(
+        [
+            sys.executable,
+            "-S",
+            "-E",
+            "-c",
+            f"import sys; sys.path.insert(0, {str(ROOT / '.editable')!r}); {code}",
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert result.stdout == "[]\n"
+
+
+def test_the_page_of_the_door_runs_and_has_every_name(tmp_path, monkeypatch):
+    page = ROOT / "docs" / "python.md"
+    text = page.read_text(encoding="utf-8")
+    for name in vi.__all__:
+        assert f"vi.{name}" in text, name
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").symlink_to(ROOT / "examples")
+    failed, tried = doctest.testfile(
+        str(page), module_relative=False, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+    )
+    assert failed == 0
+    assert tried > 30
+
+
+def test_a_run_in_memory_is_that_of_the_file(tmp_path):
+    scene = vi.Scene.from_dict(FORCED).with_sweep({"forcing.angular_frequency": [0.8, 0.9]})
+    found, written = vi.run(scene), vi.run(scene, tmp_path / "run.nc")
+    timeless = [one.drop_vars("point_seconds").drop_attrs(deep=False) for one in (found, written)]
+    xr.testing.assert_identical(*timeless)
+    xr.testing.assert_identical(written, vi.open_dataset(tmp_path / "run.nc"))
+    assert found.sizes["angular_frequency"] == 2
+    assert found.encoding == {}
+    # it saves and opens as any other
+    found.to_netcdf(tmp_path / "again.nc")
+    assert vi.open_dataset(tmp_path / "again.nc").outcome.values.tolist() == [0, 0]
+
+
+def test_scenes_are_given_as_object_file_or_tables(tmp_path):
+    (tmp_path / "free.toml").write_text(vi.Scene.from_dict(FREE).to_toml())
+    given = [FREE, vi.Scene.from_dict(FREE), tmp_path / "free.toml", str(tmp_path / "free.toml")]
+    ends = {float(vi.run(one).final_displacement) for one in given}
+    assert len(ends) == 1
+    assert vi.cost_of(FREE).points == 1
+    with pytest.raises(
+        vi.VibroimpactError, match=r"scene: expected a Scene, the path of one or its tables, got int"
+    ):
+        vi.run(3)
+
+
+def test_a_campaign_resumes_and_takes_a_client(tmp_path):
+    scene = vi.Scene.from_dict(FORCED).with_sweep({"forcing.angular_frequency": np.linspace(0.7, 1.0, 7)})
+    here = vi.campaign(scene, tmp_path / "here", workers=1, progress=False)
+    assert here.sizes["angular_frequency"] == 7
+    xr.testing.assert_identical(vi.campaign(scene, tmp_path / "here", progress=False), here)
+    with (
+        distributed.LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=":0") as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        there = vi.campaign(scene, tmp_path / "there", scheduler=client, progress=False)
+        assert client.status == "running"
+    for name in ("displacement_range", "impact_velocity", "final_phase"):
+        np.testing.assert_array_equal(there[name], here[name])
+    with pytest.raises(vi.VibroimpactError, match="connected"):
+        vi.campaign(scene, tmp_path / "closed", scheduler=client)
+
+
+def test_what_cannot_run_points_is_refused(tmp_path):
+    scene = vi.Scene.from_dict(FORCED).with_sweep({"forcing.angular_frequency": [0.8, 0.9]})
+    with (
+        distributed.Client(processes=False, dashboard_address=":0") as client,
+        pytest.raises(vi.VibroimpactError, match="threads of this one"),
+    ):
+        vi.campaign(scene, tmp_path / "threads", scheduler=client)
+    with pytest.raises(vi.VibroimpactError, match="expected an address or a dask"):
+        vi.campaign(scene, tmp_path / "no", scheduler=3)
+    with pytest.raises(vi.VibroimpactError, match="expected one of them, got both"):
+        vi.campaign(scene, tmp_path / "no", workers=2, scheduler="tcp://127.0.0.1:1")
+
+
+def test_figures_go_into_axes_that_are_there():
+    scene = vi.Scene.from_dict(FORCED).with_sweep({"forcing.angular_frequency": np.linspace(0.7, 1.0, 7)})
+    swept, single = vi.run(scene), vi.run(ROOT / "examples" / "single_run.toml")
+    axes = Figure().subplots(2, 2)
+    assert vi.figures.draw_into(axes[:, 0], swept) is not None
+    alone = vi.draw(swept).axes
+    for one, own in zip(axes[:, 0], alone, strict=True):
+        assert (one.get_ylabel(), one.get_ylim()) == (own.get_ylabel(), own.get_ylim())
+        np.testing.assert_array_equal(one.lines[0].get_xydata(), own.lines[0].get_xydata())
+    assert vi.figures.draw_into(axes[0, 1], single, "portrait") is axes[0, 1]
+    assert axes[0, 1].get_xlabel() == "displacement (-)"
+    assert not axes[1, 1].lines
+    # afterwards a figure is its own again
+    assert vi.draw(swept) is not axes[0, 0].figure
+    for given, words in (
+        (axes[0, 0], "expected 2 for the panels of this figure, got 1"),
+        ([], "expected axes of matplotlib, got list"),
+        (Figure(), "expected axes of matplotlib, got Figure"),
+    ):
+        with pytest.raises(vi.VibroimpactError, match=words):
+            vi.figures.draw_into(given, swept)
+
+
+def test_a_notebook_sees_a_bar_that_ends_full():
+    shown = []
+    bar = NotebookBar(shown.append)
+    bar.begin(100, 40)
+    for _ in range(60):
+        bar.advance(1)
+    bar.lost_workers(2)
+    bar.note("a <b> & c")
+    assert '<progress max="100" value="40">' in shown[0]
+    assert '<progress max="100" value="100">' in shown[-1]
+    assert "2 workers lost" in shown[-1]
+    assert "a &lt;b&gt; &amp; c" in shown[-1]
+    assert len(shown) < 10
