@@ -28,7 +28,7 @@ Floats = npt.NDArray[np.float64]
 
 _MM = 1 / 25.4
 COLUMN_WIDTH = 85 * _MM
-_DPI = 300
+_DPI, _SCREEN_DPI = 300, 150
 _SMALLEST, _LARGEST = 20, 1000
 """mm: of a side of a figure."""
 LINE = "#20567D"
@@ -137,6 +137,16 @@ def drawing_into(axes: list[Axes]) -> Iterator[None]:
         _GIVEN.reset(token)
 
 
+class Page(Figure):
+    """A figure of this package: a notebook shows it, whether pyplot is loaded or not."""
+
+    def _repr_png_(self) -> bytes:
+        content = io.BytesIO()
+        with page_style():
+            self.savefig(content, format="png", dpi=_SCREEN_DPI)
+        return content.getvalue()
+
+
 class _GivenAxes(Figure):
     """Stands for the figure of a drawing whose panels are axes of somebody else's figure."""
 
@@ -178,6 +188,6 @@ def canvas(height_mm: float, width: float = COLUMN_WIDTH) -> Figure:
     given = _GIVEN.get()
     if given is not None:
         return _GivenAxes(given)
-    figure = Figure(figsize=(width, height_mm * _MM), layout="constrained")
+    figure = Page(figsize=(width, height_mm * _MM), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
