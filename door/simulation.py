@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
 PathLike = str | os.PathLike[str]
+
+_ONE_AT_A_TIME = threading.Lock()
 
 
 def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True) -> xr.Dataset:
@@ -57,11 +60,12 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
     >>> str(run(tables).outcome.item())
     '0'
     """
-    chosen = _scene(scene)
-    with _shown(progress) as shown:
-        if path is not None:
-            run_scene(chosen, path, progress=shown)
-            return open_dataset(path)
+    chosen, target = _scene(scene), None if path is None else _path(path)
+    # NetCDF's library is not for several threads at once
+    with _ONE_AT_A_TIME, _shown(progress) as shown:
+        if target is not None:
+            run_scene(chosen, target, progress=shown)
+            return open_dataset(target)
         with ScratchFolder("run") as folder:
             file = Path(folder.name, "run.nc")
             run_scene(chosen, file, progress=shown)
@@ -111,9 +115,11 @@ def campaign(
     >>> found = campaign("examples/bifurcation.toml", "bifurcation", workers=2)        # doctest: +SKIP
     >>> found.displacement_range.sel(direction="up")                                   # doctest: +SKIP
     """
-    _refuse_both(workers, scheduler)
+    _refuse_workers(workers, scheduler)
     with _shown(progress) as shown:
-        report = run_campaign(_scene(scene), folder, workers=workers, scheduler=scheduler, progress=shown)
+        report = run_campaign(
+            _scene(scene), _path(folder), workers=workers, scheduler=scheduler, progress=shown
+        )
     return open_dataset(report.dataset)
 
 
@@ -164,7 +170,7 @@ def replay(
         _scene(scene), _paths(recordings), fit=keys or None, score=_paths(score), execution=execution
     )
     if path is not None:
-        write_results(whole.dataset, path, kind="replay")
+        write_results(whole.dataset, _path(path), kind="replay")
     return whole.dataset
 
 
@@ -193,6 +199,10 @@ def _scene(given: SceneLike) -> Scene:
         return given
     if isinstance(given, Mapping):
         return Scene.from_dict(given)
+    if isinstance(given, str) and "\n" in given:
+        raise UsageError(
+            "scene: expected the path of a file, got text of several lines. Scene.from_text reads it."
+        )
     if isinstance(given, str | os.PathLike):
         return Scene.from_file(given)
     raise UsageError(
@@ -202,15 +212,24 @@ def _scene(given: SceneLike) -> Scene:
 
 
 def _paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
-    several = [given] if isinstance(given, str | os.PathLike) else list(given)
-    return [Path(one) for one in several]
+    if isinstance(given, str | os.PathLike) or not isinstance(given, Iterable):
+        return [_path(given)]
+    return [_path(one) for one in given]
+
+
+def _path(given: object) -> Path:
+    if not isinstance(given, str | os.PathLike) or "\0" in os.fspath(given):
+        raise UsageError(f"path: expected the name of a file or folder, got {given!r}.")
+    return Path(given)
 
 
 def _shown(progress: bool) -> AbstractContextManager[Progress]:
     return shown_progress() if progress else nullcontext(Silence())
 
 
-def _refuse_both(workers: int | None, scheduler: object) -> None:
+def _refuse_workers(workers: int | None, scheduler: object) -> None:
+    if workers is not None and (not isinstance(workers, int) or workers < 1):
+        raise UsageError(f"workers: expected a whole number of 1 or more, got {workers!r}.")
     if workers is not None and scheduler is not None:
         raise UsageError(
             "workers and scheduler: expected one of them, got both. A scheduler has its own workers."

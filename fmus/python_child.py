@@ -23,14 +23,30 @@ def python_command(*arguments: str) -> list[str]:
 def safe_module_path() -> Iterator[None]:
     """Keep the current folder off the module path of the Python processes that libraries start meanwhile.
 
-    For processes whose command is not ours to choose: those of Dask and multiprocessing.
+    For processes whose command is not ours to choose: those of Dask and multiprocessing. They do not run the script of
+    this process again either, as multiprocessing would to find what is defined in it: one that starts a campaign
+    outside of `if __name__ == "__main__"` would start another in every worker.
     """
     before = os.environ.get(SAFE_PATH)
     os.environ[SAFE_PATH] = "1"
     try:
-        yield
+        with _nameless_main():
+            yield
     finally:
         if before is None:
             del os.environ[SAFE_PATH]
         else:
             os.environ[SAFE_PATH] = before
+
+
+@contextmanager
+def _nameless_main() -> Iterator[None]:
+    main = vars(sys.modules["__main__"])
+    names = {name: main[name] for name in ("__file__", "__spec__") if main.get(name) is not None}
+    if "__file__" in names:
+        del main["__file__"]
+    main["__spec__"] = None
+    try:
+        yield
+    finally:
+        main.update(names)

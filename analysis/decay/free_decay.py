@@ -16,7 +16,8 @@ from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponen
 from vibroimpact.analysis.decay.law_choice import LawChoice, choose_law
 from vibroimpact.analysis.decay.law_fit import CUBIC, LawFit
 from vibroimpact.analysis.decay.laws import ALL_LAWS, COULOMB, QUADRATIC, VISCOUS, DampingLaw, spoken
-from vibroimpact.analysis.decay.samples import DecaySamples
+from vibroimpact.analysis.decay.samples import DecaySamples, decay_samples
+from vibroimpact.analysis.recording import Channel
 from vibroimpact.fmus.errors import EstimationError
 
 T = TypeVar("T")
@@ -108,7 +109,7 @@ class FreeDecay:
 
 
 def estimate_decay(
-    samples: DecaySamples,
+    samples: DecaySamples | Channel | xr.DataArray,
     laws: Sequence[DampingLaw] = ALL_LAWS,
     *,
     cubic: bool = False,
@@ -118,7 +119,8 @@ def estimate_decay(
 
     Parameters
     ----------
-    samples : DecaySamples
+    samples : DecaySamples, Channel or xarray.DataArray
+        A signal: its samples from the largest excursion on, see `decay_samples`.
     laws : sequence of DampingLaw
         Tried; none: the choice of a law is left out.
     cubic : bool
@@ -131,6 +133,7 @@ def estimate_decay(
     EstimationError
         Nothing oscillates.
     """
+    samples = samples if isinstance(samples, DecaySamples) else decay_samples(samples)
     exponential = fit_exponential(samples)
     refusals: dict[str, str] = {}
 

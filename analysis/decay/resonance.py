@@ -216,7 +216,7 @@ def _shape(omega: Floats, natural: float, damping: float, form: str) -> Complexe
     return np.asarray((1j * omega) ** FORMS.index(form) / bottom)
 
 
-def fit_resonance(curve: Curve) -> Resonance:
+def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
     """Fit one resonance to a frequency response by least squares, weighted by its errors where these are known.
 
     Standard errors are those of the scatter about the fit, neighbouring lines correlated or not, or those that the
@@ -224,13 +224,15 @@ def fit_resonance(curve: Curve) -> Resonance:
 
     Parameters
     ----------
-    curve : Curve
+    curve : Curve or FrequencyResponse
+        A response: the part around its highest peak, see `curve_of`.
 
     Raises
     ------
     EstimationError
         No resonance is in the band.
     """
+    curve = curve_of(curve) if isinstance(curve, FrequencyResponse) else curve
     omega, magnitude = curve.angular_frequency, np.abs(curve.response)
     peak, width = _peak(omega, magnitude)
     known = bool(np.all(curve.error > 0.0))
@@ -308,6 +310,7 @@ def _described(curve: Curve, found: Floats, covariance: Floats, fitted: Floats) 
         constant = abs(turned) * (1.0 if turned.real >= 0.0 else -1.0)
         constant_error = float(np.sqrt(along @ block @ along))
         phase = Estimate(float(np.angle(turned)), float(np.sqrt(across @ block @ across)), "rad", freedom)
+    curve = curve_of(curve) if isinstance(curve, FrequencyResponse) else curve
     omega, magnitude = curve.angular_frequency, np.abs(curve.response)
     return Resonance(
         Estimate(float(found[0]), float(error[0]), "rad s-1", freedom),

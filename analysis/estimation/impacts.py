@@ -87,6 +87,11 @@ def estimate_impacts(
         No impacts were found, or no flight between them follows a forced oscillator.
     """
     channel, held = channel_of(channel), known or Known()
+    if not isinstance(forcing, Forcing) or not isinstance(held, Known):
+        got = type(forcing if not isinstance(forcing, Forcing) else held).__name__
+        raise UsageError(
+            f"forcing, known: expected a Forcing and a Known, got {got}. Write Forcing(angular_frequency)."
+        )
     _check(methods, draws, confidence)
     _check_known(held)
     check_displacement(channel)

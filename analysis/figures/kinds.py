@@ -216,6 +216,11 @@ def _family(data: Data) -> Family:
     """Return what data is: it decides which kinds there are."""
     if isinstance(data, Recording):
         return "recording"
+    if not isinstance(data, xr.Dataset):
+        raise UsageError(
+            f"figure: expected a dataset or a recording, got {type(data).__name__}. "
+            "open_dataset, open_measured and open_recording open files."
+        )
     results: dict[str, Family] = {"replay": "replay", "estimates": "estimates", "spikes": "spikes"}
     written = str(data.attrs.get("results_kind", ""))
     if written in results:

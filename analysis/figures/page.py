@@ -69,6 +69,9 @@ def laid_out(figure: Figure, title: str | None, width: float | None, height: flo
     """
     if title is not None:
         figure.suptitle(title, fontsize=8, wrap=True)
+    for given in (width, height):
+        if given is not None and not isinstance(given, int | float):
+            raise UsageError(f"figure: size: expected numbers, mm, got {given!r}.")
     if width is not None or height is not None:
         size = [
             old if given is None else given * _MM

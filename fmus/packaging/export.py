@@ -94,7 +94,7 @@ def _check_counts(component: Component, counts: Mapping[str, int]) -> None:
         # a body of no modes is none: what counts the block says the least
         least = max((int(v.minimum or 0) for v in component.variables if v.counts == block), default=0)
         most = component.repeats[block]
-        if not least <= count <= most:
+        if not isinstance(count, int) or not least <= count <= most:
             problems.append(f"{component.name}: {plural(block)}: expected {least} to {most}, got {count}.")
     if problems:
         raise UsageError("\n".join(problems))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.hardware.formats.choosing import check_file, holds_recording
 from vibroimpact.hardware.recordings.building import Parts
 from vibroimpact.hardware.recordings.gaps import AGREEMENT
-from vibroimpact.hardware.recordings.settings import ImportSettings
+from vibroimpact.hardware.recordings.settings import ImportSettings, checked
 from vibroimpact.hardware.recordings.sources import Source, named, read_source, spread
 
 PathLike = str | os.PathLike[str]
@@ -22,7 +22,7 @@ PathLike = str | os.PathLike[str]
 
 def import_recording(
     files: PathLike | Sequence[PathLike],
-    settings: ImportSettings | None = None,
+    settings: ImportSettings | Mapping[str, Any] | None = None,
     common: ImportSettings | None = None,
 ) -> Recording:
     """Read files into one recording.
@@ -31,7 +31,7 @@ def import_recording(
     ----------
     files : path or sequence of path
         Several files become one recording; each has a trigger, and so a time axis, of its own.
-    settings : ImportSettings or None
+    settings : ImportSettings, mapping or None
         For all columns of all files together (the command line); it has the last word.
     common : ImportSettings or None
         For each file, in place of the settings file beside it.
@@ -48,8 +48,10 @@ def import_recording(
     UsageError
         The settings do not fit the files.
     """
-    given = settings or ImportSettings()
+    given = settings if isinstance(settings, ImportSettings) else checked(settings or {}, "settings")
     paths = [Path(one) for one in ([files] if isinstance(files, str | os.PathLike) else files)]
+    if not paths:
+        raise UsageError("files: expected one or more, got none.")
     if any(_is_ours(path) for path in paths):
         return _passed_on(paths, given)
     sources = [read_source(path, given, common) for path in paths]

@@ -81,8 +81,7 @@ def text_of_tables(tables: Mapping[str, Any], source: str) -> str:
     impacts = true
     """
     problems: list[Problem] = []
-    if not isinstance(tables, Mapping):
-        raise SceneError([Problem("", "a mapping of the tables of a scene", quoted(tables)).line(source)])
+    refuse_no_mapping(tables, "the tables of a scene", source)
     plain = _plain(tables, (), problems)
     if problems:
         raise SceneError([problem.line(source) for problem in problems])
@@ -99,18 +98,33 @@ def _plain(value: Any, path: tuple[str | int, ...], problems: list[Problem]) -> 
         )
         return 0
     if isinstance(value, Mapping):
-        for key in value:
-            if not isinstance(key, str):
-                problems.append(Problem(key_path(path), "keys that are text", quoted(key)))
-        return {key: _plain(of, (*path, key), problems) for key, of in value.items() if isinstance(key, str)}
+        keys = [key for key in value if _is_text(key)]
+        for key in value.keys() - set(keys):
+            problems.append(Problem(key_path(path), "keys that are text", ascii(key)))
+        return {key: _plain(value[key], (*path, key), problems) for key in keys}
     if isinstance(value, Sequence) and not isinstance(value, str | bytes):
         return [_plain(of, (*path, place), problems) for place, of in enumerate(value)]
     if isinstance(value, PathLike):
         return fspath(value)
-    if not isinstance(value, str | bool | int | float | date | time):
-        problems.append(Problem(key_path(path), _VALUE, quoted(value)))
+    if not isinstance(value, str | bool | int | float | date | time) or (
+        isinstance(value, str) and not _is_text(value)
+    ):
+        problems.append(
+            Problem(key_path(path), _VALUE, ascii(value) if isinstance(value, str) else quoted(value))
+        )
         return 0
     return value
+
+
+def _is_text(value: object) -> bool:
+    """Return whether a value is text that a file can hold: halves of surrogate pairs are none."""
+    return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
+
+
+def refuse_no_mapping(given: object, what: str, source: str) -> None:
+    """Refuse what has no keys where keys with values are asked for."""
+    if not isinstance(given, Mapping):
+        raise _file_error(source, f"a mapping of {what}", quoted(given), "Write a dictionary.")
 
 
 def _read_bytes(path: Path, source: str) -> bytes:

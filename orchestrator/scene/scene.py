@@ -19,7 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_serializer
 
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.scene.changes import changed_document, changed_values
-from vibroimpact.orchestrator.scene.file import parse_toml, read_text, text_of_tables
+from vibroimpact.orchestrator.scene.file import parse_toml, read_text, refuse_no_mapping, text_of_tables
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.keys import (
     Key,
@@ -185,6 +185,8 @@ class Scene(BaseModel):
         SceneError
             With all problems of the file, each on one line.
         """
+        if not isinstance(path, str | PathLike):
+            raise UsageError(f"scene: expected the path of a file, got {type(path).__name__}.")
         return load_scene(path)
 
     @classmethod
@@ -208,6 +210,9 @@ class Scene(BaseModel):
         >>> scene.value("body.stiffness")
         4.0
         """
+        for given, what in ((text, "TOML text"), (source, "the name of the scene as text")):
+            if not isinstance(given, str):
+                raise UsageError(f"scene: expected {what}, got {type(given).__name__}.")
         return parse_scene(text, source)
 
     @classmethod
@@ -254,6 +259,7 @@ class Scene(BaseModel):
         >>> scene.with_values({"body.mass": 2.0}).body.mass
         2.0
         """
+        refuse_no_mapping(values, "keys and their new values", self.source)
         document = changed_values(parse_toml(self.text, self.source), values, self.source)
         return self.from_dict(document, self.source)
 
@@ -277,6 +283,7 @@ class Scene(BaseModel):
         >>> scene.with_sweep({"body.damping": [0.1, 0.2], "body.stiffness": {"start": 1, "stop": 4, "points": 4}}).runs
         8
         """
+        refuse_no_mapping(axes, "swept keys and their values", self.source)
         tables = {key: axis if isinstance(axis, Mapping) else {"values": axis} for key, axis in axes.items()}
         document = parse_toml(self.text, self.source)
         document.pop("sweep", None)

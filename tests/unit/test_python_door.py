@@ -6,6 +6,7 @@ import ast
 import doctest
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import distributed
@@ -180,3 +181,78 @@ def test_a_notebook_sees_a_bar_that_ends_full():
     assert "2 workers lost" in shown[-1]
     assert "a &lt;b&gt; &amp; c" in shown[-1]
     assert len(shown) < 10
+
+
+def test_a_script_without_a_main_guard_runs_once(tmp_path):
+    script = tmp_path / "sweep.py"
+    script.write_text(
+        "import vibroimpact as vi\n"
+        "print('once', flush=True)\n"
+        f"scene = vi.Scene.from_dict({FORCED!r}).with_sweep({{'forcing.angular_frequency': [0.8, 0.9, 1.0]}})\n"
+        "print(vi.campaign(scene, 'sweep', workers=2, progress=False).sizes['angular_frequency'], __file__)\n"
+    )
+    result = subprocess.run(
+        [sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert result.stdout == f"once\n3 {script}\n"
+    assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_runs_in_threads_are_those_of_one_thread():
+    scenes = [vi.Scene.from_dict(FORCED).with_values({"body.mass": 1.0 + 0.1 * k}) for k in range(8)]
+    alone = [float(vi.run(scene).final_displacement) for scene in scenes]
+    with ThreadPoolExecutor(4) as threads:
+        together = list(threads.map(lambda scene: float(vi.run(scene).final_displacement), scenes))
+    assert together == alone
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: vi.run("[body]\nmass = 1"), "Scene.from_text reads it"),
+        (lambda: vi.run(FREE, 3), "path: expected the name of a file or folder, got 3"),
+        (lambda: vi.run(FREE, "a\0b.nc"), "path: expected the name of a file or folder"),
+        (lambda: vi.Scene.from_file(None), "expected the path of a file, got NoneType"),
+        (lambda: vi.Scene.from_text(b"x"), "expected TOML text, got bytes"),
+        (lambda: vi.Scene.from_text("", None), "expected the name of the scene as text, got NoneType"),
+        (
+            lambda: vi.Scene.from_dict(FREE).with_values([1]),
+            "expected a mapping of keys and their new values",
+        ),
+        (
+            lambda: vi.Scene.from_dict(FREE).with_sweep(None),
+            "expected a mapping of swept keys and their values",
+        ),
+        (lambda: vi.Scene.from_dict({**FREE, "scene": {"title": "\ud800"}}), r"got '\\ud800'"),
+        (lambda: vi.campaign(FREE, None), "path: expected the name of a file or folder, got None"),
+        (lambda: vi.campaign(FREE, "c", workers=0), "workers: expected a whole number of 1 or more, got 0"),
+        (lambda: vi.campaign(FREE, "c", workers="two"), "workers: expected a whole number of 1 or more"),
+        (lambda: vi.replay(FREE, 3), "path: expected the name of a file or folder, got 3"),
+        (lambda: vi.draw("run.nc"), "expected a dataset or a recording, got str. open_dataset"),
+        (lambda: vi.draw(vi.run(FREE), width="a"), "size: expected numbers, mm, got 'a'"),
+        (lambda: vi.estimate_impacts(xr.DataArray([0.0, 1.0], {"time": [0.0, 1.0]}), 10.0), "got float"),
+        (lambda: vi.import_recording([]), "files: expected one or more, got none"),
+        (lambda: vi.import_recording("a.csv", {"rates": 3}), "settings: rates"),
+        (lambda: vi.fmus.export("beam", "x.fmu", modes=2.5), "modes: expected 1 to 64, got 2.5"),
+    ],
+)
+def test_a_wrong_type_is_named_in_one_line(call, words):
+    with pytest.raises(vi.VibroimpactError, match=words) as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    str(caught.value).encode()
+
+
+def test_responses_and_signals_are_fitted_without_steps_between():
+    clock = {"time": np.arange(4000) * 0.001}
+    rng = np.random.default_rng(1)
+    force = rng.normal(size=4000)
+    kernel = np.exp(-0.02 * np.arange(400)) * np.sin(0.3 * np.arange(400))
+    motion = np.convolve(force, kernel)[:4000]
+    response = vi.frequency_response(xr.DataArray(force, clock), xr.DataArray(motion, clock), segment=1024)
+    assert (
+        vi.fit_resonance(response).natural_angular_frequency
+        == vi.fit_resonance(vi.curve_of(response)).natural_angular_frequency
+    )
+    decay = xr.DataArray(kernel, {"time": np.arange(400) * 0.001}, name="arm")
+    assert vi.estimate_decay(decay, laws=()).exponential.decay_rate.value == pytest.approx(20.0, rel=1e-6)
