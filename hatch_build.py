@@ -64,7 +64,7 @@ def link_packages(root: Path) -> None:
         link = folder / package
         if not link.exists():
             _link(link, root / package)
-    for module in (root / DOOR).glob("*.py*"):
+    for module in (*(root / DOOR).glob("*.py"), root / DOOR / "py.typed"):
         _link_file(folder / module.name, module)
 
 

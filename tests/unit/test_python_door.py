@@ -42,6 +42,7 @@ def declared() -> dict[str, str]:
 
 def test_type_checkers_see_what_is_there():
     there = declared()
+    assert Path(vi.__file__).with_name("py.typed").is_file()
     assert {*there, "__version__"} == set(vi.__all__) == set(dir(vi))
     for name, module in there.items():
         found = getattr(vi, name)
