@@ -98,20 +98,22 @@ _ROOMS = {"figures": "analysis.figures", "fmus": "fmus"}
 __all__ = [*_HOMES, *_ROOMS, "__version__"]
 
 
-def __getattr__(name: str) -> object:
-    import importlib
+if not TYPE_CHECKING:  # else every name would be one
 
-    if name == "__version__":
-        from importlib.metadata import version
+    def __getattr__(name: str) -> object:
+        import importlib
 
-        return version("vibroimpact")
-    if name in _ROOMS:
-        return importlib.import_module(f"{__name__}.{_ROOMS[name]}")
-    if name not in _HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    found = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
-    globals()[name] = found
-    return found
+        if name == "__version__":
+            from importlib.metadata import version
+
+            return version("vibroimpact")
+        if name in _ROOMS:
+            return importlib.import_module(f"{__name__}.{_ROOMS[name]}")
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        found = getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)
+        globals()[name] = found
+        return found
 
 
 def __dir__() -> list[str]:

@@ -17,12 +17,14 @@ if TYPE_CHECKING:
 __all__ = ["component_name", "components", "export", "fmu_path"]
 
 
-def __getattr__(name: str) -> object:
-    # The installation builds the FMUs before anything that an export needs is installed.
-    if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    import importlib
+if not TYPE_CHECKING:  # else every name would be one
 
-    if name == "export":
-        return importlib.import_module(f"{__name__}.packaging.export").export_fmu
-    return getattr(importlib.import_module(f"{__name__}.shipped"), name)
+    def __getattr__(name: str) -> object:
+        # The installation builds the FMUs before anything that an export needs is installed.
+        if name not in __all__:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        import importlib
+
+        if name == "export":
+            return importlib.import_module(f"{__name__}.packaging.export").export_fmu
+        return getattr(importlib.import_module(f"{__name__}.shipped"), name)
