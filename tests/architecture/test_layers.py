@@ -5,8 +5,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
+from support.places import ROOT
 
 
 def test_each_layer_imports_only_those_below_it_and_each_heavy_dependency_has_one_door() -> None:

@@ -9,10 +9,10 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from support.places import ROOT
 
 from vibroimpact.fmus import components
 
-ROOT = Path(__file__).parents[2]
 PACKAGES = ("fmus", "orchestrator", "analysis", "hardware")
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from support.places import ROOT
+
 # Run as scripts of their own, before or without the command line.
 SCRIPTS = ("fmus/packaging/build.py", "fmus/packaging/load_check.py")
 WRITES = re.compile(

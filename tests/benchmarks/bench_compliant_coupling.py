@@ -20,7 +20,7 @@ import numpy as np
 import xarray as xr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from compliant_parts import coupled, plain_contact
+from support.compliant_parts import coupled, plain_contact
 
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions

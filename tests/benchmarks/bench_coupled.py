@@ -28,10 +28,10 @@ import numpy as np
 import xarray as xr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from coupled_parts import EXCHANGES, P11, body, contact, events_of, external, link, part, stop, values
 from fmpy.fmi3 import FMU3Slave
 from fmpy.model_description import read_model_description
-from fmu_factory import bouncing_ball
+from support.coupled_parts import EXCHANGES, P11, body, contact, events_of, external, link, part, stop, values
+from support.fmu_factory import bouncing_ball
 
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus import fmu_path

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from campaign_scenes import assert_same_rows
-from command_line import in_this_process
+from support.campaign_scenes import assert_same_rows
+from support.command_line import in_this_process
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import Outcome

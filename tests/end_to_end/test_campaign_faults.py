@@ -14,13 +14,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from campaign_scenes import amplitude_text, assert_same_rows, frequency_text
 from distributed.security import Security
+from support.campaign_process import CampaignProcess, run_campaign_process, wait_until
+from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_text
+from support.places import TESTS
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
-
-sys.path.insert(0, str(Path(__file__).parent))
-from campaign_process import CampaignProcess, run_campaign_process, wait_until
 
 POINTS, MILLISECONDS = 600, 3.0
 """Enough that half a second of work is left when four parts are there, on either path."""
@@ -318,7 +317,7 @@ def free_port() -> int:
 @contextmanager
 def started_cluster(address: str, *options: str) -> Iterator[None]:
     """Start a scheduler and two workers as another command would."""
-    path = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, sys.path)])
+    path = os.pathsep.join([str(TESTS), *filter(None, sys.path)])
     environment = os.environ | {"PYTHONPATH": path}
     place = ["--host", "127.0.0.1", "--port", address.rpartition(":")[2]]
     commands = [["scheduler", *place, "--no-dashboard", *options]]

@@ -12,15 +12,13 @@ from pathlib import Path
 
 import pytest
 import typer
-from campaign_scenes import assert_same_rows
-from command_line import in_this_process, vibroimpact
+from support.campaign_scenes import assert_same_rows
+from support.command_line import in_this_process, vibroimpact
+from support.places import EXAMPLES
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.fmus import fmu_path
 from vibroimpact.orchestrator.commands.cli import app, load_commands, main
-
-ROOT = Path(__file__).parents[2]
-EXAMPLES = ROOT / "examples"
 
 
 def small_sweep(path: str) -> str:

@@ -7,8 +7,9 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
-from fmu_factory import bouncing_ball
 from scipy.io import savemat
+from support.fmu_factory import bouncing_ball
+from support.places import EXAMPLES
 
 #: What the processes of a command import first, or late: the interpreter's own modules and other people's.
 TRAPS = (
@@ -27,7 +28,7 @@ TRAPS = (
     ),
     *("sitecustomize", "usercustomize", "vibroimpact"),
 )
-LAW = Path(__file__).parents[2] / "examples" / "user_contact_law.py"
+LAW = EXAMPLES / "user_contact_law.py"
 GUARDED = """
 [component.ball]
 fmu = "BouncingBall.fmi2.fmu"

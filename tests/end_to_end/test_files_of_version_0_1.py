@@ -1,6 +1,6 @@
 """Scenes, datasets, recordings and campaign folders of version 0.1 keep working, or one line says what to do.
 
-`tests/version_0_1.zip` was written by version 0.1: `done` is a finished campaign, `half` one that lost a part before it
+`version_0_1.zip` was written by version 0.1: `done` is a finished campaign, `half` one that lost a part before it
 was compacted, `recording.nc` a decay at 9 rad/s and .3 1/s, `estimates.nc` what was found in it.
 """
 
@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import in_this_process, vibroimpact
-from tolerance import SEQUENCE
+from support.command_line import in_this_process, vibroimpact
+from support.tolerance import SEQUENCE
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.orchestrator.run.fused import BodyDriver
 
-FILES = Path(__file__).parents[1] / "version_0_1.zip"
+FILES = Path(__file__).with_name("version_0_1.zip")
 
 
 @pytest.fixture

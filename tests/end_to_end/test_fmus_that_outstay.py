@@ -8,9 +8,9 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import fmu_factory
 import psutil  # type: ignore[import-untyped, unused-ignore]
 import pytest
+from support import fmu_factory
 
 from vibroimpact.analysis.dataset import Outcome
 from vibroimpact.fmus.errors import ComponentError

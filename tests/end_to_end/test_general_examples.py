@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import in_this_process, vibroimpact
-from fmu_factory import bouncing_ball
+from support.command_line import in_this_process, vibroimpact
+from support.fmu_factory import bouncing_ball
+from support.places import EXAMPLES
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
 def ran(folder: Path, name: str) -> Path:

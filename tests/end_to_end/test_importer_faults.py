@@ -8,10 +8,10 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-import fmu_factory
 import numpy as np
 import psutil  # type: ignore[import-untyped, unused-ignore]
 import pytest
+from support import fmu_factory
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
 from vibroimpact.fmus.errors import ComponentError

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import ENTRY, in_this_process
+from support.command_line import ENTRY, in_this_process
 
 SCENE = """
 [scene]

@@ -14,13 +14,13 @@ from typing import Any
 
 import pytest
 import typer
-from real_data import recording_folder
+from support.places import ROOT
+from support.real_data import recording_folder
 
 from vibroimpact.hardware.recordings import import_recording, read_settings
 from vibroimpact.orchestrator.commands.cli import app, load_commands
 from vibroimpact.orchestrator.scene import load_scene
 
-ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "examples" / "recordings").glob("*.toml"))
 SETTINGS = sorted((ROOT / "examples" / "recordings" / "import").glob("*.toml"))
 PAGES = sorted((ROOT / "docs" / "recordings").glob("*.md"))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from replay_scenes import BOARD, channel, pulse, written
+from support.replay_scenes import BOARD, channel, pulse, written
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.orchestrator.replay import opened_replays

@@ -9,19 +9,19 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
-from reference_bodies import beam_shape, period_one_orbits, uniform_chain
 from scipy.interpolate import CubicSpline
+from support.places import EXAMPLES, ROOT
+from support.reference_bodies import beam_shape, period_one_orbits, uniform_chain
 
 from vibroimpact.analysis import figures, open_dataset
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.scene import load_scene
 
-FOLDER = Path(__file__).parents[2] / "examples" / "thesis"
+FOLDER = EXAMPLES / "thesis"
 SCENES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
@@ -228,5 +228,5 @@ def test_the_motion_after_figure_7_10_is_not_periodic(run) -> None:
 def test_each_scene_says_which_figure_it_is_and_is_on_the_page_of_the_figures(name: str) -> None:
     text = (FOLDER / f"{name}.toml").read_text()
     assert re.match(r"# (Thesis figure|After thesis figure|The stiff beam of the thesis)", text)
-    page = (FOLDER.parents[1] / "docs" / "thesis_figures.md").read_text()
+    page = (ROOT / "docs" / "thesis_figures.md").read_text()
     assert f"{name}.toml" in page

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from oscillator_fmu import LOWER, VERSIONS, OscillatorFmu, stop
-from tolerance import ROUNDING, SEQUENCE
+from support.oscillator_fmu import LOWER, VERSIONS, OscillatorFmu, stop
+from support.tolerance import ROUNDING, SEQUENCE
 
 GRAVITY = 2.0
 FALL = {"stiffness": 0.0, "forcing.amplitude": -GRAVITY}

@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from exact_motion import Oscillator as Exact
-from exact_motion import exact_flow
 from mpmath import mp, mpf
-from oscillator_fmu import LOWER, VERSIONS, OscillatorFmu, forced, stop
-from tolerance import ROUNDING, SEQUENCE
+from support.exact_motion import Oscillator as Exact
+from support.exact_motion import exact_flow
+from support.oscillator_fmu import LOWER, VERSIONS, OscillatorFmu, forced, stop
+from support.tolerance import ROUNDING, SEQUENCE
 
 FORCE, W = 1.0, 0.2
 

@@ -9,10 +9,10 @@ import math
 from ctypes import c_void_p
 from pathlib import Path
 
-import fmu_factory
 import numpy as np
 import pytest
-from compliant_parts import (
+from support import fmu_factory
+from support.compliant_parts import (
     FREE,
     LAWS,
     contact_energy_error,
@@ -21,7 +21,7 @@ from compliant_parts import (
     yielding_contact,
     yielding_stop,
 )
-from coupled_parts import VERSIONS, body, contact, events_of, external, link, part, stop
+from support.coupled_parts import VERSIONS, body, contact, events_of, external, link, part, stop
 
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Value

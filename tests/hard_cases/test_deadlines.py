@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import ENVIRONMENT, in_this_process
+from support.command_line import ENVIRONMENT, in_this_process
+from support.places import EXAMPLES
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, read_flat
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.run import GeneralRunner, PointRunner
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 DEADLINE = 0.3
 
 STIFF_DASHPOT = ("thesis/figure_6_5d", {"dampings": "[1e5, 0.1]"})

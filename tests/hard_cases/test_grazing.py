@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from oscillator_fmu import VERSIONS, OscillatorFmu, forced, simulate, stop
-from tolerance import SEQUENCE
+from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, simulate, stop
+from support.tolerance import SEQUENCE
 
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import parse_scene

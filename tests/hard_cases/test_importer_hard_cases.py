@@ -5,10 +5,10 @@ import runpy
 from collections.abc import Callable
 from pathlib import Path
 
-import fmu_factory
 import numpy as np
 import pytest
-from coupled_parts import (
+from support import fmu_factory
+from support.coupled_parts import (
     EXCHANGES,
     P11,
     VERSIONS,
@@ -24,7 +24,7 @@ from coupled_parts import (
     stop,
     values,
 )
-from tolerance import PARTITION, SEQUENCE
+from support.tolerance import PARTITION, SEQUENCE
 
 from vibroimpact.fmus.core import Oscillator, flow, next_contact
 from vibroimpact.orchestrator.importer.component import Value

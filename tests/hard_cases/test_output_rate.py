@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from tolerance import ROUNDING
+from support.tolerance import ROUNDING
 
 from vibroimpact.fmus.structure import Modes, Structure
 from vibroimpact.orchestrator.run import Session

@@ -7,13 +7,13 @@ from ctypes import c_void_p
 from pathlib import Path
 
 import pytest
-from coupled_parts import VERSIONS, body, contact, external, stop, values
+from support.coupled_parts import VERSIONS, body, contact, external, stop, values
+from support.places import TESTS
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.master import Importer
 
-HERE = Path(__file__).parents[1]
 #: Slow forcing: chatter from about 1 s to 2.5098 s, then sticking until 7.854 s.
 SLOW: dict[str, Value] = {
     "damping": 0.1,
@@ -35,7 +35,7 @@ MEGABYTE = 1 << 20
 GO_ON = """
 import json, sys
 sys.path.insert(0, {tests!r})
-from coupled_parts import values
+from support.coupled_parts import values
 from test_saved_states import OUTPUTS, coupled, fused
 kind, version, time, end, *files = json.loads(sys.argv[1])
 importer = {{"fused": fused, "coupled": coupled}}[kind](version)
@@ -74,8 +74,9 @@ def saved(importer: Importer) -> list[bytes]:
 @pytest.mark.parametrize("kind", ["fused", "coupled"])
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_state_goes_on_in_another_process_as_in_its_own(tmp_path: Path, version: str, kind: str) -> None:
-    code = GO_ON.format(tests=str(HERE)).replace(
-        "from test_saved_states", f"sys.path.insert(0, {str(HERE / 'hard_cases')!r})\nfrom test_saved_states"
+    code = GO_ON.format(tests=str(TESTS)).replace(
+        "from test_saved_states",
+        f"sys.path.insert(0, {str(Path(__file__).parent)!r})\nfrom test_saved_states",
     )
     importer = {"fused": fused, "coupled": coupled}[kind](version)
     others, here = [], []
@@ -153,7 +154,7 @@ print(cycles(1000) - warm)
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the largest memory of a process is read from POSIX")
 def test_a_thousand_lives_leave_no_memory_behind() -> None:
-    code = CYCLES.format(tests=str(HERE), here=str(HERE / "hard_cases"))
+    code = CYCLES.format(tests=str(TESTS), here=str(Path(__file__).parent))
     processes = [
         subprocess.Popen([sys.executable, "-c", code, version, "coupled"], stdout=subprocess.PIPE, text=True)
         for version in VERSIONS

@@ -5,10 +5,10 @@ import random
 
 import numpy as np
 import pytest
-from exact_motion import Oscillator as Exact
-from exact_motion import exact_flow, exact_next_contact
-from oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
-from tolerance import FLOW, LONG_PHASE, ORBIT, PARTITION, SEQUENCE
+from support.exact_motion import Oscillator as Exact
+from support.exact_motion import exact_flow, exact_next_contact
+from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
+from support.tolerance import FLOW, LONG_PHASE, ORBIT, PARTITION, SEQUENCE
 
 from vibroimpact.fmus.core import Oscillator, next_contact
 

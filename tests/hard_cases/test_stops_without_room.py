@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from soak import bodies
-from tolerance import ROUNDING
+from support.tolerance import ROUNDING
 
 from vibroimpact.fmus.structure import DONE, Modes, Stop, Structure
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from soak.bodies import check
-from tolerance import ROUNDING, SEQUENCE
+from support.tolerance import ROUNDING, SEQUENCE
 
 from vibroimpact.fmus.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from exact_motion import Oscillator, exact_flow, exact_next_contact
-from reference_bodies import Body, beam, chain, uniform_chain
-from reference_stops import Forcing
-from reference_stops import Stop as ReferenceStop
-from structure_reference import Reference
-from tolerance import LONG_PHASE, SEQUENCE
+from support.exact_motion import Oscillator, exact_flow, exact_next_contact
+from support.reference_bodies import Body, beam, chain, uniform_chain
+from support.reference_stops import Forcing
+from support.reference_stops import Stop as ReferenceStop
+from support.structure_reference import Reference
+from support.tolerance import LONG_PHASE, SEQUENCE
 
 from vibroimpact.fmus.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
-from tolerance import SEQUENCE
+from support.tolerance import SEQUENCE
 
 from vibroimpact.fmus.structure import DONE, Modes, Stop, Structure
 

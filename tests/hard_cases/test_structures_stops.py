@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from reference_bodies import beam, chain
-from tolerance import ROUNDING, SEQUENCE
+from support.reference_bodies import beam, chain
+from support.tolerance import ROUNDING, SEQUENCE
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.structure import DONE, REFUSED, Modes, Stop, Structure

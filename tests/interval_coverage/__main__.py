@@ -11,7 +11,8 @@ from functools import partial
 from pathlib import Path
 
 from rich.console import Console
-from soak._journal import ROOT, state_of_the_code
+from soak._journal import state_of_the_code
+from support.places import ROOT
 
 from interval_coverage._asked import asked
 from interval_coverage._table import Line, again, shares, table_of, thin

@@ -4,7 +4,7 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tolerance import ROUNDING
+from support.tolerance import ROUNDING
 
 from vibroimpact.fmus.structure import Modes, Stop, Structure
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from dataset_examples import CONNECTIONS, coupled_dataset, coupled_record, dataset_of, failed, record
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.dataset_examples import CONNECTIONS, coupled_dataset, coupled_record, dataset_of, failed, record
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import Direction, RunRecord, file_names, merge_datasets, write_dataset

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from impact_records import THESIS, channel_of, record_of
+from support.impact_records import THESIS, channel_of, record_of
 
 from vibroimpact.analysis.estimation import Known, estimate_impacts
 from vibroimpact.analysis.estimation.physics import Forcing, Parameters

@@ -3,12 +3,12 @@
 import math
 
 import numpy as np
-from exact_motion import Oscillator as Exact
-from exact_motion import exact_flow
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
-from oscillator_fmu import LOWER, UPPER, VERSIONS, OscillatorFmu, forced, stop
-from tolerance import DIFFERENCES, EPSILON, FLOW, ROUNDING
+from support.exact_motion import Oscillator as Exact
+from support.exact_motion import exact_flow
+from support.oscillator_fmu import LOWER, UPPER, VERSIONS, OscillatorFmu, forced, stop
+from support.tolerance import DIFFERENCES, EPSILON, FLOW, ROUNDING
 
 from vibroimpact.fmus.core import Oscillator, flow, next_contact
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
-from replay_signals import HIT, INTERVAL, channel, clock, ring
+from support.replay_signals import HIT, INTERVAL, channel, clock, ring
 
 from vibroimpact.analysis.replay import align, match_events, running_windows, variance_accounted_for
 

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from replay_scenes import Floats
+from support.replay_scenes import Floats
 
 from vibroimpact.orchestrator.replay.drive import quiet_level, step_instants
 from vibroimpact.orchestrator.run import Session

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from spike_signals import channel, pulses, time_above
+from support.spike_signals import channel, pulses, time_above
 
 from vibroimpact.analysis.spikes import SpikeSettings, identify, measure_pulses
 from vibroimpact.analysis.spikes.waveforms import WAVEFORMS

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from random_structures import (
+from support.random_structures import (
     COMPLIANT,
     MOST_IMPACTS,
     RIGID,
@@ -20,7 +20,7 @@ from random_structures import (
     follow,
     scenes,
 )
-from tolerance import ROUNDING
+from support.tolerance import ROUNDING
 
 from vibroimpact.fmus.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 

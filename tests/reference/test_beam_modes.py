@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from exact_modes import beam_root, beam_shape
 from scipy.optimize import brentq
-from tolerance import EPSILON, PRINTED_12, ROUNDING
+from support.exact_modes import beam_root, beam_shape
+from support.tolerance import EPSILON, PRINTED_12, ROUNDING
 
 from vibroimpact.fmus.modes import BOUNDARIES, Array, beam_modes
 

@@ -5,9 +5,9 @@ import math
 import mpmath as mp
 import numpy as np
 import pytest
-from exact_modes import as_doubles
-from exact_modes import chain_modes as exact_modes
-from tolerance import EPSILON, ROUNDING
+from support.exact_modes import as_doubles
+from support.exact_modes import chain_modes as exact_modes
+from support.tolerance import EPSILON, ROUNDING
 
 from vibroimpact.fmus.modes import ChainModes, chain_modes
 

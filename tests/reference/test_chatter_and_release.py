@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from oscillator_fmu import VERSIONS, OscillatorFmu, forced, simulate, stop
-from tolerance import AFTER_RELEASE, PRINTED_12, ROUNDING, SEQUENCE
+from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, simulate, stop
+from support.tolerance import AFTER_RELEASE, PRINTED_12, ROUNDING, SEQUENCE
 
 ANCHOR = {**forced(1.0, 0.2, 0.05, displacement_start=-0.1), **stop(0.0)}
 STICK_START, STICK_END = 2.50982609171411, 7.853981633974483

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 import pytest
-from compliant_parts import FREE, LAWS, contact_energy_error, coupled, plain_energy_error
-from coupled_parts import EXCHANGES, VERSIONS
+from support.compliant_parts import FREE, LAWS, contact_energy_error, coupled, plain_energy_error
+from support.coupled_parts import EXCHANGES, VERSIONS
 
 from vibroimpact.orchestrator.run.coupled import CoupledDriver
 from vibroimpact.orchestrator.run.fused import BodyDriver

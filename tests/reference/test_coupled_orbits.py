@@ -3,11 +3,10 @@
 import math
 import re
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
 import pytest
-from coupled_parts import (
+from support.coupled_parts import (
     EXCHANGES,
     P11,
     P11_PHASE,
@@ -19,7 +18,8 @@ from coupled_parts import (
     phase_error,
     stop,
 )
-from tolerance import SEQUENCE
+from support.places import EXAMPLES
+from support.tolerance import SEQUENCE
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
@@ -27,7 +27,6 @@ from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.run import PointRunner
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 PERIOD = 2.0 * math.pi
 ORBIT = 1e-12
 """Of the orbit at any macro step: what the issue promises, 1e-12."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from real_data import recording_folder
+from support.real_data import recording_folder
 
 from vibroimpact.analysis.decay.backbone import backbone
 from vibroimpact.analysis.decay.decrement import logarithmic_decrement

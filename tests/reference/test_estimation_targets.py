@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from impact_records import THESIS, WORKED, record_of
+from support.impact_records import THESIS, WORKED, record_of
 
 from vibroimpact.analysis.estimation import Known, estimate_impacts
 

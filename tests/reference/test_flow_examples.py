@@ -3,10 +3,10 @@
 import math
 
 import pytest
-from exact_motion import Oscillator as Exact
-from exact_motion import exact_flow
-from oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
-from tolerance import FLOW, ORBIT, PRINTED_14, ROUNDING
+from support.exact_motion import Oscillator as Exact
+from support.exact_motion import exact_flow
+from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
+from support.tolerance import FLOW, ORBIT, PRINTED_14, ROUNDING
 
 from vibroimpact.fmus.core import Oscillator, flow
 

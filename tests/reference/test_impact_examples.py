@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
-from tolerance import FLOW, ORBIT, PRINTED_14, ROUNDING
+from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
+from support.tolerance import FLOW, ORBIT, PRINTED_14, ROUNDING
 
 from vibroimpact.analysis.landmarks import ImpactOscillator, grazing_frequencies
 from vibroimpact.fmus.core import Oscillator, next_contact

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy.io
 from numpy.typing import NDArray
-from real_data import recording_folder
+from support.real_data import recording_folder
 
 from vibroimpact.analysis.intervals import interval_report, interval_train, seams
 from vibroimpact.analysis.intervals.gaps import find_gaps

@@ -3,9 +3,9 @@
 import math
 
 import pytest
-from exact_motion import period_one_orbits
-from oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
-from tolerance import LONG_PHASE, ORBIT, PARTITION
+from support.exact_motion import period_one_orbits
+from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
+from support.tolerance import LONG_PHASE, ORBIT, PARTITION
 
 PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773
 SCENE = {**forced(), **stop(1.0)}

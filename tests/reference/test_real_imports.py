@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from real_data import recording_folder
+from support.real_data import recording_folder
 
 from vibroimpact.analysis.recording import Quality, Recording
 from vibroimpact.hardware.recordings import ImportSettings, import_recording

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from real_data import recording_folder
+from support.places import EXAMPLES
+from support.real_data import recording_folder
 
 from vibroimpact.analysis.recording import write_recording
 from vibroimpact.analysis.replay.comparison import Comparison
@@ -16,7 +17,7 @@ from vibroimpact.hardware.recordings.settings import checked
 from vibroimpact.orchestrator.replay import ReplayFit, compare_motion, fit_replay, opened_replays, scores_of
 from vibroimpact.orchestrator.scene import load_scene
 
-EXAMPLES = Path(__file__).parents[2] / "examples" / "recordings"
+EXAMPLES = EXAMPLES / "recordings"
 
 
 def board_recording(trial: str, folder: Path) -> Path:

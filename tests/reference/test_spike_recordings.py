@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from real_data import recording_folder
-from spike_signals import channel, pulses, time_above
+from support.real_data import recording_folder
+from support.spike_signals import channel, pulses, time_above
 
 from vibroimpact.analysis.intervals import interval_report
 from vibroimpact.analysis.recording import Channel, EventTrain, open_signals

@@ -8,11 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from reference_bodies import Beam, Body, Chain, beam, eigenvalue, oscillator, period_one_orbits, uniform_chain
-from reference_stops import Forcing, Stop
 from scipy.special import beta
-from structure_fmu import ROW_IMPACT, StructureFmu, forced, numbered, stop
-from structure_reference import Reference
+from support.reference_bodies import (
+    Beam,
+    Body,
+    Chain,
+    beam,
+    eigenvalue,
+    oscillator,
+    period_one_orbits,
+    uniform_chain,
+)
+from support.reference_stops import Forcing, Stop
+from support.structure_fmu import ROW_IMPACT, StructureFmu, forced, numbered, stop
+from support.structure_reference import Reference
 
 # DOP853 at rtol 1e-12, over up to 50 flights of a contracting orbit
 ROAD = 1e-9

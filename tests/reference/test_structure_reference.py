@@ -6,7 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from reference_bodies import (
+from scipy.integrate import quad
+from scipy.optimize import brentq
+from support.reference_bodies import (
     Body,
     Chain,
     beam,
@@ -17,10 +19,8 @@ from reference_bodies import (
     period_one_orbits,
     uniform_chain,
 )
-from reference_stops import Forcing, Stop, complementary
-from scipy.integrate import quad
-from scipy.optimize import brentq
-from structure_reference import Reference
+from support.reference_stops import Forcing, Stop, complementary
+from support.structure_reference import Reference
 
 THREE_MASSES = chain([1.0, 2.0, 0.5], [3.0, 1.0, 2.0], [0.12, 0.04, 0.08])
 

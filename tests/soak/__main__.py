@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from support.places import ROOT
 
 from soak._case import attempt
-from soak._journal import ROOT, Journal, Tried, state_of_the_code
+from soak._journal import Journal, Tried, state_of_the_code
 from soak._kinds import Kind, kind, names
 from soak._runner import Counts, run
 

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import IO
 
 import psutil
+from support.places import TESTS
 
 from soak._kinds import Kind
 
-TESTS = Path(__file__).parents[1]
 WALL_PER_PROCESSOR_TIME = 5.0
 """On a machine that is shared, a case may take so much longer than its processor time."""
 START_SECONDS = 60.0

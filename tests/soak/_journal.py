@@ -7,7 +7,8 @@ import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from support.places import ROOT
+
 SOURCES = ("fmus", "analysis", "orchestrator", "hardware", "tests/soak")
 SUFFIXES = {".py", ".c", ".h", ".toml"}
 

@@ -11,7 +11,7 @@ import zipfile
 from pathlib import Path
 from unittest.mock import patch
 
-from command_line import in_this_process
+from support.command_line import in_this_process
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import ComponentFileError

@@ -11,7 +11,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
-from random_structures import (
+from support.random_structures import (
     ALL_LAWS,
     COMPLIANT,
     MOST_IMPACTS,

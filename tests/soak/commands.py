@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import typer
-from command_line import in_this_process
-from dataset_examples import up_down
+from support.command_line import in_this_process
+from support.dataset_examples import up_down
 
 from vibroimpact.analysis import write_dataset
 from vibroimpact.orchestrator.commands.cli import app, load_commands

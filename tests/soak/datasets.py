@@ -12,9 +12,9 @@ from unittest.mock import patch
 
 import netCDF4
 import numpy as np
-from command_line import in_this_process
-from dataset_examples import everything, up_down
 from scipy.io import savemat
+from support.command_line import in_this_process
+from support.dataset_examples import everything, up_down
 
 from vibroimpact.analysis import open_dataset, write_dataset
 from vibroimpact.analysis.dataset import open_measured, read_flat, read_part

@@ -7,6 +7,8 @@ import re
 import time
 from pathlib import Path
 
+from support.places import EXAMPLES
+
 from vibroimpact.fmus.errors import ComponentError, SceneError
 from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.run import named_runner
@@ -19,7 +21,6 @@ GRACE = 1.5
 """Processor time that reading a scene, starting it and the piece of work under way may take beyond the deadline, s."""
 LONGEST_MESSAGE = 4000
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 SCENES = sorted(path for path in EXAMPLES.rglob("*.toml") if path.parent.name != "recordings")
 EXTREMES = (
     *("1e300", "1e100", "1e30", "1e15", "1e9", "1e5", "1000", "1", "0"),

@@ -18,8 +18,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 import xarray as xr
-from campaign_scenes import TIMING, frequency_text
-from serial_pool import campaign_here
+from support.campaign_scenes import TIMING, frequency_text
+from support.serial_pool import campaign_here
 
 import vibroimpact.orchestrator.campaign.schedule as schedule
 from vibroimpact.analysis import open_dataset
@@ -29,7 +29,7 @@ from vibroimpact.orchestrator.campaign import CampaignInterrupted
 
 TEXT = frequency_text(6, "up", milliseconds=0.001)
 LONGER = frequency_text(6, "up-down", milliseconds=0.001)
-RUNNER = "busy_runner:SceneRunner"
+RUNNER = "support.busy_runner:SceneRunner"
 
 Files = dict[str, bytes]
 

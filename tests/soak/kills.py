@@ -11,7 +11,8 @@ from functools import lru_cache
 from pathlib import Path
 
 import psutil
-from campaign_scenes import TIMING, frequency_text
+from support.campaign_scenes import TIMING, frequency_text
+from support.places import TESTS
 
 from vibroimpact.analysis.dataset import read_flat
 
@@ -26,8 +27,7 @@ POINTS = {"independent": 120, "up-down": 60}
 MILLISECONDS = 8.0
 STAMPS = ("history", "date_created", "creation_date")
 
-TESTS = Path(__file__).resolve().parents[1]
-COMMAND = TESTS / "end_to_end" / "busy_command.py"
+COMMAND = TESTS / "support" / "busy_command.py"
 
 
 def check(seed: int) -> str | None:

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import fmu_factory
 import numpy as np
 import psutil  # type: ignore[import-untyped, unused-ignore]
+from support import fmu_factory
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError

@@ -10,6 +10,8 @@ import unicodedata
 from functools import lru_cache
 from pathlib import Path
 
+from support.places import EXAMPLES
+
 from vibroimpact.fmus.errors import SceneError, UsageError, VibroimpactError
 from vibroimpact.fmus.terminal import printable
 from vibroimpact.orchestrator.campaign.chunks import Chunk, points_of, run_point
@@ -20,7 +22,6 @@ from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 SAMPLE = 150
 SECONDS = 10.0
-EXAMPLES = Path(__file__).parents[2] / "examples"
 LONGEST_MESSAGE = 100_000
 DEADLINE = 1.0
 LARGEST_RUN = 2**24

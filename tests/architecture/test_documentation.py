@@ -1,0 +1,51 @@
+"""Pages lead to each other: no link into nowhere, no page that nobody finds."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from support.places import ROOT
+
+PAGES = [*ROOT.glob("*.md"), *sorted((ROOT / "docs").rglob("*.md"))]
+PACKAGES = ("fmus", "analysis", "orchestrator", "hardware")
+FOLDERS = sorted(page for package in PACKAGES for page in (ROOT / package).rglob("README.md"))
+SECTION = re.compile(r"^##+ (\d+(?:\.\d+)?)\b", re.MULTILINE)
+CITED = re.compile(r"equations\.md ((?:\d+(?:\.\d+)?(?:, | and | to )?)+)")
+LINK = re.compile(r"\]\(([^)\s#]+)(?:#[^)]*)?\)")
+
+
+def links(page: Path) -> list[str]:
+    found = LINK.findall(page.read_text(encoding="utf-8"))
+    return [link for link in found if not link.startswith(("http://", "https://", "mailto:"))]
+
+
+@pytest.mark.parametrize("page", [*PAGES, *FOLDERS], ids=lambda page: str(page.relative_to(ROOT)))
+def test_no_link_of_a_page_leads_into_nowhere(page: Path) -> None:
+    assert [link for link in links(page) if not (page.parent / link).exists()] == []
+
+
+def test_every_page_is_found_from_the_readme() -> None:
+    found, waiting = set[Path](), [ROOT / "README.md"]
+    while waiting:
+        page = waiting.pop()
+        if page in found:
+            continue
+        found.add(page)
+        waiting += [path for link in links(page) if (path := (page.parent / link).resolve()).suffix == ".md"]
+    assert [str(page.relative_to(ROOT)) for page in PAGES if page.resolve() not in found] == []
+
+
+def test_every_section_of_the_equations_that_code_cites_is_there() -> None:
+    sections = set(SECTION.findall((ROOT / "docs" / "equations.md").read_text(encoding="utf-8")))
+    cited = {
+        (str(path.relative_to(ROOT)), number)
+        for package in (*PACKAGES, "tests", "docs")
+        for path in sorted((ROOT / package).rglob("*"))
+        if path.suffix in (".py", ".c", ".h", ".toml", ".md") and "built" not in path.parts
+        for found in CITED.findall(" ".join(path.read_text(encoding="utf-8").split()))
+        for number in re.findall(r"\d+(?:\.\d+)?", found)
+    }
+    assert len(cited) > 50
+    assert sorted((path, number) for path, number in cited if number not in sections) == []

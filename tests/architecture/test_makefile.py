@@ -1,0 +1,62 @@
+"""What `make` offers is what it says it does."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+
+import pytest
+from support.places import ROOT
+
+pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="there is no make here")
+
+
+def make(*arguments: str) -> subprocess.CompletedProcess[str]:
+    # the make that runs these tests hands down what it was given
+    theirs = ("MAKEFLAGS", "MFLAGS", "MAKEOVERRIDES", "MAKELEVEL", "PYTHON", "VENV", "INSTALL")
+    environment = {name: value for name, value in os.environ.items() if name not in theirs}
+    return subprocess.run(
+        ["make", *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60
+    )
+
+
+def targets() -> set[str]:
+    (line,) = re.findall(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    return set(line.split())
+
+
+def test_help_names_every_target() -> None:
+    listed = {line.split()[0] for line in make("help").stdout.splitlines()}
+    assert listed == targets()
+
+
+def test_the_readme_names_every_target_a_developer_needs() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [name for name in targets() - {"clean"} if f"make {name}" not in readme] == []
+
+
+def test_a_python_that_is_given_has_an_environment_of_its_own() -> None:
+    version = f"{sys.version_info[0]}.{sys.version_info[1]}"
+    given = make("--dry-run", "--always-make", "demo", f"PYTHON={sys.executable}").stdout
+    assert f".venv-{version}/bin/vibroimpact demo" in given
+    assert ".venv/bin/vibroimpact demo" in make("--dry-run", "--always-make", "demo").stdout
+
+
+def test_the_lowest_versions_are_refused_on_another_python() -> None:
+    refused = make("oldest", "PYTHON=false")
+    assert refused.returncode != 0
+    assert "expected Python 3.11" in refused.stderr
+
+
+@pytest.mark.parametrize("target", ["demo", "test", "bench", "lint", "oldest"])
+def test_an_installation_says_what_it_does(target: str) -> None:
+    commands = make("--dry-run", "--always-make", target, f"OLDEST={sys.executable}").stdout.splitlines()
+    installing = [line for line in commands if " pip install" in line]
+    assert installing
+    assert [line for line in installing if "--quiet" in line or " -q" in line] == []
+    assert any(
+        line.startswith('echo "Installing vibroimpact and what it needs into .venv') for line in commands
+    )

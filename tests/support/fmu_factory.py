@@ -1,0 +1,101 @@
+"""FMUs that the test suite makes itself, from the C in `tests/support/fmus`: other people's FMUs, good and bad.
+
+They share nothing with the package's own C. Each is compiled once in a process, in a fraction of a second;
+asking again only writes the file.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import uuid
+from functools import cache
+from pathlib import Path
+
+from vibroimpact.fmus.packaging.build import fmi_headers
+from vibroimpact.fmus.packaging.compiler import compile_library
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
+
+SOURCES = Path(__file__).with_name("fmus")
+#: The C file of each model; those with a description of a version can be made in that version.
+MODELS = {"BouncingBall": "ball.c", "Faulty": "faulty.c", "Gain": "gain.c", "SteppedBall": "stepped_ball.c"}
+MADE = tuple((name, fmi) for name in MODELS for fmi in ("2.0", "3.0") if (name, fmi) != ("Gain", "3.0"))
+
+
+def bouncing_ball(folder: Path, fmi: str = "2.0") -> Path:
+    """Write a ball that looks for the ground only where a step ends: has state, but no events.
+
+    Outputs `h` (m), `v` (m/s), `bounces`; parameters `g`, `e`, and `landing`: what a bounce does to `h`.
+    """
+    return _write("BouncingBall", fmi, folder)
+
+
+def stepped_ball(folder: Path, fmi: str = "3.0") -> Path:
+    """Write a ball that bounces inside steps, as that of FMI's Reference-FMUs; in FMI 3.0 with event mode.
+
+    Outputs `h` (m), `v` (m/s), `bounces`; parameters `g`, `e`.
+    """
+    return _write("SteppedBall", fmi, folder)
+
+
+def faulty(folder: Path, fmi: str = "3.0") -> Path:
+    """Write an integrator y' = u with the parameters `fault` (what goes wrong) and `fault_time`."""
+    return _write("Faulty", fmi, folder)
+
+
+def gain(folder: Path) -> Path:
+    """Write y = k u + b in FMI 2.0: direct feedthrough, and no state that can be saved."""
+    return _write("Gain", "2.0", folder)
+
+
+def _write(name: str, fmi: str, folder: Path) -> Path:
+    version = f"fmi{fmi[0]}"
+    path = folder / f"{name}.{version}.fmu"
+    description = (SOURCES / f"{name}.{version}.xml").read_text(encoding="utf-8")
+    members = {
+        "modelDescription.xml": description.replace("{token}", _token(name, fmi)).encode(),
+        f"binaries/{binary_folder(fmi)}/{name}{library_suffix()}": _binary(name, fmi),
+    }
+    write_fmu(path, members)
+    return path
+
+
+def _token(name: str, fmi: str) -> str:
+    return f"{{{uuid.uuid5(uuid.NAMESPACE_DNS, f'{name} {fmi}')}}}"
+
+
+@cache
+def _binary(name: str, fmi: str) -> bytes:
+    adapter = SOURCES / f"fmi{fmi[0]}.c"
+    with tempfile.TemporaryDirectory() as folder:
+        generated = Path(folder)
+        (generated / "token.h").write_text(f'#define TOKEN "{_token(name, fmi)}"\n', encoding="ascii")
+        rest = generated / "rest.c"
+        rest.write_text(_functions_left_out(adapter, fmi), encoding="ascii")
+        library = generated / f"{name}{library_suffix()}"
+        # not strict: the headers' own empty parameter lists are a warning for some compilers
+        sources = [adapter, SOURCES / MODELS[name], rest]
+        compile_library(library, sources, [SOURCES, generated, fmi_headers()], export_all=True, strict=False)
+        return library.read_bytes()
+
+
+def _functions_left_out(adapter: Path, fmi: str) -> str:
+    """Return C for the functions of the standard that an adapter has not: they answer error, or no instance.
+
+    They take no arguments, as they look at none: in C's calling conventions the caller clears them away.
+    """
+    major = fmi[0]
+    header = (fmi_headers() / f"fmi{major}Functions.h").read_text(encoding="utf-8", errors="replace")
+    declared = re.findall(rf"FMI{major}_Export\s+fmi{major}\w+TYPE\s+(fmi{major}\w+);", header)
+    defined = set(
+        re.findall(rf"^\w.*?\b(fmi{major}\w+)\(", adapter.read_text(encoding="utf-8"), re.MULTILINE)
+    )
+    lines = [_refusal(function) for function in dict.fromkeys(declared) if function not in defined]
+    return "\n".join(lines)
+
+
+def _refusal(function: str) -> str:
+    if "Instantiate" in function:
+        return f"void *{function}(void);\nvoid *{function}(void) {{ return (void *)0; }}"
+    return f"int {function}(void);\nint {function}(void) {{ return 3; }}"

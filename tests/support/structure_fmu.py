@@ -1,0 +1,68 @@
+"""A body's FMU with its record of impacts and sticks taken along the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from support.component_fmu import ComponentFmu
+
+ROW_IMPACT, ROW_STICK = 1.0, 2.0
+LAWS = {"restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossley": 4}
+
+
+def numbered(name: str, values: Iterable[float]) -> dict[str, float]:
+    """Return an array parameter, element by element, numbered from 1."""
+    return {f"{name}[{i}]": float(value) for i, value in enumerate(values, start=1)}
+
+
+def stop(position: float, k: int = 1, *, law: str = "restitution", **more: float) -> dict[str, float]:
+    """Return the parameters of stop k on the upper side."""
+    parameters: dict[str, float] = {"law": LAWS[law], "position": position, "side": 1, **more}
+    return {f"contact[{k}].{name}": value for name, value in parameters.items()}
+
+
+def forced(amplitude: float, angular_frequency: float, phase: float = 0.0) -> dict[str, float]:
+    """Return a harmonic force, of a beam or an oscillator."""
+    return {
+        "forcing.amplitude": amplitude,
+        "forcing.angular_frequency": angular_frequency,
+        "forcing.phase": phase % (2.0 * math.pi),
+    }
+
+
+class StructureFmu(ComponentFmu):
+    """One initialized instance that records its impacts and sticks; its time is that of the last step."""
+
+    def __init__(self, component: str, parameters: Mapping[str, float], start_time: float = 0.0) -> None:
+        self._taken: list[np.ndarray] = []
+        recording = {**parameters, "record.impacts": True}
+        super().__init__(component, recording, start_time=start_time, early_return=True)
+
+    def advance(self, end: float) -> StructureFmu:
+        """Advance to `end`, over early returns, and take the record."""
+        while self.time < end:
+            self.step(end - self.time)
+            self._taken.append(self.rows())
+        return self
+
+    def array(self, name: str, count: int) -> np.ndarray:
+        """Return the first `count` elements of an array output."""
+        return self.get_each(name + "[{}]", count)
+
+    def recorded(self, kind: float) -> np.ndarray:
+        """Return the rows of one kind, shape (n, 8)."""
+        table = np.concatenate(self._taken)
+        return table[table[:, 0] == kind]
+
+    @property
+    def impacts(self) -> np.ndarray:
+        """Time, phase, velocity before, impulse and contact of each impact, shape (n, 5)."""
+        return self.recorded(ROW_IMPACT)[:, 1:6]
+
+    @property
+    def sticks(self) -> np.ndarray:
+        """Start, end and contact of each stick that has ended, shape (n, 3)."""
+        return self.recorded(ROW_STICK)[:, 1:4]

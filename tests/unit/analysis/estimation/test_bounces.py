@@ -1,0 +1,105 @@
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from support.command_line import in_this_process
+from support.impact_records import channel_of
+
+from vibroimpact.analysis.decay.free_decay import estimate_decay
+from vibroimpact.analysis.decay.samples import decay_samples
+from vibroimpact.analysis.estimation import estimate_bounces
+from vibroimpact.fmus.errors import EstimationError
+
+SCENE = """
+[scene]
+title = "A ball under its weight"
+
+[body]
+mass = 1.0
+stiffness = 0.0
+displacement_start = 1.0
+
+[forcing]
+amplitude = 9.81
+phase = 3.141592653589793
+angular_frequency = 0.0
+
+[[stop]]
+law = "restitution"
+position = 0.0
+side = "lower"
+restitution = 0.8
+
+[record]
+transient_time = 0.0
+recorded_time = 3.5
+time_series = { rate = 500 }
+"""
+
+
+def ball(restitution, noise=0.0, bounces=12, first=0.7, seed=0, rate=500.0):
+    """Return the height of a ball, each flight `restitution` times as long as the one before."""
+    lengths = first * np.cumprod(np.append(1.0, np.broadcast_to(restitution, bounces - 1)))
+    starts = np.concatenate([[0.0], np.cumsum(lengths)])
+    time = np.arange(0.0, starts[-1], 1.0 / rate)
+    k = np.searchsorted(starts, time, side="right") - 1
+    height = 0.5 * 9.81 * (time - starts[k]) * (starts[k + 1] - time)
+    return channel_of(time, height + noise * np.random.default_rng(seed).standard_normal(len(time)))
+
+
+def test_flight_times_of_a_ball_give_its_restitution():
+    found = estimate_bounces(ball(0.8))
+    assert found.values["flight_times"]["restitution"].value == pytest.approx(0.8, abs=1e-4)
+    assert found.values["flight_times"]["stop_position"].value == pytest.approx(0.0, abs=1e-4)
+    assert found.verdict == "sure of flight times."
+    assert found.facts["side"] == "lower"
+
+
+def test_intervals_of_bounces_hold_the_truth_in_most_of_60_records():
+    held = [
+        estimate_bounces(ball(0.75, 3e-3, seed=seed)).values["flight_times"]["restitution"].covers(0.75)
+        for seed in range(60)
+    ]
+    # 51 or fewer of 60 would be seen once in 200 times
+    assert sum(held) > 51
+
+
+def test_a_restitution_that_falls_with_the_speed_is_not_sure():
+    found = estimate_bounces(ball(np.linspace(0.7, 0.85, 11), 1e-3))
+    assert "flight times do not shrink by one ratio" in found.verdict
+    assert found.verdict.startswith("not sure, because ")
+
+
+def test_bounces_end_where_a_flight_is_longer_than_the_one_before():
+    first, second = ball(0.8, bounces=6), ball(0.8, bounces=8)
+    values = np.concatenate([first.values, second.values])
+    found = estimate_bounces(channel_of(np.arange(len(values)) / 500.0, values))
+    assert len(found.impact_times) <= 8
+    assert found.values["flight_times"]["restitution"].value == pytest.approx(0.8, abs=1e-3)
+
+
+def test_two_bounces_are_refused_with_what_to_do():
+    with pytest.raises(EstimationError, match="at least 3 flights"):
+        estimate_bounces(ball(0.8, bounces=3))
+
+
+def test_a_ball_that_comes_to_rest_is_read_as_a_decay_without_a_warning():
+    # windows in which nothing moves have no weight: one window alone has no slope
+    flying = ball(0.6, bounces=8)
+    values = np.append(flying.values, np.zeros(3000))
+    decay = estimate_decay(decay_samples(channel_of(np.arange(len(values)) / 500.0, values), None, None), ())
+    assert decay.estimates()
+
+
+def test_estimate_of_a_ball_under_its_weight_takes_the_flight_times(tmp_path):
+    scene, data, figure = (tmp_path / name for name in ("ball.toml", "ball.nc", "ball.png"))
+    scene.write_text(SCENE)
+    assert in_this_process("run", scene, "-o", data).returncode == 0
+    done = in_this_process("estimate", data, "--figure", figure, "-o", tmp_path / "found.nc")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("sure of flight times.")
+    assert figure.stat().st_size > 10_000
+    with xr.open_dataset(tmp_path / "found.nc") as found:
+        value = float(found.estimate.sel(estimator="flight_times", quantity="restitution"))
+    assert math.isclose(value, 0.8, abs_tol=1e-3)

@@ -1,0 +1,484 @@
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+import xarray as xr
+from matplotlib.figure import Figure
+from support.dataset_examples import coupled_dataset, coupled_record, dataset_of, record, up_down
+from support.impact_sweep import SCENE, Oscillator
+from typer.testing import CliRunner
+
+from vibroimpact.analysis import figures, open_dataset, write_dataset
+from vibroimpact.analysis.commands import plot as commands
+from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
+from vibroimpact.analysis.figures.scene_text import limits
+from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
+from vibroimpact.analysis.landmarks import observed_order
+from vibroimpact.fmus.errors import DatasetError, UsageError
+
+PNG = b"\x89PNG\r\n"
+
+
+def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
+    write_dataset(dataset, folder / "runs.nc")
+    return open_dataset(folder / "runs.nc")
+
+
+def sampled_run() -> xr.Dataset:
+    """One period of the P(1,1) motion at angular frequency 1, sampled, with its impact."""
+    oscillator = Oscillator(1.0, 0.0, 0.0)
+    for _ in range(100):
+        oscillator.advance(None, 0.0)
+    start = (oscillator.displacement, oscillator.velocity)
+    impacts: list[list[float]] = []
+    oscillator.advance(impacts, 0.0)
+    before = impacts[0][0]
+    rows = []
+    for t in np.linspace(0.0, oscillator.period, 200):
+        if t < before:
+            rows.append([t, *oscillator.flow(*start, 0.0, t)])
+        else:
+            rows.append([t, *oscillator.flow(1.0, -0.7 * impacts[0][2], before, t - before)])
+    run = RunRecord(
+        Outcome.ok, "", None, np.array(impacts[:1]), np.empty((0, 3)), np.array(rows), 0.0, 0.0, 0.0, 1e-3
+    )
+    return dataset_of([run], coordinates={}, units="nondimensional", attrs={"scene": SCENE})
+
+
+BOUNCES = np.sqrt(2.0 / 9.81) * np.array([1.0, 2.4, 3.38])
+
+
+def bouncing_ball() -> xr.Dataset:
+    """A ball dropped from 1 m that loses 30 % of its velocity at each bounce, sampled; another rests."""
+    rows = []
+    for t in np.linspace(0.0, BOUNCES[-1], 300):
+        bounce = int(np.searchsorted(BOUNCES, t, side="right"))
+        begin = BOUNCES[bounce - 1] if bounce else -BOUNCES[0]
+        up = 0.7**bounce * 9.81 * BOUNCES[0]
+        age = t - begin
+        rows.append([t, up * age - 9.81 * age**2 / 2, up - 9.81 * age, 0.2, 0.1])
+    events = np.column_stack([BOUNCES[:2], np.zeros(2), np.ones(2)])
+    run = RunRecord(
+        Outcome.ok, "", None, None, None, np.array(rows), np.nan, np.nan, np.nan, 1e-3, events=events
+    )
+    names = ["ball.h", "ball.v", "other.h", "other.energy[1].kinetic"]
+    return coupled_dataset(
+        [run],
+        coordinates={},
+        sample_variables=names,
+        unit_of=dict(zip(names, ["m", "m/s", "m", "J"], strict=True)),
+        event_components=["ball", "other"],
+        connections=(),
+    )
+
+
+def ladder() -> xr.Dataset:
+    """Errors of first, second and fourth order, as a benchmark of coupling would measure them."""
+    step = 0.1 * 0.5 ** np.arange(7)
+    error = np.stack([0.8 * step, 0.3 * step**2, 0.2 * step**4])
+    drift = np.stack([0.5 * step, -0.1 * step**2, np.zeros(7)])
+    return xr.Dataset(
+        {
+            "error": (("exchange", "macro_step"), error, {"units": "m"}),
+            "energy_drift": (("exchange", "macro_step"), drift, {"units": "1"}),
+        },
+        coords={
+            "exchange": ["jacobi", "gauss_seidel", "iterated"],
+            "macro_step": ("macro_step", step, {"units": "s"}),
+        },
+        attrs={"title": "Two coupled oscillators"},
+    )
+
+
+def texts(figure: Figure) -> list[str]:
+    axes = figure.axes
+    return [text for axis in axes for text in (axis.get_xlabel(), axis.get_ylabel()) if text]
+
+
+def smallest_font(figure: Figure) -> float:
+    labels = [tick for axis in figure.axes for tick in (*axis.get_xticklabels(), *axis.get_yticklabels())]
+    names = [axis.xaxis.label for axis in figure.axes] + [axis.yaxis.label for axis in figure.axes]
+    legends = [text for legend in figure.legends for text in legend.get_texts()]
+    return min(float(text.get_fontsize()) for text in (*labels, *names, *legends))
+
+
+def test_a_bifurcation_diagram_is_one_column_wide_with_fonts_that_can_be_read(tmp_path: Path) -> None:
+    figure = figures.draw(opened(up_down(), tmp_path))
+    assert figure.get_figwidth() == pytest.approx(85 / 25.4)
+    assert smallest_font(figure) >= 7
+
+
+def test_axes_name_quantities_and_units(tmp_path: Path) -> None:
+    assert texts(figures.draw(opened(up_down(), tmp_path))) == [
+        "displacement range (m)",
+        "angular frequency (rad/s)",
+        "impact velocity (m/s)",
+    ]
+
+
+def test_nondimensional_axes_say_so(tmp_path: Path) -> None:
+    runs = [record(float(k), impacts=1) for k in range(3)]
+    figure = figures.draw(opened(dataset_of(runs, units="nondimensional"), tmp_path))
+    assert "angular frequency (-)" in texts(figure)
+
+
+def test_up_and_down_differ_in_colour_and_marker_and_the_legend_covers_no_point(tmp_path: Path) -> None:
+    figure = figures.draw(opened(up_down(), tmp_path))
+    up, down = figure.axes[0].get_lines()
+    assert up.get_color() != down.get_color()
+    assert up.get_marker() != down.get_marker()
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["up sweep", "down sweep"]
+    figure.draw_without_rendering()
+    below = legend.get_window_extent().y0
+    assert all(axis.get_window_extent().y1 <= below for axis in figure.axes)
+
+
+def test_every_impact_is_one_point_at_the_parameter_of_its_run(tmp_path: Path) -> None:
+    figure = figures.draw(opened(up_down(), tmp_path))
+    up, down = figure.axes[1].get_lines()
+    assert up.get_xdata().tolist() == [0.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+    assert down.get_xdata().tolist() == [2.0] * 4 + [1.0] * 5 + [0.0] * 6
+
+
+def test_a_selection_of_a_dataset_draws_only_its_own_impacts(tmp_path: Path) -> None:
+    chosen = opened(up_down(), tmp_path).sel(direction=["down"]).isel(angular_frequency=slice(0, 2))
+    (down,) = figures.draw(chosen).axes[1].get_lines()
+    assert sorted(down.get_xdata().tolist()) == [0.0] * 6 + [1.0] * 5
+
+
+def test_two_swept_parameters_give_colour_maps_of_the_grid(tmp_path: Path) -> None:
+    mass, position = np.meshgrid([1.0, 2.0], [0.1, 0.2, 0.3], indexing="ij")
+    runs = [record(float(k), impacts=k) for k in range(6)]
+    grid = {"mass": mass.ravel(), "position": position.ravel()}
+    dataset = opened(dataset_of(runs, coordinates=grid), tmp_path)
+    largest = figures.largest_impact_velocity(dataset)
+    np.testing.assert_allclose(largest, [[np.nan, 1.0, 2.01], [3.02, 4.03, 5.04]])
+    figure = figures.draw(dataset)
+    assert {"mass (kg)", "position (m)", "largest impact velocity (m/s)"} <= set(texts(figure))
+
+
+def test_a_map_of_an_up_down_sweep_has_a_column_for_each_direction(tmp_path: Path) -> None:
+    grid = {"mass": np.array([1.0, 1.0, 2.0, 2.0] * 2), "position": np.array([0.1, 0.2] * 4)}
+    directions = [Direction.up] * 4 + [Direction.down] * 4
+    runs = [record(float(k), impacts=1) for k in range(8)]
+    figure = figures.draw(opened(dataset_of(runs, coordinates=grid, direction=directions), tmp_path))
+    assert {axis.get_title() for axis in figure.axes} >= {"up sweep", "down sweep"}
+
+
+def test_the_points_of_a_crowd_are_small_and_faint_and_all_there(tmp_path: Path) -> None:
+    # 300 impacts of chaos beside 300 of one periodic orbit and three of another
+    runs = [record(1.0, impacts=300), record(2.0, impacts=300), record(3.0, impacts=3)]
+    assert runs[1].impacts is not None
+    runs[1].impacts[:, 2] = 2.0
+    axis = figures.draw(opened(dataset_of(runs), tmp_path)).axes[1]
+    single = np.concatenate([line.get_xdata() for line in axis.get_lines()])
+    (dots,) = axis.collections
+    assert single.tolist() == [1.0] * 300 + [2.0] * 3
+    assert len(dots.get_offsets()) == 300
+    assert np.all(dots.get_alpha() < 0.5)
+
+
+def noisy(count: int, missing: tuple[int, ...] = ()) -> list[RunRecord]:
+    """Runs on one orbit, whose numbers differ by rounding; some without an impact."""
+    runs = [record(3.0037242956, impacts=0 if k in missing else 1) for k in range(count)]
+    for k, run in enumerate(runs):
+        assert run.periods is not None
+        run.periods[:, 0] *= 1.0 + 4e-16 * (k % 3)
+    return runs
+
+
+def test_a_map_of_rounding_is_one_colour_and_says_so(tmp_path: Path) -> None:
+    # drawn over its own range of 3e-15 it looked like a fractal basin
+    grid = {"mass": np.repeat([1.0, 2.0, 3.0], 3), "position": np.tile([0.1, 0.2, 0.3], 3)}
+    figure = figures.draw(opened(dataset_of(noisy(9, missing=(4,)), coordinates=grid), tmp_path))
+    above, below, bar, _ = figure.axes
+    (mesh,) = above.collections
+    assert mesh.get_clim()[1] - mesh.get_clim()[0] > 1.0
+    assert above.get_title() == "one value, to 1e-09 of it"
+    assert len(bar.get_yticks()) == 1
+    assert below.get_title() == "one value, to 1e-09 of it; gray: no impact"
+
+
+def test_a_diagram_of_rounding_keeps_its_points_within_the_frame(tmp_path: Path) -> None:
+    runs = noisy(4)
+    figure = figures.draw(opened(dataset_of(runs), tmp_path))
+    for axis in figure.axes:
+        for line in axis.get_lines():
+            assert np.max(line.get_ydata()) < 0.99 * axis.get_ylim()[1]
+        assert axis.get_title(loc="left").startswith("one value, to 1e-09 of it: ")
+
+
+@pytest.mark.parametrize(
+    ("keys", "x"),
+    [
+        (("body.velocity_start", "body.displacement_start"), "displacement start (m)"),
+        (("stop[1].restitution", "forcing.angular_frequency"), "restitution (-)"),
+        (("forcing.angular_frequency", "stop[1].restitution"), "angular frequency (rad/s)"),
+    ],
+)
+def test_a_map_has_the_first_key_of_the_scene_across_and_a_phase_plane_its_displacement(
+    tmp_path: Path, keys: tuple[str, str], x: str
+) -> None:
+    names = [key.rpartition(".")[2] for key in keys]
+    grid = {name: values for name, values in zip(names, ([1.0, 1.0, 2.0, 2.0], [0.1, 0.2] * 2), strict=True)}
+    scene = "[sweep]\n" + "".join(f'"{key}" = {{ values = [1] }}\n' for key in keys)
+    dataset = dataset_of(
+        [record(float(k), impacts=1) for k in range(4)],
+        coordinates={name: np.array(values) for name, values in grid.items()},
+        attrs={"scene": scene},
+    )
+    figure = figures.draw(opened(dataset, tmp_path))
+    assert figure.axes[1].get_xlabel() == x
+
+
+def test_a_run_shows_its_stop_and_a_velocity_that_breaks_at_the_impact(tmp_path: Path) -> None:
+    figure = figures.draw(opened(sampled_run(), tmp_path))
+    above, middle, below = figure.axes
+    assert [line.get_ydata() for line in above.get_lines() if line.get_linestyle() == "--"] == [[1.0, 1.0]]
+    velocity = middle.get_lines()[0].get_ydata()
+    assert np.isnan(velocity).sum() == 1
+    marks = below.get_lines()[1]
+    # The impact of the P(1,1) motion at zeta = .05 is on the stop, moving into it.
+    assert marks.get_xdata() == pytest.approx([1.0])
+    assert marks.get_ydata()[0] > 0.5
+    assert smallest_font(figure) >= 7
+
+
+def test_a_run_without_time_series_shows_its_periods(tmp_path: Path) -> None:
+    figure = figures.draw(opened(up_down().drop_dims("sample").drop_vars("sample_count"), tmp_path), "run", 4)
+    assert texts(figure)[0] == "recorded forcing period (-)"
+    assert "impact velocity (m/s)" in texts(figure)
+
+
+def test_variables_of_components_have_a_panel_for_each_unit_and_a_line_at_each_event(tmp_path: Path) -> None:
+    figure = figures.draw(opened(bouncing_ball(), tmp_path))
+    heights, speeds, energy = figure.axes
+    assert texts(figure) == ["h (m)", "ball.v (m/s)", "time (s)", "kinetic (J)"]
+    assert [line.get_label() for line in heights.get_lines()] == ["ball.h", "other.h"]
+    assert len({line.get_color() for line in heights.get_lines()}) == 2
+    for axis in (heights, speeds, energy):
+        (events,) = axis.collections
+        assert [segment[0, 0] for segment in events.get_segments()] == pytest.approx(BOUNCES[:2])
+    legends = [
+        [text.get_text() for text in axis.get_legend().get_texts()] if axis.get_legend() else []
+        for axis in figure.axes
+    ]
+    # What is too long for the axis is named above it.
+    assert legends == [["ball.h", "other.h", "event"], [], ["other.energy[1].kinetic"]]
+    assert smallest_font(figure) >= 7
+
+
+def test_variables_without_any_event_are_drawn_alone(tmp_path: Path) -> None:
+    dataset = bouncing_ball().drop_dims("event").drop_vars("event_count")
+    figure = figures.draw(opened(dataset, tmp_path), "run")
+    assert [len(axis.collections) for axis in figure.axes] == [0, 0, 0]
+    assert [text.get_text() for text in figure.axes[0].get_legend().get_texts()] == ["ball.h", "other.h"]
+
+
+def test_one_run_of_a_sweep_over_components_is_drawn_by_its_index() -> None:
+    runs = [coupled_record(float(k), events=k, samples=4) for k in range(3)]
+    with pytest.raises(DatasetError, match="expected one run, got 3"):
+        figures.draw(coupled_dataset(runs), "run")
+    figure = figures.draw(coupled_dataset(runs), run=2)
+    assert figure.axes[0].get_lines()[0].get_xdata().tolist() == [2.0, 3.0, 4.0, 5.0]
+    assert len(figure.axes[0].collections[0].get_segments()) == 2
+
+
+def test_a_ladder_of_macro_steps_shows_the_order_of_each_exchange() -> None:
+    figure = figures.convergence(ladder())
+    above, below = figure.axes
+    orders = [[text.get_text() for text in axis.get_legend().get_texts()] for axis in figure.axes]
+    assert orders == [
+        ["Jacobi 1.00", "Gauss-Seidel 2.00", "iterated 4.00"],
+        ["Jacobi 1.00", "Gauss-Seidel 2.00", "iterated (none)"],
+    ]
+    assert (above.get_xscale(), above.get_yscale(), below.get_yscale()) == ("log", "log", "log")
+    # A drift may have either sign; its magnitude is what falls.
+    assert (below.get_lines()[1].get_ydata() > 0).all()
+    assert texts(figure) == ["error (m)", "macro step (s)", "energy drift (-)"]
+    assert figure.get_suptitle() == "Two coupled oscillators"
+    assert figure.get_figwidth() == pytest.approx(85 / 25.4)
+    assert smallest_font(figure) >= 7
+
+
+def test_the_order_of_an_error_is_not_led_astray_by_rounding_or_by_one_step_that_is_too_large() -> None:
+    step = 0.1 * 0.5 ** np.arange(9)
+    error = 0.3 * step**2
+    error[0] *= 10
+    error[-2:] = 3e-6, 0.0
+    assert observed_order(step[::-1], error[::-1]) == pytest.approx(2.0)
+    assert np.isnan(observed_order(step[:1], error[:1]))
+
+
+def test_what_is_no_ladder_is_refused_by_name() -> None:
+    with pytest.raises(DatasetError, match="got no such energy_drift"):
+        figures.draw(ladder().drop_vars("energy_drift"), "convergence")
+
+
+@pytest.mark.parametrize(
+    ("kind", "run", "message"),
+    [
+        ("run", None, "expected one run, got 6. Name one by its run_index (--run): 0, 1, 2, 3, 4, 5."),
+        ("auto", 99, "expected one run of those there are (0, 1, 2, 3, 4, 5), got none of run_index 99."),
+        ("bifurcation", 2, "run: expected none for a dataset of runs drawn as bifurcation, got one."),
+    ],
+)
+def test_a_run_must_be_named_among_several_and_is_never_left_out(
+    kind: str, run: int, message: str, tmp_path: Path
+) -> None:
+    dataset = up_down().drop_dims("sample").drop_vars("sample_count")
+    with pytest.raises((DatasetError, UsageError), match=re.escape(message)):
+        figures.draw(opened(dataset, tmp_path), kind, run)
+
+
+def test_a_bifurcation_of_a_single_run_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DatasetError, match="expected one swept parameter, got 0"):
+        figures.draw(opened(sampled_run(), tmp_path), "bifurcation")
+
+
+@pytest.mark.parametrize(("ending", "start"), [("png", PNG), ("pdf", b"%PDF"), ("svg", b"<?xml")])
+def test_the_ending_chooses_the_format(ending: str, start: bytes, tmp_path: Path) -> None:
+    figures.save(figures.draw(opened(up_down(), tmp_path)), tmp_path / f"figure.{ending}")
+    assert (tmp_path / f"figure.{ending}").read_bytes().startswith(start)
+
+
+def command_line() -> typer.Typer:
+    app = typer.Typer()
+    app.callback()(lambda: None)
+    commands.register(app)
+    return app
+
+
+def test_plot_writes_the_figure_and_nothing_else(tmp_path: Path) -> None:
+    write_dataset(up_down(), tmp_path / "dataset.nc")
+    done = CliRunner().invoke(command_line(), ["plot", str(tmp_path), "-o", str(tmp_path / "figure.png")])
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "figure.png").read_bytes().startswith(PNG)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["dataset.nc", "figure.png"]
+
+
+def test_plot_draws_what_a_benchmark_measured(tmp_path: Path) -> None:
+    ladder().to_netcdf(tmp_path / "ladder.nc")
+    arguments = ["plot", str(tmp_path / "ladder.nc"), "-o", str(tmp_path / "a.png"), "--kind", "convergence"]
+    done = CliRunner().invoke(command_line(), arguments)
+    assert done.exit_code == 0, done.output
+    assert (tmp_path / "a.png").read_bytes().startswith(PNG)
+
+
+def test_plot_help_has_an_example() -> None:
+    done = CliRunner().invoke(command_line(), ["plot", "--help"])
+    assert "Example: vibroimpact plot" in done.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        (
+            ["missing.nc", "-o", "a.png"],
+            DatasetError,
+            "missing.nc: expected a dataset file, got no such file",
+        ),
+        (["corrupt.nc", "-o", "a.png"], DatasetError, "corrupt.nc: expected a readable NetCDF dataset"),
+        (
+            ["corrupt.nc", "-o", "a.png", "--kind", "convergence"],
+            DatasetError,
+            "expected a readable NetCDF dataset",
+        ),
+        (
+            ["none.nc", "-o", "a.png", "--kind", "convergence"],
+            DatasetError,
+            "expected a dataset file, got no such file",
+        ),
+        (
+            ["runs.nc", "-o", "a.png", "--kind", "convergence"],
+            DatasetError,
+            "kind: expected one that fits a dataset of runs (bifurcation, strobe, run, portrait, impact-map,",
+        ),
+        (["runs.nc", "-o", "a.docx"], UsageError, "expected a name ending in .png, .pdf, .svg, got '.docx'"),
+        (
+            ["runs.nc", "-o", "none/a.png"],
+            UsageError,
+            "expected a place where a file can be written, got no folder of that name",
+        ),
+        (
+            ["runs.nc", "-o", "a.png", "--kind", "pie"],
+            UsageError,
+            "kind: expected one of auto, bifurcation, map, impacts-per-period, strobe, run, portrait",
+        ),
+    ],
+)
+def test_plot_says_what_is_wrong_with_its_files(
+    arguments: list[str],
+    error: type[Exception],
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_dataset(up_down(), tmp_path / "runs.nc")
+    Path("corrupt.nc").write_bytes(Path("runs.nc").read_bytes()[:5000])
+    done = CliRunner().invoke(command_line(), ["plot", *arguments])
+    assert isinstance(done.exception, error)
+    assert message in str(done.exception)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["corrupt.nc", "runs.nc"]
+
+
+def test_a_file_that_is_damaged_in_its_data_is_one_message_too(tmp_path: Path) -> None:
+    path = tmp_path / "runs.nc"
+    write_dataset(dataset_of([record(float(k), impacts=400) for k in range(3)]), path, compression=1)
+    content = bytearray(path.read_bytes()[:-LINE_LENGTH])  # as a file of version 0.1, without its hash
+    # Damage in the middle of the compressed values; the structure of the file stays whole.
+    middle = slice(len(content) // 2, len(content) * 3 // 4)
+    content[middle] = bytes(len(content[middle]))
+    path.write_bytes(content)
+    done = CliRunner().invoke(command_line(), ["plot", str(path), "-o", str(tmp_path / "a.png")])
+    assert isinstance(done.exception, DatasetError)
+    assert "expected a readable NetCDF dataset" in str(done.exception)
+
+
+def test_more_than_displacement_and_velocity_is_drawn_in_panels_by_unit_with_modal_energies_apart(
+    tmp_path: Path,
+) -> None:
+    names = [
+        "displacement",
+        "velocity",
+        "displacement[2]",
+        "energy.kinetic",
+        "modal_energy[1]",
+        "modal_energy[2]",
+    ]
+    time = np.linspace(0.0, 1.0, 20)
+    run = RunRecord(
+        Outcome.ok,
+        "",
+        None,
+        np.array([[0.25, 1.0, 0.5, 0.8, 1.0, 0.7, 0.0]]),
+        np.empty((0, 3)),
+        np.column_stack([time, *(np.sin(k * time) for k in range(1, 7))]),
+        0.0,
+        0.0,
+        0.0,
+        1e-3,
+    )
+    figure = figures.draw(opened(dataset_of([run], coordinates={}, sample_variables=names), tmp_path))
+    panels = [(axis.get_ylabel().split()[-1], len(axis.get_lines())) for axis in figure.axes]
+    assert sorted(panels) == [("(J)", 1), ("(J)", 2), ("(m)", 2), ("(m/s)", 1)]
+    assert figure.axes[-1].get_xlabel() == "time (s)"
+
+
+def test_a_stop_at_another_point_than_the_observed_one_is_not_drawn_as_its_limit() -> None:
+    beam = '[body]\nkind = "beam"\n[[stop]]\nposition = 1.0\nlocation = {}\n'
+    chain = '[body]\nkind = "chain"\nmasses = [1, 1]\nobserved_mass = {}\n[[stop]]\nposition = 1.0\n'
+    for text, shown in (
+        (beam.format(1.0), [1.0]),
+        (beam.format(0.5), []),
+        (chain.format(2), [1.0]),
+        (chain.format(1), []),
+    ):
+        dataset = dataset_of([record(1.0)], coordinates={}, attrs={"scene": text})
+        assert limits(dataset, "displacement") == shown

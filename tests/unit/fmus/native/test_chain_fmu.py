@@ -1,0 +1,408 @@
+"""The Chain FMU in any tool: modes, closed-form motion, refusals, inputs, saved states. References: equations.md 5."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+from fmpy.fmi1 import FMICallException
+from numpy.typing import NDArray
+from scipy.linalg import expm
+from support.component_fmu import ComponentFmu
+from support.oscillator_fmu import EXTERNAL, LOWER, VERSIONS, stop
+from support.tolerance import ORBIT, PARTITION, ROUNDING, SEQUENCE
+
+from vibroimpact.fmus import fmu_path
+
+#: Issue's reference: thesis chapter 6, two unit masses, force on the first, stop on the second.
+TWO = {"masses": 2, "damping[1]": 0.1, "damping[2]": 0.1, "forcing.amplitude[1]": 0.5}
+SCENE = {**TWO, "forcing.angular_frequency": 0.9, **stop(0.1)}
+KELVIN_VOIGT = 2
+
+
+def chain(parameters: Mapping[str, float] = {}, **options: Any) -> ComponentFmu:
+    return ComponentFmu("Chain", parameters, **options)
+
+
+def each(name: str, values: Any) -> dict[str, float]:
+    return {f"{name}[{k + 1}]": float(value) for k, value in enumerate(values)}
+
+
+def matrix(elements: Any, far: float = 0.0) -> NDArray[np.float64]:
+    """Return K or C from the elements' constants. equations.md 5.1"""
+    values = np.array([*elements, far], dtype=float)
+    return np.diag(values[:-1] + values[1:]) - np.diag(values[1:-1], 1) - np.diag(values[1:-1], -1)
+
+
+def refusal(parameters: Mapping[str, float], version: str = "3.0") -> str:
+    """Return the one message with which initialization is refused."""
+    with chain(parameters, version=version, initialize=False) as c:
+        with pytest.raises(FMICallException, match="ExitInitializationMode"):
+            c.initialize()
+        assert len(c.messages) == 1
+        return c.messages[0]
+
+
+# ---- modes ----
+
+
+@pytest.mark.parametrize("masses", [1, 2, 5, 64])
+def test_a_uniform_chain_has_the_closed_form_frequencies(masses: int) -> None:
+    j = np.arange(1, masses + 1)
+    expected = 2.0 * np.sin((2 * j - 1) * np.pi / (2 * (2 * masses + 1))) * math.sqrt(3.0 / 2.0)
+    parameters = {"masses": masses, **each("mass", [2.0] * masses), **each("stiffness", [3.0] * masses)}
+    with chain(parameters) as c:
+        natural = c.get_each("natural_angular_frequency[{}]", masses)
+    assert natural == pytest.approx(expected, rel=ROUNDING)
+
+
+def test_a_chain_of_different_masses_has_the_frequencies_of_the_equation_sheet() -> None:
+    with chain({"masses": 3, **each("mass", [1, 2, 0.5]), **each("stiffness", [3, 1, 2])}) as c:
+        natural = c.get_each("natural_angular_frequency[{}]", 4)
+        assert natural == pytest.approx([0.53645647, 2.0, 2.28302747, 0.0], abs=5e-9)
+
+
+def test_a_far_spring_makes_the_two_ends_alike() -> None:
+    with chain({"masses": 3, "far_stiffness": 1.0}) as c:
+        # fixed at both ends: 2 sin(j pi / (2 (N + 1)))
+        expected = [2.0 * math.sin(j * math.pi / 8.0) for j in (1, 2, 3)]
+        assert c.get_each("natural_angular_frequency[{}]", 3) == pytest.approx(expected, rel=ROUNDING)
+
+
+# ---- motion without stops ----
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_mode_that_is_released_decays_in_its_closed_form(version: str) -> None:
+    masses, c1 = 4, 0.05
+    i, angle = np.arange(1, masses + 1), np.pi / (2 * masses + 1)
+    shape, natural = np.sin(i * angle), 2.0 * math.sin(angle / 2.0)
+    parameters = {"masses": masses, **each("damping", [c1] * masses), **each("displacement_start", shape)}
+    ratio, time = c1 * natural / 2.0, 17.3
+    damped = natural * math.sqrt(1.0 - ratio**2)
+    decay = math.exp(-ratio * natural * time)
+    expected = decay * (math.cos(damped * time) + ratio * natural / damped * math.sin(damped * time))
+    with chain(parameters, version=version) as c:
+        c.step(time)
+        assert c.get_each("displacement[{}]", masses) == pytest.approx(shape * expected, abs=SEQUENCE)
+        assert c.get("displacement") == c.get("displacement[4]")
+
+
+@pytest.mark.parametrize("load", ["forcing.amplitude", "force"])
+def test_a_constant_force_ends_in_the_static_deflection(load: str) -> None:
+    stiffness, force = [3.0, 1.0, 2.0], [0.2, 0.0, -0.5]
+    parameters = {"masses": 3, **each("stiffness", stiffness), "far_stiffness": 0.5}
+    damping = {**each("damping", [3.0, 1.0, 2.0]), "far_damping": 0.5}
+    with chain({**parameters, **damping, **each(load, force)}) as c:
+        c.step(300.0)
+        expected = np.linalg.solve(matrix(stiffness, 0.5), force)
+        assert c.get_each("displacement[{}]", 3) == pytest.approx(expected, abs=ORBIT)
+        assert c.get_each("acceleration[{}]", 3) == pytest.approx([0.0] * 3, abs=ORBIT)
+
+
+def test_an_accelerated_base_is_felt_by_all_masses() -> None:
+    masses = [1.0, 2.0, 0.5]
+    parameters = {"masses": 3, **each("mass", masses), **each("damping", [2.0] * 3), "base_acceleration": 0.3}
+    with chain(parameters) as c:
+        assert c.get("acceleration[3]") == pytest.approx(0.0, abs=ROUNDING)
+        c.step(300.0)
+        expected = np.linalg.solve(matrix([1.0] * 3), -0.3 * np.array(masses))
+        assert c.get_each("displacement[{}]", 3) == pytest.approx(expected, abs=1e-11)
+        assert c.get_each("acceleration[{}]", 3) == pytest.approx([0.3] * 3, abs=1e-11)
+
+
+def test_free_masses_stay_where_they_are_while_the_base_moves_away() -> None:
+    rate = 0.1
+    with chain({**each("stiffness", [0.0, 1.0]), "base_acceleration_rate": rate}) as c:
+        c.step(2.0)
+        assert c.get_each("displacement[{}]", 2) == pytest.approx([-rate * 2.0**3 / 6.0] * 2, abs=SEQUENCE)
+        # absolute: none, also at the end of the slope
+        assert c.get_each("acceleration[{}]", 2) == pytest.approx([0.0] * 2, abs=SEQUENCE)
+
+
+@pytest.mark.parametrize("dampings", [[0.3, 0.0, 0.0], [0.0, 2.0, 9.0], [1.0, 0.5, 0.1]])
+def test_damping_that_couples_the_modes_moves_as_the_matrix_exponential(dampings: list[float]) -> None:
+    start = np.array([0.3, -0.1, 0.2, 0.5, 0.0, -0.4])
+    mass, stiffness = np.array([1.0, 2.0, 0.5]), [3.0, 1.0, 2.0]
+    inverse = np.diag(1.0 / mass)
+    below = np.hstack([-inverse @ matrix(stiffness), -inverse @ matrix(dampings)])
+    expected = expm(np.vstack([np.eye(3, 6, 3), below]) * 7.0) @ start
+    parameters = {
+        **{"masses": 3, **each("mass", mass), **each("stiffness", stiffness), **each("damping", dampings)},
+        **{**each("displacement_start", start[:3]), **each("velocity_start", start[3:])},
+    }
+    with chain(parameters) as c:
+        c.step(7.0)
+        assert c.get_each("displacement[{}]", 3) == pytest.approx(expected[:3], abs=PARTITION)
+        assert c.get_each("velocity[{}]", 3) == pytest.approx(expected[3:], abs=PARTITION)
+
+
+def test_a_mass_on_a_dashpot_alone_comes_to_rest() -> None:
+    one = {"masses": 1, "mass[1]": 2.0, "stiffness[1]": 0.0, "damping[1]": 0.5, "velocity_start[1]": 3.0}
+    with chain(one) as c:
+        c.step(1.7)
+        assert c.get("velocity") == pytest.approx(3.0 * math.exp(-0.25 * 1.7), rel=SEQUENCE)
+        assert c.get("displacement") == pytest.approx(12.0 * (1.0 - math.exp(-0.25 * 1.7)), rel=SEQUENCE)
+
+
+# ---- stops ----
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_thesis_chain_settles_on_its_orbit_of_one_impact(version: str) -> None:
+    with chain(SCENE, version=version) as c:
+        for k in range(1, 301):
+            c.step(k * 10.0 - c.time)
+        # reference of the issue
+        assert c.get("contact[1].last_velocity") == pytest.approx(0.787660852554797, abs=ORBIT)
+        loss = (1.0 - 0.7**2) / 2.0 * c.get("contact[1].last_velocity") ** 2
+        assert loss == pytest.approx(0.158204452755, abs=1e-12)
+
+
+def test_stock_fmpy_runs_it_alone() -> None:
+    runs = [
+        simulate_fmu(
+            str(fmu_path("Chain", version)),
+            start_values=SCENE,
+            output=["displacement", "contact[1].count"],
+            stop_time=60.0,
+            output_interval=interval,
+        )
+        for version, interval in (("3.0", 0.1), ("2.0", 0.1), ("3.0", 60.0))
+    ]
+    assert runs[0]["displacement"].max() <= 0.1
+    assert np.array_equal(runs[0]["displacement"], runs[1]["displacement"])
+    assert abs(runs[0]["displacement"][-1] - runs[2]["displacement"][-1]) <= PARTITION
+    assert runs[0]["contact[1].count"][-1] == runs[2]["contact[1].count"][-1] > 5
+
+
+def test_an_impact_leaves_the_velocities_of_the_other_masses() -> None:
+    before = [0.3, 0.8, -0.2]
+    start = {"masses": 3, **each("mass", [1.0, 2.0, 0.5]), **each("velocity_start", before)}
+    with chain({**start, **stop(0.0, 0.6), "contact[1].mass_number": 2}) as c:
+        assert c.get("contact[1].mass") == pytest.approx(2.0, rel=ROUNDING)
+        c.step(1e-9)
+        after = c.get_each("velocity[{}]", 3)
+        assert after == pytest.approx([0.3, -0.6 * 0.8, -0.2], abs=1e-8)
+        assert c.get("contact[1].impulse") == pytest.approx(1.6 * 0.8 * 2.0, rel=SEQUENCE)
+
+
+def test_the_observed_mass_and_a_stop_are_on_the_last_mass_unless_told_otherwise() -> None:
+    start = {"masses": 3, **each("displacement_start", [0.1, 0.2, 0.3])}
+    for number, expected in ((0, 0.3), (3, 0.3), (1, 0.1)):
+        with chain({**start, "observed_mass": number}) as c:
+            assert c.get("displacement") == pytest.approx(expected, abs=ROUNDING)
+        with chain({**start, **stop(1.0), "contact[1].mass_number": number}) as c:
+            assert c.get("contact[1].displacement") == pytest.approx(expected, abs=ROUNDING)
+
+
+def test_an_importer_that_answers_the_impacts_gets_the_same_motion() -> None:
+    external = {**SCENE, "contact[1].law": EXTERNAL}
+    with chain(SCENE) as fused, chain(external, event_mode=True) as coupled:
+        for _ in range(12):
+            coupled.advance_to_event()
+            coupled.answer(0.7)
+        while fused.get("contact[1].count") < 12:
+            fused.step(0.25)
+        assert coupled.get("contact[1].last_time") == pytest.approx(
+            fused.get("contact[1].last_time"), abs=PARTITION
+        )
+
+
+def test_two_contacts_at_one_instant_wait_for_both_answers() -> None:
+    two = {**each("velocity_start", [0.5, 0.5]), "stiffness[1]": 0.0, "contact[2].mass_number": 1}
+    with chain({**two, **stop(0.1, law=EXTERNAL), **stop(0.1, law=EXTERNAL, k=2)}, event_mode=True) as c:
+        c.advance_to_event()
+        c.set("contact[1].applied_restitution", 0.5)
+        with pytest.raises(FMICallException):
+            c.fmu.updateDiscreteStates()
+        assert "contact[2].applied_restitution: expected an answer" in c.messages[-1]
+        c.answer(0.8, k=2)
+        assert c.get_each("velocity[{}]", 2) == pytest.approx([-0.4, -0.25], rel=SEQUENCE)
+
+
+def test_an_importer_without_events_is_told_to_use_another_law() -> None:
+    assert "contact law external" in refusal({**SCENE, "contact[1].law": EXTERNAL})
+
+
+# ---- energies ----
+
+
+def test_energies_balance_and_are_only_followed_when_asked_for() -> None:
+    names = ("kinetic", "potential", "forcing_work", "damping_loss", "contact_loss")
+    with chain({**SCENE, "velocity_start[1]": 0.4, "record.energies": True}) as c:
+        start = c.get("energy.kinetic")
+        c.advance(100.0)
+        kinetic, potential, work, damping, contact = (c.get(f"energy.{name}") for name in names)
+        assert kinetic + potential == pytest.approx(start + work - damping - contact, abs=1e-11)
+        assert min(work, damping, contact) > 0.1
+        assert c.get_each("modal_energy[{}]", 2).sum() == pytest.approx(kinetic + potential, rel=SEQUENCE)
+    with chain(SCENE) as c:
+        c.advance(100.0)
+        followed = [*names[2:], *("modal_energy[1]", "modal_energy[2]")]
+        assert [c.get(n if n.startswith("modal") else f"energy.{n}") for n in followed] == [0.0] * 5
+        assert c.get("energy.kinetic") > 0.0
+
+
+# ---- saved states ----
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("law", [stop(0.1), {**stop(0.1, law=KELVIN_VOIGT), "contact[1].stiffness": 50.0}])
+def test_a_state_that_is_restored_goes_on_as_it_did(version: str, law: dict[str, float]) -> None:
+    scene = {**TWO, "forcing.angular_frequency": 0.2, **law, "record.energies": True}
+    with chain(scene, version=version) as c, chain(scene, version=version) as other:
+        for _ in range(20):  # impacts, sticking or pressing, flight
+            c.step(1.7)
+            data, time = c.serialized(), c.time
+            c.step(11.0)
+            end = c.state()
+            c.restore(data)
+            c.time = time
+            c.step(11.0)
+            assert c.state() == end
+            other.restore(data)
+            other.time = time
+            other.step(11.0)
+            assert other.state() == end
+
+
+def test_both_versions_of_fmi_move_alike() -> None:
+    ends = []
+    for version in VERSIONS:
+        with chain({**SCENE, **stop(-0.3, 0.4, side=LOWER, k=2)}, version=version) as c:
+            for k in range(50):
+                c.set("force[2]", 0.1 * math.sin(k))
+                c.set("force_rate[2]", 0.05)
+                c.step(0.5)
+            ends.append([*c.state(), *c.contact("count", "last_time", k=2)])
+    assert ends[0] == ends[1]
+    assert ends[0][2] > 0
+
+
+# ---- refusals ----
+
+BAD = [
+    ("masses", 0, "1 to 64"),
+    ("masses", 65, "1 to 64"),
+    ("mass[2]", 0.0, "> 0"),
+    ("mass[1]", math.nan, "> 0"),
+    ("stiffness[2]", -1.0, ">= 0"),
+    ("damping[1]", math.inf, ">= 0"),
+    ("far_stiffness", -1.0, ">= 0"),
+    ("far_damping", math.nan, ">= 0"),
+    ("forcing.amplitude[2]", math.nan, "finite"),
+    ("forcing.angular_frequency", -1.0, ">= 0"),
+    ("forcing.phase", math.inf, "finite"),
+    ("displacement_start[1]", math.nan, "finite"),
+    ("velocity_start[2]", -math.inf, "finite"),
+    ("observed_mass", 3, "1 to 2"),
+    ("contact[1].mass_number", 3, "1 to 2"),
+    ("contact[1].mass_number", -1, "0 for the last"),
+    ("contact[1].restitution", 1.2, "0 <= r <= 1"),
+    ("contact[1].yield_velocity", -1.0, ">= 0"),
+    ("contact[1].relaxation_time", math.nan, ">= 0"),
+    ("contact[1].position", math.nan, "finite"),
+    ("contact[1].law", 7, "6 (external_force)"),
+    ("contact[1].side", 3, "1 (upper)"),
+    ("contact_tolerance", 0.0, "0 < tolerance"),
+    ("impact_limit", -1, ">= 0"),
+    ("force[2]", math.nan, "finite"),
+    ("base_acceleration_rate", math.inf, "finite"),
+    ("contact[1].applied_force", math.nan, "finite"),
+]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize(("name", "value", "rule"), BAD)
+def test_a_bad_parameter_is_named_with_its_rule_and_its_value(
+    version: str, name: str, value: float, rule: str
+) -> None:
+    text = refusal({**SCENE, name: value}, version)
+    assert f"{name}: expected" in text
+    assert rule in text
+    assert f"got {value:g}" in text
+
+
+def test_all_bad_parameters_are_told_at_once() -> None:
+    bad = {"mass[1]": -1.0, "stiffness[2]": -2.0, "contact[1].restitution": 3.0, "contact[8].stiffness": -1.0}
+    text = refusal({**SCENE, **bad, "contact[8].law": KELVIN_VOIGT})
+    assert all(f"{name}: expected" in text for name in bad)
+
+
+def test_more_problems_than_a_message_holds_are_cut_and_marked() -> None:
+    text = refusal({"masses": 64, **each("mass", [-1.0] * 64)})
+    assert "mass[1]: expected" in text
+    assert text.endswith("...")
+
+
+def test_a_law_needs_only_its_own_numbers() -> None:
+    unused = {"contact[1].stiffness": -1.0, "contact[1].exponent": 0.0, "contact[2].position": math.nan}
+    with chain({**SCENE, **unused}) as c:
+        assert c.messages == []
+    yielding = {**SCENE, **stop(0.1, law=4), **unused}
+    text = refusal(yielding)
+    assert "contact[1].stiffness: expected" in text
+    assert "contact[1].exponent: expected a finite number >= 1" in text
+
+
+def test_a_start_beyond_a_rigid_stop_is_refused_by_its_name() -> None:
+    text = refusal({**SCENE, "displacement_start[2]": 0.2})
+    assert "displacement_start: expected a start on the free side of contact[1] (<= 0.1" in text
+
+
+@pytest.mark.parametrize(
+    ("second", "message"),
+    [
+        (stop(0.1, side=LOWER, k=2), "contact[2].position: expected room between it and contact[1]"),
+        (stop(0.2, side=LOWER, k=2), "contact[2].position: expected room between it and contact[1]"),
+        (stop(0.2, k=2), "contact[2].position: expected a position that the rigid contact[1]"),
+        (stop(0.05, k=2), "contact[1].position: expected a position that the rigid contact[2]"),
+        (
+            {**stop(0.1, law=KELVIN_VOIGT, k=2), "contact[2].stiffness": 1.0},
+            "contact[2].position: expected a position that the rigid contact[1]",
+        ),
+    ],
+)
+def test_stops_that_cannot_both_be_met_are_refused(second: dict[str, float], message: str) -> None:
+    assert message in refusal({**SCENE, **second})
+
+
+def test_stops_that_can_be_met_one_after_the_other_are_allowed() -> None:
+    soft = {**stop(0.05, law=KELVIN_VOIGT, k=2), "contact[2].stiffness": 10.0}
+    softer = {**stop(0.02, law=KELVIN_VOIGT, k=3), "contact[3].stiffness": 1.0}
+    elsewhere = {**stop(0.0, k=4), "contact[4].mass_number": 1}
+    with chain({**SCENE, **soft, **softer, **elsewhere}) as c:
+        c.advance(100.0)
+        assert min(c.get(f"contact[{k}].count") for k in (1, 2, 3, 4)) > 0
+
+
+def test_initialization_can_be_repeated_with_better_values() -> None:
+    with chain({**SCENE, "mass[1]": -1.0}, initialize=False) as c:
+        with pytest.raises(FMICallException):
+            c.initialize()
+        c.set("mass[1]", 1.0)
+        c.set("displacement_start[2]", 0.1)  # on the stop
+        assert c.get("contact[1].displacement") == 0.1
+        c.set("displacement_start[2]", 0.2)
+        with pytest.raises(FMICallException):
+            c.fmu.exitInitializationMode()
+        c.set("displacement_start[2]", 0.0)
+        c.fmu.exitInitializationMode()
+        c.step(1.0)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+@pytest.mark.parametrize("size", [0.0, -0.1, math.nan, math.inf])
+def test_a_step_that_cannot_be_made_changes_nothing(version: str, size: float) -> None:
+    with chain(SCENE, version=version) as c:
+        c.step(3.0)
+        before = c.state()
+        with pytest.raises(FMICallException):
+            c.step(size)
+        assert "communicationStepSize: expected a finite number > 0" in c.messages[-1]
+        c.time = 3.0
+        c.step(1e-300)
+        assert c.state() == before

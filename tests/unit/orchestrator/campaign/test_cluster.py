@@ -1,0 +1,201 @@
+"""The pool of workers: those that die are replaced, and what cannot work is said once."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import os
+import ssl
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from distributed.comm import connect
+from distributed.security import Security
+from support.busy_runner import die_while, freeze_once, same
+
+from vibroimpact.fmus.errors import CampaignError, UsageError
+from vibroimpact.orchestrator.campaign import cluster
+from vibroimpact.orchestrator.campaign.cluster import MOST_DEATHS, MOST_STARTS, open_workers
+from vibroimpact.orchestrator.campaign.progress import Silence
+
+kills_itself = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
+
+
+@kills_itself
+def test_a_worker_that_dies_before_the_first_chunk_is_replaced_and_the_new_one_is_asked(
+    tmp_path: Path,
+) -> None:
+    for wish in range(2):
+        (tmp_path / f"{wish}").touch()
+    with open_workers(workers=2) as pool:
+        answers = pool.call_everywhere(die_while, str(tmp_path))
+        assert len(set(answers.values())) == 2
+        assert answers.keys() == set(pool.worker_addresses())
+        assert pool.lost_workers == 2
+
+
+@kills_itself
+def test_a_call_that_kills_every_worker_is_one_clear_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "MOST_DEATHS", 1)
+    for wish in range(MOST_DEATHS):
+        (tmp_path / f"{wish}").touch()
+    with (
+        pytest.raises(CampaignError, match="got 2 that died while they loaded the components"),
+        open_workers(workers=1) as pool,
+    ):
+        pool.call_everywhere(die_while, str(tmp_path))
+
+
+def test_work_whose_message_waits_for_a_clock_that_was_set_back_is_sent_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(cluster, "STALL_SECONDS", 1.0)
+    said = Said()
+    with open_workers(workers=1, progress=said) as pool:
+        pool.submit(same, 1)
+        assert pool.next_finished().result == 1
+        # What Dask's sender is left with when the clock goes back 20 minutes just after a message.
+        pool._client.scheduler_comm.next_deadline = time.time() + 1200.0
+        ticket = pool.submit(same, 2)
+        finished = pool.next_finished()
+        assert (finished.ticket, finished.result) == (ticket, 2)
+    assert len(said.notes) == 1
+    assert "clock that was set back" in said.notes[0]
+
+
+def test_a_long_point_is_no_stall(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "STALL_SECONDS", 0.1)
+    monkeypatch.setattr(cluster, "LOOK_SECONDS", 0.1)
+    said = Said()
+    with open_workers(workers=1, progress=said) as pool:
+        pool.submit(time.sleep, 2.0)
+        assert pool.next_finished().error is None
+    assert not said.notes
+
+
+@kills_itself
+def test_a_worker_that_does_not_answer_any_more_is_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, seconds in (("STALL_SECONDS", 0.5), ("LOOK_SECONDS", 0.2), ("RESULT_SECONDS", 1.0)):
+        monkeypatch.setattr(cluster, name, seconds)
+    said = Said()
+    (tmp_path / "wish").touch()
+    with open_workers(workers=1, progress=said) as pool:
+        pool.submit(freeze_once, str(tmp_path / "wish"))
+        assert pool.next_finished().result == "thawed"
+    assert len(said.notes) == 1
+
+
+def test_a_call_of_dask_that_ctrl_c_ended_before_it_began_says_nothing(
+    recwarn: pytest.WarningsRecorder,
+) -> None:
+    async def never_awaited() -> None:
+        raise AssertionError
+
+    with open_workers(workers=1):
+        left = never_awaited()
+        del left
+        gc.collect()
+    assert not [one for one in recwarn if "never awaited" in str(one.message)]
+
+
+class Said(Silence):
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        self.notes.append(text)
+
+
+def _strangers() -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield how somebody without the key may try to connect."""
+    yield "tcp", {}
+    yield "tls", Security.temporary().get_connection_args("client")
+    trusting = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    trusting.check_hostname, trusting.verify_mode = False, ssl.CERT_NONE
+    yield "tls", {"ssl_context": trusting}
+
+
+def _answers(address: str, options: dict[str, Any]) -> bool:
+    """Return whether the Dask server at an address takes an order."""
+
+    async def ask() -> bool:
+        comm = await connect(address, timeout=2.0, **options)
+        await comm.write({"op": "identity", "reply": True})
+        answer = await comm.read()
+        await comm.close()
+        return "id" in answer
+
+    try:
+        return asyncio.run(ask())
+    except OSError:
+        return False
+
+
+def test_nobody_without_the_key_of_a_campaign_reaches_its_processes() -> None:
+    with open_workers(workers=1) as pool:
+        client = pool._client
+        (worker,) = client.scheduler_info()["workers"].values()
+        own = client.security.get_connection_args("client")
+        for address in (client.scheduler.address, *pool.worker_addresses(), worker["nanny"]):
+            assert _answers(address, own)
+            for protocol, options in _strangers():
+                assert not _answers(f"{protocol}://{address.partition('://')[2]}", options)
+
+
+def test_the_key_of_a_campaign_lies_where_only_its_user_reads_and_the_next_command_sweeps() -> None:
+    # one in memory would be written to a folder of its own for each connection, and stay there after kill -9
+    with open_workers(workers=1) as pool:
+        security = pool._client.security
+        for role in ("client", "scheduler", "worker"):
+            folder = Path(getattr(security, f"tls_{role}_key")).parent
+            assert folder.name.startswith("vibroimpact-scratch-workers-")
+            assert os.name == "nt" or folder.stat().st_mode & 0o077 == 0
+    assert not folder.exists()
+
+
+def test_a_machine_without_cryptography_is_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "cryptography", None)
+    with pytest.raises(UsageError, match="pip install cryptography"), open_workers(workers=1):
+        pass
+
+
+class _Stillborn:
+    """Stands in for a cluster of which a worker dies while it starts."""
+
+    def __init__(self, starts: list[int], failures: int) -> None:
+        self._starts, self._failures = starts, failures
+
+    def __call__(self, **options: Any) -> str:
+        self._starts.append(options["n_workers"])
+        if len(self._starts) <= self._failures:
+            raise RuntimeError("Nanny failed to start.")
+        return "started"
+
+
+def test_workers_that_die_while_they_start_are_started_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    starts: list[int] = []
+    monkeypatch.setattr(cluster, "LocalCluster", _Stillborn(starts, MOST_STARTS - 1))
+    assert cluster._started_workers(3, tmp_path) == "started"
+    assert starts == [3] * MOST_STARTS
+
+
+def test_workers_that_never_start_are_one_clear_error(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    starts: list[int] = []
+    monkeypatch.setattr(cluster, "LocalCluster", _Stillborn(starts, 100))
+    with pytest.raises(CampaignError, match="expected 3 workers that start, got a failure 5 times"):
+        cluster._started_workers(3, tmp_path)
+    assert len(starts) == MOST_STARTS

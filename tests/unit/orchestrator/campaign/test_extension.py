@@ -1,0 +1,222 @@
+"""A campaign goes on with another sweep: it keeps every point whose values are equal, and is as if it were new."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+import xarray as xr
+from support.campaign_scenes import TIMING, assert_same_rows
+from support.serial_pool import Notes, campaign_here
+
+import vibroimpact.orchestrator.campaign.schedule as schedule
+from vibroimpact.analysis import open_dataset
+from vibroimpact.analysis.dataset import read_flat
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.campaign import CampaignInterrupted
+
+BODY = """
+[scene]
+title = "{title}"
+units = "nondimensional"
+[body]
+mass = 0.001
+stiffness = 1.0
+[forcing]
+amplitude = 0.5
+angular_frequency = 0.8
+[[stop]]
+position = 1.0
+restitution = {restitution}
+[record]
+transient_periods = 10
+recorded_periods = 2
+[sweep]
+"""
+
+
+def sweep(*axes: str, title: str = "a sweep", restitution: float = 0.7) -> str:
+    return BODY.format(title=title, restitution=restitution) + "\n".join(axes)
+
+
+def frequency(points: int, path: str = "independent") -> str:
+    return f'"forcing.angular_frequency" = {{ start = 0.6, stop = 1.6, points = {points}, path = "{path}" }}'
+
+
+def values(key: str, *numbers: float, path: str = "independent") -> str:
+    return f'"{key}" = {{ values = {list(numbers)}, path = "{path}" }}'
+
+
+ONE, THREE = values("forcing.amplitude", 0.5), values("forcing.amplitude", 0.5, 0.4, 0.6)
+
+GROWN = {
+    "twice as fine": (sweep(frequency(101)), sweep(frequency(201)), 101),
+    "an appended value": (
+        sweep(values("forcing.amplitude", 0.1, 0.2, 0.3)),
+        sweep(values("forcing.amplitude", 0.1, 0.2, 0.3, 0.25)),
+        3,
+    ),
+    "another axis": (sweep(frequency(11)), sweep(THREE, frequency(11)), 11),
+    "another axis, the fastest": (sweep(frequency(11)), sweep(frequency(11), THREE), 11),
+    "an axis taken away": (sweep(THREE, frequency(11)), sweep(frequency(11)), 11),
+    "axes the other way round": (sweep(THREE, frequency(5)), sweep(frequency(5), THREE), 15),
+    "a path up to the first other value": (
+        sweep(values("body.mass", 0.001, 0.002, 0.003, 0.005, path="up")),
+        sweep(values("body.mass", 0.001, 0.002, 0.003, 0.004, 0.005, 0.006, path="up")),
+        3,
+    ),
+    "a path that goes further": (
+        sweep(values("body.mass", 0.001, 0.002, 0.003, path="up")),
+        sweep(values("body.mass", 0.001, 0.002, 0.003, 0.004, path="up")),
+        3,
+    ),
+    "a path down as well": (sweep(frequency(9, "up")), sweep(frequency(9, "up-down")), 9),
+    "more branches": (sweep(ONE, frequency(9, "up-down")), sweep(THREE, frequency(9, "up-down")), 18),
+    "branches where there was one": (
+        sweep(frequency(9, "up-down")),
+        sweep(THREE, frequency(9, "up-down")),
+        18,
+    ),
+    "a number that the sweep replaces": (
+        sweep(frequency(11)),
+        sweep(frequency(11)).replace("angular_frequency = 0.8", "angular_frequency = 0.9"),
+        11,
+    ),
+}
+
+
+def assert_as_if_new(extended: Path, fresh: Path) -> None:
+    """Assert that two datasets are bit-identical with all attributes, but for their timing."""
+    assert_same_rows(extended, fresh)
+    one, other = (read_flat(path).drop_vars(TIMING) for path in (extended, fresh))
+    xr.testing.assert_identical(one, other)
+
+
+@pytest.mark.parametrize("name", GROWN)
+def test_a_finished_campaign_is_extended_as_if_it_were_new(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new, kept = GROWN[name]
+    campaign_here(monkeypatch, old, tmp_path / "campaign")
+    report = campaign_here(monkeypatch, new, tmp_path / "campaign")
+    campaign_here(monkeypatch, new, tmp_path / "new")
+    assert report.resumed == kept
+    assert report.outcomes.total() == report.runs - kept
+    assert_as_if_new(tmp_path / "campaign" / "dataset.nc", tmp_path / "new" / "dataset.nc")
+    assert not (tmp_path / "campaign" / "parts").exists()
+
+
+def begun(monkeypatch: pytest.MonkeyPatch, text: str, folder: Path, chunks: int) -> None:
+    """Leave a campaign after so many chunks of two or three points."""
+    with monkeypatch.context() as patch:
+        patch.setattr(schedule, "FIRST_POINTS", 2)
+        patch.setattr(schedule, "MOST_POINTS", 3)
+        with pytest.raises(CampaignInterrupted):
+            campaign_here(monkeypatch, text, folder, most_chunks=chunks)
+
+
+@pytest.mark.parametrize("name", GROWN)
+def test_a_half_done_campaign_is_extended_as_if_it_were_new(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    old, new, _ = GROWN[name]
+    begun(monkeypatch, old, tmp_path / "campaign", chunks=1)
+    with suppress(CampaignInterrupted):
+        campaign_here(monkeypatch, new, tmp_path / "campaign", most_chunks=1)
+    report = campaign_here(monkeypatch, new, tmp_path / "campaign")
+    campaign_here(monkeypatch, new, tmp_path / "new")
+    assert report.resumed > 0
+    assert_as_if_new(tmp_path / "campaign" / "dataset.nc", tmp_path / "new" / "dataset.nc")
+
+
+def test_points_that_the_new_sweep_does_not_have_are_not_thrown_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    notes = Notes()
+    folder = tmp_path / "campaign"
+    campaign_here(monkeypatch, sweep(THREE, frequency(5)), folder)
+    before = read_flat(folder / "dataset.nc")
+    campaign_here(monkeypatch, sweep(frequency(5)), folder, notes=notes)
+    (earlier,) = folder.glob("earlier-*.nc")
+    xr.testing.assert_identical(read_flat(earlier).drop_attrs(), before.drop_attrs())
+    assert open_dataset(earlier).sizes["amplitude"] == 3
+    assert f"10 points of the earlier sweep are not in this one; they stay in {earlier.name}." in notes.lines
+
+
+@pytest.mark.parametrize(
+    ("new", "told"),
+    [
+        (sweep(frequency(21), restitution=0.8), "stop[1].restitution was 0.7, is 0.8"),
+        (
+            sweep(values("forcing.amplitude", 0.4, 0.6), frequency(11)),
+            "sweep.forcing.amplitude.path was absent",
+        ),
+        (sweep(frequency(11, "down")), 'path was "independent", is "down"'),
+        (sweep(values("forcing.phase", 0.5, 1.0)), "sweep.forcing.angular_frequency.path"),
+    ],
+)
+def test_what_has_no_equal_point_is_refused_and_nothing_is_touched(
+    new: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    campaign_here(monkeypatch, sweep(frequency(11)), tmp_path)
+    before = {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()}
+    with pytest.raises(UsageError) as refused:
+        campaign_here(monkeypatch, new, tmp_path)
+    assert told in str(refused.value)
+    assert "\n" not in str(refused.value)
+    assert {path: path.read_bytes() for path in tmp_path.iterdir() if path.is_file()} == before
+
+
+def test_a_changed_title_keeps_every_point_and_is_that_of_the_dataset(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "campaign"
+    begun(monkeypatch, sweep(frequency(101)), folder, chunks=1)
+    renamed = sweep(frequency(101), title="another title")
+    assert campaign_here(monkeypatch, renamed, folder).resumed > 0
+    campaign_here(monkeypatch, renamed, tmp_path / "new")
+    assert_as_if_new(folder / "dataset.nc", tmp_path / "new" / "dataset.nc")
+    last = sweep(frequency(101), title="the last title")
+    report = campaign_here(monkeypatch, last, folder)
+    assert report.resumed == report.runs
+    campaign_here(monkeypatch, last, tmp_path / "last")
+    assert_as_if_new(folder / "dataset.nc", tmp_path / "last" / "dataset.nc")
+
+
+def test_a_campaign_that_dies_at_any_step_of_an_extension_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every change of a file is one step: after any number of them the command finds a folder it can go on with."""
+    replace, unlink = os.replace, Path.unlink
+    old, new = sweep(THREE, frequency(5)), sweep(frequency(9))
+    campaign_here(monkeypatch, new, tmp_path / "new")
+    steps = 0
+    while True:
+        folder = tmp_path / str(steps)
+        begun(monkeypatch, old, folder, chunks=3)
+        left = [steps]
+
+        def counted(change: Callable[..., Any], left: list[int] = left) -> Callable[..., Any]:
+            def step(*arguments: Any, **options: Any) -> Any:
+                left[0] -= 1
+                if left[0] < 0:
+                    raise SystemExit
+                return change(*arguments, **options)
+
+            return step
+
+        with monkeypatch.context() as patch, suppress(SystemExit):
+            patch.setattr(os, "replace", counted(replace))
+            patch.setattr(Path, "unlink", counted(unlink))
+            campaign_here(monkeypatch, new, folder)
+        ended = left[0] >= 0
+        campaign_here(monkeypatch, new, folder)
+        assert_as_if_new(folder / "dataset.nc", tmp_path / "new" / "dataset.nc")
+        if ended:
+            break
+        steps += 1
+    assert steps > 5

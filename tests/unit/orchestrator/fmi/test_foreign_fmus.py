@@ -1,0 +1,295 @@
+"""FMUs of other people: when a step has ended, who asks for the end, who is watched, what is not for this importer."""
+
+import shutil
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import fmu_factory
+from support.places import EXAMPLES
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.fmus.errors import ComponentError, ComponentFileError, SceneError
+from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.orchestrator.fmi import rounding
+from vibroimpact.orchestrator.guard import make_runner
+from vibroimpact.orchestrator.run import GeneralRunner
+from vibroimpact.orchestrator.scene import parse_scene
+
+EXAMPLE = EXAMPLES / "bouncing_ball.toml"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("foreign")
+    for fmi in ("2.0", "3.0"):
+        fmu_factory.faulty(folder, fmi)
+        fmu_factory.stepped_ball(folder, fmi)
+        fmu_factory.bouncing_ball(folder, fmi)
+    fmu_factory.gain(folder)
+    return folder
+
+
+def run(text: str, folder: Path) -> RunRecord:
+    runner = GeneralRunner(parse_scene(text, str(folder / "scene.toml")))
+    try:
+        return runner.run({})
+    finally:
+        runner.close()
+
+
+# ---- the bouncing ball of the Reference-FMUs ----
+
+
+def bounces_of_the_rule(restitution: float, end: float) -> list[float]:
+    """Bounces by the rule of the Reference-FMU: Euler steps of 1 ms."""
+    h, v, g, found = 1.0, 0.0, -9.81, []
+    for k in range(1, round(end / 1e-3) + 1):
+        h, v = h + 1e-3 * v, v + 1e-3 * g
+        if h <= 0.0 and v < 0.0:
+            h, v = np.finfo(float).tiny, -restitution * v
+            found.append(k * 1e-3)
+            if v < 0.1:
+                v = g = 0.0
+    return found
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_every_bounce_inside_a_step_of_the_example_is_found_at_its_instant(
+    folder: Path, tmp_path: Path, fmi: str
+) -> None:
+    shutil.copy(folder / f"SteppedBall.fmi{fmi[0]}.fmu", tmp_path / "BouncingBall.fmu")
+    scene = parse_scene(EXAMPLE.read_text(encoding="utf-8"), str(tmp_path / "ball.toml"))
+    runner = GeneralRunner(scene)
+    try:
+        for restitution in (0.6, 0.7, 0.8):
+            record = runner.run({"ball.e": restitution})
+            assert (record.outcome, record.message) == (Outcome.ok, "")
+            assert record.events is not None
+            expected = bounces_of_the_rule(restitution, 3.0)
+            assert len(expected) > 3
+            # the solver's step is nearer than 1e-5 s to the communication point at which the FMU makes it
+            np.testing.assert_allclose(record.events[:, 0], expected, rtol=0, atol=1.1e-5)
+    finally:
+        runner.close()
+
+
+def test_the_same_ball_unwatched_has_its_events_in_event_mode(folder: Path) -> None:
+    text = """
+[scene]
+units = "SI"
+[component.ball]
+fmu = "SteppedBall.fmi3.fmu"
+[record]
+recorded_time = 2.0
+[execution]
+macro_step = 0.01
+"""
+    record = run(text, folder)
+    assert record.events is not None
+    np.testing.assert_allclose(record.events[:, 0], bounces_of_the_rule(0.7, 2.0), rtol=0, atol=1e-9)
+
+
+def test_a_watch_on_a_body_whose_contact_another_component_answers_is_refused_with_the_reason(
+    folder: Path,
+) -> None:
+    text = """
+[scene]
+units = "SI"
+[component.body]
+fmu = "Oscillator"
+parameters = { "contact[1].law" = "external", "contact[1].position" = 0.5 }
+[component.stop]
+fmu = "ImpactStop"
+[[connection]]
+from = "body.contact[1].velocity"
+to = "stop.velocity"
+[[connection]]
+from = "stop.applied_restitution"
+to = "body.contact[1].applied_restitution"
+[[event]]
+watch = "body.displacement"
+direction = "rising"
+[record]
+recorded_time = 1.0
+[execution]
+macro_step = 0.1
+"""
+    with pytest.raises(SceneError) as refused:
+        parse_scene(text, str(folder / "scene.toml"))
+    (problem,) = refused.value.problems
+    assert (
+        "event[1].watch: expected a component without a contact, got one that stop.applied_restitution"
+        in problem
+    )
+    assert "runs without event mode and early return" in problem
+    with_its_own_law = text.replace('"external"', '"restitution"')
+    with_its_own_law = (
+        with_its_own_law.split("[component.stop]")[0] + "[[event]]" + text.split("[[event]]")[1]
+    )
+    assert run(with_its_own_law.replace('"external"', '"restitution"'), folder).outcome is Outcome.ok
+
+
+# ---- the end of a step ----
+
+LIES = """
+[scene]
+units = "SI"
+[component.before]
+fmu = "Gain.fmi2.fmu"
+[component.culprit]
+fmu = "Faulty.fmi{major}.fmu"
+parameters = {{ fault = "{fault}", fault_time = 0.35, says_early = {early} }}
+[record]
+recorded_time = 1.0
+{record}
+[execution]
+macro_step = 0.1
+"""
+
+
+@pytest.mark.parametrize("early", [0, 1])
+@pytest.mark.parametrize(
+    ("fault", "told"),
+    [
+        ("says_nan", "nan"),
+        ("says_infinite", "inf"),
+        ("says_beyond", "360000"),
+        ("says_start", "0.3"),
+        ("says_past", "-1000000000"),
+    ],
+)
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_a_step_that_lies_about_its_end_is_an_error_that_names_what_was_said(
+    folder: Path, fmi: str, fault: str, told: str, early: int
+) -> None:
+    text = LIES.format(major=fmi[0], fault=fault, early=early, record="")
+    if fault == "says_start" and (fmi == "2.0" or early):
+        # FMI 2.0: no lie, the run ends there; FMI 3.0: it has gone on, and refuses to do so from where it said it was
+        if fmi == "2.0":
+            assert run(text, folder).message.startswith("a component asked for the end at time 0.3")
+        else:
+            with pytest.raises(
+                ComponentError,
+                match=r"culprit: fmi3DoStep returned error at time 0\.3.*: wrong communication point",
+            ):
+                run(text, folder)
+        return
+    with pytest.raises(ComponentError) as failure:
+        run(text, folder)
+    message = str(failure.value)
+    assert message.startswith(f"culprit: fmi{fmi[0]}DoStep said that a step of 0.1 s has ended at")
+    assert f"has ended at time {told}" in message
+    assert failure.value.instance == "culprit"
+    assert failure.value.time == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize("record", ["", 'variables = ["culprit.y", "before.y"]\nrate = 100'])
+def test_a_component_that_asks_for_the_end_inside_a_step_ends_the_run_there(
+    folder: Path, fmi: str, record: str
+) -> None:
+    found = run(LIES.format(major=fmi[0], fault="end_short", early=0, record=record), folder)
+    assert found.outcome is Outcome.ok
+    assert found.message.startswith("a component asked for the end at time 0.34999999999999998")
+    if found.samples is not None:
+        assert found.samples[-1, 0] == pytest.approx(0.35)
+        np.testing.assert_allclose(found.samples[:, 1], found.samples[:, 0], rtol=0, atol=1e-12)  # y' = 1
+
+
+def test_a_component_that_ends_a_repeated_step_early_is_an_error_and_no_wrong_sample(folder: Path) -> None:
+    # it counts its calls in the process, not in its state: sampled inside a step, it ended short of the sample
+    text = LIES.format(major="3", fault="end_short", early=0, record='variables = ["culprit.y"]\nrate = 100')
+    text = text.replace("says_early = 0", "fault_after = 1").replace(
+        "macro_step = 0.1", "macro_step = 0.1\nguard = true"
+    )
+    runner = make_runner(parse_scene(text, str(folder / "scene.toml")))
+    try:
+        with pytest.raises(
+            ComponentError, match=r"culprit: fmi3DoStep: expected .* at time 0\.3 .*as before"
+        ):
+            runner.run({})
+    finally:
+        runner.close()
+
+
+def test_two_components_end_together_where_the_second_asks_for_the_end(folder: Path) -> None:
+    text = LIES.format(
+        major="2", fault="end_short", early=0, record='variables = ["culprit.y", "before.y"]\nrate = 100'
+    ).replace('fmu = "Gain.fmi2.fmu"', 'fmu = "Faulty.fmi2.fmu"')
+    found = run(text, folder)
+    assert found.message.startswith("a component asked for the end at time 0.34999999999999998")
+    assert "others" not in found.message  # it went back to there
+    assert found.samples is not None
+    np.testing.assert_allclose(found.samples[:, 2], found.samples[:, 0], rtol=0, atol=1e-12)
+    found = run(text.replace('variables = ["culprit.y", "before.y"]\nrate = 100', ""), folder)
+    assert "others, which could not be taken back, had been stepped to 0.4" in found.message
+
+
+# ---- the rounding mode ----
+
+
+@pytest.mark.parametrize("place", ["step", "exit_initialization", "instantiate"])
+@pytest.mark.parametrize("fault", ["round_upward", "flush_to_zero"])
+def test_a_component_that_changes_the_rounding_is_named_and_changes_no_other_component(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, fault: str, place: str
+) -> None:
+    def one(told: str, where: str) -> RunRecord:
+        text = LIES.format(
+            major="3", fault=told, early=0, record='variables = ["after.displacement"]\nrate = 100'
+        )
+        text = text.replace("says_early = 0", f'fault_place = "{where}"')
+        after = '[component.after]\nfmu = "Oscillator"\nparameters = { displacement_start = 1.0 }\n[record]'
+        return run(text.replace("[record]", after), folder)
+
+    usual = one("none", "step")
+    if place == "instantiate":
+        monkeypatch.setenv(
+            "VIBROIMPACT_FAULTY_INSTANTIATE", {"round_upward": "23", "flush_to_zero": "24"}[fault]
+        )
+    found = one(fault, "step" if place == "instantiate" else place)
+    monkeypatch.undo()
+    assert rounding.is_usual()
+    assert usual.samples is not None
+    assert found.samples is not None
+    np.testing.assert_array_equal(found.samples, usual.samples)  # bit for bit
+    assert "culprit changed the rounding of numbers in its process" in found.message
+
+
+# ---- what this importer does not import ----
+
+
+def redescribed(source: Path, target: Path, *replacements: tuple[str, str]) -> Path:
+    with zipfile.ZipFile(source) as archive, zipfile.ZipFile(target, "w") as changed:
+        for name in archive.namelist():
+            content = archive.read(name)
+            if name == "modelDescription.xml":
+                text = content.decode()
+                for old, new in replacements:
+                    assert old in text
+                    text = text.replace(old, new)
+                content = text.encode()
+            changed.writestr(name, content)
+    return target
+
+
+def test_fmi_1_is_called_by_its_name(folder: Path, tmp_path: Path) -> None:
+    old = redescribed(
+        folder / "Faulty.fmi2.fmu", tmp_path / "old.fmu", ('fmiVersion="2.0"', 'fmiVersion="1.0"')
+    )
+    with pytest.raises(ComponentFileError, match=r"old\.fmu: modelDescription\.xml: .*got FMI 1\.0\. "):
+        unpack(old)
+
+
+def test_scheduled_execution_is_called_by_its_name(folder: Path, tmp_path: Path) -> None:
+    redescribed(
+        folder / "SteppedBall.fmi3.fmu",
+        tmp_path / "clocks.fmu",
+        ("<CoSimulation", "<ScheduledExecution"),
+        (' hasEventMode="true" mightReturnEarlyFromDoStep="true" fixedInternalStepSize="1e-3"', ""),
+        (' canHandleVariableCommunicationStepSize="true"', ""),
+    )
+    text = '[scene]\nunits = "SI"\n[component.a]\nfmu = "clocks.fmu"\n[record]\nrecorded_time = 1.0\n'
+    with pytest.raises(SceneError, match=r"clocks\.fmu for scheduled execution only"):
+        parse_scene(text, str(tmp_path / "scene.toml"))
