@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.oscillator_fmu import LOWER, VERSIONS, OscillatorFmu, stop
+from support.component_fmu import LOWER, VERSIONS, OscillatorFmu, stop
 from support.tolerance import ROUNDING, SEQUENCE
 
 GRAVITY = 2.0

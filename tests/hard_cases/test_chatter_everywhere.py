@@ -4,9 +4,9 @@ import math
 
 import pytest
 from mpmath import mp, mpf
+from support.component_fmu import LOWER, VERSIONS, OscillatorFmu, forced, stop
 from support.exact_motion import Oscillator as Exact
 from support.exact_motion import exact_flow
-from support.oscillator_fmu import LOWER, VERSIONS, OscillatorFmu, forced, stop
 from support.tolerance import ROUNDING, SEQUENCE
 
 FORCE, W = 1.0, 0.2

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, simulate, stop
+from support.component_fmu import VERSIONS, OscillatorFmu, forced, simulate, stop
 from support.tolerance import SEQUENCE
 
 from vibroimpact.orchestrator.run import PointRunner
@@ -75,6 +75,7 @@ def test_a_peak_over_the_stop_is_an_impact_in_a_stock_importer_from_every_phase(
     for excess in LEVELS:
         for phase in PHASES:
             result = simulate(
+                "Oscillator",
                 {**steady(excess, phase), **stop(1.0)},
                 ["contact[1].count", "displacement"],
                 math.ceil(PERIOD / interval) * interval,

@@ -5,9 +5,9 @@ import random
 
 import numpy as np
 import pytest
+from support.component_fmu import VERSIONS, OscillatorFmu, forced, stop
 from support.exact_motion import Oscillator as Exact
 from support.exact_motion import exact_flow, exact_next_contact
-from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
 from support.tolerance import FLOW, LONG_PHASE, ORBIT, PARTITION, SEQUENCE
 
 from vibroimpact.fmus.core import Oscillator, next_contact

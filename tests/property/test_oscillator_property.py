@@ -5,9 +5,9 @@ import math
 import numpy as np
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
+from support.component_fmu import LOWER, UPPER, VERSIONS, OscillatorFmu, forced, stop
 from support.exact_motion import Oscillator as Exact
 from support.exact_motion import exact_flow
-from support.oscillator_fmu import LOWER, UPPER, VERSIONS, OscillatorFmu, forced, stop
 from support.tolerance import DIFFERENCES, EPSILON, FLOW, ROUNDING
 
 from vibroimpact.fmus.core import Oscillator, flow, next_contact

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, simulate, stop
+from support.component_fmu import VERSIONS, OscillatorFmu, forced, simulate, stop
 from support.tolerance import AFTER_RELEASE, PRINTED_12, ROUNDING, SEQUENCE
 
 ANCHOR = {**forced(1.0, 0.2, 0.05, displacement_start=-0.1), **stop(0.0)}
@@ -34,7 +34,7 @@ def test_chatter_ends_sticks_and_is_released_at_the_same_instants_at_any_interva
 @pytest.mark.parametrize("interval", [0.02, 1.1])
 def test_a_stock_importer_sees_the_same_chatter(version: str, interval: float) -> None:
     names = ["contact[1].stick_start", "contact[1].stick_end", "contact[1].last_velocity", "displacement"]
-    result = simulate(ANCHOR, names, 24.2, interval, version=version)
+    result = simulate("Oscillator", ANCHOR, names, 24.2, interval, version=version)
     assert abs(result[names[0]][-1] - STICK_START) <= SEQUENCE
     assert abs(result[names[1]][-1] - STICK_END) <= SEQUENCE
     assert np.nanmax(result["displacement"]) <= 0.0

@@ -3,9 +3,9 @@
 import math
 
 import pytest
+from support.component_fmu import VERSIONS, OscillatorFmu, forced, stop
 from support.exact_motion import Oscillator as Exact
 from support.exact_motion import exact_flow
-from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
 from support.tolerance import FLOW, ORBIT, PRINTED_14, ROUNDING
 
 from vibroimpact.fmus.core import Oscillator, flow

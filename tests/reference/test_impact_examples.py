@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
+from support.component_fmu import VERSIONS, OscillatorFmu, forced, stop
 from support.tolerance import FLOW, ORBIT, PRINTED_14, ROUNDING
 
 from vibroimpact.analysis.landmarks import ImpactOscillator, grazing_frequencies

@@ -3,8 +3,8 @@
 import math
 
 import pytest
+from support.component_fmu import VERSIONS, OscillatorFmu, forced, stop
 from support.exact_motion import period_one_orbits
-from support.oscillator_fmu import VERSIONS, OscillatorFmu, forced, stop
 from support.tolerance import LONG_PHASE, ORBIT, PARTITION
 
 PHASE, VELOCITY = 0.3665212101960540571, 0.7910497883492130773

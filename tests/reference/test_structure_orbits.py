@@ -9,18 +9,19 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from scipy.special import beta
+from support.component_fmu import HERTZ, KELVIN_VOIGT, each, stop
+from support.exact_modes import beam_root
 from support.reference_bodies import (
     Beam,
     Body,
     Chain,
     beam,
-    eigenvalue,
     oscillator,
     period_one_orbits,
     uniform_chain,
 )
 from support.reference_stops import Forcing, Stop
-from support.structure_fmu import ROW_IMPACT, StructureFmu, forced, numbered, stop
+from support.structure_fmu import ROW_IMPACT, StructureFmu, forced
 from support.structure_reference import Reference
 
 # DOP853 at rtol 1e-12, over up to 50 flights of a contracting orbit
@@ -33,9 +34,9 @@ def chain_parameters(
 ) -> dict[str, float]:
     return {
         "masses": len(masses),
-        **numbered("mass", masses),
-        **numbered("stiffness", stiffnesses),
-        **numbered("damping", dampings),
+        **each("mass", masses),
+        **each("stiffness", stiffnesses),
+        **each("damping", dampings),
     }
 
 
@@ -43,7 +44,7 @@ def thesis_chain(angular_frequency: float, **more: float) -> dict[str, float]:
     """Two unit masses, k = 1, c = .1, stop on mass 2 at .1, force .5 on mass 1, r = .7 (thesis 6.2)."""
     return {
         **chain_parameters([1.0, 1.0], [1.0, 1.0], [0.1, 0.1]),
-        **numbered("forcing.amplitude", [0.5, 0.0]),
+        **each("forcing.amplitude", [0.5, 0.0]),
         "forcing.angular_frequency": angular_frequency,
         **stop(0.1, restitution=0.7),
         **more,
@@ -58,8 +59,8 @@ def thesis_reference(angular_frequency: float, fmu: StructureFmu) -> Reference:
         body,
         [Stop(body.shapes[1], 0.1, 0.7)],
         Forcing(body.shapes[0] * 0.5, angular_frequency),
-        inverse @ fmu.array("displacement", 2),
-        inverse @ fmu.array("velocity", 2),
+        inverse @ fmu.get_each("displacement[{}]", 2),
+        inverse @ fmu.get_each("velocity[{}]", 2),
         fmu.time,
     )
 
@@ -68,7 +69,7 @@ def test_the_thesis_chain_settles_on_the_closed_form_orbit_and_its_loss() -> Non
     # equations.md 9
     period = 2.0 * math.pi / 0.9
     with StructureFmu("Chain", {**thesis_chain(0.9), "record.energies": True}) as fmu:
-        natural = fmu.array("natural_angular_frequency", 2)
+        natural = fmu.get_each("natural_angular_frequency[{}]", 2)
         fmu.advance(300 * period)
         before = fmu.get("energy.contact_loss")
         fmu.advance(310 * period)
@@ -185,7 +186,7 @@ def orbiting_beam() -> Orbiting:
         "length": 1.0,
         "flexural_rigidity": 1.0,
         "mass_per_length": 1.0,
-        **numbered("damping_ratio", [0.05] * 4),
+        **each("damping_ratio", [0.05] * 4),
         **forced(0.05, float(body.natural[0])),
         "forcing_location": 0.5,
         "contact[1].location": 1.0,
@@ -220,7 +221,7 @@ def test_fifty_impacts_of_a_period_one_orbit_are_those_of_dop853_and_of_the_clos
     many = o.body.modes > 1
     displacement, velocity = o.to_start @ orbit.q, o.to_start @ orbit.p
     start = (
-        {**numbered(o.start[0], displacement), **numbered(o.start[1], velocity)}
+        {**each(o.start[0], displacement), **each(o.start[1], velocity)}
         if many
         else {o.start[0]: displacement[0], o.start[1]: velocity[0]}
     )
@@ -244,7 +245,7 @@ def test_the_chatter_of_a_chain_accumulates_at_the_time_in_forty_digits() -> Non
     # equations.md 3.1, N-DOF form
     parameters = {
         **chain_parameters([1.0, 1.0], [1.0, 1.0], [0.2, 0.2]),
-        **numbered("forcing.amplitude", [0.7, 0.1]),
+        **each("forcing.amplitude", [0.7, 0.1]),
         "forcing.angular_frequency": 0.23,
         **stop(0.05, restitution=0.55),
     }
@@ -259,26 +260,26 @@ def test_a_held_mass_leaves_the_printed_motion_of_the_others_and_the_printed_for
     # equations.md 3.4; a constant force of 1 on the held mass keeps it pressed and does nothing else
     parameters = {
         **chain_parameters([1.0, 2.0, 0.5], [3.0, 1.0, 2.0], [0.12, 0.04, 0.08]),
-        **numbered("forcing.amplitude", [0.6, 0.0, 0.2]),
+        **each("forcing.amplitude", [0.6, 0.0, 0.2]),
         "forcing.angular_frequency": 0.75,
         **stop(0.1, restitution=0.6),
-        **numbered("displacement_start", [0.3, -0.05, 0.1]),
-        **numbered("velocity_start", [0.2, 0.1, 0.0]),
+        **each("displacement_start", [0.3, -0.05, 0.1]),
+        **each("velocity_start", [0.2, 0.1, 0.0]),
         "force[3]": 1.0,
     }
     with StructureFmu("Chain", parameters, start_time=0.4) as fmu:
         fmu.advance(2.1)
-        assert fmu.array("displacement", 3) == pytest.approx([-0.06125467, 0.2933916, 0.1], abs=5e-9)
+        assert fmu.get_each("displacement[{}]", 3) == pytest.approx([-0.06125467, 0.2933916, 0.1], abs=5e-9)
         assert fmu.get("contact[1].force") == pytest.approx(1.391935115043184, abs=1e-12)
 
 
-def compliant(law: str, velocity: float = 1.0, **parameters: float) -> tuple[float, float, float]:
+def compliant(law: int, velocity: float = 1.0, **parameters: float) -> tuple[float, float, float]:
     """Return contact time, restitution and impulse of a free unit mass against a compliant stop."""
     start = {
         **chain_parameters([1.0], [0.0], [0.0]),
         **stop(0.0, law=law, **parameters),
-        **numbered("displacement_start", [-0.5]),
-        **numbered("velocity_start", [velocity]),
+        **each("displacement_start", [-0.5]),
+        **each("velocity_start", [velocity]),
     }
     with StructureFmu("Chain", start) as fmu:
         fmu.advance(2.0)
@@ -292,7 +293,7 @@ def test_a_hertzian_stop_gives_all_energy_back_after_its_closed_form_contact_tim
     # equations.md 6.10: 3.2180650... = (4/5) B(2/5, 1/2) (5/4)^(2/5)
     factor = 0.8 * beta(0.4, 0.5) * 1.25**0.4
     assert factor == pytest.approx(3.218065, abs=5e-7)
-    time, restitution, impulse = compliant("hertz", stiffness=stiffness)
+    time, restitution, impulse = compliant(HERTZ, stiffness=stiffness)
     # with the default contact_tolerance of 1e-10: the end of the contact, where the force is flat, is the less exact
     assert time == pytest.approx(factor * stiffness**-0.4, rel=1e-8)
     assert restitution == pytest.approx(1.0, abs=1e-9)
@@ -306,7 +307,7 @@ def test_a_kelvin_voigt_stop_has_contact_time_and_restitution_of_the_damped_half
 ) -> None:
     # equations.md 6.9, separation where the force vanishes
     rate = math.sqrt(stiffness)
-    time, restitution, _ = compliant("kelvin_voigt", stiffness=stiffness, damping=2.0 * ratio * rate)
+    time, restitution, _ = compliant(KELVIN_VOIGT, stiffness=stiffness, damping=2.0 * ratio * rate)
     angle = math.acos(ratio) / math.sqrt(1.0 - ratio**2)
     assert time == pytest.approx(2.0 * angle / rate, rel=1e-11)
     assert restitution == pytest.approx(math.exp(-2.0 * ratio * angle), rel=1e-11)
@@ -321,7 +322,7 @@ def test_a_stiff_kelvin_voigt_stop_tends_to_the_restitution_law_with_the_contact
         ratio *= math.log(0.7) / (-2.0 * ratio * angle)
     errors = []
     for stiffness in (1e6, 1e8, 1e10):
-        law = stop(0.1, law="kelvin_voigt", stiffness=stiffness, damping=2.0 * ratio * math.sqrt(stiffness))
+        law = stop(0.1, law=KELVIN_VOIGT, stiffness=stiffness, damping=2.0 * ratio * math.sqrt(stiffness))
         without = {k: v for k, v in thesis_chain(0.9).items() if not k.startswith("contact[1]")}
         with StructureFmu("Chain", {**without, **law}) as fmu:
             fmu.advance(150 * period)
@@ -342,7 +343,7 @@ def constrained(body: Beam) -> tuple[np.ndarray, np.ndarray]:
 def test_a_beam_with_its_tip_held_approaches_the_clamped_pinned_beam_with_the_third_power_of_its_modes() -> (
     None
 ):
-    exact = np.array([float(eigenvalue("clamped_pinned", j)) for j in (1, 2, 3)])
+    exact = np.array([float(beam_root("clamped_pinned", j)) for j in (1, 2, 3)])
     gaps = []
     for modes in (16, 32, 64):
         natural, _ = constrained(beam(modes))
@@ -371,11 +372,11 @@ def test_a_beam_pressed_to_a_stop_at_its_tip_swings_at_the_frequencies_of_the_he
         "forcing_location": 1.0,
         "contact[1].location": 1.0,
         **stop(0.0, restitution=0.5),
-        **numbered("modal_displacement_start", start),
+        **each("modal_displacement_start", start),
         "force": 10.0,
     }
     with StructureFmu("Beam", parameters) as fmu:
         for turn, sign in ((1, -1.0), (2, 1.0), (20, 1.0)):
             fmu.advance(turn * half)
             assert fmu.get("contact[1].stuck")
-            assert fmu.array("modal_displacement", modes) == pytest.approx(sign * start, abs=1e-13)
+            assert fmu.get_each("modal_displacement[{}]", modes) == pytest.approx(sign * start, abs=1e-13)

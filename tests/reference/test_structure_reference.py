@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
+from support.exact_modes import beam_root
 from support.reference_bodies import (
     Body,
     Chain,
     beam,
     beam_shape,
     chain,
-    eigenvalue,
     oscillator,
     period_one_orbits,
     uniform_chain,
@@ -237,7 +237,7 @@ def test_impulses_are_complementary_where_one_contact_pushes_the_other_off() -> 
 )
 def test_beam_eigenvalues_are_the_printed_ones(boundary: str, printed: list[float]) -> None:
     # thesis table 7.1, equations.md 6.2
-    found = [float(eigenvalue(boundary, j)) for j in range(1, len(printed) + 1)]
+    found = [float(beam_root(boundary, j)) for j in range(1, len(printed) + 1)]
     assert found == pytest.approx(printed, abs=6e-7)
 
 

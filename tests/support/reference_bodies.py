@@ -1,4 +1,4 @@
-"""Bodies with many modes by other roads than the package's: eigh for chains, 60-digit textbook shapes for beams.
+"""Bodies with many modes by other roads than the package's: eigh for chains, textbook shapes in many digits for beams.
 
 Modes are mass-normalised as in equations.md 5 and 6: q'' + damping q' + diag(w^2) q = f, the displacement of a point is
 shape . q, and a force at the point gives f = shape * force.
@@ -13,8 +13,10 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
-from mpmath import mp, mpf
 from scipy.linalg import eigh, expm
+
+from support import exact_modes
+from support.exact_modes import beam_root
 
 Floats = npt.NDArray[np.float64]
 
@@ -103,49 +105,16 @@ def beam(
     boundary: str = "clamped_free",
 ) -> Beam:
     """Return the first modes of an Euler-Bernoulli beam (equations.md 6.1); its shape functions have norm 1."""
-    xi = np.array([float(eigenvalue(boundary, j)) for j in range(1, modes + 1)])
+    xi = np.array([float(beam_root(boundary, j)) for j in range(1, modes + 1)])
     natural = xi**2 * math.sqrt(flexural_rigidity / (mass_per_length * length**4))
     ratios = np.broadcast_to(np.asarray(damping_ratio, dtype=float), (modes,))
     return Beam(natural, np.diag(2.0 * ratios * natural), mass_per_length * length, boundary)
 
 
-_GUESS = {"clamped_free": -0.5, "clamped_clamped": 0.5, "clamped_pinned": 0.25, "pinned_pinned": 0.0}
-
-
-def _digits(j: int) -> int:
-    """Return the digits that leave 40 of them after the cosh and sinh of mode j have cancelled."""
-    return 60 + 3 * j
-
-
-@cache
-def eigenvalue(boundary: str, j: int) -> mpf:
-    """Return xi_j, by root search in many digits on the equations of equations.md 6.2."""
-    with mp.workdps(_digits(j)):
-        equations = {
-            "clamped_free": lambda x: mp.cos(x) + mp.sech(x),
-            "clamped_clamped": lambda x: mp.cos(x) - mp.sech(x),
-            "clamped_pinned": lambda x: mp.tan(x) - mp.tanh(x),
-            "pinned_pinned": mp.sin,
-        }
-        return +mp.findroot(equations[boundary], (j + mpf(_GUESS[boundary])) * mp.pi)
-
-
 @cache
 def beam_shape(boundary: str, j: int, s: float, derivative: int = 0) -> float:
     """Return phi_j(s), or a derivative of it, in the textbook's cosh and sinh form in many digits (thesis 7.23)."""
-    with mp.workdps(_digits(j)):
-        xi, place = eigenvalue(boundary, j), mpf(s)
-        if boundary == "pinned_pinned":
-            turned = mp.sin(xi * place + derivative * mp.pi / 2)
-            return float(mp.sqrt(2) * xi**derivative * turned)
-        if boundary == "clamped_free":
-            sigma = (mp.sinh(xi) - mp.sin(xi)) / (mp.cosh(xi) + mp.cos(xi))
-        else:
-            sigma = (mp.cosh(xi) - mp.cos(xi)) / (mp.sinh(xi) - mp.sin(xi))
-        x, quarter = xi * place, derivative * mp.pi / 2
-        even, odd = (mp.cosh(x), mp.sinh(x)) if derivative % 2 == 0 else (mp.sinh(x), mp.cosh(x))
-        value = even - mp.cos(x + quarter) - sigma * (odd - mp.sin(x + quarter))
-        return float(xi**derivative * value)
+    return float(beam_root(boundary, j) ** derivative * exact_modes.beam_shape(boundary, j, s, derivative))
 
 
 @dataclass(frozen=True)

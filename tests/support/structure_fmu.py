@@ -3,25 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from support.component_fmu import ComponentFmu
 
 ROW_IMPACT, ROW_STICK = 1.0, 2.0
-LAWS = {"restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossley": 4}
-
-
-def numbered(name: str, values: Iterable[float]) -> dict[str, float]:
-    """Return an array parameter, element by element, numbered from 1."""
-    return {f"{name}[{i}]": float(value) for i, value in enumerate(values, start=1)}
-
-
-def stop(position: float, k: int = 1, *, law: str = "restitution", **more: float) -> dict[str, float]:
-    """Return the parameters of stop k on the upper side."""
-    parameters: dict[str, float] = {"law": LAWS[law], "position": position, "side": 1, **more}
-    return {f"contact[{k}].{name}": value for name, value in parameters.items()}
 
 
 def forced(amplitude: float, angular_frequency: float, phase: float = 0.0) -> dict[str, float]:
@@ -47,10 +35,6 @@ class StructureFmu(ComponentFmu):
             self.step(end - self.time)
             self._taken.append(self.rows())
         return self
-
-    def array(self, name: str, count: int) -> np.ndarray:
-        """Return the first `count` elements of an array output."""
-        return self.get_each(name + "[{}]", count)
 
     def recorded(self, kind: float) -> np.ndarray:
         """Return the rows of one kind, shape (n, 8)."""

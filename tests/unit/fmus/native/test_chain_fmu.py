@@ -1,4 +1,4 @@
-"""The Chain FMU in any tool: modes, closed-form motion, refusals, inputs, saved states. References: equations.md 5."""
+"""The Chain FMU: modes, closed-form motion, stops, energies, refusals. References: equations.md 5."""
 
 import math
 from collections.abc import Mapping
@@ -6,34 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
-from numpy.typing import NDArray
 from scipy.linalg import expm
-from support.component_fmu import ComponentFmu
-from support.oscillator_fmu import EXTERNAL, LOWER, VERSIONS, stop
+from support.component_fmu import EXTERNAL, KELVIN_VOIGT, LOWER, VERSIONS, ComponentFmu, each, stop
+from support.reference_bodies import chain_matrix
 from support.tolerance import ORBIT, PARTITION, ROUNDING, SEQUENCE
-
-from vibroimpact.fmus import fmu_path
 
 #: Issue's reference: thesis chapter 6, two unit masses, force on the first, stop on the second.
 TWO = {"masses": 2, "damping[1]": 0.1, "damping[2]": 0.1, "forcing.amplitude[1]": 0.5}
 SCENE = {**TWO, "forcing.angular_frequency": 0.9, **stop(0.1)}
-KELVIN_VOIGT = 2
 
 
 def chain(parameters: Mapping[str, float] = {}, **options: Any) -> ComponentFmu:
     return ComponentFmu("Chain", parameters, **options)
-
-
-def each(name: str, values: Any) -> dict[str, float]:
-    return {f"{name}[{k + 1}]": float(value) for k, value in enumerate(values)}
-
-
-def matrix(elements: Any, far: float = 0.0) -> NDArray[np.float64]:
-    """Return K or C from the elements' constants. equations.md 5.1"""
-    values = np.array([*elements, far], dtype=float)
-    return np.diag(values[:-1] + values[1:]) - np.diag(values[1:-1], 1) - np.diag(values[1:-1], -1)
 
 
 def refusal(parameters: Mapping[str, float], version: str = "3.0") -> str:
@@ -97,7 +82,7 @@ def test_a_constant_force_ends_in_the_static_deflection(load: str) -> None:
     damping = {**each("damping", [3.0, 1.0, 2.0]), "far_damping": 0.5}
     with chain({**parameters, **damping, **each(load, force)}) as c:
         c.step(300.0)
-        expected = np.linalg.solve(matrix(stiffness, 0.5), force)
+        expected = np.linalg.solve(chain_matrix(stiffness, 0.5), force)
         assert c.get_each("displacement[{}]", 3) == pytest.approx(expected, abs=ORBIT)
         assert c.get_each("acceleration[{}]", 3) == pytest.approx([0.0] * 3, abs=ORBIT)
 
@@ -108,7 +93,7 @@ def test_an_accelerated_base_is_felt_by_all_masses() -> None:
     with chain(parameters) as c:
         assert c.get("acceleration[3]") == pytest.approx(0.0, abs=ROUNDING)
         c.step(300.0)
-        expected = np.linalg.solve(matrix([1.0] * 3), -0.3 * np.array(masses))
+        expected = np.linalg.solve(chain_matrix([1.0] * 3), -0.3 * np.array(masses))
         assert c.get_each("displacement[{}]", 3) == pytest.approx(expected, abs=1e-11)
         assert c.get_each("acceleration[{}]", 3) == pytest.approx([0.3] * 3, abs=1e-11)
 
@@ -127,7 +112,7 @@ def test_damping_that_couples_the_modes_moves_as_the_matrix_exponential(dampings
     start = np.array([0.3, -0.1, 0.2, 0.5, 0.0, -0.4])
     mass, stiffness = np.array([1.0, 2.0, 0.5]), [3.0, 1.0, 2.0]
     inverse = np.diag(1.0 / mass)
-    below = np.hstack([-inverse @ matrix(stiffness), -inverse @ matrix(dampings)])
+    below = np.hstack([-inverse @ chain_matrix(stiffness), -inverse @ chain_matrix(dampings)])
     expected = expm(np.vstack([np.eye(3, 6, 3), below]) * 7.0) @ start
     parameters = {
         **{"masses": 3, **each("mass", mass), **each("stiffness", stiffness), **each("damping", dampings)},
@@ -161,23 +146,6 @@ def test_the_thesis_chain_settles_on_its_orbit_of_one_impact(version: str) -> No
         assert loss == pytest.approx(0.158204452755, abs=1e-12)
 
 
-def test_stock_fmpy_runs_it_alone() -> None:
-    runs = [
-        simulate_fmu(
-            str(fmu_path("Chain", version)),
-            start_values=SCENE,
-            output=["displacement", "contact[1].count"],
-            stop_time=60.0,
-            output_interval=interval,
-        )
-        for version, interval in (("3.0", 0.1), ("2.0", 0.1), ("3.0", 60.0))
-    ]
-    assert runs[0]["displacement"].max() <= 0.1
-    assert np.array_equal(runs[0]["displacement"], runs[1]["displacement"])
-    assert abs(runs[0]["displacement"][-1] - runs[2]["displacement"][-1]) <= PARTITION
-    assert runs[0]["contact[1].count"][-1] == runs[2]["contact[1].count"][-1] > 5
-
-
 def test_an_impact_leaves_the_velocities_of_the_other_masses() -> None:
     before = [0.3, 0.8, -0.2]
     start = {"masses": 3, **each("mass", [1.0, 2.0, 0.5]), **each("velocity_start", before)}
@@ -198,19 +166,6 @@ def test_the_observed_mass_and_a_stop_are_on_the_last_mass_unless_told_otherwise
             assert c.get("contact[1].displacement") == pytest.approx(expected, abs=ROUNDING)
 
 
-def test_an_importer_that_answers_the_impacts_gets_the_same_motion() -> None:
-    external = {**SCENE, "contact[1].law": EXTERNAL}
-    with chain(SCENE) as fused, chain(external, event_mode=True) as coupled:
-        for _ in range(12):
-            coupled.advance_to_event()
-            coupled.answer(0.7)
-        while fused.get("contact[1].count") < 12:
-            fused.step(0.25)
-        assert coupled.get("contact[1].last_time") == pytest.approx(
-            fused.get("contact[1].last_time"), abs=PARTITION
-        )
-
-
 def test_two_contacts_at_one_instant_wait_for_both_answers() -> None:
     two = {**each("velocity_start", [0.5, 0.5]), "stiffness[1]": 0.0, "contact[2].mass_number": 1}
     with chain({**two, **stop(0.1, law=EXTERNAL), **stop(0.1, law=EXTERNAL, k=2)}, event_mode=True) as c:
@@ -221,10 +176,6 @@ def test_two_contacts_at_one_instant_wait_for_both_answers() -> None:
         assert "contact[2].applied_restitution: expected an answer" in c.messages[-1]
         c.answer(0.8, k=2)
         assert c.get_each("velocity[{}]", 2) == pytest.approx([-0.4, -0.25], rel=SEQUENCE)
-
-
-def test_an_importer_without_events_is_told_to_use_another_law() -> None:
-    assert "contact law external" in refusal({**SCENE, "contact[1].law": EXTERNAL})
 
 
 # ---- energies ----
@@ -246,90 +197,7 @@ def test_energies_balance_and_are_only_followed_when_asked_for() -> None:
         assert c.get("energy.kinetic") > 0.0
 
 
-# ---- saved states ----
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("law", [stop(0.1), {**stop(0.1, law=KELVIN_VOIGT), "contact[1].stiffness": 50.0}])
-def test_a_state_that_is_restored_goes_on_as_it_did(version: str, law: dict[str, float]) -> None:
-    scene = {**TWO, "forcing.angular_frequency": 0.2, **law, "record.energies": True}
-    with chain(scene, version=version) as c, chain(scene, version=version) as other:
-        for _ in range(20):  # impacts, sticking or pressing, flight
-            c.step(1.7)
-            data, time = c.serialized(), c.time
-            c.step(11.0)
-            end = c.state()
-            c.restore(data)
-            c.time = time
-            c.step(11.0)
-            assert c.state() == end
-            other.restore(data)
-            other.time = time
-            other.step(11.0)
-            assert other.state() == end
-
-
-def test_both_versions_of_fmi_move_alike() -> None:
-    ends = []
-    for version in VERSIONS:
-        with chain({**SCENE, **stop(-0.3, 0.4, side=LOWER, k=2)}, version=version) as c:
-            for k in range(50):
-                c.set("force[2]", 0.1 * math.sin(k))
-                c.set("force_rate[2]", 0.05)
-                c.step(0.5)
-            ends.append([*c.state(), *c.contact("count", "last_time", k=2)])
-    assert ends[0] == ends[1]
-    assert ends[0][2] > 0
-
-
 # ---- refusals ----
-
-BAD = [
-    ("masses", 0, "1 to 64"),
-    ("masses", 65, "1 to 64"),
-    ("mass[2]", 0.0, "> 0"),
-    ("mass[1]", math.nan, "> 0"),
-    ("stiffness[2]", -1.0, ">= 0"),
-    ("damping[1]", math.inf, ">= 0"),
-    ("far_stiffness", -1.0, ">= 0"),
-    ("far_damping", math.nan, ">= 0"),
-    ("forcing.amplitude[2]", math.nan, "finite"),
-    ("forcing.angular_frequency", -1.0, ">= 0"),
-    ("forcing.phase", math.inf, "finite"),
-    ("displacement_start[1]", math.nan, "finite"),
-    ("velocity_start[2]", -math.inf, "finite"),
-    ("observed_mass", 3, "1 to 2"),
-    ("contact[1].mass_number", 3, "1 to 2"),
-    ("contact[1].mass_number", -1, "0 for the last"),
-    ("contact[1].restitution", 1.2, "0 <= r <= 1"),
-    ("contact[1].yield_velocity", -1.0, ">= 0"),
-    ("contact[1].relaxation_time", math.nan, ">= 0"),
-    ("contact[1].position", math.nan, "finite"),
-    ("contact[1].law", 7, "6 (external_force)"),
-    ("contact[1].side", 3, "1 (upper)"),
-    ("contact_tolerance", 0.0, "0 < tolerance"),
-    ("impact_limit", -1, ">= 0"),
-    ("force[2]", math.nan, "finite"),
-    ("base_acceleration_rate", math.inf, "finite"),
-    ("contact[1].applied_force", math.nan, "finite"),
-]
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize(("name", "value", "rule"), BAD)
-def test_a_bad_parameter_is_named_with_its_rule_and_its_value(
-    version: str, name: str, value: float, rule: str
-) -> None:
-    text = refusal({**SCENE, name: value}, version)
-    assert f"{name}: expected" in text
-    assert rule in text
-    assert f"got {value:g}" in text
-
-
-def test_all_bad_parameters_are_told_at_once() -> None:
-    bad = {"mass[1]": -1.0, "stiffness[2]": -2.0, "contact[1].restitution": 3.0, "contact[8].stiffness": -1.0}
-    text = refusal({**SCENE, **bad, "contact[8].law": KELVIN_VOIGT})
-    assert all(f"{name}: expected" in text for name in bad)
 
 
 def test_more_problems_than_a_message_holds_are_cut_and_marked() -> None:
@@ -392,17 +260,3 @@ def test_initialization_can_be_repeated_with_better_values() -> None:
         c.set("displacement_start[2]", 0.0)
         c.fmu.exitInitializationMode()
         c.step(1.0)
-
-
-@pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("size", [0.0, -0.1, math.nan, math.inf])
-def test_a_step_that_cannot_be_made_changes_nothing(version: str, size: float) -> None:
-    with chain(SCENE, version=version) as c:
-        c.step(3.0)
-        before = c.state()
-        with pytest.raises(FMICallException):
-            c.step(size)
-        assert "communicationStepSize: expected a finite number > 0" in c.messages[-1]
-        c.time = 3.0
-        c.step(1e-300)
-        assert c.state() == before

@@ -7,8 +7,7 @@ from typing import Any
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions
-from support.component_fmu import ComponentFmu
-from support.oscillator_fmu import LOGGER2, VERSIONS
+from support.component_fmu import LOGGER2, VERSIONS, ComponentFmu
 from typer.testing import CliRunner
 
 from vibroimpact.fmus import fmu_path
