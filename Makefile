@@ -1,6 +1,6 @@
 # Everything sets itself up: a virtual environment in .venv, the packages, the FMUs.
 .DEFAULT_GOAL := help
-.PHONY: help demo test soak coverage oldest sanitize bench lint clean
+.PHONY: help demo fast test soak coverage oldest sanitize bench lint clean
 
 OLDEST := $(or $(PYTHON),python3.11)
 ifneq ($(PYTHON),)
@@ -30,6 +30,9 @@ help: ## show this
 
 demo: $(VENV)/demo.stamp $(VENV)/fmus.stamp ## run the demonstration campaign; leaves a dataset and a figure
 	$(BIN)/vibroimpact demo
+
+fast: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run the tests that take less than a minute, of every room; says what it left out
+	$(BIN)/python -m pytest -q --fast $(PARALLEL)
 
 test: $(VENV)/test.stamp $(VENV)/fmus.stamp sanitize ## run all tests but the benchmarks
 	$(BIN)/python -m pytest --ignore=tests/benchmarks -m "not benchmark" $(PARALLEL)

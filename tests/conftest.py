@@ -1,9 +1,10 @@
-"""States seed and number of examples of every property test at the end of a run."""
+"""What `--fast` leaves out; seed and number of examples of every property test. The end of a run says both."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import hypothesis
@@ -14,6 +15,32 @@ SEED = 4
 """Of every property test, so that a run can be repeated anywhere; `--hypothesis-seed=N` takes another."""
 
 COUNTS = pytest.StashKey[dict[str, list[int]]]()
+SLOW = pytest.StashKey[int]()
+"""Number of tests marked slow that `--fast` leaves out."""
+
+TESTS = Path(__file__).parent
+FAST_FOLDERS = ("architecture", "unit")
+"""All that `--fast` takes tests from."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are not marked slow"
+    parser.addoption("--fast", action="store_true", help=text)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    if not config.getoption("fast") or TESTS not in collection_path.parents:
+        return None
+    return True if collection_path.relative_to(TESTS).parts[0] not in FAST_FOLDERS else None
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if not config.getoption("fast"):
+        return
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    config.stash[SLOW] = len(slow)
+    config.hook.pytest_deselected(items=slow)
+    items[:] = [item for item in items if item not in slow]
 
 
 def _seed(config: pytest.Config) -> int | str:
@@ -73,21 +100,36 @@ def pytest_runtest_call(item: pytest.Item) -> Any:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """Hand over what was tried, if this process runs only a share of the tests."""
+    """Hand over what was tried and left out, if this process runs only a share of the tests."""
     output = getattr(session.config, "workeroutput", None)
     if output is not None:
         output["property_examples"] = session.config.stash.get(COUNTS, {})
+        output["slow"] = session.config.stash.get(SLOW, 0)
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any, error: object) -> None:
-    """Take over what a process tried that ran a share of the tests."""
+    """Take over what a process tried and left out that ran a share of the tests."""
+    output = getattr(node, "workeroutput", {})
     counts = node.config.stash.setdefault(COUNTS, {})
-    counts.update(getattr(node, "workeroutput", {}).get("property_examples", {}))
+    counts.update(output.get("property_examples", {}))
+    # each of them has left out the same
+    node.config.stash[SLOW] = output.get("slow", 0)
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """Write what was tried."""
+    """Write what was tried, and what was not."""
+    _tell_examples(terminalreporter, config)
+    if config.getoption("fast"):
+        folders = sorted({path.relative_to(TESTS).parts[0] for path in TESTS.glob("*/**/test_*.py")})
+        left_out = [f"tests/{folder}" for folder in folders if folder not in FAST_FOLDERS]
+        terminalreporter.section("left out")
+        terminalreporter.line(
+            f"{config.stash.get(SLOW, 0)} tests that are marked slow, and {', '.join(left_out)}"
+        )
+
+
+def _tell_examples(terminalreporter: Any, config: pytest.Config) -> None:
     counts = config.stash.get(COUNTS, {})
     if not counts:
         return

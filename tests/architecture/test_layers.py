@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from support.places import ROOT
 
+PACKAGES = ("fmus", "analysis", "orchestrator", "hardware")
+
 
 def test_each_layer_imports_only_those_below_it_and_each_heavy_dependency_has_one_door() -> None:
     command = [sys.executable, "-c", "from importlinter.cli import lint_imports_command as run; run()"]
@@ -17,7 +19,7 @@ def test_each_layer_imports_only_those_below_it_and_each_heavy_dependency_has_on
 
 def test_no_module_imports_one_that_imports_it_not_even_for_its_types() -> None:
     modules = {}
-    for package in ("fmus", "analysis", "orchestrator", "hardware"):
+    for package in PACKAGES:
         for path in (ROOT / package).rglob("*.py"):
             name = ".".join(("vibroimpact", *path.relative_to(ROOT).with_suffix("").parts))
             modules[name.removesuffix(".__init__")] = path
@@ -66,6 +68,7 @@ def test_what_starts_light_loads_nothing_heavy(module: str, not_loaded: tuple[st
     assert result.stdout == "[]\n"
 
 
+@pytest.mark.slow
 def test_every_benchmark_starts() -> None:
     """Nothing else of the tests runs them: a name that has moved would be found by the next person who measures."""
     folder = ROOT / "tests" / "benchmarks"
@@ -73,3 +76,29 @@ def test_every_benchmark_starts() -> None:
     code = f"import sys; sys.path.insert(0, {str(folder)!r}); import {', '.join(names)}"
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
+
+
+def test_every_room_has_a_folder_of_tests_of_which_make_fast_runs_some() -> None:
+    unit = ROOT / "tests" / "unit"
+    rooms = {
+        path.parent.relative_to(ROOT)
+        for package in PACKAGES
+        for path in ROOT.glob(f"{package}/*/__init__.py")
+    }
+    quick = {path.parent.relative_to(unit) for path in unit.rglob("test_*.py") if not all(marked_slow(path))}
+    assert sorted(map(str, rooms - quick)) == []
+    assert [
+        str(path) for path in unit.rglob("test_*.py") if not (ROOT / path.parent.relative_to(unit)).is_dir()
+    ] == []
+
+
+def marked_slow(path: Path) -> list[bool]:
+    """Return of each test of a module whether it, or the module, is marked slow."""
+    text = path.read_text(encoding="utf-8")
+    tests = [
+        node
+        for node in ast.parse(text).body
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test")
+    ]
+    whole = "pytestmark = pytest.mark.slow" in text
+    return [whole or "pytest.mark.slow" in map(ast.unparse, test.decorator_list) for test in tests]

@@ -51,7 +51,30 @@ def test_the_lowest_versions_are_refused_on_another_python() -> None:
     assert "expected Python 3.11" in refused.stderr
 
 
-@pytest.mark.parametrize("target", ["demo", "test", "bench", "lint", "oldest"])
+@pytest.mark.slow
+def test_the_fast_tests_say_what_they_leave_out() -> None:
+    folders = ["tests/architecture", "tests/interval_coverage"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "--fast",
+        "--collect-only",
+        "-q",
+        "-p",
+        "no:cacheprovider",
+        *folders,
+    ]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "test_help_names_every_target" in result.stdout
+    assert "test_the_fast_tests_say_what_they_leave_out" not in result.stdout
+    assert re.search(
+        r"^\d+ tests that are marked slow, and tests/end_to_end, .*tests/soak$", result.stdout, re.M
+    )
+
+
+@pytest.mark.parametrize("target", ["demo", "fast", "test", "bench", "lint", "oldest"])
 def test_an_installation_says_what_it_does(target: str) -> None:
     commands = make("--dry-run", "--always-make", target, f"OLDEST={sys.executable}").stdout.splitlines()
     installing = [line for line in commands if " pip install" in line]

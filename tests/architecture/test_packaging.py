@@ -53,6 +53,7 @@ def test_the_sdist_has_the_sources_of_all_packages_and_nothing_built(sdist: Path
     assert [name for name in names if name.startswith(left_out)] == []
 
 
+@pytest.mark.slow
 def test_the_wheel_has_all_packages_and_the_fmus_and_is_for_one_platform(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
@@ -68,6 +69,7 @@ def test_the_wheel_has_all_packages_and_the_fmus_and_is_for_one_platform(wheel: 
     assert not wheel.name.endswith("-any.whl")
 
 
+@pytest.mark.slow
 def test_the_wheel_works_in_a_fresh_environment(wheel: Path, tmp_path: Path) -> None:
     environment = tmp_path / "venv"
     venv.create(environment, with_pip=True)

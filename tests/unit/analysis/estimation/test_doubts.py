@@ -18,6 +18,8 @@ from vibroimpact.analysis.estimation.physics import Parameters
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.fmus.errors import EstimationError
 
+pytestmark = pytest.mark.slow
+
 METHODS = ["weak_form", "trajectory"]
 #: Forced at 2.78 times the natural frequency against a stop at rest: aperiodic, speeds of all sizes.
 PLAIN = Body(

@@ -32,6 +32,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_killed_process_is_swept_and_that_of_a_living_one_is_not(temporary: Path) -> None:
     command = [sys.executable, "-c", OWNER, "wait"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as owner:
@@ -47,6 +48,7 @@ def test_the_folder_of_a_killed_process_is_swept_and_that_of_a_living_one_is_not
     assert not os.listdir(temporary)
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_leaves_no_folder(temporary: Path) -> None:
     done = subprocess.run([sys.executable, "-c", OWNER, "end"], capture_output=True, text=True, check=True)
     assert str(temporary) in done.stdout
@@ -78,6 +80,7 @@ def test_a_sweep_leaves_folders_of_other_users(temporary: Path) -> None:
     assert folder.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 def test_folders_of_many_processes_that_start_and_die_at_once_do_not_disturb_each_other(
     temporary: Path,

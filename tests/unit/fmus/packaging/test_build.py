@@ -42,6 +42,7 @@ def commanded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]
     return folder, codes, err.getvalue()
 
 
+@pytest.mark.slow
 def test_building_twice_in_different_places_gives_the_same_bytes(
     commanded: tuple[Path, list[int], str], built_elsewhere: Path
 ) -> None:
@@ -61,6 +62,7 @@ def test_an_edit_of_the_c_makes_the_build_out_of_date(built_elsewhere: Path, sou
     assert fingerprint(sources) != fingerprint()
 
 
+@pytest.mark.slow
 def test_an_error_in_the_c_is_told_in_the_compilers_words(sources: Path, tmp_path: Path) -> None:
     (sources / "core" / "zz_wrong.c").write_text("int wrong(void) { return undeclared_name; }\n")
     with pytest.raises(ComponentError, match="undeclared_name"):
@@ -96,6 +98,7 @@ def test_a_machine_without_a_compiler_is_told_what_to_install(monkeypatch: pytes
         find_compiler()
 
 
+@pytest.mark.slow
 def test_the_core_library_exports_the_functions_that_the_fmu_hides(sources: Path, tmp_path: Path) -> None:
     (sources / "core" / "zz_probe.c").write_text("int vi_probe(void);\nint vi_probe(void) { return 42; }\n")
     for description in sources.glob("*/variables.toml"):

@@ -18,6 +18,8 @@ from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.export import SIZES_MEMBER, export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 
+pytestmark = pytest.mark.slow
+
 BODIES = {"Beam": "modes", "Chain": "masses"}
 SIZES = [(1, 0), (3, 1), (64, 8)]
 

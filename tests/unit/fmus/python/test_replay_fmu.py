@@ -233,6 +233,7 @@ def test_instances_share_one_copy_of_the_samples_until_a_file_changes(
 # What it says of itself.
 
 
+@pytest.mark.slow
 def test_the_description_is_valid_and_says_what_importers_need(fmu: Path) -> None:
     assert validate(fmu) == ()
     assert check_fmu(fmu) == ()

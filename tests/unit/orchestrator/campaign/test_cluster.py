@@ -22,6 +22,8 @@ from vibroimpact.orchestrator.campaign import cluster
 from vibroimpact.orchestrator.campaign.cluster import MOST_DEATHS, MOST_STARTS, open_workers
 from vibroimpact.orchestrator.campaign.progress import Silence
 
+pytestmark = pytest.mark.slow
+
 kills_itself = pytest.mark.skipif(sys.platform == "win32", reason="SIGKILL")
 
 

@@ -1,0 +1,82 @@
+"""Notes of the FMI call under way, as the process reads them that outlives the one which made the call."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import sys
+from pathlib import Path
+
+import pytest
+from support.coupled_parts import P11, body
+
+from vibroimpact.orchestrator.fmi.log import callback
+from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
+from vibroimpact.orchestrator.importer.master import Importer
+
+
+@pytest.fixture
+def notes(tmp_path: Path) -> tuple[Breadcrumbs, Breadcrumbs]:
+    """Return the notes as their writer and as their reader map them."""
+    path = tmp_path / "notes"
+    Breadcrumbs.create(path)
+    return Breadcrumbs(path), Breadcrumbs(path)
+
+
+def test_there_is_no_call_before_the_first_one(notes: tuple[Breadcrumbs, Breadcrumbs]) -> None:
+    instance, function, time = notes[1].last_call()
+    assert (instance, function) == ("", "")
+    assert math.isnan(time)
+    assert notes[1].last_lines() == ()
+
+
+def test_a_call_is_noted_before_it_is_made_and_a_step_with_its_time(
+    notes: tuple[Breadcrumbs, Breadcrumbs],
+) -> None:
+    writer, reader = notes
+    seen = []
+    ball, stop = writer.wrap("ball"), writer.wrap("stop")
+    step = ball("fmi3DoStep", lambda *_: seen.append(reader.last_call()))
+    save = stop("fmi3GetFMUState", lambda *_: seen.append(reader.last_call()))
+    step(None, ctypes.c_double(1.25), ctypes.c_double(0.5))
+    save(None)
+    assert seen == [("ball", "fmi3DoStep", 1.25), ("stop", "fmi3GetFMUState", 1.25)]
+
+
+def test_the_lines_are_those_of_the_component_of_the_call_and_begin_forgets_them(
+    notes: tuple[Breadcrumbs, Breadcrumbs],
+) -> None:
+    writer, reader = notes
+    log = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)(
+        callback("fmi3").value
+    )
+    for name in ("ball", "stop"):
+        log(writer.log(name).environment, 0, b"", f"{name} speaks".encode())
+    writer.wrap("ball")("fmi3Reset", lambda: None)()
+    assert reader.last_call()[:2] == ("ball", "fmi3Reset")
+    assert reader.last_lines() == ("ball speaks",)
+    reader.begin()
+    assert reader.last_call()[:2] == ("", "")
+    writer.wrap("stop")("fmi3Reset", lambda: None)()
+    assert reader.last_lines() == ()
+
+
+def test_the_frames_of_a_thread_show_the_call_that_it_is_in(
+    notes: tuple[Breadcrumbs, Breadcrumbs], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writer, reader = notes
+    importer = Importer([body("b", P11)])
+    importer.begin()
+    instance = importer.components["b"].instance
+    step, seen = instance._do_step, []
+
+    def noted_step() -> int:
+        writer.note_frame(sys._getframe())
+        seen.append(reader.last_call())
+        return int(step())
+
+    monkeypatch.setattr(instance, "_do_step", noted_step)
+    for time in (0.0, 0.5):
+        instance.step(time, 0.5)
+    importer.free()
+    assert [(name, function) for name, function, _ in seen] == [("b", "fmi3DoStep")] * 2
