@@ -7,18 +7,17 @@ import doctest
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import distributed
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
+from support.places import ROOT
 
 import vibroimpact as vi
 from vibroimpact.orchestrator.campaign.progress import NotebookBar
 
-ROOT = Path(__file__).parents[2]
 DOOR = ROOT / "door" / "__init__.py"
 FREE = {"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 5.0, "extrema": True}}
 FORCED = {

@@ -10,11 +10,11 @@ import pytest
 import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from support.places import ROOT
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 
-ROOT = Path(__file__).parents[2]
 FREE = {"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 5.0}}
 
 
