@@ -76,9 +76,9 @@ def test_elastic_bounces_too_low_to_matter_come_to_rest(height: float, position:
     # undamped, pressed, r = 1: 2e-30 s from bounce to bounce, for ever, if nothing ends it
     parameters = {"force": 1.0 + position, "displacement_start": position - height}
     with OscillatorFmu({**parameters, **stop(position, 1.0)}) as o:
-        o.step(1000.0)
+        o.step(100.0)
         assert o.get("displacement") >= position - 2.0 * height
-        assert o.contact("count")[0] + o.contact("graze_count")[0] < 30_000_000
+        assert o.contact("count")[0] + o.contact("graze_count")[0] < 5_000_000
 
 
 def test_a_dead_stop_catches_at_the_first_impact_when_pressed() -> None:
