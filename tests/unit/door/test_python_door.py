@@ -7,6 +7,7 @@ import doctest
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import distributed
 import numpy as np
