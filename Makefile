@@ -1,6 +1,6 @@
 # Everything sets itself up: a virtual environment in .venv, the packages, the FMUs.
 .DEFAULT_GOAL := help
-.PHONY: help demo fast test soak coverage oldest sanitize bench lint clean
+.PHONY: help demo fast test soak coverage oldest sanitize bench lint docs clean
 
 OLDEST := $(or $(PYTHON),python3.11)
 ifneq ($(PYTHON),)
@@ -60,8 +60,13 @@ lint: $(VENV)/lint.stamp ## check style, types and the directions of imports
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(VENV)/docs.stamp $(VENV)/fmus.stamp ## build the documentation site, its pictures and its tutorial; a warning is an error
+	$(BIN)/python docs/site/gallery.py build/docs/gallery
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -c docs/site -d build/docs/doctrees . build/docs/html
+	@echo "The site begins at build/docs/html/index.html."
+
 clean: ## remove what make has made
-	rm -rf .venv .venv-* .editable fmus/built
+	rm -rf .venv .venv-* .editable build/docs fmus/built
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "make: needs Python 3.11 or newer, found none on PATH. Install it, or say where it is: make PYTHON=/path/to/python3" >&2; exit 1; }
@@ -89,6 +94,11 @@ $(VENV)/bench.stamp: $(SETUP) | $(BIN)/python
 $(VENV)/lint.stamp: $(SETUP) | $(BIN)/python
 	$(ANNOUNCE)
 	$(INSTALL) -e '.[lint]'
+	@touch $@ $(VENV)/demo.stamp $(VENV)/fmus.stamp
+
+$(VENV)/docs.stamp: $(SETUP) | $(BIN)/python
+	$(ANNOUNCE)
+	$(INSTALL) -e '.[docs]'
 	@touch $@ $(VENV)/demo.stamp $(VENV)/fmus.stamp
 
 # the installation builds the FMUs; only an edit of the C makes them again

@@ -69,7 +69,7 @@ class FrequencyResponse:
 
     @property
     def relative_error(self) -> Floats:
-        """Standard error of |H1| over |H1|: `sqrt((1 - coherence) / (2 averages coherence))`."""
+        """Standard error of `|H1|` over `|H1|`: `sqrt((1 - coherence) / (2 averages coherence))`."""
         error: Floats = np.sqrt((1.0 - self.coherence) / (2.0 * self.averages * self.coherence))
         return error
 

@@ -48,7 +48,7 @@ class Resonance:
     half_power_damping_ratio : float
         From the bandwidth at the peak over sqrt 2, as a check; NaN where the curve does not fall that far.
     angular_frequency, magnitude, fitted : ndarray of float, shape (line,)
-        What was fitted: rad/s, |H| measured and fitted.
+        What was fitted: rad/s, `|H|` measured and fitted.
     error : ndarray of float, shape (line,)
         Standard error of the magnitude; zeros where not known.
     remarks : tuple of str
@@ -202,7 +202,7 @@ def half_power_damping_ratio(omega: Floats, magnitude: Floats) -> float:
     Parameters
     ----------
     omega, magnitude : ndarray of float, shape (line,)
-        rad/s, and |H|.
+        rad/s, and `|H|`.
     """
     low, high = _half_power(omega, magnitude)
     return float((high**2 - low**2) / (4.0 * omega[int(np.argmax(magnitude))] ** 2))

@@ -1,0 +1,80 @@
+"""Settings of the documentation site. `make docs` builds it, from the pages that a forge shows too."""
+
+from __future__ import annotations
+
+import sys
+from importlib import metadata
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+project = "vibroimpact"
+author = "vibroimpact developers"
+copyright = author
+release = version = metadata.version("vibroimpact")
+
+# The source folder is the root of the project: a link to a README or a scene is the same on the site and on a forge.
+root_doc = "docs/index"
+include_patterns = ["*.md", "docs/*.md", "docs/**/*.md", "*/README.md", "*/**/README.md"]
+exclude_patterns = [".*", "build", "fmus/built", "tests"]
+
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx_design",
+    "command_reference",
+    "gallery_page",
+]
+
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 4
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120
+nb_merge_streams = True
+
+autodoc_typehints = "none"
+autodoc_default_options = {"exclude-members": "model_config"}
+toc_object_entries_show_parents = "hide"
+autodoc_member_order = "bysource"
+numpydoc_show_class_members = False
+default_role = "code"
+# two hyphens are an option of a command, not a dash
+smartquotes = False
+highlight_language = "none"
+
+html_theme = "pydata_sphinx_theme"
+html_title = "vibroimpact"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+# The front page is docs/index.html; this one, at the top, leads there.
+html_additional_pages = {"index": "to_front_page.html"}
+templates_path = ["templates"]
+html_copy_source = False
+html_show_copyright = False
+html_theme_options = {
+    "secondary_sidebar_items": ["page-toc"],
+    "navbar_align": "left",
+    "show_prev_next": True,
+    "footer_start": [],
+    "footer_end": ["sphinx-version"],
+}
+
+
+def _without_heading(
+    sphinx: Sphinx, what: str, name: str, item: object, options: object, lines: list[str]
+) -> None:
+    """Take the heading off the example of a room: several rooms stand on one page, whose headings differ."""
+    if what == "module" and "Examples" in lines:
+        place = lines.index("Examples")
+        lines[place : place + 2] = []
+
+
+def setup(sphinx: Sphinx) -> None:
+    """Connect what Sphinx calls before numpydoc reads a docstring."""
+    sphinx.connect("autodoc-process-docstring", _without_heading, priority=100)
