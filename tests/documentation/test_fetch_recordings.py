@@ -14,8 +14,8 @@ from types import ModuleType
 from urllib.parse import unquote
 
 import pytest
+from support.places import ROOT
 
-ROOT = Path(__file__).parents[2]
 CONTENT = b"0.0 1.0\n0.1 2.0\n"
 ASKED = "/somebody/rig/0123abcd/data/set #1/hit 1.txt"
 

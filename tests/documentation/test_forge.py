@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 import yaml
+from support.places import ROOT
 
-ROOT = Path(__file__).parents[2]
 FORGE = ROOT / ".github"
 FORMS = sorted(path for path in (FORGE / "ISSUE_TEMPLATE").glob("*.yml") if path.stem != "config")
 WORKFLOW = FORGE / "workflows" / "ci.yml"

@@ -12,11 +12,11 @@ from typing import Any
 
 import pytest
 import typer
+from support.places import ROOT
 
 from vibroimpact.analysis.figures import KINDS
 from vibroimpact.orchestrator.commands.cli import app, load_commands
 
-ROOT = Path(__file__).parents[2]
 EXAMPLES = ROOT / "examples"
 SCENES = sorted(
     path for folder in (".", "thesis", "recordings") for path in (EXAMPLES / folder).glob("*.toml")
