@@ -7,8 +7,8 @@ import math
 from rich.table import Table
 
 from vibroimpact.analysis.estimation.estimates import QUANTITIES, SHOWN, Estimate, ImpactEstimates
-from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.fmus.units import written_unit
 
 
 def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:

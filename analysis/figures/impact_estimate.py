@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import COLOURS, COLUMN_WIDTH, LINE, MARK, STOP, canvas, unit_symbol
-from vibroimpact.analysis.recording.unit_symbols import written_unit
+from vibroimpact.fmus.units import written_unit
 
 _SIGNAL_MM, _RESIDUAL_MM = 42, 26
 _COLUMNS = 2

@@ -21,8 +21,8 @@ from matplotlib.figure import Figure
 from vibroimpact.analysis.dataset.outputs import FIGURE_ENDINGS
 from vibroimpact.analysis.figures.style import page_style as page_style
 from vibroimpact.analysis.files.atomic import write_atomically
-from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.units import written_unit
 
 Floats = npt.NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, STOP, Floats, canvas, page_style
 from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording
-from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.units import written_unit
 
 _QUANTITIES = {
     "m": "displacement",

@@ -19,8 +19,8 @@ from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order
 from vibroimpact.analysis.figures.series import sampled_names, within
 from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.analysis.recording import Recording
-from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.units import written_unit
 
 _PANEL_MM = 38
 _FEWEST = 16

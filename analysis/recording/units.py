@@ -13,8 +13,8 @@ from typing import Any
 
 import pint
 
-from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.units import written_unit
 
 STANDARD_GRAVITY = 9.80665
 """m/s^2, exact by definition."""
@@ -68,7 +68,7 @@ class MeasuredUnit:
 
 
 def unit_label(cf: str) -> str:
-    """Return a unit as people write it behind a number, see `unit_symbols.written_unit`.
+    """Return a unit as people write it behind a number, see `fmus.units.written_unit`.
 
     >>> unit_label("9.80665 m s-2"), unit_label("0.001 m"), unit_label("1")
     ('g', 'mm', '1')

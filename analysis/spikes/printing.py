@@ -6,10 +6,10 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
-from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.analysis.spikes.contact import SHORT_CONTACT
 from vibroimpact.analysis.spikes.report import SpikeReport
 from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.fmus.units import written_unit
 
 #: A longer list of spikes is cut; all of them are in the dataset.
 _MOST_ROWS = 12

@@ -22,7 +22,7 @@ from xml.etree import ElementTree
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.python_child import python_command
-from vibroimpact.fmus.si_units import SiUnit
+from vibroimpact.fmus.units import Unit
 
 SOURCES = Path(__file__).parents[1] / "python"
 USER_CONTACT_LAW = SOURCES / "user_contact_law"
@@ -32,9 +32,9 @@ DESCRIPTION = "modelDescription.xml"
 #: Longest time that pythonfmu, which runs the user's file, may take, s.
 BUILD_LIMIT = 120.0
 UNITS = {
-    "displacement": SiUnit({"m": 1}),
-    "velocity": SiUnit({"m": 1, "s": -1}),
-    "applied_force": SiUnit({"N": 1}),
+    "displacement": Unit({"m": 1}),
+    "velocity": Unit({"m": 1, "s": -1}),
+    "applied_force": Unit({"N": 1}),
 }
 
 
@@ -50,7 +50,7 @@ class PythonFmu:
         Files and folders that go into the resources with it.
     readme : Path
         What the FMU's documentation says.
-    units : mapping of str to SiUnit
+    units : mapping of str to Unit
         Units of the variables that have one.
     blamed : str
         What messages of a build that fails begin with: the user's file.
@@ -59,7 +59,7 @@ class PythonFmu:
     script: Path
     extras: tuple[Path, ...]
     readme: Path
-    units: Mapping[str, SiUnit]
+    units: Mapping[str, Unit]
     blamed: str
 
 
@@ -164,7 +164,7 @@ def _last_message(errors: str) -> str:
     return last.removeprefix("ValueError: ").replace("%%", "%")
 
 
-def _completed(members: Mapping[str, bytes], units: Mapping[str, SiUnit]) -> bytes:
+def _completed(members: Mapping[str, bytes], units: Mapping[str, Unit]) -> bytes:
     root = ElementTree.fromstring(members[DESCRIPTION])
     root.attrib.pop("generationDateAndTime", None)
     _add_units(root, units)
@@ -175,7 +175,7 @@ def _completed(members: Mapping[str, bytes], units: Mapping[str, SiUnit]) -> byt
     return text
 
 
-def _add_units(root: ElementTree.Element, units: Mapping[str, SiUnit]) -> None:
+def _add_units(root: ElementTree.Element, units: Mapping[str, Unit]) -> None:
     definitions = ElementTree.Element("UnitDefinitions")
     for name, unit in {unit.name: unit for unit in units.values() if unit.name}.items():
         definition = ElementTree.SubElement(definitions, "Unit", name=name)
@@ -190,7 +190,7 @@ def _add_units(root: ElementTree.Element, units: Mapping[str, SiUnit]) -> None:
             real.set("unit", found.name)
 
 
-def _base_unit(unit: SiUnit) -> dict[str, str]:
+def _base_unit(unit: Unit) -> dict[str, str]:
     attributes = {base: str(exponent) for base, exponent in unit.exponents.items()}
     if unit.factor != 1.0:
         attributes["factor"] = repr(unit.factor)

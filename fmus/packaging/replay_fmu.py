@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.packaging.python_fmus import SOURCES, PythonFmu, make_fmu, require_pythonfmu
-from vibroimpact.fmus.si_units import SiUnit, si_unit
+from vibroimpact.fmus.units import Unit, si_unit
 
 REPLAY = SOURCES / "replay"
 #: As in `python/replay/replay.py`, which must not import this package.
@@ -46,7 +46,7 @@ class ReplaySignal:
     values : array_like, shape (sample,)
         In `unit`; NaN where there is none (a gap).
     unit : str
-        `m/s2`, `9.80665 m s-2`, as `si_units.si_unit` reads it; `1` for a pure number, which fits any connection.
+        `m/s2`, `9.80665 m s-2`, as `units.si_unit` reads it; `1` for a pure number, which fits any connection.
     start, interval : float
         The first instant and the spacing of evenly spaced samples, s.
     """
@@ -102,7 +102,7 @@ def build_replay(signals: Mapping[str, ReplaySignal], output: Path | str) -> Pat
         script = Path(folder, f"{_module_name()}.py")
         shutil.copyfile(REPLAY / "replay.py", script)
         units = {name: unit for name, array in arrays.items() for name, unit in _units(name, array.unit)}
-        units[TIME_SHIFT] = SiUnit({"s": 1})
+        units[TIME_SHIFT] = Unit({"s": 1})
         parts = PythonFmu(script, (Path(folder, FOLDER),), REPLAY / "README.md", units, "replay")
         return make_fmu(parts, output)
 
@@ -118,7 +118,7 @@ class _Arrays:
     """A signal as it is stored: `times` is None where the samples are evenly spaced."""
 
     values: Floats
-    unit: SiUnit
+    unit: Unit
     start: float
     interval: float
     times: Floats | None
@@ -181,7 +181,7 @@ def _arrays(signal: ReplaySignal) -> _Arrays:
     return _Arrays(values, unit, 0.0, 0.0, times)
 
 
-def _units(name: str, unit: SiUnit) -> Iterator[tuple[str, SiUnit]]:
+def _units(name: str, unit: Unit) -> Iterator[tuple[str, Unit]]:
     yield name, unit
     yield f"{name}_rate", unit.per_second
     yield f"{name}_offset", unit.difference

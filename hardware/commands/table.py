@@ -8,8 +8,8 @@ import numpy as np
 from rich.table import Table
 
 from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording
-from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.fmus.units import written_unit
 
 _PIPE_WIDTH = 160
 

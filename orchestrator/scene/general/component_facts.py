@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from vibroimpact.fmus.packaging.archive import content_hash
 from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, read_description
-from vibroimpact.orchestrator.scene.unit_check import BASE_UNITS, Unit, unit_of
+from vibroimpact.fmus.units import BASE_UNITS, Unit, declared_unit
 
 Kind = Literal["real", "integer", "enumeration", "boolean", "text", "binary", "clock"]
 #: Kinds that are numbers in a dataset.
@@ -125,7 +125,7 @@ def _unit(definition: Any) -> Unit | None:
     base = definition.baseUnit
     if base is None:
         return None
-    return unit_of(
+    return declared_unit(
         definition.name, {name: getattr(base, name) for name in BASE_UNITS}, base.factor, base.offset
     )
 

@@ -11,6 +11,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from vibroimpact.fmus.units import (
+    Unit,
+    agree,
+    gain_unit_between,
+    parse_unit,
+    product_agrees,
+)
 from vibroimpact.orchestrator.scene.general.component_facts import (
     NUMERIC_KINDS,
     ComponentFacts,
@@ -21,13 +28,6 @@ from vibroimpact.orchestrator.scene.general.models import ConnectionTable, Event
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN, Execution
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
-from vibroimpact.orchestrator.scene.unit_check import (
-    Unit,
-    agree,
-    gain_unit_between,
-    parse_unit,
-    product_agrees,
-)
 
 MOST_STEPS_PER_RUN = 10**10
 #: Inputs of a body's contact port by which another component answers its contact.

@@ -1,4 +1,4 @@
-"""Units at the two ends of a connection: by what they mean, never by how they are called."""
+"""Units of FMUs, scenes and recorded channels: by what they mean, never by how they are called."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vibroimpact.orchestrator.scene.unit_check import (
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.units import (
     BASE_UNITS,
     Unit,
     agree,
+    declared_unit,
     gain_unit_between,
     parse_unit,
     product_agrees,
-    unit_of,
+    si_unit,
 )
 
 
@@ -86,12 +88,12 @@ def test_a_spring_turns_displacement_into_force() -> None:
 
 
 def test_a_factor_written_in_decimals_agrees_with_the_exact_one() -> None:
-    described = unit_of("degree", {"rad": 1}, 0.0174532925199)
+    described = declared_unit("degree", {"rad": 1}, 0.0174532925199)
     assert agree(described, unit("deg"))
 
 
 def test_a_unit_whose_zero_is_elsewhere_agrees_with_itself_only() -> None:
-    celsius, kelvin = unit_of("degC", {"K": 1}, 1.0, 273.15), unit("K")
+    celsius, kelvin = declared_unit("degC", {"K": 1}, 1.0, 273.15), unit("K")
     assert agree(celsius, celsius)
     assert not agree(celsius, kelvin)
     assert not product_agrees(celsius, unit("1"), celsius)
@@ -112,8 +114,8 @@ def test_a_gain_unit_is_suggested_that_fits(source: str, target: str, gain: str)
 
 
 def test_no_gain_unit_is_suggested_where_none_can_be_written() -> None:
-    inch = unit_of("inch", {"m": 1}, 0.0254)
-    celsius = unit_of("degC", {"K": 1}, 1.0, 273.15)
+    inch = declared_unit("inch", {"m": 1}, 0.0254)
+    celsius = declared_unit("degC", {"K": 1}, 1.0, 273.15)
     assert gain_unit_between(inch, unit("m")) is None
     assert gain_unit_between(celsius, unit("K")) is None
 
@@ -123,7 +125,7 @@ exponents = st.dictionaries(st.sampled_from(BASE_UNITS), st.integers(-4, 4), max
 
 @given(source=exponents, target=exponents)
 def test_a_suggested_gain_unit_always_fits(source: dict[str, int], target: dict[str, int]) -> None:
-    one, other = unit_of("one", source), unit_of("other", target)
+    one, other = declared_unit("one", source), declared_unit("other", target)
     suggested = gain_unit_between(one, other)
     assert suggested is not None
     assert product_agrees(one, unit(suggested), other)
@@ -133,3 +135,23 @@ def test_a_suggested_gain_unit_always_fits(source: dict[str, int], target: dict[
 def test_any_text_is_a_unit_or_none(text: str) -> None:
     parsed = parse_unit(text)
     assert parsed is None or parsed.factor > 0.0
+
+
+@pytest.mark.parametrize("text", ["g", "mV", "deg", "furlong", "m s-", "0 m", "m/s/", "N m-1)", "."])
+def test_what_is_not_si_is_refused_in_a_recording(text: str) -> None:
+    with pytest.raises(UsageError, match="expected a product of kg, m, s"):
+        si_unit(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "cf", "fmi"),
+    [
+        ("m s-2", "m s-2", "m/s2"),
+        ("W/(m2.K)", "W m-2 K-1", "W/(m2.K)"),
+        ("/s", "s-1", "1/s"),
+        ("0.001 V", "0.001 V", "0.001 V"),
+        ("", "1", ""),
+    ],
+)
+def test_a_unit_is_written_as_cf_and_as_fmi_want_it(text: str, cf: str, fmi: str) -> None:
+    assert (si_unit(text).cf, si_unit(text).name) == (cf, fmi)
