@@ -258,29 +258,11 @@ RESERVED_NAMES = frozenset(
 NOT_SWEPT = {"swept": "no"}
 """Attribute of the numbers of a scene that are the same for all of its runs; scalar coordinates."""
 
-# Units of swept parameters and sampled variables, found by the end of their name.
+# Units of sampled variables, found by the end of their name; those of swept parameters come with them.
 _QUANTITY_UNITS = {
-    "mass": "kg",
-    "masses": "kg",
-    "stiffnesses": "N m-1",
-    "dampings": "N s m-1",
-    "flexural_rigidity": "N m2",
-    "mass_per_length": "kg m-1",
-    "stiffness": "N m-1",
-    "damping": "N s m-1",
-    "damping_ratio": "1",
-    "angular_frequency": "rad s-1",
-    "frequency": "Hz",
-    "amplitude": "N",
-    "phase": "rad",
-    "position": "m",
-    "restitution": "1",
-    "exponent": "1",
     "displacement": "m",
     "velocity": "m s-1",
     "acceleration": "m s-2",
-    "displacement_start": "m",
-    "velocity_start": "m s-1",
     "force": "N",
     "forcing": "N",
     "force_rate": "N s-1",
@@ -292,19 +274,8 @@ _QUANTITY_UNITS = {
     "potential": "J",
     "work": "J",
     "loss": "J",
-    "length": "m",
-    "width": "m",
-    "thickness": "m",
-    "density": "kg m-3",
-    "youngs_modulus": "Pa",
-    "location": "1",
     "stuck": "1",
     "count": "1",
-    "frequency_slope": "m-1",
-    "damping_slope": "m-1",
-    "damping_reciprocal": "m",
-    "gain": "1",
-    "offset": "1",
 }
 
 
@@ -406,15 +377,15 @@ def unit_in(system: UnitSystem, unit: str) -> str:
 
 
 def quantity_unit(name: str, system: UnitSystem) -> str:
-    """Return the unit of a swept parameter or sampled variable, known by the end of its name.
+    """Return the unit of a sampled variable, known by the end of its name.
 
     Raises
     ------
     DatasetError
         If no known quantity ends the name; the writer must then be told the unit.
 
-    >>> quantity_unit("stop_1_position", "SI"), quantity_unit("angular_frequency", "SI")
-    ('m', 'rad s-1')
+    >>> quantity_unit("contact_displacement", "SI"), quantity_unit("velocity_2", "SI")
+    ('m', 'm s-1')
     """
     unit = known_unit(name)
     if unit is None:
@@ -427,7 +398,7 @@ def quantity_unit(name: str, system: UnitSystem) -> str:
 
 def known_unit(name: str) -> str | None:
     """Return the SI unit of a quantity by the end of its name, or None if no known quantity ends it."""
-    # The number of one of several alike (damping_ratio_2) does not change what it is.
+    # The number of one of several alike (velocity_2) does not change what it is.
     words = name.rstrip("0123456789_").split("_")
     ends = ("_".join(words[start:]) for start in range(len(words)))
     return next((_QUANTITY_UNITS[end] for end in ends if end in _QUANTITY_UNITS), None)

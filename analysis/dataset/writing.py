@@ -79,7 +79,7 @@ def build_dataset(
     attrs : mapping, optional
         Provenance: scene text, versions, hashes; written as global attributes.
     unit_of : mapping of str to str, optional
-        SI units of swept parameters or sampled variables whose name does not tell; a variable of one of
+        SI units of swept parameters, and of sampled variables whose name does not tell; a variable of one of
         the `event_components` that is not here has the unit 1.
     omit : collection of str
         Per-period variables that the scene does not record; they are not stored.
@@ -155,7 +155,7 @@ def with_constants(
     constants : mapping of str to float
         By their names in the file; the dataset has nothing of such a name.
     unit_of : mapping of str to str, optional
-        SI units of those whose name does not tell.
+        Their SI units; those of sampled quantities may be left out.
 
     Raises
     ------

@@ -19,7 +19,8 @@ from pydantic import (
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.hardware.formats.labels import is_known_unit
-from vibroimpact.orchestrator.scene.problems import Rule, lines_of, problems_of, syntax_problem
+from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.problems import lines_of, problems_of, syntax_problem
 
 _LARGEST = 2**16
 

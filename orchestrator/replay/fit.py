@@ -21,19 +21,11 @@ from vibroimpact.orchestrator.replay.covariance import LagSlopes, covariance_of,
 from vibroimpact.orchestrator.replay.replayer import Replayer
 from vibroimpact.orchestrator.replay.scoring import compare_motion
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.fields import bounds_of
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-#: Numbers that mean nothing at or below 0, by the end of their key.
-POSITIVE = frozenset(
-    {"mass", "stiffness", "frequency", "angular_frequency", "length", "width", "thickness", "density"}
-    | {"youngs_modulus", "flexural_rigidity", "mass_per_length"}
-)
-NOT_NEGATIVE = frozenset(
-    {"damping", "damping_ratio", "damping_reciprocal", "yield_velocity", "relaxation_time"}
-)
-FRACTIONS = frozenset({"restitution", "location"})
 #: How the natural frequency enters a number: frequencies as such, stiffnesses by their square.
 _FREQUENCY_POWER = {"frequency": 1.0, "stiffness": 2.0, "flexural_rigidity": 2.0, "youngs_modulus": 2.0}
 MOST_ALIGNMENTS = 6
@@ -148,7 +140,9 @@ class _Fit:
                 f"{scene.source}: replay.compare: expected something to fit to, got nothing. Add compare = [...]."
             )
         self.start = np.array([scene.value(key) for key in keys])
-        self.lower, self.upper = (np.array(ends) for ends in zip(*map(_bounds, keys), strict=True))
+        bounds = [bounds_of(scene.field(key)) for key in keys]
+        self.lower = np.array([bound.low for bound in bounds], dtype=np.float64)
+        self.upper = np.array([bound.high for bound in bounds], dtype=np.float64)
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
         self.simulations = 0
         self.flat: dict[int, float] = {}
@@ -403,13 +397,6 @@ def _explained(comparisons: Sequence[Sequence[Comparison]]) -> float:
         pair = comparison.values[comparison.scored], comparison.simulated[comparison.scored]
         found.append(float(np.corrcoef(*pair)[0, 1]) ** 2 if np.ptp(pair[1]) > 0.0 else 0.0)
     return float(np.mean(found))
-
-
-def _bounds(key: str) -> tuple[float, float]:
-    name = _name(key)
-    if name in FRACTIONS:
-        return 0.0, 1.0
-    return (0.0, np.inf) if name in POSITIVE | NOT_NEGATIVE else (-np.inf, np.inf)
 
 
 def _have_settled(before: Sequence[Sequence[Comparison]], after: Sequence[Sequence[Comparison]]) -> bool:

@@ -26,9 +26,10 @@ from vibroimpact.orchestrator.importer.specification import ComponentSpec, Conne
 from vibroimpact.orchestrator.replay.covariance import drawn_noise, quiet_noise
 from vibroimpact.orchestrator.replay.drive import DriveSignal, drive_of, step_instants
 from vibroimpact.orchestrator.run import Session
-from vibroimpact.orchestrator.run.parameters import AMPLITUDE_KEYS
 from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.fields import field_of, numeric_keys, rule_of
+from vibroimpact.orchestrator.scene.models import AMPLITUDE
 from vibroimpact.orchestrator.scene.replay_models import Compared, Replay
 from vibroimpact.orchestrator.scene.rules.replay import plain_variable
 
@@ -268,7 +269,9 @@ def replay_table(scene: Scene) -> Replay:
 
 def is_linear(scene: Scene) -> bool:
     """Whether a multiple of a motion of this scene is one too: no stops, and nothing that follows the amplitude."""
-    return not scene.stops and not any(np.any(getattr(scene.body, key, 0.0)) for key in AMPLITUDE_KEYS)
+    model = type(scene.body)
+    following = [key for key in numeric_keys(model) if rule_of(field_of(model, key)).effect == AMPLITUDE]
+    return not scene.stops and not any(np.any(getattr(scene.body, key)) for key in following)
 
 
 def recording_of(scene: Scene, number: int) -> Path:

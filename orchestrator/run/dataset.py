@@ -17,9 +17,12 @@ from vibroimpact.analysis.dataset import (
     file_names,
     with_constants,
 )
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.units import si_unit
 from vibroimpact.orchestrator.run.empty_record import sample_variables
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.keys import coordinate_name, parse_key
+from vibroimpact.orchestrator.scene.fields import rule_of
+from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 
 EXTREMA = ("displacement_max", "displacement_min")
@@ -111,41 +114,32 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
         units = {**scene.general.start_units, **scene.general.units}
         stored = {file: units[key] for key, file in names.items() if key in units}
         return units | stored if scene.units == "SI" else stored
-    if scene.units != "SI":
-        return {}
-    swept = {file: unit for key, file in names.items() if (unit := _unit_of_key(scene, key))}
     forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
-    return forcing | swept
+    return forcing | {file: _cf_unit(scene, key) or "1" for key, file in names.items()}
 
 
-def _unit_of_key(scene: Scene, key: str) -> str | None:
-    """Return the unit of a swept key where it depends on its table; None where the name says it."""
+def _cf_unit(scene: Scene, key: str) -> str | None:
+    """Return the unit of a number of the short form as CF writes it; None where CF cannot write it."""
     if key == RECORDING_KEY:
         return "1"
-    if key == "forcing.amplitude" and scene.forcing is not None:
+    if key.startswith("forcing.amplitude") and scene.forcing is not None:
         return FORCING_UNITS[scene.forcing.kind]
-    parts = parse_key(key)
-    if parts is None or parts.place is None:
+    try:
+        return si_unit(_unit(scene, key).replace("^", "")).cf
+    except UsageError:  # UDUNITS has no broken exponents, and a wrong unit would be worse than none
         return None
-    law = scene.stops[parts.place].law
-    if law == "hunt_crossley" and parts.name == "damping":
-        return "s m-1"
-    # UDUNITS has no broken exponents, and a wrong unit would be worse than none
-    return "1" if parts.name == "stiffness" and law in ("hertz", "hunt_crossley") else None
+
+
+def _unit(scene: Scene, key: str) -> str:
+    return rule_of(scene.field(key)).unit
 
 
 def _long_names(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
     """Names of swept keys whose unit cannot be said otherwise."""
     if scene.general is not None or scene.units != "SI":
         return {}
-    exponents = {"hertz": "1.5", "hunt_crossley": "exponent"}
-    found = {}
-    for key, file in names.items():
-        parts = parse_key(key)
-        law = scene.stops[parts.place].law if parts is not None and parts.place is not None else ""
-        if parts is not None and parts.name == "stiffness" and law in exponents:
-            found[file] = f"{file.replace('_', ' ')} in N/m^{exponents[law]}"
-    return found
+    unsaid = {file: key for key, file in names.items() if _cf_unit(scene, key) is None}
+    return {file: f"{file.replace('_', ' ')} in {_unit(scene, key)}" for file, key in unsaid.items()}
 
 
 def _omitted(scene: Scene) -> tuple[str, ...]:

@@ -6,14 +6,16 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
+from pydantic import BaseModel
+
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.fields import fmu_variables_of
 from vibroimpact.orchestrator.scene.models import (
     BeamBody,
     ChainBody,
     Forcing,
     OscillatorBody,
     RestitutionStop,
-    Stop,
 )
 from vibroimpact.orchestrator.scene.places import (
     forcing_location,
@@ -29,23 +31,9 @@ if TYPE_CHECKING:
 FMU_NAMES = {"oscillator": "Oscillator", "chain": "Chain", "beam": "Beam"}
 LAW_NUMBERS = {"none": 0, "restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossley": 4}
 SIDE_NUMBERS = {"upper": 1, "lower": 2}
-#: Parameters of contact laws; each has some of them.
-_OF_A_LAW = (
-    "restitution",
-    "yield_velocity",
-    "stiffness",
-    "damping",
-    "exponent",
-    "relaxation_time",
-)
 BOUNDARY_NUMBERS = {"clamped-free": 1, "clamped-clamped": 2, "clamped-pinned": 3, "pinned-pinned": 4}
 FORCING_NUMBERS = {"force": 1, "uniform": 2, "mode": 3, "base_acceleration": 4}
 PROJECTION_NUMBERS = {"variational": 1, "collocation": 2}
-AMPLITUDE_KEYS = ("frequency_slope", "damping_slope", "damping_reciprocal")
-_GIVEN = (
-    *("width", "thickness", "youngs_modulus", "density"),
-    *("flexural_rigidity", "mass_per_length"),
-)
 
 
 def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str, float]:
@@ -62,14 +50,32 @@ def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str,
     """
     parameters = _own_floats(scene) | contact_floats(scene)
     if scene.forcing is not None:
-        parameters["forcing.angular_frequency"] = scene.forcing.angular_frequency
-        parameters["forcing.phase"] = scene.forcing.phase
-    if scene.execution.contact_tolerance is not None:
-        parameters["contact_tolerance"] = scene.execution.contact_tolerance
+        parameters |= named_numbers(scene.forcing)
+    parameters |= named_numbers(scene.execution)
     if start is not None:
         parameters |= _carried(scene, start)
         if scene.period is not None:
             parameters["forcing.phase"] = 0.0
+    return parameters
+
+
+def named_numbers(table: BaseModel, size: int = 0) -> dict[str, float]:
+    """Return the numbers of a table of a scene by the names that its fields say they have in the FMU, SI.
+
+    Parameters
+    ----------
+    table : BaseModel
+        What it leaves out, and has no default, is left out.
+    size : int
+        Elements of each array: masses or modes.
+    """
+    parameters: dict[str, float] = {}
+    for variable in fmu_variables_of(type(table)):
+        value = getattr(table, variable.key)
+        if value is None or (variable.is_told_if_given and variable.attribute not in table.model_fields_set):
+            continue
+        own = numbered(variable.name, each(value, size)) if variable.is_array else {variable.name: value}
+        parameters |= own
     return parameters
 
 
@@ -123,16 +129,10 @@ def contact_floats(scene: Scene) -> dict[str, float]:
     parameters: dict[str, float] = {}
     for k, stop in enumerate(scene.stops, start=1):
         port = f"contact[{k}]"
-        parameters[f"{port}.position"] = stop.position
-        parameters |= {f"{port}.{name}": value for name, value in _law_floats(stop).items()}
+        parameters |= {name.replace("contact[k]", port): value for name, value in named_numbers(stop).items()}
         if isinstance(scene.body, BeamBody):
             parameters[f"{port}.location"] = stop_location(stop)
     return parameters
-
-
-def _law_floats(stop: Stop) -> dict[str, float]:
-    """Return the numbers of the law of a stop."""
-    return {name: getattr(stop, name) for name in _OF_A_LAW if hasattr(stop, name)}
 
 
 def contact_integers(scene: Scene) -> dict[str, int]:
@@ -149,16 +149,7 @@ def contact_integers(scene: Scene) -> dict[str, int]:
 
 def oscillator_floats(body: OscillatorBody, scene: Scene) -> dict[str, float]:
     """Return the real parameters of the Oscillator, by variable name, SI."""
-    parameters = {
-        "mass": body.mass,
-        "damping": body.damping,
-        "stiffness": body.stiffness,
-        "displacement_start": body.displacement_start,
-        "velocity_start": body.velocity_start,
-    }
-    for key in ("frequency_slope", "damping_slope", "damping_reciprocal"):
-        if key in body.model_fields_set:
-            parameters[f"amplitude.{key}"] = getattr(body, key)
+    parameters = named_numbers(body)
     if scene.forcing is not None:
         # a base that accelerates is an inertial force on the relative coordinate
         scale = 1.0 if scene.forcing.kind == "force" else -body.mass
@@ -201,12 +192,7 @@ def each(values: float | tuple[float, ...], count: int) -> tuple[float, ...]:
 
 def chain_floats(body: ChainBody, scene: Scene) -> dict[str, float]:
     """Return the real parameters of the Chain, by variable name, SI."""
-    parameters = {"far_stiffness": body.far_stiffness, "far_damping": body.far_damping}
-    parameters |= numbered("mass", body.masses)
-    parameters |= numbered("stiffness", each(body.stiffnesses, body.size))
-    parameters |= numbered("damping", each(body.dampings, body.size))
-    parameters |= numbered("displacement_start", each(body.displacement_start, body.size))
-    parameters |= numbered("velocity_start", each(body.velocity_start, body.size))
+    parameters = named_numbers(body, body.size)
     if scene.forcing is not None:
         parameters |= numbered("forcing.amplitude", _amplitudes(body, scene.forcing))
     return parameters
@@ -227,19 +213,11 @@ def chain_integers(body: ChainBody, scene: Scene) -> dict[str, int]:
 
 def beam_floats(body: BeamBody, scene: Scene) -> dict[str, float]:
     """Return the real parameters of the Beam, by variable name, SI."""
-    parameters = {"length": body.length, "poisson_ratio": body.poisson_ratio}
-    parameters |= {name: getattr(body, name) for name in _GIVEN if getattr(body, name) is not None}
+    parameters = named_numbers(body, body.size)
     if body.frequency is not None:
         parameters["flexural_rigidity"] = rigidity_of_frequency(body)
-    parameters |= numbered("damping_ratio", each(body.damping_ratio, body.size))
-    for key in AMPLITUDE_KEYS:
-        if key in body.model_fields_set:  # an effect that the scene does not name is not even told to the FMU
-            parameters |= numbered(f"amplitude.{key}", each(getattr(body, key), body.size))
     if body.rayleigh is not None:
-        parameters["rayleigh.mass"] = body.rayleigh.mass
-        parameters["rayleigh.stiffness"] = body.rayleigh.stiffness
-    parameters |= numbered("modal_displacement_start", each(body.displacement_start, body.size))
-    parameters |= numbered("modal_velocity_start", each(body.velocity_start, body.size))
+        parameters |= named_numbers(body.rayleigh)
     parameters["sensor_location"] = observed_location(body, scene.stops, scene.sensor)
     parameters["forcing_location"] = forcing_location(body, scene.forcing)
     if scene.forcing is not None:

@@ -10,22 +10,20 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.scene.fields import field_name, numeric_keys
+from vibroimpact.orchestrator.scene.models import BODY_MODELS, STOP_MODELS, Forcing, Sensor
 
-SWEEPABLE: dict[str, tuple[str, ...]] = {
-    "body": (
-        *("mass", "stiffness", "damping", "damping_ratio", "displacement_start", "velocity_start"),
-        *("masses", "stiffnesses", "dampings", "far_stiffness", "far_damping"),
-        *("length", "width", "thickness", "youngs_modulus", "density"),
-        *("flexural_rigidity", "mass_per_length", "frequency"),
-        *("frequency_slope", "damping_slope", "damping_reciprocal"),
-    ),
-    "forcing": ("amplitude", "angular_frequency", "frequency", "phase", "location"),
-    "sensor": ("location", "gain", "offset"),
-    "stop": (
-        *("position", "restitution", "yield_velocity"),
-        *("stiffness", "damping", "exponent", "relaxation_time", "location"),
-    ),
+_MODELS: dict[str, tuple[type[BaseModel], ...]] = {
+    "body": tuple(BODY_MODELS.values()),
+    "forcing": (Forcing,),
+    "sensor": (Sensor,),
+    "stop": tuple(STOP_MODELS.values()),
 }
+SWEEPABLE: dict[str, tuple[str, ...]] = {
+    table: tuple(dict.fromkeys(key for model in models for key in numeric_keys(model)))
+    for table, models in _MODELS.items()
+}
+"""The numbers that a sweep may vary, by table."""
 START_STATE = ("body.displacement_start", "body.velocity_start")
 
 # The second of each pair has the last word in its model, so that giving the first must clear it.
@@ -80,12 +78,6 @@ def numeric_key(text: str) -> Key:
         expected = "a numeric key such as body.mass or stop[1].position"
         raise UsageError(f'scene key: expected {expected}, got "{text}".')
     return key
-
-
-@lru_cache(maxsize=64)
-def field_name(model: type[BaseModel], key: str) -> str:
-    """Return the attribute that stores a key of the scene file in its model."""
-    return next(name for name, field in model.model_fields.items() if key in (field.alias, name))
 
 
 def number_of(owner: object, key: Key) -> float | None:

@@ -1,8 +1,9 @@
 """The tables of a scene file as frozen pydantic models.
 
-Each field says three things in one place: its constraints, its `Rule` in words (for messages), and its
-default. Rules between fields or tables are in `rules`. Another kind of body or contact law becomes
-one more model here and one more entry in `BODY_MODELS` or `STOP_MODELS`.
+A field says everything about itself in one place: its constraints, its default, and its `Rule`, from which messages,
+keys of sweeps, units of datasets, parameters of FMUs and the tables of docs/scene.md come (`fields`). Rules between
+fields or tables are in `rules`. Another kind of body or contact law becomes one more model here and one more entry in
+`BODY_MODELS` or `STOP_MODELS`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from vibroimpact.orchestrator.importer.specification import Exchange
-from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, NUMBER_TAG, Rule
+from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, NUMBER_TAG
 from vibroimpact.orchestrator.scene.sweep import Path
 
 MOST_SAMPLES_PER_RUN = 10**8
@@ -28,7 +30,6 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[Finite, Field(gt=0)]
 NotNegative = Annotated[Finite, Field(ge=0)]
 Fraction = Annotated[Finite, Field(ge=0, le=1)]
-Switch = Annotated[bool, Rule("true or false")]
 ModeNumber = Annotated[int, Field(ge=1, le=MOST_MODES)]
 _Array = Field(strict=False, min_length=1, max_length=MOST_MODES)
 FiniteArray = Annotated[tuple[Finite, ...], _Array]
@@ -57,19 +58,41 @@ class SceneTable(BaseModel):
 class SceneHeader(SceneTable):
     """`[scene]`: what the scene is called and what its numbers mean."""
 
-    title: Annotated[str, Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$"), Rule("one line of text")] = (
-        ""
-    )
+    title: Annotated[
+        str,
+        Field(max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$"),
+        Rule("one line of text", doc="one line, at most 200 characters"),
+    ] = ""
     units: Annotated[
         Literal["SI", "nondimensional"],
-        Rule('"SI" or "nondimensional"', hint="A scene has one system of units for all of its numbers."),
+        Rule(hint="A scene has one system of units for all of its numbers."),
     ] = "SI"
 
 
+DAMPING = "damping"
+FALLING_RESTITUTION = "restitution that falls with speed"
+AMPLITUDE = "motion that depends on its amplitude"
+"""Effects that a number > 0 calls for."""
+
 _BODY_KINDS = Rule('"oscillator", "chain" or "beam"')
+_FEEDS = "Negative damping feeds energy into the body."
 
 
-_SLOPE_HINT = "It is of the amplitude of the motion; 0 is a mode that does not depend on it."
+def _of_amplitude(name: str, unit: str, doc: str, each: str = "") -> Rule:
+    """Return the rule of a number by which motion follows its amplitude; an FMU that is not told of it saves it."""
+    hint = "It is of the amplitude of the motion; 0 is a mode that does not depend on it."
+    variable = f"amplitude.{name}{each}"
+    return Rule(unit=unit, hint=hint, fmu=variable, told_if_given=True, effect=AMPLITUDE, doc=doc)
+
+
+_FREQUENCY_SLOPE = (
+    "frequency_slope",
+    "1/m",
+    "relative change of the natural frequency per metre of amplitude, see "
+    "[below](#motion-that-depends-on-its-amplitude)",
+)
+_DAMPING_SLOPE = ("damping_slope", "1/m", "change of the damping ratio per metre of amplitude")
+_DAMPING_RECIPROCAL = ("damping_reciprocal", "m", "damping ratio times amplitude that is added")
 
 
 class OscillatorBody(SceneTable):
@@ -79,19 +102,30 @@ class OscillatorBody(SceneTable):
     NAME: ClassVar[str] = "an oscillator"
 
     kind: Annotated[Literal["oscillator"], _BODY_KINDS] = "oscillator"
-    mass: Annotated[Positive, Rule("a number > 0", "kg")]
-    stiffness: Annotated[NotNegative, Rule("a number >= 0", "N/m", "Use 0 for a body without a spring.")]
-    damping_given: Annotated[
-        NotNegative, Rule("a number >= 0", "N s/m", "Negative damping feeds energy into the body.")
-    ] = Field(0.0, alias="damping")
+    mass: Annotated[Positive, Rule(unit="kg", fmu="mass")]
+    stiffness: Annotated[
+        NotNegative, Rule(unit="N/m", hint="Use 0 for a body without a spring.", fmu="stiffness")
+    ]
+    damping_given: Annotated[NotNegative, Rule(unit="N s/m", hint=_FEEDS, fmu="damping", effect=DAMPING)] = (
+        Field(0.0, alias="damping")
+    )
     damping_ratio: Annotated[
-        NotNegative | None, Rule("a number >= 0", hint="Negative damping feeds energy into the body.")
+        NotNegative | None,
+        Rule(
+            hint=_FEEDS,
+            effect=DAMPING,
+            doc="needs stiffness > 0; instead of `damping`: damping = 2 damping_ratio sqrt(stiffness mass) at every "
+            "point of a sweep",
+        ),
     ] = None
-    displacement_start: Annotated[Finite, Rule("a finite number", "m")] = 0.0
-    velocity_start: Annotated[Finite, Rule("a finite number", "m/s")] = 0.0
-    frequency_slope: Annotated[Finite, Rule("a finite number", "1/m", _SLOPE_HINT)] = 0.0
-    damping_slope: Annotated[Finite, Rule("a finite number", "1/m", _SLOPE_HINT)] = 0.0
-    damping_reciprocal: Annotated[NotNegative, Rule("a number >= 0", "m", _SLOPE_HINT)] = 0.0
+    displacement_start: Annotated[
+        Finite,
+        Rule(unit="m", fmu="displacement_start", doc="not beyond a rigid stop; exactly on a stop is allowed"),
+    ] = 0.0
+    velocity_start: Annotated[Finite, Rule(unit="m/s", fmu="velocity_start")] = 0.0
+    frequency_slope: Annotated[Finite, _of_amplitude(*_FREQUENCY_SLOPE)] = 0.0
+    damping_slope: Annotated[Finite, _of_amplitude(*_DAMPING_SLOPE)] = 0.0
+    damping_reciprocal: Annotated[NotNegative, _of_amplitude(*_DAMPING_RECIPROCAL)] = 0.0
 
     @property
     def damping(self) -> float:
@@ -101,7 +135,9 @@ class OscillatorBody(SceneTable):
         return 2.0 * self.damping_ratio * math.sqrt(self.stiffness * self.mass)
 
 
+_ARRAY_OR_ONE = "an array of numbers >= 0, or one number for all"
 _SPRING_HINT = "Element i lies between mass i - 1 (the ground for i = 1) and mass i."
+_FREE_END = "Use 0 for a free far end."
 
 
 class ChainBody(SceneTable):
@@ -114,28 +150,68 @@ class ChainBody(SceneTable):
     masses: Annotated[
         tuple[Positive, ...],
         _Array,
-        Rule(f"an array of 1 to {MOST_MODES} numbers > 0", "kg", "One for each mass.", item="a number > 0"),
+        Rule(
+            f"an array of 1 to {MOST_MODES} numbers > 0",
+            unit="kg",
+            hint="One for each mass.",
+            fmu="mass[i]",
+            doc=f"1 to {MOST_MODES} of them",
+        ),
     ]
     stiffnesses: Annotated[
         NotNegativeNumbers,
-        Rule("an array of numbers >= 0, or one number for all", "N/m", _SPRING_HINT, item="a number >= 0"),
+        Rule(
+            _ARRAY_OR_ONE,
+            unit="N/m",
+            hint=_SPRING_HINT,
+            fmu="stiffness[i]",
+            doc="one for each mass, or one for all",
+        ),
     ]
     dampings: Annotated[
         NotNegativeNumbers,
-        Rule("an array of numbers >= 0, or one number for all", "N s/m", _SPRING_HINT, item="a number >= 0"),
+        Rule(
+            _ARRAY_OR_ONE,
+            unit="N s/m",
+            hint=_SPRING_HINT,
+            fmu="damping[i]",
+            effect=DAMPING,
+            doc="one for each mass, or one for all",
+        ),
     ] = 0.0
-    far_stiffness: Annotated[NotNegative, Rule("a number >= 0", "N/m", "Use 0 for a free far end.")] = 0.0
-    far_damping: Annotated[NotNegative, Rule("a number >= 0", "N s/m", "Use 0 for a free far end.")] = 0.0
+    far_stiffness: Annotated[
+        NotNegative,
+        Rule(
+            unit="N/m",
+            hint=_FREE_END,
+            fmu="far_stiffness",
+            doc="a spring between the last mass and the ground behind it",
+        ),
+    ] = 0.0
+    far_damping: Annotated[
+        NotNegative,
+        Rule(unit="N s/m", hint=_FREE_END, fmu="far_damping", effect=DAMPING, doc="likewise a dashpot"),
+    ] = 0.0
     observed_mass: Annotated[
-        ModeNumber | None, Rule(f"a whole number from 1 to {MOST_MODES}", hint="Masses count from 1.")
+        ModeNumber | None,
+        Rule(
+            hint="Masses count from 1.",
+            doc="the mass whose displacement and velocity are recorded",
+            default="the mass of `stop[1]`; without a stop the last",
+        ),
     ] = None
     displacement_start: Annotated[
         StartArray,
-        Rule("an array of finite numbers", "m", "One for each mass.", item="a finite number"),
+        Rule(
+            unit="m",
+            hint="One for each mass.",
+            fmu="displacement_start[i]",
+            doc="one for each mass; not beyond a rigid stop",
+            default="0",
+        ),
     ] = ()
     velocity_start: Annotated[
-        StartArray,
-        Rule("an array of finite numbers", "m/s", "One for each mass.", item="a finite number"),
+        StartArray, Rule(unit="m/s", hint="One for each mass.", fmu="velocity_start[i]", default="0")
     ] = ()
 
     @property
@@ -147,8 +223,8 @@ class ChainBody(SceneTable):
 class Rayleigh(SceneTable):
     """`body.rayleigh`: damping ratios mass / (2 w) + stiffness w / 2 in addition to those given."""
 
-    mass: Annotated[NotNegative, Rule("a number >= 0", "1/s")] = 0.0
-    stiffness: Annotated[NotNegative, Rule("a number >= 0", "s")] = 0.0
+    mass: Annotated[NotNegative, Rule(unit="1/s", fmu="rayleigh.mass")] = 0.0
+    stiffness: Annotated[NotNegative, Rule(unit="s", fmu="rayleigh.stiffness")] = 0.0
 
 
 class BeamBody(SceneTable):
@@ -158,62 +234,90 @@ class BeamBody(SceneTable):
     NAME: ClassVar[str] = "a beam"
 
     kind: Annotated[Literal["beam"], _BODY_KINDS]
-    length: Annotated[Positive, Rule("a number > 0", "m")]
-    width: Annotated[Positive | None, Rule("a number > 0", "m")] = None
-    thickness: Annotated[Positive | None, Rule("a number > 0", "m", "It is measured along the motion.")] = (
-        None
-    )
-    youngs_modulus: Annotated[Positive | None, Rule("a number > 0", "Pa")] = None
-    density: Annotated[Positive | None, Rule("a number > 0", "kg/m^3")] = None
-    flexural_rigidity: Annotated[Positive | None, Rule("a number > 0", "N m^2")] = None
-    mass_per_length: Annotated[Positive | None, Rule("a number > 0", "kg/m")] = None
+    length: Annotated[Positive, Rule(unit="m", fmu="length")]
+    width: Annotated[Positive | None, Rule(unit="m", fmu="width", doc="with the three keys below")] = None
+    thickness: Annotated[
+        Positive | None,
+        Rule(unit="m", hint="It is measured along the motion.", fmu="thickness", doc="along the motion"),
+    ] = None
+    youngs_modulus: Annotated[Positive | None, Rule(unit="Pa", fmu="youngs_modulus")] = None
+    density: Annotated[Positive | None, Rule(unit="kg/m^3", fmu="density")] = None
+    flexural_rigidity: Annotated[
+        Positive | None,
+        Rule(
+            unit="N m^2",
+            fmu="flexural_rigidity",
+            doc="beside `mass_per_length`, in place of the four keys above",
+        ),
+    ] = None
+    mass_per_length: Annotated[Positive | None, Rule(unit="kg/m", fmu="mass_per_length")] = None
     frequency: Annotated[
         Positive | None,
-        Rule("a number > 0", "Hz", "It is the first natural frequency, beside mass_per_length."),
+        Rule(
+            unit="Hz",
+            hint="It is the first natural frequency, beside mass_per_length.",
+            doc="first natural frequency, beside `mass_per_length` and in place of `flexural_rigidity`",
+        ),
     ] = None
     boundary: Annotated[
-        Literal["clamped-free", "clamped-clamped", "clamped-pinned", "pinned-pinned"],
-        Rule('"clamped-free", "clamped-clamped", "clamped-pinned" or "pinned-pinned"'),
+        Literal["clamped-free", "clamped-clamped", "clamped-pinned", "pinned-pinned"], Rule()
     ] = "clamped-free"
-    modes: Annotated[ModeNumber, Rule(f"a whole number from 1 to {MOST_MODES}")] = 4
+    modes: Annotated[
+        ModeNumber, Rule(doc="a coefficient of restitution has a meaning only together with it")
+    ] = 4
     damping_ratio: Annotated[
         NotNegativeNumbers,
-        Rule(
-            "a number >= 0, or an array of them",
-            hint="One number for all modes, or one for each.",
-            item="a number >= 0",
-        ),
+        Rule(hint="One number for all modes, or one for each.", fmu="damping_ratio[i]", effect=DAMPING),
     ] = 0.0
-    frequency_slope: Annotated[
-        FiniteNumbers,
-        Rule("a finite number, or an array of them", "1/m", _SLOPE_HINT, item="a finite number"),
-    ] = 0.0
-    damping_slope: Annotated[
-        FiniteNumbers,
-        Rule("a finite number, or an array of them", "1/m", _SLOPE_HINT, item="a finite number"),
-    ] = 0.0
-    damping_reciprocal: Annotated[
-        NotNegativeNumbers, Rule("a number >= 0, or an array of them", "m", _SLOPE_HINT, item="a number >= 0")
-    ] = 0.0
+    frequency_slope: Annotated[FiniteNumbers, _of_amplitude(*_FREQUENCY_SLOPE, each="[i]")] = 0.0
+    damping_slope: Annotated[FiniteNumbers, _of_amplitude(*_DAMPING_SLOPE, each="[i]")] = 0.0
+    damping_reciprocal: Annotated[NotNegativeNumbers, _of_amplitude(*_DAMPING_RECIPROCAL, each="[i]")] = 0.0
     rayleigh: Annotated[
-        Rayleigh | None, Rule("a table such as { mass = 0.1, stiffness = 1e-5 }", hint="Both are optional.")
+        Rayleigh | None,
+        Rule(
+            "a table such as { mass = 0.1, stiffness = 1e-5 }",
+            hint="Both are optional.",
+            doc="`{ mass = .., stiffness = .. }`: adds mass / (2 w) + stiffness w / 2 to each damping ratio",
+        ),
     ] = None
     poisson_ratio: Annotated[
         Finite,
         Field(gt=-1, le=0.5),
-        Rule("-1 < nu <= 0.5", hint="It serves the warning of modes that are too short for this theory."),
+        Rule(
+            "-1 < nu <= 0.5",
+            hint="It serves the warning of modes that are too short for this theory.",
+            sweepable=False,
+            fmu="poisson_ratio",
+            doc="only for the warning of modes that leave the theory's validity",
+        ),
     ] = 0.3
     impact_projection: Annotated[
         Literal["variational", "collocation"],
-        Rule('"variational" or "collocation"', hint="Only variational impacts never create energy."),
+        Rule(
+            hint="Only variational impacts never create energy.",
+            doc='`"variational"`: impacts never create energy; `"collocation"`: the thesis\'s rule (7.60), which can',
+        ),
     ] = "variational"
     displacement_start: Annotated[
         StartArray,
-        Rule("an array of finite numbers", "m", "One for each mode.", item="a finite number"),
+        Rule(
+            unit="m",
+            hint="One for each mode.",
+            fmu="modal_displacement_start[i]",
+            doc="of the modes: the displacement at s is the sum of shape(s) times these; at most one for each mode. "
+            "The beam's FMU refuses a start beyond a rigid stop",
+            default="0",
+        ),
     ] = ()
     velocity_start: Annotated[
         StartArray,
-        Rule("an array of finite numbers", "m/s", "One for each mode.", item="a finite number"),
+        Rule(
+            unit="m/s",
+            hint="One for each mode.",
+            fmu="modal_velocity_start[i]",
+            doc="likewise",
+            default="0",
+        ),
     ] = ()
 
     @property
@@ -222,20 +326,40 @@ class BeamBody(SceneTable):
         return self.modes
 
 
-_LOCATION = Rule(
-    "a number from 0 to 1", hint="It is a fraction of the length: 0 is the clamped end, 1 the far end."
-)
+def _location(doc: str, default: str) -> Rule:
+    hint = "It is a fraction of the length: 0 is the clamped end, 1 the far end."
+    return Rule(hint=hint, doc=doc, default=default)
 
 
 class Sensor(SceneTable):
     """`[sensor]`: the observed point of a beam, and what a reading there is: gain * value + offset."""
 
-    location: Annotated[Fraction | None, _LOCATION] = None
+    location: Annotated[
+        Fraction | None,
+        _location(
+            "beams only; a point that moves",
+            "left out: the tip of a clamped-free beam, else the point of `stop[1]`, or the middle",
+        ),
+    ] = None
     gain: Annotated[
         Finite,
-        Rule("a finite number", hint="A reading is gain * value + offset, in the unit of its channel."),
+        Rule(
+            hint="A reading is gain * value + offset, in the unit of its channel.",
+            doc="replays only: reading per value, both in the unit of the channel; where these are of different "
+            "kinds, in its unit per SI unit",
+        ),
     ] = 1.0
-    offset: Annotated[Finite, Rule("a finite number", hint="It has the unit of the reading.")] = 0.0
+    offset: Annotated[
+        Finite,
+        Rule(
+            hint="It has the unit of the reading.",
+            doc="replays only, in the unit of the reading: left out, the level of the channel before its event is "
+            "taken off instead",
+        ),
+    ] = 0.0
+
+
+_CONSTANT = "Use 0 for a constant force."
 
 
 class Forcing(SceneTable):
@@ -243,25 +367,55 @@ class Forcing(SceneTable):
 
     kind: Annotated[
         Literal["force", "base_acceleration", "uniform", "mode"],
-        Rule('"force", "base_acceleration", "uniform" or "mode"'),
+        Rule(
+            doc='`"force"`; `"base_acceleration"`: the amplitude is the acceleration of the base, displacements are '
+            'relative to it; for beams also `"uniform"`: a force per length, and `"mode"`: a load in the shape of a '
+            "mode"
+        ),
     ] = "force"
     amplitude: Annotated[
         FiniteNumbers,
         Rule(
             "a finite number, or an array of them for a chain",
-            "N (m/s^2 for base_acceleration, N/m for uniform)",
-            item="a finite number",
+            unit="N (m/s^2 for base_acceleration, N/m for uniform)",
+            doc='of a chain under `"force"` one for each mass; a number is enough for a single mass',
         ),
     ]
-    location: Annotated[Fraction | None, _LOCATION] = None
-    mode: Annotated[ModeNumber | None, Rule(f"a whole number from 1 to {MOST_MODES}")] = None
     angular_frequency_given: Annotated[
-        NotNegative | None, Rule("a number >= 0", "rad/s", "Use 0 for a constant force.")
+        NotNegative | None,
+        Rule(
+            unit="rad/s",
+            hint=_CONSTANT,
+            fmu="forcing.angular_frequency",
+            doc="0 is a constant force, amplitude cos(phase), for example a weight",
+            default="this or `frequency`",
+        ),
     ] = Field(None, alias="angular_frequency")
-    frequency: Annotated[NotNegative | None, Rule("a number >= 0", "Hz", "Use 0 for a constant force.")] = (
-        None
-    )
-    phase: Annotated[Finite, Rule("a finite number", "rad")] = 0.0
+    frequency: Annotated[
+        NotNegative | None,
+        Rule(unit="Hz", hint=_CONSTANT, doc="SI scenes only", default="this or `angular_frequency`"),
+    ] = None
+    phase: Annotated[
+        Finite,
+        Rule(
+            unit="rad",
+            fmu="forcing.phase",
+            doc="of the force at time 0. The recording begins and ends where the forcing phase is 0, so with a phase "
+            "other than 0 it begins up to one period after time 0, also with `transient_periods = 0`: what happens "
+            "before is not in the data",
+        ),
+    ] = 0.0
+    location: Annotated[
+        Fraction | None,
+        _location('point of a beam that a `"force"` acts on; one that moves', "the free tip, or the middle"),
+    ] = None
+    mode: Annotated[
+        ModeNumber | None,
+        Rule(
+            doc="the mode whose shape the load has; no other mode is driven by it",
+            default='required for `"mode"`',
+        ),
+    ] = None
 
     @property
     def scalar_amplitude(self) -> float:
@@ -283,24 +437,46 @@ _LAWS = Rule('"restitution", "kelvin_voigt", "hertz" or "hunt_crossley"')
 class StopTable(SceneTable):
     """Base of `[[stop]]`: where a stop is."""
 
-    position: Annotated[Finite, Rule("a finite number", "m")]
+    position: Annotated[Finite, Rule(unit="m", fmu="contact[k].position")]
     side: Annotated[
         Literal["upper", "lower"],
-        Rule('"upper" or "lower"', hint="upper: displacement <= position; lower: displacement >= position."),
+        Rule(
+            hint="upper: displacement <= position; lower: displacement >= position.",
+            doc='`"upper"`: displacement <= position; `"lower"`: displacement >= position',
+        ),
     ] = "upper"
     mass: Annotated[
-        ModeNumber | None, Rule(f"a whole number from 1 to {MOST_MODES}", hint="Masses count from 1.")
+        ModeNumber | None,
+        Rule(hint="Masses count from 1.", doc="chains: the mass that the stop limits", default="the last"),
     ] = None
-    location: Annotated[Fraction | None, _LOCATION] = None
+    location: Annotated[
+        Fraction | None,
+        _location(
+            "beams: the point that the stop limits; one that moves",
+            "the tip; required where the far end is supported",
+        ),
+    ] = None
 
 
 class RestitutionStop(StopTable):
     """`[[stop]]`: a rigid stop; an impact multiplies the velocity by -restitution."""
 
     law: Annotated[Literal["restitution"], _LAWS] = "restitution"
-    restitution: Annotated[Fraction, Rule("0 <= r <= 1", hint="Use 1 for an elastic stop, 0 for a dead one.")]
+    restitution: Annotated[
+        Fraction,
+        Rule(
+            "0 <= r <= 1", hint="Use 1 for an elastic stop, 0 for a dead one.", fmu="contact[k].restitution"
+        ),
+    ]
     yield_velocity: Annotated[
-        NotNegative, Rule("a number >= 0", "m/s", "Use 0 for a restitution that does not depend on speed.")
+        NotNegative,
+        Rule(
+            unit="m/s",
+            hint="Use 0 for a restitution that does not depend on speed.",
+            fmu="contact[k].yield_velocity",
+            effect=FALLING_RESTITUTION,
+            doc="above it restitution falls as (velocity / yield_velocity)^(-1/4); 0: it is constant",
+        ),
     ] = 0.0
 
 
@@ -308,12 +484,16 @@ class KelvinVoigtStop(StopTable):
     """`[[stop]]`: a spring beside a dashpot; it never pulls."""
 
     law: Annotated[Literal["kelvin_voigt"], _LAWS]
-    stiffness: Annotated[Positive, Rule("a number > 0", "N/m")]
-    damping: Annotated[
-        NotNegative, Rule("a number >= 0", "N s/m", "Negative damping feeds energy into the body.")
-    ] = 0.0
+    stiffness: Annotated[Positive, Rule(unit="N/m", fmu="contact[k].stiffness")]
+    damping: Annotated[NotNegative, Rule(unit="N s/m", hint=_FEEDS, fmu="contact[k].damping")] = 0.0
     relaxation_time: Annotated[
-        NotNegative, Rule("a number >= 0", "s", "Use 0 for a surface that relaxes at once.")
+        NotNegative,
+        Rule(
+            unit="s",
+            hint="Use 0 for a surface that relaxes at once.",
+            fmu="contact[k].relaxation_time",
+            doc="time constant with which the surface comes back after separation; 0: at once; fused runs only",
+        ),
     ] = 0.0
 
 
@@ -321,24 +501,22 @@ class HertzStop(StopTable):
     """`[[stop]]`: an elastic ball, force = stiffness penetration^1.5."""
 
     law: Annotated[Literal["hertz"], _LAWS]
-    stiffness: Annotated[Positive, Rule("a number > 0", "N/m^1.5")]
+    stiffness: Annotated[Positive, Rule(unit="N/m^1.5", fmu="contact[k].stiffness")]
 
 
 class HuntCrossleyStop(StopTable):
     """`[[stop]]`: force = stiffness penetration^exponent (1 + damping rate); it never pulls."""
 
     law: Annotated[Literal["hunt_crossley"], _LAWS]
-    stiffness: Annotated[Positive, Rule("a number > 0", "N/m^exponent")]
-    damping: Annotated[
-        NotNegative, Rule("a number >= 0", "s/m", "Negative damping feeds energy into the body.")
-    ] = 0.0
-    exponent: Annotated[Finite, Field(ge=1, le=10), Rule("a number from 1 to 10")] = 1.5
+    stiffness: Annotated[Positive, Rule(unit="N/m^exponent", fmu="contact[k].stiffness")]
+    damping: Annotated[NotNegative, Rule(unit="s/m", hint=_FEEDS, fmu="contact[k].damping")] = 0.0
+    exponent: Annotated[Finite, Field(ge=1, le=10), Rule(fmu="contact[k].exponent")] = 1.5
 
 
 class TimeSeries(SceneTable):
     """`record.time_series`: variables sampled at a constant rate; `sampled_names` knows which there are."""
 
-    rate: Annotated[Positive, Rule("a number > 0", "samples per s")]
+    rate: Annotated[Positive, Rule(unit="samples per s", doc="at most 10^8 samples per run")]
     variables: Annotated[
         tuple[Annotated[str, Field(min_length=1, max_length=60)], ...],
         Field(strict=False, min_length=1),
@@ -346,8 +524,12 @@ class TimeSeries(SceneTable):
             "an array of variable names",
             item="a variable name",
             hint='For example ["displacement", "velocity", "contact_force"].',
+            doc="of the names below, each once",
         ),
     ] = ("displacement", "velocity")
+
+
+_NOT_RECORDED = "not recorded"
 
 
 class Record(SceneTable):
@@ -356,19 +538,31 @@ class Record(SceneTable):
     A forced scene counts periods and its times are 0; any other scene has times and its periods are 0.
     """
 
-    transient_periods: Annotated[
-        int, Field(ge=0, le=MOST_PERIODS), Rule(f"a whole number from 0 to {MOST_PERIODS}")
-    ] = 0
+    transient_periods: Annotated[int, Field(ge=0, le=MOST_PERIODS), Rule(doc=_NOT_RECORDED)] = 0
     recorded_periods: Annotated[
-        int, Field(ge=1, le=MOST_SAMPLES_PER_RUN), Rule(f"a whole number from 1 to {MOST_SAMPLES_PER_RUN}")
+        int, Field(ge=1, le=MOST_SAMPLES_PER_RUN), Rule(default="required when forced")
     ] = 0
-    transient_time: Annotated[NotNegative, Rule("a number >= 0", "s")] = 0.0
-    recorded_time: Annotated[Positive, Rule("a number > 0", "s")] = 0.0
-    impacts: Switch = True
-    extrema: Switch = True
-    strobe: Switch = True
+    transient_time: Annotated[NotNegative, Rule(unit="s", doc=_NOT_RECORDED)] = 0.0
+    recorded_time: Annotated[Positive, Rule(unit="s", default="required when unforced")] = 0.0
+    impacts: Annotated[bool, Rule(doc="times, phases, velocities and impulses of impacts; sticking")] = True
+    extrema: Annotated[
+        bool,
+        Rule(
+            doc="largest and smallest displacement of each period; an unforced scene has no periods and none of these"
+        ),
+    ] = True
+    strobe: Annotated[
+        bool,
+        Rule(
+            doc="displacement and velocity once per period, where the forcing phase is 0; none in an unforced scene"
+        ),
+    ] = True
     time_series: Annotated[
-        TimeSeries | None, Rule('a table such as { rate = 200, variables = ["displacement"] }')
+        TimeSeries | None,
+        Rule(
+            'a table such as { rate = 200, variables = ["displacement"] }',
+            doc='`{ rate = 200, variables = ["displacement", "velocity"] }`',
+        ),
     ] = None
 
 
@@ -379,39 +573,74 @@ class Execution(SceneTable):
     """
 
     how: Annotated[
-        Literal["auto", "coupled", "fused"], Rule('"auto", "coupled" or "fused"', unavailable=("batch",))
+        Literal["auto", "coupled", "fused"],
+        Rule(
+            unavailable=("batch",),
+            doc='`"auto"`; `"fused"`: the contact law runs inside the body; `"coupled"`: each component is an FMU of '
+            "its own and the importer finds the events between them",
+        ),
     ] = "auto"
     impact_limit: Annotated[
         int,
         Field(ge=1, le=MOST_IMPACTS_PER_POINT),
-        Rule(f"a whole number from 1 to {MOST_IMPACTS_PER_POINT}"),
+        Rule(
+            doc="impacts, touch-downs and rests per point, recorded or not, then its outcome is impact_limit"
+        ),
     ] = DEFAULT_IMPACT_LIMIT
-    deadline: Annotated[Positive | None, Rule("a number > 0", "s")] = None
-    macro_step: Annotated[Positive | None, Rule("a number > 0", "s")] = None
-    exchange: Annotated[Exchange, Rule('"jacobi", "gauss_seidel" or "iterated"')] = "gauss_seidel"
-    guard: Switch = False
+    deadline: Annotated[
+        Positive | None,
+        Rule(
+            unit="s",
+            doc="wall time per point, then its outcome is timeout; looked at every few hundredths of a second, within "
+            "a long step too",
+        ),
+    ] = None
+    macro_step: Annotated[
+        Positive | None,
+        Rule(unit="s", doc="time between two exchanges of values; coupled only", default="the whole run"),
+    ] = None
+    exchange: Annotated[
+        Exchange,
+        Rule(
+            doc='`"jacobi"`, `"gauss_seidel"`, `"iterated"`: whose values of the step each component sees; coupled only'
+        ),
+    ] = "gauss_seidel"
+    guard: Annotated[
+        bool,
+        Rule(
+            doc="points run in a child process, which may crash or hang; coupled only",
+            default="false; true as soon as a component is a file",
+        ),
+    ] = False
     contact_tolerance: Annotated[
         Annotated[Finite, Field(gt=0, le=1e-2)] | None,
-        Rule("0 < tolerance <= 0.01", hint="It is the relative error of hertz and hunt_crossley stops."),
+        Rule(
+            "0 < tolerance <= 0.01",
+            hint="It is the relative error of hertz and hunt_crossley stops.",
+            fmu="contact_tolerance",
+            doc="relative error of hertz and hunt_crossley stops, whose contacts are integrated; the other laws are "
+            "exact; not in general scenes",
+            default="1e-10",
+        ),
     ] = None
 
 
 class AxisTable(SceneTable):
     """One entry of `[sweep]` as written: a range or a list, and a path."""
 
-    start: Annotated[Finite | None, Rule("a finite number")] = None
-    stop: Annotated[Finite | None, Rule("a finite number")] = None
+    start: Annotated[Finite | None, Rule(doc="first value of a range")] = None
+    stop: Annotated[Finite | None, Rule(doc="last value of a range, included")] = None
     points: Annotated[
         int | None,
         Field(ge=1, le=MOST_POINTS_PER_AXIS),
-        Rule(f"a whole number from 1 to {MOST_POINTS_PER_AXIS}"),
+        Rule(doc="number of values of a range, evenly spaced; at least 2 unless start = stop"),
     ] = None
     values: Annotated[
         tuple[Finite, ...] | None,
         Field(strict=False, min_length=1),
-        Rule("an array of finite numbers", item="a finite number"),
+        Rule(doc="instead of a range; all different"),
     ] = None
-    path: Annotated[Path, Rule('"independent", "up", "down" or "up-down"')] = "independent"
+    path: Annotated[Path, Rule()] = "independent"
 
 
 Body = OscillatorBody | ChainBody | BeamBody

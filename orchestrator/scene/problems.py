@@ -13,12 +13,13 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
-from typing import Any, get_args
+from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from vibroimpact.fmus.safe_toml import TooDeepError
+from vibroimpact.orchestrator.scene.fields import Rule, choices_of, field_of, forms_of, known_keys, rule_of
 
 NUMBER_TAG, ARRAY_TAG = "number alone", "array of numbers"
 """Which form of a field "a number, or an array of them" was read; part of pydantic's location, not of the key."""
@@ -86,36 +87,6 @@ def _concerns(key: str, changed: Collection[str]) -> bool:
         return inner == outer or inner.startswith((f"{outer}.", f"{outer}["))
 
     return any(within(key, other) or within(other, key) for other in changed)
-
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """What a field of a scene model accepts, in words; stands beside its constraints in the model.
-
-    Attributes
-    ----------
-    expected : str
-        Completes "expected ...".
-    unit : str
-        The unit of the field in an SI scene; empty where it has none.
-    hint : str
-        What to do about a value outside the rule.
-    unavailable : tuple of str
-        Words of the scene format that this version does not run.
-    item : str
-        Completes "expected ..." for one item of an array.
-    """
-
-    expected: str
-    unit: str = ""
-    hint: str = ""
-    unavailable: tuple[str, ...] = ()
-    item: str = ""
-
-
-def rule_of(field: FieldInfo) -> Rule:
-    """Return the rule of a model field; each field of a scene model has one."""
-    return next(entry for entry in field.metadata if isinstance(entry, Rule))
 
 
 def quoted(value: object) -> str:
@@ -198,11 +169,6 @@ def unknown_key(path: Sequence[str | int], known: Iterable[str]) -> Problem:
     )
 
 
-def known_keys(model: type[BaseModel]) -> list[str]:
-    """Return the keys of a table as a scene file spells them."""
-    return [field.alias or name for name, field in model.model_fields.items()]
-
-
 def problems_of(
     error: ValidationError, model: type[BaseModel], table: tuple[str | int, ...]
 ) -> list[Problem]:
@@ -250,7 +216,7 @@ def _problem_of(entry: Any, model: type[BaseModel], table: tuple[str | int, ...]
     owner, name = _owner(model, entry["loc"])
     if entry["type"] == "extra_forbidden":
         return unknown_key(path, known_keys(owner))
-    field = _field(owner, name)
+    field = field_of(owner, name)
     if entry["type"] == "missing":
         hint = f"Add {key_path(path[-1:])} = ... to {_header(path[:-1])}."
         return Problem(key_path(path), rule_of(field).expected, "nothing", hint)
@@ -262,7 +228,7 @@ def _owner(model: type[BaseModel], location: Sequence[str | int]) -> tuple[type[
     name = str(location[0])
     if len(location) == 1 or isinstance(location[1], int):
         return model, name
-    inner = next(part for part in _parts(_field(model, name).annotation) if isinstance(part, type))
+    inner = forms_of(field_of(model, name).annotation)[0]
     return _owner(inner, location[1:])
 
 
@@ -286,7 +252,7 @@ def choice_problem(
 def _value_hint(rule: Rule, field: FieldInfo, value: object) -> str:
     if isinstance(value, str) and value in rule.unavailable:
         return f'"{value}" is not available in this version.'
-    choices = [choice for choice in _parts(field.annotation) if isinstance(choice, str)]
+    choices = [choice for choice in choices_of(field.annotation) if isinstance(choice, str)]
     if isinstance(value, str) and choices:
         near = _nearest_word(value, choices)
         return f'Did you mean "{near}"?' if near else rule.hint
@@ -294,18 +260,6 @@ def _value_hint(rule: Rule, field: FieldInfo, value: object) -> str:
         unit = f"; the unit of this key is {rule.unit} in an SI scene" if rule.unit else ""
         return f"Write the number alone, without quotes{unit}."
     return rule.hint
-
-
-def _parts(annotation: Any) -> list[Any]:
-    """Return the innermost parts of an annotation: "a" and "b" of tuple[Literal["a", "b"], ...]."""
-    found: list[Any] = []
-    for argument in get_args(annotation):
-        found += _parts(argument) if get_args(argument) else [argument]
-    return found
-
-
-def _field(model: type[BaseModel], key: str) -> FieldInfo:
-    return next(field for name, field in model.model_fields.items() if key in (field.alias, name))
 
 
 def _header(table: tuple[str | int, ...]) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import Field
 
+from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.models import Finite, NotNegative, Positive, SceneTable
-from vibroimpact.orchestrator.scene.problems import Rule
 
 MOST_RECORDINGS = 10_000
 RECORDING_KEY = "replay.recording"
@@ -35,14 +36,27 @@ class Replay(SceneTable):
     drive: Annotated[
         Literal["base_acceleration", "force"] | None,
         Rule(
-            '"base_acceleration" or "force"', hint="Leave it out to let the body move freely from its start."
+            hint="Leave it out to let the body move freely from its start.",
+            doc='`"base_acceleration"`, `"force"`; without it the body moves freely from its start state',
         ),
     ] = None
-    channel: Annotated[_Name | None, _CHANNEL] = Field(None, alias="from")
+    channel: Annotated[
+        _Name | None,
+        replace(
+            _CHANNEL,
+            doc="channel that drives, linear between its samples",
+            default="required beside `drive`",
+        ),
+    ] = Field(None, alias="from")
     recordings: Annotated[
         tuple[_Name, ...],
         Field(strict=False, max_length=MOST_RECORDINGS),
-        Rule('an array of recording files such as ["a0.nc", "a1.nc"]', item="the name of a recording"),
+        Rule(
+            'an array of recording files such as ["a0.nc", "a1.nc"]',
+            item="the name of a recording",
+            doc="recording files, from the folder of the scene; several make an axis of the sweep",
+            default="the command line's",
+        ),
     ] = ()
     compare: Annotated[
         tuple[Compared, ...],
@@ -50,36 +64,80 @@ class Replay(SceneTable):
         Rule(
             'an array such as [{ simulated = "beam.sensor.acceleration", measured = "board" }]',
             item="a table with simulated and measured",
+            doc="`simulated`: a variable as in a time series, `sensor.` before it for a reading of `[sensor]`, the "
+            "body's kind before that if you like; `measured`: a channel",
+            default="none",
         ),
     ] = ()
     drive_offset: Annotated[
         Finite | None,
         Rule(
-            "a finite number",
-            "unit of the channel",
-            "Without it the channel's level before and after its event is taken off.",
+            unit="unit of the channel",
+            hint="Without it the channel's level before and after its event is taken off.",
+            doc="taken off what drives",
+            default="the channel's level where it is quietest",
         ),
     ] = None
-    start: Annotated[Finite | None, Rule("a finite number", "s")] = None
-    stop: Annotated[Finite | None, Rule("a finite number", "s")] = None
-    most_lag: Annotated[Positive | None, Rule("a number > 0", "s")] = None
-    event_window: Annotated[Positive | None, Rule("a number > 0", "s")] = None
+    start: Annotated[
+        Finite | None,
+        Rule(
+            unit="s",
+            doc="where the simulation begins, on the clock of the channel that drives; without one, of the first that "
+            "is compared",
+            default="the first sample",
+        ),
+    ] = None
+    stop: Annotated[
+        Finite | None, Rule(unit="s", doc="where the simulation ends", default="the last sample")
+    ] = None
+    most_lag: Annotated[
+        Positive | None,
+        Rule(
+            unit="s",
+            doc="largest lag tried between channels of separate triggers",
+            default="half the shorter record",
+        ),
+    ] = None
+    event_window: Annotated[
+        Positive | None,
+        Rule(
+            unit="s",
+            doc="lag and polarity are found within so much of the start of the event",
+            default="from half a dominant period before to three after the onset",
+        ),
+    ] = None
     lag: Annotated[
         Finite | None,
-        Rule("a finite number", "s", "Without it the lag is estimated from the start of the event."),
+        Rule(
+            unit="s",
+            hint="Without it the lag is estimated from the start of the event.",
+            doc="given, it is not estimated",
+            default="found; 0 for channels of one trigger",
+        ),
     ] = None
-    polarity: Annotated[Literal[-1, 1] | None, Rule("1 or -1")] = None
+    polarity: Annotated[
+        Literal[-1, 1] | None,
+        Rule(
+            "1 or -1", doc="1 or -1; given, it is not found", default="found; 1 for channels of one trigger"
+        ),
+    ] = None
     peaks: Annotated[
         tuple[NotNegative, Positive] | None,
         Field(strict=False),
-        Rule("a span such as [0.003, 0.006]", "s from the start of the event"),
+        Rule(
+            "a span such as [0.003, 0.006]",
+            unit="s from the start of the event",
+            doc="`[start, stop]`: span in which successive extremes are compared",
+        ),
     ] = None
     windows: Annotated[
         tuple[Annotated[tuple[NotNegative, Positive], Field(strict=False)], ...],
         Field(strict=False, max_length=100),
         Rule(
             "an array of spans such as [[0.0, 0.03]]",
-            "s from the start of the event",
+            unit="s from the start of the event",
             item="a span [start, stop]",
+            doc="`[start, stop]`, ...: spans that are scored by themselves",
+            default="none",
         ),
     ] = ()

@@ -16,9 +16,11 @@ from typing import Any, Literal
 
 import tomli_w
 from pydantic import BaseModel, ConfigDict, Field, field_serializer
+from pydantic.fields import FieldInfo
 
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.scene.changes import changed_document, changed_values
+from vibroimpact.orchestrator.scene.fields import field_of, known_keys
 from vibroimpact.orchestrator.scene.file import parse_toml, read_text, refuse_no_mapping, text_of_tables
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.keys import (
@@ -136,6 +138,20 @@ class Scene(BaseModel):
             return self.general.value(key)
         parts = numeric_key(key)
         return self._number(key, parts, self._numbered_tables().get(_slot(parts)))
+
+    def field(self, key: str) -> FieldInfo:
+        """Return the field of the model that a numeric key of the short form names; `fields` reads it.
+
+        Raises
+        ------
+        UsageError
+            When the scene has no such key.
+        """
+        parts = numeric_key(key)
+        owner = self._numbered_tables().get(_slot(parts))
+        if owner is None or parts.name not in known_keys(type(owner)):
+            raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent one.")
+        return field_of(type(owner), parts.name)
 
     def _number(self, key: str, parts: Key, owner: BaseModel | None) -> float:
         number = number_of(owner, parts)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from vibroimpact.orchestrator.scene.models import ChainBody, OscillatorBody, RestitutionStop
+from vibroimpact.orchestrator.scene.fields import rule_of
+from vibroimpact.orchestrator.scene.models import (
+    AMPLITUDE,
+    DAMPING,
+    FALLING_RESTITUTION,
+    ChainBody,
+    OscillatorBody,
+    RestitutionStop,
+)
 from vibroimpact.orchestrator.scene.sampled_names import follow_energies
 from vibroimpact.orchestrator.scene.scene import Scene
-
-_DAMPING = ("damping", "dampings", "damping_ratio", "far_damping")
-_AMPLITUDE = ("frequency_slope", "damping_slope", "damping_reciprocal")
 
 
 def engine(scene: Scene) -> str:
@@ -58,15 +61,15 @@ def effects(scene: Scene) -> dict[str, bool]:
     if scene.general is not None:
         found = {"connections": bool(scene.general.connections), "watched events": bool(scene.general.events)}
         return found | common
-    numbers, series = _largest(scene), scene.record.time_series
+    called, series = _called_by_numbers(scene), scene.record.time_series
     followed = not isinstance(scene.body, OscillatorBody) and series is not None
     return {
         "forcing": scene.forcing is not None,
         "recorded drive": scene.replay is not None and scene.replay.drive is not None,
-        "damping": _acts(numbers, "body", _DAMPING) or getattr(scene.body, "rayleigh", None) is not None,
+        DAMPING: DAMPING in called or getattr(scene.body, "rayleigh", None) is not None,
         "stops": bool(scene.stops),
-        "restitution that falls with speed": _acts(numbers, "stop", ("yield_velocity",)),
-        "motion that depends on its amplitude": _acts(numbers, "body", _AMPLITUDE),
+        FALLING_RESTITUTION: FALLING_RESTITUTION in called,
+        AMPLITUDE: AMPLITUDE in called,
         "energies": followed and series is not None and follow_energies(series.variables),
         **common,
     }
@@ -84,12 +87,9 @@ def _largest(scene: Scene) -> dict[str, float]:
     return {key: abs(number) for key, number in scene.constants().items()} | swept
 
 
-def _acts(numbers: Mapping[str, float], table: str, words: tuple[str, ...]) -> bool:
-    return any(
-        number > 0.0
-        for key, number in numbers.items()
-        if key.startswith(table) and key.rpartition(".")[2].partition("[")[0] in words
-    )
+def _called_by_numbers(scene: Scene) -> set[str]:
+    """Return the effects that numbers other than 0 call for."""
+    return {rule_of(scene.field(key)).effect for key, largest in _largest(scene).items() if largest > 0.0}
 
 
 def in_one_line(scene: Scene) -> str:

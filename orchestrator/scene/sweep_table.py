@@ -6,21 +6,20 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Annotated, Any, get_origin
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from vibroimpact.orchestrator.scene.keys import SWEEPABLE, field_name, parse_key
+from vibroimpact.orchestrator.scene.fields import field_of, is_array_only, known_keys, rule_of
+from vibroimpact.orchestrator.scene.keys import SWEEPABLE, parse_key
 from vibroimpact.orchestrator.scene.models import BODY_MODELS, STOP_MODELS, AxisTable, Forcing, Sensor
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     key_path,
-    known_keys,
     nearest,
     problems_of,
     quoted,
-    rule_of,
     value_problem,
 )
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
@@ -95,7 +94,7 @@ def _keys_in(name: str, table: Any) -> Iterator[str]:
         written = table.get(word) if isinstance(table, dict) else None
         if isinstance(written, list):
             yield from (f"{name}.{word}[{number}]" for number in range(1, len(written) + 1))
-        elif model is None or not _is_array(model, word):
+        elif model is None or not is_array_only(field_of(model, word)):
             yield f"{name}.{word}"
 
 
@@ -107,11 +106,6 @@ def _model_of(name: str, table: Any) -> type[BaseModel] | None:
     if name.startswith("stop"):
         return STOP_MODELS.get(str(written.get("law", "restitution")))
     return Forcing if name == "forcing" else Sensor
-
-
-def _is_array(model: type[BaseModel], word: str) -> bool:
-    """Whether a key takes an array and nothing else."""
-    return get_origin(model.model_fields[field_name(model, word)].annotation) is tuple
 
 
 def _stop_count(document: Mapping[str, Any]) -> int:
@@ -151,7 +145,7 @@ def _element_hint(text: str, document: Mapping[str, Any], known: list[str]) -> s
     elements = [key for key in known if key.startswith(f"{where}.{word}[")]
     if elements:
         return f'It is an array of {len(elements)}: sweep an element of it, such as "{elements[0]}".'
-    if "[" in name or _is_array(model, word):
+    if "[" in name or is_array_only(field_of(model, word)):
         return f"Write {word} as an array first, then its elements can be swept."
     return ""
 
@@ -229,7 +223,7 @@ def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Proble
     model = next(_model_of(name, table) for name, table in _tables(document) if name == where)
     if model is None:
         return []
-    field = model.model_fields[field_name(model, key.name)]
+    field = field_of(model, key.name)
     annotated: Any = Annotated
     rule = TypeAdapter(annotated[(field.annotation, *field.metadata)])
     for value in (min(axis.values), max(axis.values)):

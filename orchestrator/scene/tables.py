@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.scene.draft import Draft
+from vibroimpact.orchestrator.scene.fields import known_keys
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.keys import parse_key
 from vibroimpact.orchestrator.scene.models import (
@@ -25,7 +26,6 @@ from vibroimpact.orchestrator.scene.problems import (
     Problem,
     choice_problem,
     key_path,
-    known_keys,
     quoted,
     unknown_key,
 )

@@ -14,6 +14,7 @@ from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import parse_scene
+from vibroimpact.orchestrator.scene.fields import known_keys
 from vibroimpact.orchestrator.scene.models import (
     Execution,
     Forcing,
@@ -22,7 +23,6 @@ from vibroimpact.orchestrator.scene.models import (
     RestitutionStop,
     SceneHeader,
 )
-from vibroimpact.orchestrator.scene.problems import known_keys
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 MODELS: dict[str, type[BaseModel]] = {

@@ -66,6 +66,19 @@ def failed(message: str) -> RunRecord:
     )
 
 
+#: Units of swept parameters of these examples; a scene's fields say them otherwise.
+UNITS = {
+    "angular_frequency": "rad s-1",
+    "body_mass": "kg",
+    "damping_ratio_2": "1",
+    "frequency": "Hz",
+    "mass": "kg",
+    "position": "m",
+    "restitution": "1",
+    "stop_position": "m",
+}
+
+
 def dataset_of(runs: list[RunRecord], **changes: Any) -> xr.Dataset:
     """Return a dataset of runs, by default an independent sweep of the angular frequency 0, 1, 2, ..."""
     arguments: dict[str, Any] = {
@@ -76,6 +89,7 @@ def dataset_of(runs: list[RunRecord], **changes: Any) -> xr.Dataset:
         "units": "SI",
         "attrs": {"title": "example"},
     }
+    arguments["unit_of"] = UNITS | changes.pop("unit_of", {})
     return build_dataset(runs, **(arguments | changes))
 
 
@@ -149,4 +163,4 @@ def everything(**changes: Any) -> xr.Dataset:
         compared=COMPARED,
         **changes,
     )
-    return with_constants(dataset, {"restitution": 0.7, "stop_1_position": 1e-3})
+    return with_constants(dataset, {"restitution": 0.7, "stop_position": 1e-3}, unit_of=UNITS)

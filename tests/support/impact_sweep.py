@@ -134,5 +134,6 @@ def up_down_sweep(points: int, transient: int, recorded: int) -> xr.Dataset:
         direction=[Direction.up] * points + [Direction.down] * points,
         run_index=np.arange(2 * points),
         units="nondimensional",
+        unit_of={"angular_frequency": "rad s-1"},
         attrs={"scene": SCENE},
     )

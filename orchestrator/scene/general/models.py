@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from vibroimpact.orchestrator.importer.specification import Direction
-from vibroimpact.orchestrator.scene.models import Finite, NotNegative, Positive, SceneTable, Switch
-from vibroimpact.orchestrator.scene.problems import Rule
+from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.models import Finite, NotNegative, Positive, SceneTable
 
 _Text = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$")]
 _VARIABLE_RULE = Rule(
@@ -24,49 +25,92 @@ class ComponentTable(SceneTable):
 
     fmu: Annotated[
         _Text,
-        Rule("a path of an FMU file, or the name of a shipped component", hint='For example "ball.fmu".'),
+        Rule(
+            "a path of an FMU file, or the name of a shipped component",
+            hint='For example "ball.fmu".',
+            doc="a file name that ends in `.fmu`, from the folder of the scene file; or a shipped component: "
+            '`"Oscillator"`, `"Chain"`, `"Beam"`, `"ImpactStop"`',
+        ),
     ]
-    fmi: Annotated[Literal["3.0", "2.0"] | None, Rule('"3.0" or "2.0", in quotes')] = None
+    fmi: Annotated[
+        Literal["3.0", "2.0"] | None,
+        Rule(
+            '"3.0" or "2.0", in quotes',
+            doc='`"3.0"`, `"2.0"`; only of a shipped component',
+            default='`"3.0"`',
+        ),
+    ] = None
     parameters: Annotated[
-        dict[str, object], Rule('a table such as { "mass" = 1.0, "contact[1].law" = "external" }')
+        dict[str, object],
+        Rule(
+            'a table such as { "mass" = 1.0, "contact[1].law" = "external" }',
+            doc="start values by variable name, names with dots or brackets in quotes",
+            default="empty",
+        ),
     ] = Field(default_factory=dict)
 
 
 class ConnectionTable(SceneTable):
     """`[[connection]]`: an input that is gain times an output, at every exchange."""
 
-    source: Annotated[_Text, _VARIABLE_RULE] = Field(alias="from")
-    target: Annotated[_Text, _VARIABLE_RULE] = Field(alias="to")
-    gain: Annotated[Finite, Rule("a finite number")] = 1.0
+    source: Annotated[_Text, replace(_VARIABLE_RULE, doc="an output, a local variable or a parameter")] = (
+        Field(alias="from")
+    )
+    target: Annotated[
+        _Text, replace(_VARIABLE_RULE, doc="an input; each is fed by one connection at most")
+    ] = Field(alias="to")
+    gain: Annotated[Finite, Rule(doc="the input is gain times the output; between real numbers only")] = 1.0
     gain_unit: Annotated[
-        _Text | None, Rule('a unit such as "N/m", "N.s/m" or "1"', hint='Use "1" for a plain number.')
+        _Text | None,
+        Rule(
+            'a unit such as "N/m", "N.s/m" or "1"',
+            hint='Use "1" for a plain number.',
+            doc='the unit of the gain, a product of SI units: `"N/m"`, `"N.s/m"`, `"kg.m2/s2"`, `"1"`',
+        ),
     ] = None
 
 
 class EventTable(SceneTable):
     """`[[event]]`: a crossing to be found in a component that does not report events itself."""
 
-    watch: Annotated[_Text, _VARIABLE_RULE]
+    watch: Annotated[
+        _Text,
+        replace(
+            _VARIABLE_RULE,
+            doc="a continuous real variable of an FMU that can restore its state (`canGetAndSetFMUState`)",
+        ),
+    ]
     direction: Annotated[
         Direction,
-        Rule('"falling", "rising" or "either"', hint="It says how the variable crosses the level."),
+        Rule(
+            hint="It says how the variable crosses the level.",
+            doc='`"falling"`, `"rising"`, `"either"`',
+        ),
     ]
-    level: Annotated[Finite, Rule("a finite number")] = 0.0
+    level: Annotated[Finite, Rule(doc="in the unit of the variable")] = 0.0
 
 
 class GeneralRecord(SceneTable):
     """`[record]` of a general scene: how long to wait, how long to record, and what."""
 
-    transient_time: Annotated[NotNegative, Rule("a number >= 0", "s")] = 0.0
-    recorded_time: Annotated[Positive, Rule("a number > 0", "s")]
+    transient_time: Annotated[NotNegative, Rule(unit="s", doc="not recorded")] = 0.0
+    recorded_time: Annotated[Positive, Rule(unit="s")]
     variables: Annotated[
         tuple[Reference, ...],
         Field(strict=False),
-        Rule(
-            'an array such as ["ball.h", "ball.v"]',
-            item="a variable COMPONENT.VARIABLE in quotes",
-            hint='For example "ball.h"; the component ends at the first dot.',
+        replace(
+            _VARIABLE_RULE,
+            expected='an array such as ["ball.h", "ball.v"]',
+            doc="numbers, and true or false, of any component; each once",
+            default="empty",
         ),
     ] = ()
-    rate: Annotated[Positive | None, Rule("a number > 0", "samples per s")] = None
-    events: Switch = True
+    rate: Annotated[
+        Positive | None,
+        Rule(
+            unit="samples per s",
+            doc="at most 10^8 samples per run",
+            default="required beside `variables`",
+        ),
+    ] = None
+    events: Annotated[bool, Rule(doc="the events that were located")] = True

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from difflib import get_close_matches
 
 from vibroimpact.orchestrator.scene.draft import Draft
-from vibroimpact.orchestrator.scene.models import BeamBody, Body, ChainBody, Forcing
+from vibroimpact.orchestrator.scene.fields import field_of, fmu_variables_of, is_array_only
+from vibroimpact.orchestrator.scene.models import BeamBody, Body, ChainBody, Forcing, OscillatorBody
 from vibroimpact.orchestrator.scene.places import moves
 from vibroimpact.orchestrator.scene.problems import Problem, nearest, quoted
 from vibroimpact.orchestrator.scene.sampled_names import sampled_names
 
-AMPLITUDE_KEYS = ("frequency_slope", "damping_slope", "damping_reciprocal")
 SECTION_KEYS = ("width", "thickness", "youngs_modulus", "density")
 RIGIDITY_KEYS = ("flexural_rigidity", "mass_per_length")
 FREQUENCY_KEYS = ("frequency", "mass_per_length")
@@ -21,17 +21,19 @@ FREQUENCY_KEYS = ("frequency", "mass_per_length")
 def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
     """Elements and start states of a chain count as its masses do, those of a beam as its modes."""
     body = draft.body
-    if isinstance(body, ChainBody):
-        for key in ("stiffnesses", "dampings", "displacement_start", "velocity_start"):
-            yield from _size_problem(f"body.{key}", getattr(body, key), body.size, "mass")
-    if isinstance(body, BeamBody):
-        for key in ("damping_ratio", *AMPLITUDE_KEYS):
-            yield from _size_problem(f"body.{key}", getattr(body, key), body.size, "mode")
-        for key in ("displacement_start", "velocity_start"):
-            given = len(getattr(body, key))
-            if given > body.size:
-                expected = f"at most {body.size} numbers, one for each mode"
-                yield Problem(f"body.{key}", expected, f"an array of {given}", "Those left out are 0.")
+    if body is None or isinstance(body, OscillatorBody):
+        return
+    for variable in fmu_variables_of(type(body)):
+        if not variable.is_array:
+            continue
+        where, value = f"body.{variable.key}", getattr(body, variable.attribute)
+        if isinstance(body, ChainBody):
+            yield from _size_problem(where, value, body.size, "mass")
+        elif not is_array_only(field_of(BeamBody, variable.key)):
+            yield from _size_problem(where, value, body.size, "mode")
+        elif len(value) > body.size:
+            expected = f"at most {body.size} numbers, one for each mode"
+            yield Problem(where, expected, f"an array of {len(value)}", "Those left out are 0.")
 
 
 def _size_problem(key: str, value: object, size: int, of: str) -> Iterator[Problem]:

@@ -199,7 +199,8 @@ def test_a_campaign_that_goes_on_along_what_it_had_not_swept_has_it_as_an_axis(
 def test_files_of_two_scenes_are_not_merged(tmp_path: Path) -> None:
     for place, restitution in enumerate((0.7, 0.8)):
         dataset = dataset_of([record(1.0)], run_index=[place])
-        write_dataset(with_constants(dataset, {"restitution": restitution}), tmp_path / f"{place}.nc")
+        constant = with_constants(dataset, {"restitution": restitution}, unit_of={"restitution": "1"})
+        write_dataset(constant, tmp_path / f"{place}.nc")
     with pytest.raises(DatasetError, match=r"restitution: expected those of .* \(0.7\), got 0.8"):
         merge_datasets([tmp_path / "0.nc", tmp_path / "1.nc"])
 

@@ -230,6 +230,7 @@ def test_a_map_has_the_first_key_of_the_scene_across_and_a_phase_plane_its_displ
     dataset = dataset_of(
         [record(float(k), impacts=1) for k in range(4)],
         coordinates={name: np.array(values) for name, values in grid.items()},
+        unit_of={"displacement_start": "m", "velocity_start": "m s-1"},
         attrs={"scene": scene},
     )
     figure = figures.draw(opened(dataset, tmp_path))

@@ -28,6 +28,7 @@ def written(tmp_path: Path) -> Path:
         direction=directions,
         run_index=[0, 1],
         sample_variables=names,
+        unit_of={"stop_position": "m"},
     )
     write_dataset(dataset, path)
     return path

@@ -41,6 +41,7 @@ def lines_of(folder: Path, runs: list[RunRecord]) -> list[str]:
         direction=directions,
         run_index=np.arange(len(runs)),
         sample_variables=names,
+        unit_of={"stop_position": "m"},
     )
     write_dataset(dataset, folder / "runs.nc")
     with open_dataset(folder / "runs.nc") as opened:

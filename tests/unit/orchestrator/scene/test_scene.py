@@ -8,31 +8,10 @@ import time
 from pathlib import Path
 
 import pytest
-from pydantic import BaseModel
 from support.places import ROOT
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
-from vibroimpact.orchestrator.scene.general.models import (
-    ComponentTable,
-    ConnectionTable,
-    EventTable,
-    GeneralRecord,
-)
-from vibroimpact.orchestrator.scene.models import (
-    BODY_MODELS,
-    STOP_MODELS,
-    AxisTable,
-    Execution,
-    Forcing,
-    Rayleigh,
-    Record,
-    SceneHeader,
-    Sensor,
-    TimeSeries,
-)
-from vibroimpact.orchestrator.scene.problems import known_keys
-from vibroimpact.orchestrator.scene.replay_models import Replay
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 MADE_BY_THE_USER = {"bouncing_ball", "user_contact_law"}  # need an FMU that is not shipped
@@ -230,26 +209,3 @@ def test_coordinates_are_named_by_the_last_part_of_their_key_unless_two_clash() 
     scene = scene_of(text)
     names = [scene.sweep_coordinate_name(axis.key) for axis in scene.sweep]
     assert names == ["stop_1_position", "stop_2_position", "mass"]
-
-
-def test_the_reference_describes_every_key_of_every_table() -> None:
-    reference = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
-    models: list[type[BaseModel]] = [
-        SceneHeader,
-        *BODY_MODELS.values(),
-        Forcing,
-        Sensor,
-        *STOP_MODELS.values(),
-        Replay,
-        Record,
-        Execution,
-        AxisTable,
-        ComponentTable,
-        ConnectionTable,
-        EventTable,
-        GeneralRecord,
-    ]
-    keys = [key for model in models for key in known_keys(model)]
-    keys += [f"time_series.{key}" for key in known_keys(TimeSeries)]
-    keys += [f"rayleigh.{key}" for key in known_keys(Rayleigh)]
-    assert [key for key in keys if f"| `{key}` |" not in reference] == []

@@ -1,0 +1,207 @@
+"""What a field of a scene says of itself: what it accepts, its unit, its FMU variable, its line in docs/scene.md.
+
+A field is an annotation with constraints and a `Rule`. Messages, the keys that a sweep may vary, units in datasets,
+parameters of FMUs, bounds of a fit and the tables of docs/scene.md are read off it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """What a field of a scene model says beside its constraints.
+
+    Attributes
+    ----------
+    expected : str
+        Completes "expected ..."; without it the constraints say it: "a number > 0".
+    unit : str
+        The unit of the field in an SI scene; empty where it has none.
+    hint : str
+        What to do about a value outside the rule.
+    unavailable : tuple of str
+        Words of the scene format that this version does not run.
+    item : str
+        Completes "expected ..." for one item of an array; without it the constraints say it.
+    sweepable : bool
+        Whether a sweep may vary it, if it is a number of a table with swept keys.
+    fmu : str
+        Real variable of the body's FMU that it is: `mass`; `mass[i]` with one element for each mass or mode;
+        `contact[k].stiffness` at the port of its stop. Empty where it is none as it stands.
+    told_if_given : bool
+        Whether the FMU is told of it only where the scene gives it.
+    effect : str
+        What a scene with a value > 0 calls for, in the words of `vibroimpact check`.
+    doc : str
+        What docs/scene.md says of it after its bounds; without it the hint.
+    default : str
+        What docs/scene.md says of its default, where the value alone does not tell.
+    """
+
+    expected: str = ""
+    unit: str = ""
+    hint: str = ""
+    unavailable: tuple[str, ...] = ()
+    item: str = ""
+    sweepable: bool = True
+    fmu: str = ""
+    told_if_given: bool = False
+    effect: str = ""
+    doc: str = ""
+    default: str = ""
+
+
+class Bounds(NamedTuple):
+    """Lowest and highest number of a field, and whether the lowest itself is left out."""
+
+    low: float = -math.inf
+    high: float = math.inf
+    is_open: bool = False
+
+
+def rule_of(field: FieldInfo) -> Rule:
+    """Return the rule of a model field, complete; each field of a scene model has one."""
+    rule = _written_rule(field)
+    item = rule.item or (_number(bounds_of(field)) if _array_of(field) is float else "")
+    return replace(rule, expected=rule.expected or _expected(field), item=item)
+
+
+def _written_rule(field: FieldInfo) -> Rule:
+    return next(entry for entry in field.metadata if isinstance(entry, Rule))
+
+
+def bounds_of(field: FieldInfo) -> Bounds:
+    """Return between which numbers a field, or each item of it, lies."""
+    low, high, is_open = Bounds()
+    for mark in (*field.metadata, *_marks(field.annotation)):
+        low = getattr(mark, "gt", getattr(mark, "ge", low))
+        high = getattr(mark, "le", high)
+        is_open = is_open or hasattr(mark, "gt")
+    return Bounds(low, high, is_open)
+
+
+def _marks(annotation: Any) -> Iterator[Any]:
+    """Yield the constraints within an annotation."""
+    for entry in getattr(annotation, "__metadata__", ()):
+        yield from entry.metadata if isinstance(entry, FieldInfo) else (entry,)
+    for part in get_args(annotation):
+        yield from _marks(part)
+
+
+def forms_of(annotation: Any) -> list[Any]:
+    """Return what a value may be, without constraints and None.
+
+    Examples
+    --------
+    >>> forms_of(Annotated[float, "> 0"] | tuple[float, ...] | None)
+    [<class 'float'>, tuple[float, ...]]
+    """
+    if get_origin(annotation) is Annotated:
+        return forms_of(annotation.__origin__)
+    if get_origin(annotation) in (Union, UnionType):
+        return [form for part in get_args(annotation) for form in forms_of(part)]
+    return [] if annotation is NoneType else [annotation]
+
+
+def choices_of(annotation: Any) -> list[Any]:
+    """Return the values between which a field, or an item of it, is a choice; none of any other."""
+    if get_origin(annotation) is Literal:
+        return list(get_args(annotation))
+    return [choice for part in get_args(annotation) for choice in choices_of(part)]
+
+
+def _array_of(field: FieldInfo) -> Any:
+    """Return the type of the items of an array; None where a field takes none."""
+    arrays = [form for form in forms_of(field.annotation) if get_origin(form) is tuple]
+    return forms_of(get_args(arrays[0])[0])[0] if arrays else None
+
+
+def is_array_only(field: FieldInfo) -> bool:
+    """Whether a field takes an array and nothing else."""
+    return all(get_origin(form) is tuple for form in forms_of(field.annotation))
+
+
+def _expected(field: FieldInfo) -> str:
+    """Return what the constraints of a field say."""
+    forms, choices, bounds = forms_of(field.annotation), choices_of(field.annotation), bounds_of(field)
+    if choices:
+        return _either([f'"{choice}"' for choice in choices])
+    if forms == [bool]:
+        return "true or false"
+    if forms == [int]:
+        return f"a whole number from {bounds.low} to {bounds.high}"
+    if is_array_only(field):
+        return f"an array of {_number(bounds, 'numbers').removeprefix('a ')}"
+    return _number(bounds) if forms == [float] else f"{_number(bounds)}, or an array of them"
+
+
+def _number(bounds: Bounds, noun: str = "number") -> str:
+    if bounds.low == -math.inf:
+        return f"a finite {noun}"
+    if bounds.high < math.inf:
+        return f"a {noun} from {bounds.low:g} to {bounds.high:g}"
+    return f"a {noun} {'>' if bounds.is_open else '>='} {bounds.low:g}"
+
+
+def _either(words: Sequence[str]) -> str:
+    return " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
+
+
+@lru_cache(maxsize=256)
+def field_name(model: type[BaseModel], key: str) -> str:
+    """Return the attribute that stores a key of the scene file in its model."""
+    return next(name for name, field in model.model_fields.items() if key in (field.alias, name))
+
+
+def field_of(model: type[BaseModel], key: str) -> FieldInfo:
+    """Return the field of a key of the scene file."""
+    return model.model_fields[field_name(model, key)]
+
+
+def known_keys(model: type[BaseModel]) -> list[str]:
+    """Return the keys of a table as a scene file spells them."""
+    return [field.alias or name for name, field in model.model_fields.items()]
+
+
+def numeric_keys(model: type[BaseModel]) -> Iterator[str]:
+    """Yield the keys of a table whose numbers, or elements of numbers, a sweep may vary."""
+    for name, field in model.model_fields.items():
+        is_number = float in forms_of(field.annotation) or _array_of(field) is float
+        if is_number and _written_rule(field).sweepable:
+            yield field.alias or name
+
+
+class FmuVariable(NamedTuple):
+    """The real variable of an FMU that a key of a scene is; of an array `name` is without `[i]`. See `Rule`."""
+
+    key: str
+    attribute: str
+    name: str
+    is_array: bool
+    is_told_if_given: bool
+
+
+@lru_cache(maxsize=32)
+def fmu_variables_of(model: type[BaseModel]) -> tuple[FmuVariable, ...]:
+    """Return the variables of the FMU that the keys of a table are."""
+    return tuple(
+        FmuVariable(
+            field.alias or name,
+            name,
+            rule.fmu.removesuffix("[i]"),
+            rule.fmu.endswith("[i]"),
+            rule.told_if_given,
+        )
+        for name, field in model.model_fields.items()
+        if (rule := _written_rule(field)).fmu
+    )
