@@ -24,8 +24,8 @@ from vibroimpact.analysis.estimation.estimates import (
     METHODS,
     QUANTITIES,
     Doubt,
-    Estimate,
     ImpactEstimates,
+    MethodEstimate,
     Refusal,
 )
 from vibroimpact.analysis.estimation.impacts import estimate_impacts
@@ -42,10 +42,10 @@ __all__ = [
     "METHODS",
     "QUANTITIES",
     "Doubt",
-    "Estimate",
     "Forcing",
     "ImpactEstimates",
     "Known",
+    "MethodEstimate",
     "ModalEstimates",
     "Refusal",
     "estimate_bounces",

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from vibroimpact.analysis.estimation.checks import check_displacement
-from vibroimpact.analysis.estimation.estimates import Doubt, Estimate, FittedMotion, ImpactEstimates
+from vibroimpact.analysis.estimation.estimates import Doubt, FittedMotion, ImpactEstimates, MethodEstimate
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.segments import Impact, Segmentation, segment
 from vibroimpact.analysis.recording import Channel, channel_of
@@ -119,7 +119,7 @@ def _falling(impacts: tuple[Impact, ...]) -> list[Impact]:
     return list(impacts[: int(longer[0]) + 2] if longer.size else impacts)
 
 
-def _ratio(impacts: list[Impact], interval: float, confidence: float) -> tuple[Estimate, float]:
+def _ratio(impacts: list[Impact], interval: float, confidence: float) -> tuple[MethodEstimate, float]:
     """Return the ratio of successive flight times, and its scatter over what errors of the instants explain.
 
     Generalized least squares of log T[n] = log T[0] + n log r: neighbouring flights share the error of an instant.
@@ -140,15 +140,15 @@ def _ratio(impacts: list[Impact], interval: float, confidence: float) -> tuple[E
     reach = float(student.ppf(0.5 + confidence / 2.0, freedom)) * error
     slope = float(solution[1])
     ratio = math.exp(slope)
-    estimate = Estimate(ratio, ratio * error, math.exp(slope - reach), math.exp(slope + reach))
+    estimate = MethodEstimate(ratio, ratio * error, math.exp(slope - reach), math.exp(slope + reach))
     by_chance = square <= float(chi2.isf(_SELDOM, freedom))
     return estimate, 0.0 if by_chance else widened
 
 
-def _mean(levels: Floats, confidence: float) -> Estimate:
+def _mean(levels: Floats, confidence: float) -> MethodEstimate:
     middle, error = float(np.mean(levels)), float(np.std(levels, ddof=1)) / math.sqrt(len(levels))
     reach = float(student.ppf(0.5 + confidence / 2.0, len(levels) - 1)) * error
-    return Estimate(middle, error, middle - reach, middle + reach)
+    return MethodEstimate(middle, error, middle - reach, middle + reach)
 
 
 def _parabolas(cut: Segmentation, impacts: int) -> Floats:

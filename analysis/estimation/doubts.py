@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from scipy.stats import norm
 
-from vibroimpact.analysis.estimation.estimates import ANSWERING, Doubt, Estimate
+from vibroimpact.analysis.estimation.estimates import ANSWERING, Doubt, MethodEstimate
 from vibroimpact.analysis.estimation.flight_fit import pairs_of
 from vibroimpact.analysis.estimation.model_tests import (
     dry_friction,
@@ -35,7 +35,7 @@ _APART = 3.0
 # A natural frequency known worse than this is hardly determined.
 _DETERMINED = 0.1
 
-Values = Mapping[str, Mapping[str, Estimate]]
+Values = Mapping[str, Mapping[str, MethodEstimate]]
 
 
 def doubts_of(
@@ -147,7 +147,7 @@ def _of_contradictions(values: Values, confidence: float) -> Iterator[Doubt]:
             )
 
 
-def _apart(name: str, one: Estimate, other: Estimate, confidence: float) -> bool:
+def _apart(name: str, one: MethodEstimate, other: MethodEstimate, confidence: float) -> bool:
     """Tell whether two intervals have nothing in common, and by more than chance explains."""
     turn = 2.0 * math.pi * round((other.value - one.value) / (2.0 * math.pi)) if name == "phase" else 0.0
     above = one.value + turn > other.value

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from vibroimpact.analysis.estimation.energy import Drawn, EnergyBalance, HalfEnergies, unknowns_by_speed
-from vibroimpact.analysis.estimation.estimates import Estimate
+from vibroimpact.analysis.estimation.estimates import MethodEstimate
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, flights_to_level
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.physics import Parameters
@@ -118,7 +118,7 @@ def resample(
 
 def with_intervals(
     resampled: Resampled, estimator: Estimator, confidence: float, inflation: float
-) -> dict[str, Estimate]:
+) -> dict[str, MethodEstimate]:
     """Return an energy estimator's values less their systematic part, with standard errors and intervals.
 
     Parameters
@@ -158,7 +158,7 @@ def with_intervals(
         centre = float(value[0] - np.mean(known))
         reach = float(student.ppf(0.5 + confidence / 2.0, len(known) - 1)) * error
         reach *= math.sqrt(1.0 + 1.0 / len(known))
-        found[name] = Estimate(centre, error, centre - reach, centre + reach)
+        found[name] = MethodEstimate(centre, error, centre - reach, centre + reach)
     return found
 
 

@@ -48,7 +48,7 @@ _REASONS_IN_LINE = 2
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class MethodEstimate:
     """One number with its doubt.
 
     Attributes
@@ -140,7 +140,7 @@ class ImpactEstimates:
 
     channel: str
     unit: str
-    values: Mapping[str, Mapping[str, Estimate]]
+    values: Mapping[str, Mapping[str, MethodEstimate]]
     conditioning: Mapping[str, float] = field(default_factory=dict)
     facts: Mapping[str, float | str] = field(default_factory=dict)
     refusals: tuple[Refusal, ...] = ()

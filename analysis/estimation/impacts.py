@@ -21,7 +21,7 @@ from vibroimpact.analysis.estimation.draws import (
     resample,
     with_intervals,
 )
-from vibroimpact.analysis.estimation.estimates import METHODS, Estimate, ImpactEstimates, Refusal
+from vibroimpact.analysis.estimation.estimates import METHODS, ImpactEstimates, MethodEstimate, Refusal
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.period_one import period_one
 from vibroimpact.analysis.estimation.physics import Forcing, Known, Parameters
@@ -122,10 +122,10 @@ def _attempted(
     draws: int,
     confidence: float,
     seed: int,
-) -> tuple[dict[str, dict[str, Estimate]], list[Refusal], Resampled | None]:
+) -> tuple[dict[str, dict[str, MethodEstimate]], list[Refusal], Resampled | None]:
     """Return what each method says, why others refuse, and the draws of the energy balance."""
     natural, offset = record.parameters.natural_frequency, record.parameters.offset
-    ways: dict[str, Callable[[], dict[str, Estimate]]] = {
+    ways: dict[str, Callable[[], dict[str, MethodEstimate]]] = {
         "weak_form": lambda: _weak_values(record, held, confidence),
         "trajectory": lambda: _trajectory_values(record, held, confidence),
         "period_one": lambda: period_one(record.segmentation, natural, offset),
@@ -140,7 +140,7 @@ def _attempted(
     if resampled is not None:
         for name in energies:
             ways[name] = partial(_energy_values, name, record, resampled, forcing, held, confidence)
-    values: dict[str, dict[str, Estimate]] = {}
+    values: dict[str, dict[str, MethodEstimate]] = {}
     for name, run in ways.items():
         if name not in methods:
             continue
@@ -164,7 +164,7 @@ def _reason(method: str, problem: Exception) -> str:
     )
 
 
-def _check_answer(method: str, found: dict[str, Estimate], record: Prepared) -> None:
+def _check_answer(method: str, found: dict[str, MethodEstimate], record: Prepared) -> None:
     """Refuse an answer that cannot be: its interval has no width though there is noise, or nothing physical in it."""
     signal = record.segmentation.signal
     size = float(np.ptp(signal.values[signal.good])) * math.sqrt(len(signal.time))
@@ -202,24 +202,24 @@ def _check_known(held: Known) -> None:
         raise EstimationError(f'side: expected upper or lower, got "{held.side}".')
 
 
-def _with_normal(value: float, error: float, confidence: float) -> Estimate:
+def _with_normal(value: float, error: float, confidence: float) -> MethodEstimate:
     z = float(norm.ppf(0.5 + confidence / 2.0))
-    return Estimate(value, error, value - z * error, value + z * error)
+    return MethodEstimate(value, error, value - z * error, value + z * error)
 
 
 def _with_coordinates(
     found: Parameters, names: tuple[str, ...], covariance: Floats, confidence: float
-) -> dict[str, Estimate]:
+) -> dict[str, MethodEstimate]:
     """Return estimates whose intervals are those of the coordinates in which the equation is linear."""
     intervals = Coordinates(names, found).intervals(found, covariance, confidence)
     return {
-        name: Estimate(getattr(found, name), math.sqrt(float(covariance[k, k])), *intervals[name])
+        name: MethodEstimate(getattr(found, name), math.sqrt(float(covariance[k, k])), *intervals[name])
         for k, name in enumerate(names)
         if name in intervals
     }
 
 
-def _weak_values(record: Prepared, held: Known, confidence: float) -> dict[str, Estimate]:
+def _weak_values(record: Prepared, held: Known, confidence: float) -> dict[str, MethodEstimate]:
     """Return what weak form and flights say."""
     read = ["restitution", "impact_velocity"] + ["stop_position"] * (held.stop_position is None)
     found = {
@@ -234,7 +234,7 @@ def _weak_values(record: Prepared, held: Known, confidence: float) -> dict[str, 
     return found
 
 
-def _trajectory_values(record: Prepared, held: Known, confidence: float) -> dict[str, Estimate]:
+def _trajectory_values(record: Prepared, held: Known, confidence: float) -> dict[str, MethodEstimate]:
     """Return what the fit of whole trajectories says."""
     free = ("restitution", *record.free, *(("stop_position",) if held.stop_position is None else ()))
     found = fit_trajectory(record.segmentation, record.fit.fitted, record.parameters, free, record.fit.noise)
@@ -268,8 +268,13 @@ def _resampled(record: Prepared, draws: int, seed: int) -> Resampled:
 
 
 def _energy_values(
-    method: str, record: Prepared, resampled: Resampled, forcing: Forcing, held: Known, confidence: float
-) -> dict[str, Estimate]:
+    method: str,
+    record: Prepared,
+    resampled: Resampled,
+    forcing: Forcing,
+    held: Known,
+    confidence: float,
+) -> dict[str, MethodEstimate]:
     """Return what one of the energy balances says."""
     if method == "energy_known_damping":
         return _energy_with_known_damping(resampled, held, confidence, record.inflation)
@@ -296,7 +301,7 @@ def _energy_values(
 
 def _energy_with_known_damping(
     resampled: Resampled, held: Known, confidence: float, inflation: float
-) -> dict[str, Estimate]:
+) -> dict[str, MethodEstimate]:
     """Return restitution and energy-loss factor; strong damping takes more than an impact could: it has no factor."""
     if held.damping_ratio is None:
         return with_intervals(resampled, all_loss_at_impact, confidence, inflation)
@@ -307,16 +312,18 @@ def _energy_with_known_damping(
         return found
 
 
-def _as_measured(values: dict[str, Estimate], sign: float) -> dict[str, Estimate]:
+def _as_measured(values: dict[str, MethodEstimate], sign: float) -> dict[str, MethodEstimate]:
     """Return estimates in the coordinate of the channel: a lower stop was mirrored."""
     found = dict(values)
     for name in ("stop_position", "offset"):
         if name in found and sign < 0.0:
             one = found[name]
-            found[name] = Estimate(-one.value, one.standard_error, -one.high, -one.low)
+            found[name] = MethodEstimate(-one.value, one.standard_error, -one.high, -one.low)
     if "phase" in found:
         one = found["phase"]
         turned = one.value - (0.0 if sign > 0.0 else math.pi)
         shift = turned - 2.0 * math.pi * math.floor(turned / (2.0 * math.pi)) - one.value
-        found["phase"] = Estimate(one.value + shift, one.standard_error, one.low + shift, one.high + shift)
+        found["phase"] = MethodEstimate(
+            one.value + shift, one.standard_error, one.low + shift, one.high + shift
+        )
     return found

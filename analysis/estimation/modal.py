@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-from vibroimpact.analysis.estimation.estimates import Estimate
+from vibroimpact.analysis.estimation.estimates import MethodEstimate
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight, pairs_of
 from vibroimpact.analysis.estimation.noise import Floats, noise_level
 from vibroimpact.analysis.estimation.physics import Forcing, Parameters
@@ -40,11 +40,11 @@ class ModalEstimates:
 
     Attributes
     ----------
-    damping_ratio, natural_frequency, force : tuple of Estimate
+    damping_ratio, natural_frequency, force : tuple of MethodEstimate
         Of each mode; rad/s, and N kg^(-1/2).
-    restitution : Estimate
+    restitution : MethodEstimate
         From the speeds of the contact point.
-    restitution_from_energy : Estimate
+    restitution_from_energy : MethodEstimate
         From the residual energy and the contact mass: equal to the other where all modes are there.
     contact_mass : float
         1 / (phi . phi), kg: of the modes in use.
@@ -52,11 +52,11 @@ class ModalEstimates:
         With a usable flight on both sides.
     """
 
-    damping_ratio: tuple[Estimate, ...]
-    natural_frequency: tuple[Estimate, ...]
-    force: tuple[Estimate, ...]
-    restitution: Estimate
-    restitution_from_energy: Estimate
+    damping_ratio: tuple[MethodEstimate, ...]
+    natural_frequency: tuple[MethodEstimate, ...]
+    force: tuple[MethodEstimate, ...]
+    restitution: MethodEstimate
+    restitution_from_energy: MethodEstimate
     contact_mass: float
     impacts: int
 
@@ -172,7 +172,7 @@ def estimate_modes(
         restitution_from_energy(*_energies(fitted, contact_shape, flights))  # which refuses
     reach = errors * float(student.ppf(0.5 + confidence / 2.0, draws - 1))
     rows = np.column_stack([found, errors, found - reach, found + reach]).tolist()
-    estimates = [Estimate(*row) for row in rows]
+    estimates = [MethodEstimate(*row) for row in rows]
     count = len(modes)
     return ModalEstimates(
         tuple(estimates[:count]),

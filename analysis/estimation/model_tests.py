@@ -15,7 +15,7 @@ from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight,
 from vibroimpact.analysis.estimation.noise import Floats
 from vibroimpact.analysis.estimation.physics import Parameters
 from vibroimpact.analysis.estimation.prepared import Prepared
-from vibroimpact.analysis.estimation.trajectory import Piece, Problem, deepest, follow
+from vibroimpact.analysis.estimation.trajectory import PathProblem, Piece, deepest, follow
 from vibroimpact.fmus.core import motion
 
 _STEP = 1e-5
@@ -59,7 +59,7 @@ def slope_of_restitution(record: Prepared) -> Sized:
     if found is None:
         return math.nan, math.nan
     signal, typical = record.segmentation.signal, record.fit.reading.impact_velocity
-    problem = Problem(signal, list(found.pieces), found.parameters, found.names, 1.0)
+    problem = PathProblem(signal, list(found.pieces), found.parameters, found.names, 1.0)
     origin = np.zeros(len(problem.origin))
     column = np.concatenate(
         [

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vibroimpact.analysis.estimation.estimates import Estimate
+from vibroimpact.analysis.estimation.estimates import MethodEstimate
 from vibroimpact.analysis.estimation.segments import Segmentation
 from vibroimpact.fmus.errors import EstimationError
 
@@ -40,7 +40,9 @@ def stop_position_of(natural_frequency: float, deepest: float, flight_time: floa
     return -deepest * math.cos(0.5 * natural_frequency * flight_time)
 
 
-def period_one(segmentation: Segmentation, natural_frequency: float, offset: float) -> dict[str, Estimate]:
+def period_one(
+    segmentation: Segmentation, natural_frequency: float, offset: float
+) -> dict[str, MethodEstimate]:
     """Return both start values; the stop with the natural frequency and offset that the better methods found.
 
     Raises
@@ -72,6 +74,6 @@ def period_one(segmentation: Segmentation, natural_frequency: float, offset: flo
             f"period_one: expected a deepest point further from rest than the stop, got {depth:.4g} and {stop:.4g}."
         )
     return {
-        "natural_frequency": Estimate(natural_frequency_of(stop, depth, length)),
-        "stop_position": Estimate(offset + stop_position_of(natural_frequency, depth, length)),
+        "natural_frequency": MethodEstimate(natural_frequency_of(stop, depth, length)),
+        "stop_position": MethodEstimate(offset + stop_position_of(natural_frequency, depth, length)),
     }

@@ -9,7 +9,7 @@ import numpy as np
 
 from vibroimpact.analysis.estimation.draws import Resampled
 from vibroimpact.analysis.estimation.energy import sensitivities
-from vibroimpact.analysis.estimation.estimates import Estimate
+from vibroimpact.analysis.estimation.estimates import MethodEstimate
 from vibroimpact.analysis.estimation.physics import Known
 from vibroimpact.analysis.estimation.prepared import Prepared
 from vibroimpact.analysis.estimation.trajectory import MOST_IMPACTS
@@ -62,7 +62,7 @@ def _scatter(record: Prepared) -> float:
 
 
 def remarks_of(
-    record: Prepared, held: Known, values: Mapping[str, Mapping[str, Estimate]]
+    record: Prepared, held: Known, values: Mapping[str, Mapping[str, MethodEstimate]]
 ) -> tuple[str, ...]:
     """Return what a reader must know."""
     return (*_of_flights(record), *_of_methods(record, held, values))
@@ -86,7 +86,9 @@ def _of_flights(record: Prepared) -> Iterator[str]:
         yield f"The trajectories are those of about {MOST_IMPACTS} impacts, the first."
 
 
-def _of_methods(record: Prepared, held: Known, values: Mapping[str, Mapping[str, Estimate]]) -> Iterator[str]:
+def _of_methods(
+    record: Prepared, held: Known, values: Mapping[str, Mapping[str, MethodEstimate]]
+) -> Iterator[str]:
     """Yield what the methods rest on."""
     energy = any(name.startswith("energy") for name in values)
     if energy and record.names:

@@ -6,7 +6,7 @@ import math
 
 from rich.table import Table
 
-from vibroimpact.analysis.estimation.estimates import QUANTITIES, SHOWN, Estimate, ImpactEstimates
+from vibroimpact.analysis.estimation.estimates import QUANTITIES, SHOWN, ImpactEstimates, MethodEstimate
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.fmus.units import written_unit
 
@@ -45,7 +45,7 @@ def _estimates(estimates: ImpactEstimates) -> Table:
     return table
 
 
-def _cell(estimate: Estimate | None) -> str:
+def _cell(estimate: MethodEstimate | None) -> str:
     """Return value and interval with the digits that the doubt leaves."""
     if estimate is None:
         return ""

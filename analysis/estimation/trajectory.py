@@ -271,14 +271,14 @@ def fit_trajectory(
         if len(pieces) in tried:
             continue
         tried.add(len(pieces))
-        problem = Problem(segmentation.signal, pieces, start, tuple(free), size)
+        problem = PathProblem(segmentation.signal, pieces, start, tuple(free), size)
         if span > spans[-1] and problem.distance() > _NEAR * size:
             continue
         trial = problem.solve(noise, span)
         odd = problem.misfits(trial)
         if odd and len(odd) <= _MOST_ODD * len(pieces):
             kept = [piece for k, piece in enumerate(trial.pieces) if k not in odd]
-            again = Problem(segmentation.signal, kept, trial.parameters, tuple(free), size)
+            again = PathProblem(segmentation.signal, kept, trial.parameters, tuple(free), size)
             trial = again.solve(noise, span)
         if best is None or trial.noise < best.noise:
             best = trial
@@ -307,7 +307,7 @@ def _size(parameters: Parameters, name: str, size: float, both: bool) -> float:
     return sizes.get(name, 0.1 * square * size)
 
 
-class Problem:
+class PathProblem:
     """The least-squares problem: linear coordinates of the free parameters, then place and velocity of each piece.
 
     Parameters

@@ -19,7 +19,7 @@ from vibroimpact.analysis.figures.recordings import draw_recording
 from vibroimpact.analysis.figures.replay import draw_replay, recordings_of
 from vibroimpact.analysis.figures.runs import draw_run
 from vibroimpact.analysis.figures.scores import draw_scores
-from vibroimpact.analysis.figures.series import sampled_names
+from vibroimpact.analysis.figures.series import sampled_variables
 from vibroimpact.analysis.figures.spectra import (
     draw_recording_spectrum,
     draw_replay_spectrum,
@@ -70,7 +70,7 @@ class View:
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class FigureKind:
     """A kind of figure.
 
     Attributes
@@ -93,7 +93,7 @@ def _swept(dataset: xr.Dataset, count: int, *names: str) -> bool:
 
 
 def _has_pair(dataset: xr.Dataset) -> bool:
-    names = sampled_names(dataset)
+    names = sampled_variables(dataset)
     return any("displacement" in n and n.replace("displacement", "velocity") in names for n in names)
 
 
@@ -102,71 +102,73 @@ def _has_phases(dataset: xr.Dataset) -> bool:
 
 
 _SINGLE = ("run", "window")
-KINDS: dict[str, Kind] = {
-    "bifurcation": Kind(
+KINDS: dict[str, FigureKind] = {
+    "bifurcation": FigureKind(
         {"runs": lambda data, view: draw_bifurcation(data)},
         lambda data: _swept(data, 1, "displacement_range", "impact_velocity"),
     ),
-    "map": Kind(
+    "map": FigureKind(
         {"runs": lambda data, view: draw_map(data)},
         lambda data: _swept(data, 2, "displacement_range", "impact_velocity"),
     ),
-    "impacts-per-period": Kind(
+    "impacts-per-period": FigureKind(
         {"runs": lambda data, view: draw_impacts_per_period(data)},
         lambda data: _swept(data, 2, "impacts_per_period"),
     ),
-    "strobe": Kind(
+    "strobe": FigureKind(
         {"runs": lambda data, view: draw_strobe(data, view.run)},
         lambda data: "strobe_displacement" in data,
         ("run",),
     ),
-    "run": Kind(
+    "run": FigureKind(
         {"runs": lambda data, view: draw_run(data, view.run, view.window)},
-        lambda data: bool(sampled_names(data)) or "displacement_max" in data or "impact_velocity" in data,
+        lambda data: bool(sampled_variables(data)) or "displacement_max" in data or "impact_velocity" in data,
         _SINGLE,
     ),
-    "portrait": Kind(
+    "portrait": FigureKind(
         {"runs": lambda data, view: draw_portrait(data, view.run, view.window)}, _has_pair, _SINGLE
     ),
-    "impact-map": Kind(
+    "impact-map": FigureKind(
         {"runs": lambda data, view: draw_impact_map(data, view.run, view.window)}, _has_phases, _SINGLE
     ),
-    "return-map": Kind(
+    "return-map": FigureKind(
         {"runs": lambda data, view: draw_return_map(data, view.run, view.window)},
         lambda data: data.sizes.get("impact", 0) > 1,
         _SINGLE,
     ),
-    "spectrum": Kind(
+    "spectrum": FigureKind(
         {
             "runs": lambda data, view: draw_run_spectrum(data, view.run, view.window),
             "recording": lambda data, view: draw_recording_spectrum(data, view.window),
             "replay": lambda data, view: draw_replay_spectrum(data, view.recording, view.window),
         },
-        lambda data: bool(sampled_names(data)),
+        lambda data: bool(sampled_variables(data)),
         (*_SINGLE, "recording"),
     ),
-    "energies": Kind(
+    "energies": FigureKind(
         {"runs": lambda data, view: draw_energies(data, view.run, view.window)},
         lambda data: "modal_energy_1" in data and {"energy_kinetic", "energy_potential"} <= set(data),
         _SINGLE,
     ),
-    "shapes": Kind(
+    "shapes": FigureKind(
         {"runs": lambda data, view: draw_shapes(data)},
         lambda data: "location" in varied(data) and "displacement_start_1" in varied(data),
     ),
-    "scores": Kind(
+    "scores": FigureKind(
         {"runs": lambda data, view: draw_scores(data)},
         lambda data: "variance_accounted_for" in data and bool(varied(data)),
     ),
-    "recording": Kind({"recording": lambda data, view: draw_recording(data, view.window)}, takes=("window",)),
-    "replay": Kind(
+    "recording": FigureKind(
+        {"recording": lambda data, view: draw_recording(data, view.window)}, takes=("window",)
+    ),
+    "replay": FigureKind(
         {"replay": lambda data, view: draw_replay(data, view.recording, view.window)},
         takes=("recording", "window"),
     ),
-    "estimates": Kind({"estimates": lambda data, view: draw_estimates(data)}),
-    "intervals": Kind({"spikes": lambda data, view: draw_intervals(data)}),
-    "convergence": Kind({"ladder": lambda data, view: convergence(data)}),
-    "work-precision": Kind({"ladder": lambda data, view: work_precision(data)}),
+    "estimates": FigureKind({"estimates": lambda data, view: draw_estimates(data)}),
+    "intervals": FigureKind({"spikes": lambda data, view: draw_intervals(data)}),
+    "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
+    "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
 #: Kinds that draw all runs; a kind that takes a run, and is none of these, draws a single one.
 _OF_ALL = ("strobe",)

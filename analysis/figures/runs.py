@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, label
 from vibroimpact.analysis.figures.scene_text import observed_stops, stops
-from vibroimpact.analysis.figures.series import draw_series, sampled_names, time_part
+from vibroimpact.analysis.figures.series import draw_series, sampled_variables, time_part
 from vibroimpact.analysis.figures.strobe import draw_section
 from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.fmus.errors import DatasetError, UsageError
@@ -30,7 +30,7 @@ def draw_run(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) 
     otherwise; the phase portrait then shows all of it.
     """
     selection = {} if run is None else {"run_index": run}
-    sampled = sampled_names(dataset)
+    sampled = sampled_variables(dataset)
     if set(sampled) == {"displacement", "velocity"}:
         return _draw_samples(dataset, selection, window)
     if sampled:

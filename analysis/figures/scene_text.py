@@ -17,7 +17,7 @@ from vibroimpact.fmus.safe_toml import parse_toml
 _ELEMENT = re.compile(r"(contact_)?displacement_([0-9]+)")
 
 
-class Stop(NamedTuple):
+class ShownStop(NamedTuple):
     """A stop of a scene: position (m), side (+1 upper, -1 lower), and the point that it limits."""
 
     position: float
@@ -50,7 +50,7 @@ def column_of(key: str, names: Sequence[str]) -> str | None:
     return max((name for name in names if f"_{written}".endswith(f"_{name}")), key=len, default=None)
 
 
-def stops(dataset: xr.Dataset) -> list[Stop]:
+def stops(dataset: xr.Dataset) -> list[ShownStop]:
     """Return the stops of the scene; none where their places were swept or are not known."""
     scene = scene_of(dataset)
     if any(key.endswith((".position", ".side", ".location", ".mass")) for key in swept_keys(scene)):
@@ -61,17 +61,17 @@ def stops(dataset: xr.Dataset) -> list[Stop]:
         return []
 
 
-def _stop(written: dict[str, Any], body: dict[str, Any]) -> Stop:
+def _stop(written: dict[str, Any], body: dict[str, Any]) -> ShownStop:
     """Return one stop; points are masses of a chain, places on a beam."""
     point: float | None = None
     if body.get("kind") == "chain":
         point = written.get("mass", len(body["masses"]))
     elif body.get("kind") == "beam":
         point = written.get("location", 1.0)
-    return Stop(float(written["position"]), -1.0 if written.get("side") == "lower" else 1.0, point)
+    return ShownStop(float(written["position"]), -1.0 if written.get("side") == "lower" else 1.0, point)
 
 
-def observed_stops(dataset: xr.Dataset) -> list[Stop]:
+def observed_stops(dataset: xr.Dataset) -> list[ShownStop]:
     """Return the stops that limit the point whose displacement is recorded."""
     found = stops(dataset)
     scene = scene_of(dataset)

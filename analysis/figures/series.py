@@ -35,7 +35,7 @@ _PARTICULARS = re.compile(r"^contact_|_[0-9]+$|(?<=^energy)_.*")
 _INSTANTS = (("event", "event_time"), ("impact", "impact_time"))
 
 
-def sampled_names(dataset: xr.Dataset) -> list[str]:
+def sampled_variables(dataset: xr.Dataset) -> list[str]:
     """Return the names of the sampled variables."""
     return [
         str(name)
@@ -63,7 +63,7 @@ def draw_series(dataset: xr.Dataset, selection: dict[str, Any], window: Window =
     time = samples["time"].values
     samples = samples.isel(time=(time >= part[0]) & (time <= part[1]))
     panels: dict[tuple[str, str], list[xr.DataArray]] = {}
-    for name in in_scene_order(dataset, sampled_names(samples)):
+    for name in in_scene_order(dataset, sampled_variables(samples)):
         panels.setdefault((unit_symbol(samples[name]), _quantity(samples[name])), []).append(samples[name])
     kind, instants = _instants(dataset, selection)
     instants = instants[(instants >= part[0]) & (instants <= part[1])]

@@ -16,7 +16,7 @@ from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, 
 from vibroimpact.analysis.figures.recordings import MOST_PANELS, short_name
 from vibroimpact.analysis.figures.replay import comparison_of
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order
-from vibroimpact.analysis.figures.series import sampled_names, within
+from vibroimpact.analysis.figures.series import sampled_variables, within
 from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError
@@ -57,14 +57,14 @@ def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Windo
     DatasetError
         If no time series was recorded, or its samples are too few.
     """
-    if not sampled_names(dataset):
+    if not sampled_variables(dataset):
         raise DatasetError(
             "figure: expected a time series of the run, got none recorded. "
             'Set time_series = { rate = ..., variables = ["displacement"] } in [record].'
         )
     samples = dataset.vibroimpact.samples(**({} if run is None else {"run_index": run}))
     samples = within(dataset, samples, window)
-    names = in_scene_order(dataset, sampled_names(samples))[:MOST_PANELS]
+    names = in_scene_order(dataset, sampled_variables(samples))[:MOST_PANELS]
     time = samples["time"].values
     signals = [
         [_Signal(title(samples[name]), str(samples[name].attrs["units"]), time, samples[name].values)]

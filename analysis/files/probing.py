@@ -63,7 +63,7 @@ class UnsoundFileError(Exception):
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class LibraryRead:
     """What a library will do with a file.
 
     Attributes
@@ -78,19 +78,19 @@ class Reading:
     names: tuple[str, ...] = ()
 
 
-NETCDF = Reading()
+NETCDF = LibraryRead()
 #: What this process found out: of files that have not changed since, and of contents.
-_of_files: dict[tuple[FileState, Reading], UnsoundFileError | None] = {}
+_of_files: dict[tuple[FileState, LibraryRead], UnsoundFileError | None] = {}
 _of_contents: dict[str, UnsoundFileError | None] = {}
 
 
-def check_sound(path: str | os.PathLike[str], reading: Reading = NETCDF) -> FileState:
+def check_sound(path: str | os.PathLike[str], reading: LibraryRead = NETCDF) -> FileState:
     """Refuse a file that does not read.
 
     Parameters
     ----------
     path : path
-    reading : Reading
+    reading : LibraryRead
         What is about to be done with it.
 
     Returns
@@ -131,7 +131,7 @@ def refuse_changed(path: str | os.PathLike[str], state: FileState) -> None:
         raise UnsoundFileError("one that changed while it was being opened")
 
 
-def _verdict(path: str, size: int, reading: Reading) -> UnsoundFileError | None:
+def _verdict(path: str, size: int, reading: LibraryRead) -> UnsoundFileError | None:
     if matches_recorded_hash(path):
         return None
     with open(path, "rb") as file:
@@ -143,7 +143,7 @@ def _verdict(path: str, size: int, reading: Reading) -> UnsoundFileError | None:
     return _of_contents[content]
 
 
-def _probed(path: str, size: int, reading: Reading) -> UnsoundFileError | None:
+def _probed(path: str, size: int, reading: LibraryRead) -> UnsoundFileError | None:
     """Let a process of its own read a file."""
     seconds = PROBE_SECONDS + size / PROBE_RATE
     options = {"names": reading.names, "most_bytes": max(SPARSE_BYTES, MOST_EXPANSION * size)}

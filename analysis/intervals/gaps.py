@@ -24,7 +24,7 @@ FEWEST_INTERVALS = 10
 
 
 @dataclass(frozen=True, slots=True)
-class Gaps:
+class MissedBeats:
     """Intervals in which beats are missing.
 
     Attributes
@@ -48,7 +48,7 @@ class Gaps:
     reason: str = ""
 
 
-def find_gaps(train: IntervalTrain) -> Gaps:
+def find_gaps(train: IntervalTrain) -> MissedBeats:
     """Return the gaps of a nearly periodic train.
 
     Valid where intervals scatter by less than about a fifth about their local median; otherwise one beat and two
@@ -67,10 +67,12 @@ def find_gaps(train: IntervalTrain) -> Gaps:
     ratio = np.full(len(train.kept), np.nan)
     if len(intervals) < FEWEST_INTERVALS:
         reason = f"expected at least {FEWEST_INTERVALS} intervals, got {len(intervals)}"
-        return Gaps(nothing, nothing, ratio, float("nan"), reason)
+        return MissedBeats(nothing, nothing, ratio, float("nan"), reason)
     typical = local_median(intervals)
     if not np.all(typical > 0.0):
-        return Gaps(nothing, nothing, ratio, float("nan"), "most events of some neighbourhood coincide")
+        return MissedBeats(
+            nothing, nothing, ratio, float("nan"), "most events of some neighbourhood coincide"
+        )
     ratio[train.kept] = intervals / typical
     centred = ratio[train.kept]
     spread = robust_sigma(centred - np.median(centred))
@@ -79,10 +81,10 @@ def find_gaps(train: IntervalTrain) -> Gaps:
             f"the train is not nearly periodic: its intervals scatter by {100 * spread:.0f} % about their local "
             f"median; expected at most {100 * NEARLY_PERIODIC:.0f} %"
         )
-        return Gaps(nothing, nothing, ratio, spread, reason)
+        return MissedBeats(nothing, nothing, ratio, spread, reason)
     place = np.flatnonzero(np.nan_to_num(ratio) > LONGEST_BEAT)
     missing = np.maximum(np.rint(ratio[place]).astype(np.int64) - 1, 1)
-    return Gaps(place, missing, ratio, spread)
+    return MissedBeats(place, missing, ratio, spread)
 
 
 def local_median(values: Floats) -> Floats:

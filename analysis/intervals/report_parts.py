@@ -11,7 +11,7 @@ from vibroimpact.analysis.intervals.cycles import Cycle
 from vibroimpact.analysis.intervals.delay_shares import CELLS, expected_shares, observed_shares
 from vibroimpact.analysis.intervals.density import Density
 from vibroimpact.analysis.intervals.dimension import Dimension
-from vibroimpact.analysis.intervals.gaps import Gaps
+from vibroimpact.analysis.intervals.gaps import MissedBeats
 from vibroimpact.analysis.intervals.lattice import Lattice, Share
 from vibroimpact.analysis.intervals.trains import IntervalTrain
 from vibroimpact.analysis.intervals.variability import (
@@ -100,7 +100,7 @@ def density_part(density: Density, cycle: Cycle) -> xr.Dataset:
     )
 
 
-def gap_part(train: IntervalTrain, gaps: Gaps) -> xr.Dataset:
+def gap_part(train: IntervalTrain, gaps: MissedBeats) -> xr.Dataset:
     """Return the gaps of a nearly periodic train."""
     found = len(gaps.place)
     words = (

@@ -17,7 +17,7 @@ from __future__ import annotations
 from vibroimpact.analysis.replay.alignment import Alignment, align
 from vibroimpact.analysis.replay.baseline import naive_variance
 from vibroimpact.analysis.replay.comparison import Comparison, compare
-from vibroimpact.analysis.replay.event import Event, find_event
+from vibroimpact.analysis.replay.event import ChannelEvent, find_event
 from vibroimpact.analysis.replay.held import Held, held_over
 from vibroimpact.analysis.replay.matching import EventMatch, match_events
 from vibroimpact.analysis.replay.peaks import PeakErrors, compare_peaks
@@ -34,9 +34,9 @@ from vibroimpact.analysis.replay.trust import Verdict, trust
 
 __all__ = [
     "Alignment",
+    "ChannelEvent",
     "Comparison",
     "DominantFrequency",
-    "Event",
     "EventMatch",
     "Held",
     "PeakErrors",

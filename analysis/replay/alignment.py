@@ -18,7 +18,7 @@ from scipy.optimize import minimize_scalar
 from scipy.signal import correlate
 
 from vibroimpact.analysis.recording import Channel
-from vibroimpact.analysis.replay.event import Event, find_event
+from vibroimpact.analysis.replay.event import ChannelEvent, find_event
 from vibroimpact.fmus.errors import EstimationError
 
 Floats = NDArray[np.float64]
@@ -191,7 +191,7 @@ def align(
     event_window: tuple[float, float] | None = None,
     polarity: Literal["auto"] | int = "auto",
     lag: Literal["auto"] | float = "auto",
-    event: Event | None = None,
+    event: ChannelEvent | None = None,
 ) -> Alignment:
     """Estimate lag and polarity between a simulated and a measured signal from the start of the event.
 
@@ -214,7 +214,7 @@ def align(
         Given, where it is known.
     lag : "auto" or float
         Given (s), where both channels have one trigger, or the lag is known.
-    event : Event, optional
+    event : ChannelEvent, optional
         As `find_event` gives it, where it was found before.
 
     Returns
@@ -285,7 +285,7 @@ def _doubts(best: _Peak, at_bound: bool) -> list[str]:
 
 
 def _start_of_event(
-    simulated: Interpolated, measured: Channel, event: Event, window: tuple[float, float] | None
+    simulated: Interpolated, measured: Channel, event: ChannelEvent, window: tuple[float, float] | None
 ) -> _Start:
     step = float(np.median(np.diff(measured.time)))
     # noise has a "period" of two samples, which are too few to correlate

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import Channel, Quality
 from vibroimpact.analysis.replay.alignment import Alignment, Interpolated, align
-from vibroimpact.analysis.replay.event import Event, find_event
+from vibroimpact.analysis.replay.event import ChannelEvent, find_event
 from vibroimpact.analysis.replay.held import Held, held_over
 from vibroimpact.analysis.replay.matching import EventMatch, match_events
 from vibroimpact.analysis.replay.peaks import PeakErrors, compare_peaks
@@ -56,7 +56,7 @@ class Comparison:
         At the instants, on the clock and with the sign of the measured channel; NaN where nothing was simulated.
     scored : ndarray of bool, shape (sample,)
         Good measured samples where something was simulated.
-    event : Event
+    event : ChannelEvent
         Of the measured channel: onset, noise, dominant period.
     offset : float
         Removed from the measured values.
@@ -79,7 +79,7 @@ class Comparison:
     values: Floats
     simulated: Floats
     scored: Flags
-    event: Event
+    event: ChannelEvent
     offset: float
     alignment: Alignment
     variance: float
@@ -270,21 +270,24 @@ def _brought(simulated_time: Floats, simulated: Floats, measured: Channel, align
     return np.where(inside, alignment.polarity * model(at), np.nan)
 
 
-def _side_by_side(end: float, event: Event, running: float | None) -> list[Span]:
+def _side_by_side(end: float, event: ChannelEvent, running: float | None) -> list[Span]:
     """Return the running windows, s from the onset; the last sample is within the last."""
     stretch = end - event.onset
     length = running or max(stretch / RUNNING_WINDOWS, RUNNING_PERIODS * event.period)
     return running_windows(0.0, stretch * (1.0 + 1e-9), length)
 
 
-def _offset(offset: str | float, event: Event, values: Floats, brought: Floats) -> float:
+def _offset(offset: str | float, event: ChannelEvent, values: Floats, brought: Floats) -> float:
     if offset == "level":
         return float(np.mean(values) - np.mean(brought))
     return {"before": event.offset, "none": 0.0}[offset] if isinstance(offset, str) else float(offset)
 
 
 def _peaks(
-    signals: tuple[Floats, Floats, Floats, Flags], window: Span | None, event: Event, offset: str | float
+    signals: tuple[Floats, Floats, Floats, Flags],
+    window: Span | None,
+    event: ChannelEvent,
+    offset: str | float,
 ) -> PeakErrors | None:
     """Compare extremes, their heights from the rest value: 0 where that was removed, else the mean."""
     if window is None:
@@ -307,7 +310,7 @@ def _matched(
     )
 
 
-def _remarks(measured: Channel, event: Event, offset: str | float, scored: Flags) -> list[str]:
+def _remarks(measured: Channel, event: ChannelEvent, offset: str | float, scored: Flags) -> list[str]:
     """Say what of the record was not scored, and what could not be found out."""
     said = []
     if event.quiet is None and offset == "before":

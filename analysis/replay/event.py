@@ -31,7 +31,7 @@ ENERGY_SHARE = 0.99
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class ChannelEvent:
     """The event in a channel.
 
     Attributes
@@ -59,7 +59,7 @@ class Event:
     period: float
 
 
-def find_event(measured: Channel) -> Event:
+def find_event(measured: Channel) -> ChannelEvent:
     """Find the event of a channel.
 
     Raises
@@ -84,10 +84,10 @@ def find_event(measured: Channel) -> Event:
         if event is not None:
             return event
     end = _end_of_energy(time, values - np.mean(values))
-    return Event(float(time[0]), end, 0.0, np.nan, None, _period(time, values, float(time[0]), end))
+    return ChannelEvent(float(time[0]), end, 0.0, np.nan, None, _period(time, values, float(time[0]), end))
 
 
-def _after_rest(time: Floats, values: Floats, rest: float, noise: float, first: int) -> Event | None:
+def _after_rest(time: Floats, values: Floats, rest: float, noise: float, first: int) -> ChannelEvent | None:
     """Return the event that begins at sample `first`; None where what is before it is too short to be a rest."""
     # a slow precursor between the noise and the onset belongs to neither
     leaves = int(np.argmax(np.abs(values - rest) > NOISE_FACTOR * noise))
@@ -98,7 +98,7 @@ def _after_rest(time: Floats, values: Floats, rest: float, noise: float, first: 
     period = _period(time, values - offset, onset, end)
     if onset - float(time[0]) < QUIET_PERIODS * period:
         return None
-    return Event(
+    return ChannelEvent(
         onset, end, offset, float(np.std(quiet)), (float(time[0]), float(time[len(quiet) - 1])), period
     )
 

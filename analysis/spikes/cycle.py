@@ -35,7 +35,7 @@ _REFINEMENTS = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Cycle:
+class PeriodicPart:
     """The periodic part of a signal, or why there is none.
 
     Attributes
@@ -64,7 +64,7 @@ class Cycle:
         return self.period > 0.0
 
 
-def find_cycle(values: Floats, period: float | None = None) -> Cycle:
+def find_cycle(values: Floats, period: float | None = None) -> PeriodicPart:
     """Look for a periodic excitation.
 
     It is one if (a) at least ten cycles are there; (b) the median over its cycles, taken off, leaves less than
@@ -106,8 +106,8 @@ def find_cycle(values: Floats, period: float | None = None) -> Cycle:
     return _folded(values - drift, refined_period(values - drift, best.period), "")
 
 
-def _none(values: Floats, reason: str) -> Cycle:
-    return Cycle(0.0, np.zeros(len(values)), 0, 1.0, reason)
+def _none(values: Floats, reason: str) -> PeriodicPart:
+    return PeriodicPart(0.0, np.zeros(len(values)), 0, 1.0, reason)
 
 
 def _strongest_line(values: Floats) -> float | None:
@@ -123,9 +123,9 @@ def _strongest_line(values: Floats) -> float | None:
     return length / place if spectrum[place] > 0.0 else None
 
 
-def _fundamental(values: Floats, line: float) -> Cycle | None:
+def _fundamental(values: Floats, line: float) -> PeriodicPart | None:
     """Return the cycle whose period is the line's or a small multiple of it."""
-    best: Cycle | None = None
+    best: PeriodicPart | None = None
     exact = refined_period(values, line)
     for multiple in range(1, _HARMONICS + 1):
         period = exact * multiple
@@ -193,17 +193,17 @@ def unfold(waveform: Floats, period: float, length: int) -> Floats:
     return repeated
 
 
-def _folded(values: Floats, period: float, reason: str) -> Cycle:
+def _folded(values: Floats, period: float, reason: str) -> PeriodicPart:
     cycles = fold(values, period)
     periodic = unfold(np.median(cycles, axis=0), period, len(values))
     before, after = robust_sigma(values), robust_sigma(values - periodic)
     left = after / before if before > 0.0 else 1.0
     count = len(cycles)
     words = reason or f"{count} cycles repeat; without them {left:.1%} of the noise is left"
-    return Cycle(period, periodic, count, left, words)
+    return PeriodicPart(period, periodic, count, left, words)
 
 
-def _change_of_amplitude(values: Floats, cycle: Cycle) -> float:
+def _change_of_amplitude(values: Floats, cycle: PeriodicPart) -> float:
     """Return how much the amplitude of the cycles changes from the first third to the last."""
     cycles = fold(values, cycle.period)
     waveform = np.median(cycles, axis=0)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vibroimpact.analysis.recording import Channel, Quality
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.analysis.spikes.baseline import drift_window, running_median
-from vibroimpact.analysis.spikes.cycle import Cycle, cycle_scores, find_cycle
+from vibroimpact.analysis.spikes.cycle import PeriodicPart, cycle_scores, find_cycle
 from vibroimpact.analysis.spikes.detection import Excursions, Group, find_excursions, group_excursions
 from vibroimpact.analysis.spikes.noise import Tail, samples_in_half_wave, tail_threshold
 from vibroimpact.fmus.errors import EstimationError, UsageError
@@ -134,7 +134,7 @@ class Identification:
         Standard deviation of the residual at rest, SI unit.
     tail : Tail
         Of the statistic.
-    cycle : Cycle
+    cycle : PeriodicPart
     excursions : Excursions
     groups : list of Group
     short : int
@@ -161,7 +161,7 @@ class Identification:
     lower_threshold: float
     noise: float
     tail: Tail
-    cycle: Cycle
+    cycle: PeriodicPart
     excursions: Excursions
     groups: list[Group]
     short: int
@@ -255,18 +255,18 @@ def _bridged(channel: Channel) -> tuple[Floats, NDArray[np.bool_]]:
     return values, bad
 
 
-def _method(channel: Channel, signal: Floats, settings: SpikeSettings) -> tuple[Cycle, str, str]:
+def _method(channel: Channel, signal: Floats, settings: SpikeSettings) -> tuple[PeriodicPart, str, str]:
     """Return the periodic part, the method and why it was chosen."""
     interval = channel.axis.interval
     if settings.method == "threshold":
-        return Cycle(0.0, np.zeros(len(signal)), 0, 1.0, "not looked for"), "threshold", "asked for"
+        return PeriodicPart(0.0, np.zeros(len(signal)), 0, 1.0, "not looked for"), "threshold", "asked for"
     if interval is None:
         if settings.method.startswith("cycle"):
             raise EstimationError(
                 f"{channel.name}: {settings.method}: expected evenly spaced samples, got uneven ones. "
                 "Resample it at import, or use --method threshold."
             )
-        cycle = Cycle(0.0, np.zeros(len(signal)), 0, 1.0, "the samples are not evenly spaced")
+        cycle = PeriodicPart(0.0, np.zeros(len(signal)), 0, 1.0, "the samples are not evenly spaced")
     else:
         cycle = find_cycle(signal, settings.period / interval if settings.period else None)
     if settings.method == "auto":

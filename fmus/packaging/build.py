@@ -20,7 +20,7 @@ from pathlib import Path
 from vibroimpact.fmus.errors import ComponentError, VibroimpactError
 from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, compile_library
 from vibroimpact.fmus.packaging.description import (
-    Component,
+    ComponentDescription,
     c_header,
     fmi2_xml,
     fmi3_xml,
@@ -43,7 +43,7 @@ SMALLEST_ARRAY = 2
 FINGERPRINT = "sources.sha256"
 
 
-def read_components(native: Path = NATIVE) -> tuple[Component, ...]:
+def read_components(native: Path = NATIVE) -> tuple[ComponentDescription, ...]:
     """Read every component of a folder of C sources, in the order of their folders' names."""
     return tuple(read_component(path) for path in sorted(native.glob("*/variables.toml")))
 
@@ -130,7 +130,7 @@ def _build_core(output: Path, native: Path, strict: bool) -> Path:
     return target
 
 
-def _build_component(component: Component, output: Path, native: Path, strict: bool) -> list[Path]:
+def _build_component(component: ComponentDescription, output: Path, native: Path, strict: bool) -> list[Path]:
     own = native / component.folder
     shared = [native / "core", native / "adapters"]
     sources = [path for folder in (*shared, own) for path in _c_files(folder)]
@@ -146,14 +146,14 @@ def _build_component(component: Component, output: Path, native: Path, strict: b
     ]
 
 
-def _sizes(component: Component) -> dict[str, int]:
+def _sizes(component: ComponentDescription) -> dict[str, int]:
     # as sizes.h names them: what a component has no use for is no part of its saved states
     blocks = component.repeats
     sizes = {"VI_MODES": blocks.get("mode", blocks.get("mass", 0)), "VI_PORTS": blocks.get("contact", 0)}
     return {name: max(size, SMALLEST_ARRAY) for name, size in sizes.items()}
 
 
-def _write_component(component: Component, binary: bytes, folder: Path, version: str) -> Path:
+def _write_component(component: ComponentDescription, binary: bytes, folder: Path, version: str) -> Path:
     description = fmi3_xml(component) if version == "3.0" else fmi2_xml(component)
     members = {
         "modelDescription.xml": description.encode("utf-8"),
@@ -165,7 +165,7 @@ def _write_component(component: Component, binary: bytes, folder: Path, version:
     return path
 
 
-def _documentation(component: Component) -> dict[str, bytes]:
+def _documentation(component: ComponentDescription) -> dict[str, bytes]:
     path = _readme(component)
     has_readme = path.is_file()
     text = with_table(path.read_text(encoding="utf-8"), component) if has_readme else component.description
@@ -178,7 +178,7 @@ def _documentation(component: Component) -> dict[str, bytes]:
     }
 
 
-def _readme(component: Component) -> Path:
+def _readme(component: ComponentDescription) -> Path:
     return component.source.with_name("README.md")
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.build import read_components
-from vibroimpact.fmus.packaging.description import Component, fmi2_xml, fmi3_xml, plural
+from vibroimpact.fmus.packaging.description import ComponentDescription, fmi2_xml, fmi3_xml, plural
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.shipped import component_name, fmu_path
 
@@ -77,11 +77,11 @@ def export_fmu(
     return target
 
 
-def _component(name: str) -> Component:
+def _component(name: str) -> ComponentDescription:
     return next(component for component in read_components() if component.name == name)
 
 
-def _check_counts(component: Component, counts: Mapping[str, int]) -> None:
+def _check_counts(component: ComponentDescription, counts: Mapping[str, int]) -> None:
     problems = []
     for block, count in counts.items():
         if block not in component.repeats:

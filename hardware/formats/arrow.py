@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.files.probing import Reading
+from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.cells import sorted_out
 from vibroimpact.hardware.formats.extras import missing_extra
@@ -43,7 +43,7 @@ def read_arrow(path: os.PathLike[str] | str) -> RawFile:
         import pyarrow  # noqa: F401
     except ImportError as problem:
         raise missing_extra(f"a {kind} file", "pyarrow", "parquet") from problem
-    check_reads(path, Reading(kind))
+    check_reads(path, LibraryRead(kind))
     try:
         table, remarks = _table_of(path, kind)
     except DatasetError:

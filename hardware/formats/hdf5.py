@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.files.probing import Reading
+from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.arrays import INTERVALS, RATES, Scope, tables_of
 from vibroimpact.hardware.formats.extras import missing_extra
@@ -24,7 +24,7 @@ from vibroimpact.hardware.formats.table import MOST_SAMPLES, RawFile
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _UNITS = ("units", "unit")
 _CLASS = "MATLAB_class"
-_READING = Reading("HDF5", (*_UNITS, _CLASS.lower(), "matlab_empty", "class", *sorted(RATES | INTERVALS)))
+_READING = LibraryRead("HDF5", (*_UNITS, _CLASS.lower(), "matlab_empty", "class", *sorted(RATES | INTERVALS)))
 _DEEPEST = 16
 _MOST_OBJECTS = 10_000
 # MATLAB keeps what its cells refer to, and objects of its classes, in groups of these names.

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.files.probing import Reading
+from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.arrays import Scope, tables_of
 from vibroimpact.hardware.formats.probe import check_reads
@@ -26,7 +26,7 @@ NUMERIC = frozenset(
 )
 _READ = NUMERIC | {"struct"}
 _DEEPEST = 8
-_READING = Reading("MATLAB", tuple(sorted(_READ)))
+_READING = LibraryRead("MATLAB", tuple(sorted(_READ)))
 
 
 def read_mat(path: os.PathLike[str] | str) -> RawFile:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from vibroimpact.analysis.files.probing import Reading, UnsoundFileError, check_sound
+from vibroimpact.analysis.files.probing import LibraryRead, UnsoundFileError, check_sound
 from vibroimpact.fmus.errors import DatasetError
 
 
@@ -16,13 +16,13 @@ class UnreadableError(DatasetError):
         self.raised = raised
 
 
-def check_reads(path: os.PathLike[str] | str, reading: Reading) -> None:
+def check_reads(path: os.PathLike[str] | str, reading: LibraryRead) -> None:
     """Refuse a file that does not read; see `analysis.probing`.
 
     Parameters
     ----------
     path : path
-    reading : Reading
+    reading : LibraryRead
         What is about to be done with it.
 
     Raises

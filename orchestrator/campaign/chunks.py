@@ -149,7 +149,7 @@ def _opened(scene_text: str, source: str, runner: str) -> _Opened:
     return _Opened(scene, expand(scene), named_runner(scene, runner))
 
 
-def identify(runner: Runner) -> RunnerIdentity:
+def identity_of(runner: Runner) -> RunnerIdentity:
     """Return what a runner is: its execution, instruction set and FMU hashes."""
     return RunnerIdentity(runner.execution, runner.instruction_set, dict(runner.fmu_hashes))
 
@@ -162,7 +162,7 @@ def get_ready(work: Work) -> RunnerIdentity:
     record = empty_record(opened.scene, Outcome.error, "rehearsal", 0.0)
     with ScratchFolder("rehearsal") as folder:
         write_dataset(dataset_of(opened.scene, first_point, [record], {}), Path(folder.name, "rehearsal.nc"))
-    return identify(opened.runner)
+    return identity_of(opened.runner)
 
 
 def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
@@ -199,10 +199,10 @@ def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
 
 
 def _refuse_other_runner(work: Work, runner: Runner) -> None:
-    if work.identity is not None and identify(runner) != work.identity:
+    if work.identity is not None and identity_of(runner) != work.identity:
         raise CampaignError(
             f"worker: expected the runner that the campaign began with ({work.identity}), "
-            f"got {identify(runner)}. Use workers of one kind of machine with one version of vibroimpact."
+            f"got {identity_of(runner)}. Use workers of one kind of machine with one version of vibroimpact."
         )
 
 

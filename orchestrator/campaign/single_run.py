@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.campaign.chunks import (
     BranchPoint,
     Chunk,
     dataset_of,
-    identify,
+    identity_of,
     points_of,
     run_points,
     tally,
@@ -67,7 +67,7 @@ def run_scene(
         rehearsal = [empty_record(scene, Outcome.error, "rehearsal", 0.0)]
         with_constants_of(dataset_of(scene, points[:1], rehearsal, {}), scene)
         records = _run_all(scene, opened, points, progress or Silence())
-        dataset = dataset_of(scene, points, records, provenance(scene, identify(opened)))
+        dataset = dataset_of(scene, points, records, provenance(scene, identity_of(opened)))
         dataset = with_constants_of(dataset, scene)
     finally:
         opened.close()

@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 
 from vibroimpact.fmus.errors import ComponentFileError, VibroimpactError
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
-from vibroimpact.orchestrator.guard.pipe import Failure, Identity, Order, Point, receive, send
+from vibroimpact.orchestrator.guard.pipe import Failure, Identity, Order, PointTask, receive, send
 from vibroimpact.orchestrator.run import Runner, open_runner
 from vibroimpact.orchestrator.scene import parse_scene
 
@@ -50,7 +50,7 @@ def _private_pipes() -> tuple[BinaryIO, BinaryIO]:
     return orders, answers
 
 
-def _answer(runner: Runner, point: Point) -> Any:
+def _answer(runner: Runner, point: PointTask) -> Any:
     try:
         return runner.run(point.values, point.start)
     except (VibroimpactError, ArithmeticError, ValueError) as error:
@@ -79,6 +79,6 @@ def main() -> None:
         send(answers, Failure(str(error), misuse=isinstance(error, ComponentFileError)))
         return
     send(answers, Identity.of(runner))
-    while isinstance(point := receive(orders), Point):
+    while isinstance(point := receive(orders), PointTask):
         send(answers, _answer(runner, point))
     runner.close()

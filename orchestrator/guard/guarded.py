@@ -29,7 +29,7 @@ from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.python_child import python_command
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
-from vibroimpact.orchestrator.guard.pipe import Failure, Identity, Order, Point, receive, send
+from vibroimpact.orchestrator.guard.pipe import Failure, Identity, Order, PointTask, receive, send
 from vibroimpact.orchestrator.run import Runner, open_runner
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.scene import Scene
@@ -188,7 +188,7 @@ class GuardedRunner:
             The point failed in the child, which lives on.
         """
         began = time.perf_counter()
-        point = Point(dict(values), start)
+        point = PointTask(dict(values), start)
         used = self._child is not None and self._points > 0
         found = self._attempt(point)
         if isinstance(found, _Loss):
@@ -198,7 +198,7 @@ class GuardedRunner:
             return empty_record(self._scene, found.outcome, found.message, seconds)
         return replace(found, seconds=seconds)
 
-    def _attempt(self, point: Point) -> RunRecord | _Loss:
+    def _attempt(self, point: PointTask) -> RunRecord | _Loss:
         """Run a point in the child, or in a new one."""
         if self._child is None:
             self._start()
@@ -217,7 +217,7 @@ class GuardedRunner:
         record: RunRecord = answer
         return record
 
-    def _second_attempt(self, point: Point, loss: _Loss, *, used: bool) -> RunRecord | _Loss:
+    def _second_attempt(self, point: PointTask, loss: _Loss, *, used: bool) -> RunRecord | _Loss:
         """Repeat a lost point in a new process where that may help, or tell which call crashes."""
         if loss.outcome is Outcome.crash:
             helps = used or not self._noting

@@ -40,7 +40,7 @@ class Identity:
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class PointTask:
     """One point to run."""
 
     values: Mapping[str, float]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-Direction = Literal["falling", "rising", "either"]
+Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
 
 
@@ -56,5 +56,5 @@ class EventSpec:
 
     component: str
     variable: str
-    direction: Direction = "falling"
+    direction: Crossing = "falling"
     level: float = 0.0

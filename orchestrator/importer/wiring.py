@@ -25,7 +25,7 @@ def connection_name(connection: ConnectionSpec) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class TransferOrder:
     """Connections in the order in which they are moved, and the algebraic loops among them."""
 
     connections: tuple[ConnectionSpec, ...]
@@ -36,7 +36,7 @@ class Order:
         return any(connection in loop for loop in self.loops)
 
 
-def order_of(connections: Connections, components: dict[str, Component]) -> Order:
+def order_of(connections: Connections, components: dict[str, Component]) -> TransferOrder:
     """Order connections so that each is moved after those that its output depends on directly.
 
     Connections that depend on each other in a circle are an algebraic loop; they are moved last, by iteration.
@@ -53,7 +53,7 @@ def order_of(connections: Connections, components: dict[str, Component]) -> Orde
             continue
         break
     merged = _merged(loops)
-    return Order(
+    return TransferOrder(
         tuple(connections[i] for i in ranked),
         tuple(tuple(connections[i] for i in loop) for loop in merged),
     )
@@ -261,7 +261,7 @@ def moves_of(transfers: Iterable[Transfer]) -> CallList:
     return CallList(call for transfer in transfers for call in transfer.calls())
 
 
-def transfers_of(order: Order, components: dict[str, Component]) -> tuple[Transfer, ...]:
+def transfers_of(order: TransferOrder, components: dict[str, Component]) -> tuple[Transfer, ...]:
     """Group ordered connections into as few transfers as their order allows; loops are kept apart."""
     groups: list[list[ConnectionSpec]] = []
     for connection in order.connections:

@@ -40,7 +40,7 @@ REPLAY, DRIVE = "replay", "drive"
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ChannelReading:
     """How a simulated variable becomes what a channel reads, in the SI unit of the channel.
 
     Attributes
@@ -320,7 +320,7 @@ def _cut(times: Floats, start: float | None, stop: float | None) -> Floats:
     return chosen
 
 
-def _reading(compared: Compared, scene: Scene, recording: Recording) -> Reading:
+def _reading(compared: Compared, scene: Scene, recording: Recording) -> ChannelReading:
     variable, is_sensor = plain_variable(compared.simulated)
     channel = recording.channel(compared.measured)
     measured = measured_unit(channel.unit)
@@ -328,10 +328,10 @@ def _reading(compared: Compared, scene: Scene, recording: Recording) -> Reading:
     rule = sample_rule(stored)
     simulated = rule.unit if rule is not None else known_unit(stored)
     if scene.units == "nondimensional" or measured.si == simulated:
-        return Reading(compared, variable, channel, is_sensor, same_kind=True)
+        return ChannelReading(compared, variable, channel, is_sensor, same_kind=True)
     if not is_sensor:
         raise DatasetError(
             f"{channel.name}: expected a channel in {simulated} to compare with {compared.simulated}, "
             f"got {channel.unit}. Give [sensor] a gain and compare sensor.{variable}."
         )
-    return Reading(compared, variable, channel, is_sensor, same_kind=False)
+    return ChannelReading(compared, variable, channel, is_sensor, same_kind=False)

@@ -16,7 +16,7 @@ from vibroimpact.analysis.replay.event import find_event
 from vibroimpact.analysis.replay.held import Held
 from vibroimpact.fmus.errors import EstimationError
 from vibroimpact.orchestrator.replay.drive import quiet_level
-from vibroimpact.orchestrator.replay.replayer import Motion, Reading, Replayer
+from vibroimpact.orchestrator.replay.replayer import ChannelReading, Motion, Replayer
 
 #: Longest lag tried between channels of separate triggers, as a share of the shorter record.
 MOST_LAG_SHARE = 0.5
@@ -40,7 +40,7 @@ def compare_motion(replayer: Replayer, motion: Motion) -> list[Comparison]:
         raise EstimationError(f"{replayer.recording.title}: {problem}") from problem
 
 
-def _compared(replayer: Replayer, reading: Reading, motion: Motion, place: int) -> Comparison:
+def _compared(replayer: Replayer, reading: ChannelReading, motion: Motion, place: int) -> Comparison:
     replay = replayer.replay
     channel = reading.channel
     if replayer.drive is None:
@@ -66,7 +66,9 @@ def _compared(replayer: Replayer, reading: Reading, motion: Motion, place: int) 
     )
 
 
-def _clock(replayer: Replayer, reading: Reading) -> tuple[Literal["auto"] | float, Literal["auto"] | int]:
+def _clock(
+    replayer: Replayer, reading: ChannelReading
+) -> tuple[Literal["auto"] | float, Literal["auto"] | int]:
     """Return lag and polarity: as the scene says, none on one clock, else to be found."""
     replay = replayer.replay
     if is_on_the_clock(replayer, reading):
@@ -76,7 +78,7 @@ def _clock(replayer: Replayer, reading: Reading) -> tuple[Literal["auto"] | floa
     )
 
 
-def is_on_the_clock(replayer: Replayer, reading: Reading) -> bool:
+def is_on_the_clock(replayer: Replayer, reading: ChannelReading) -> bool:
     """Whether a channel was recorded on the clock that the simulation runs on: one axis, one trigger."""
     if replayer.drive is None:
         return True
@@ -85,7 +87,7 @@ def is_on_the_clock(replayer: Replayer, reading: Reading) -> bool:
     return axis is driven or (axis.trigger != "" and axis.trigger == driven.trigger)
 
 
-def _most_lag(replayer: Replayer, reading: Reading) -> float:
+def _most_lag(replayer: Replayer, reading: ChannelReading) -> float:
     given = replayer.replay.most_lag
     if replayer.drive is None:
         return given or 0.0
@@ -100,7 +102,7 @@ def _span(times: Floats) -> tuple[float, float]:
     return float(times[0]), float(times[-1])
 
 
-def _offset(replayer: Replayer, reading: Reading) -> Literal["before", "none"] | float:
+def _offset(replayer: Replayer, reading: ChannelReading) -> Literal["before", "none"] | float:
     """A scene that gives its sensor an offset simulates it; else the level of rest is taken off.
 
     That is the mean before the event or, where the record does not begin quietly, the level of an acceleration where
@@ -117,7 +119,7 @@ def _offset(replayer: Replayer, reading: Reading) -> Literal["before", "none"] |
     return quiet_level(channel.si()[channel.good])
 
 
-def score_without_dynamics(replayer: Replayer, reading: Reading, comparison: Comparison) -> float:
+def score_without_dynamics(replayer: Replayer, reading: ChannelReading, comparison: Comparison) -> float:
     """Return the score, percent, of the best prediction without dynamics: nothing moves, or all as the base does.
 
     The drive times the gain that suits the record best, on the same clock and the same samples.

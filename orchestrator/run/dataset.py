@@ -82,12 +82,12 @@ def _described(dataset: xr.Dataset, scene: Scene, names: Mapping[str, str]) -> x
 def with_constants_of(dataset: xr.Dataset, scene: Scene) -> xr.Dataset:
     """Return the dataset of a scene's runs with what the scene does not sweep as scalar coordinates."""
     constants = scene.constants()
-    names = constant_names(scene, constants)
+    names = constant_file_names(scene, constants)
     named = {file: constants[key] for key, file in names.items()}
     return _described(with_constants(dataset, named, unit_of=_units(scene, names)), scene, names)
 
 
-def constant_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
+def constant_file_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
     """Return the name in the file of each key that is not swept: named as if swept, beside those that are."""
     every = [*keys, *(axis.key for axis in scene.sweep)]
     short = {key: coordinate_name(key, every) for key in keys}

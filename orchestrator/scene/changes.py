@@ -13,7 +13,7 @@ from vibroimpact.fmus.safe_toml import MOST_PARTS, parse_toml
 from vibroimpact.orchestrator.scene.keys import ALTERNATIVES
 from vibroimpact.orchestrator.scene.problems import CHANGES, Problem, key_path, quoted
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 
 _PART = re.compile(
     r"""\s*(?P<name>[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')\s*(?P<places>(?:\[[1-9][0-9]{0,8}\]\s*)*)"""
@@ -31,7 +31,7 @@ _SWEPT_HINT = (
 class Change:
     """A key of a scene, with 0-based places in arrays, and its new value."""
 
-    path: Path
+    path: KeyPath
     value: Any
 
     @property
@@ -126,7 +126,7 @@ def _read(text: str) -> Change:
     return Change(path, _value(key_path(path), rest[1:].strip()))
 
 
-def _path(text: str) -> tuple[Path, str]:
+def _path(text: str) -> tuple[KeyPath, str]:
     """Return the path of the key that a text begins with, and what follows it; no path where there is no key."""
     path: list[str | int] = []
     position = 0

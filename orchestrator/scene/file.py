@@ -22,7 +22,7 @@ LARGEST_FILE = 2**20  # bytes; a scene is some hundred lines, and more is most l
 _VALUE = "a value that TOML has: a number, True, False, text, a sequence or a mapping"
 
 
-def read_text(path: Path, source: str) -> str:
+def read_scene_text(path: Path, source: str) -> str:
     """Return the text of a scene file.
 
     Raises
@@ -39,7 +39,7 @@ def read_text(path: Path, source: str) -> str:
         raise _file_error(source, "UTF-8 text", got, "Save the file as UTF-8.", f"line {line}") from None
 
 
-def parse_toml(text: str, source: str) -> dict[str, Any]:
+def parse_scene_toml(text: str, source: str) -> dict[str, Any]:
     """Return the TOML document in a text.
 
     Raises

@@ -16,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 from vibroimpact.orchestrator.importer.specification import Exchange
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, NUMBER_TAG
-from vibroimpact.orchestrator.scene.sweep import Path
+from vibroimpact.orchestrator.scene.sweep import SweepPath
 
 MOST_SAMPLES_PER_RUN = 10**8
 MOST_PERIODS = 10**9
@@ -640,7 +640,7 @@ class AxisTable(SceneTable):
         Field(strict=False, min_length=1),
         Rule(doc="instead of a range; all different"),
     ] = None
-    path: Annotated[Path, Rule()] = "independent"
+    path: Annotated[SweepPath, Rule()] = "independent"
 
 
 Body = OscillatorBody | ChainBody | BeamBody

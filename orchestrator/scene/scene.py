@@ -21,7 +21,12 @@ from pydantic.fields import FieldInfo
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.scene.changes import changed_document, changed_values
 from vibroimpact.orchestrator.scene.fields import field_of, known_keys
-from vibroimpact.orchestrator.scene.file import parse_toml, read_text, refuse_no_mapping, text_of_tables
+from vibroimpact.orchestrator.scene.file import (
+    parse_scene_toml,
+    read_scene_text,
+    refuse_no_mapping,
+    text_of_tables,
+)
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.keys import (
     Key,
@@ -276,7 +281,7 @@ class Scene(BaseModel):
         2.0
         """
         refuse_no_mapping(values, "keys and their new values", self.source)
-        document = changed_values(parse_toml(self.text, self.source), values, self.source)
+        document = changed_values(parse_scene_toml(self.text, self.source), values, self.source)
         return self.from_dict(document, self.source)
 
     def with_sweep(self, axes: Mapping[str, Any]) -> Scene:
@@ -301,7 +306,7 @@ class Scene(BaseModel):
         """
         refuse_no_mapping(axes, "swept keys and their values", self.source)
         tables = {key: axis if isinstance(axis, Mapping) else {"values": axis} for key, axis in axes.items()}
-        document = parse_toml(self.text, self.source)
+        document = parse_scene_toml(self.text, self.source)
         document.pop("sweep", None)
         return self.from_dict(document | ({"sweep": tables} if tables else {}), self.source)
 
@@ -355,7 +360,7 @@ def load_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
         With all problems of the file, each on one line.
     """
     source = str(path)
-    return parse_scene(read_text(Path(path), source), source, changes)
+    return parse_scene(read_scene_text(Path(path), source), source, changes)
 
 
 def parse_scene(text: str, source: str, changes: Sequence[str] = ()) -> Scene:
@@ -375,7 +380,7 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = ()) -> Scene:
     SceneError
         With all problems of the text, each on one line.
     """
-    document, changed = changed_document(parse_toml(text, source), changes)
+    document, changed = changed_document(parse_scene_toml(text, source), changes)
     tables, problems = read_tables(document, Path(source).parent)
     if tables is None:
         raise SceneError(lines_of(problems, source, changed))

@@ -17,10 +17,10 @@ from itertools import product
 from math import prod
 from typing import Literal, Protocol, overload
 
-Path = Literal["independent", "up", "down", "up-down"]
-Direction = Literal["independent", "up", "down"]
+SweepPath = Literal["independent", "up", "down", "up-down"]
+SweepDirection = Literal["independent", "up", "down"]
 
-DIRECTIONS: dict[Path, tuple[Direction, ...]] = {
+DIRECTIONS: dict[SweepPath, tuple[SweepDirection, ...]] = {
     "independent": ("independent",),
     "up": ("up",),
     "down": ("down",),
@@ -44,7 +44,7 @@ class SweepAxis:
 
     key: str
     values: tuple[float, ...]
-    path: Path = "independent"
+    path: SweepPath = "independent"
 
     @property
     def continuation(self) -> bool:
@@ -107,7 +107,7 @@ class Branch:
         The points in the order of travel; `point.index` is their place in the `run` dimension.
     """
 
-    direction: Direction
+    direction: SweepDirection
     fixed: Mapping[str, float]
     points: Points
 

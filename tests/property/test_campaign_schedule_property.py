@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, State
 from vibroimpact.orchestrator.campaign.parts import StoredPart
 from vibroimpact.orchestrator.campaign.schedule import CHUNK_SECONDS, MOST_POINTS, ChunkSchedule
-from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, expand
-from vibroimpact.orchestrator.scene.sweep import Path as SweepPath
+from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, SweepPath, expand
 
 paths = st.sampled_from(["independent", "up", "down", "up-down"])
 

@@ -8,10 +8,10 @@ from vibroimpact.fmus.packaging.description.c_header import c_header, header_nam
 from vibroimpact.fmus.packaging.description.fmi2_xml import fmi2_xml
 from vibroimpact.fmus.packaging.description.fmi3_xml import fmi3_xml
 from vibroimpact.fmus.packaging.description.model import (
-    Component,
+    ComponentDescription,
     Enumeration,
     EnumerationItem,
-    Unit,
+    UnitDefinition,
     Variable,
     plural,
 )
@@ -19,10 +19,10 @@ from vibroimpact.fmus.packaging.description.reading import read_component
 from vibroimpact.fmus.packaging.description.readme_table import readme_table, with_table
 
 __all__ = [
-    "Component",
+    "ComponentDescription",
     "Enumeration",
     "EnumerationItem",
-    "Unit",
+    "UnitDefinition",
     "Variable",
     "c_header",
     "fmi2_xml",

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vibroimpact.fmus.packaging.description.model import Component, Variable
+from vibroimpact.fmus.packaging.description.model import ComponentDescription, Variable
 
 C_TYPES = {"Float64": "VI_FLOAT64", "Int64": "VI_INT64", "Boolean": "VI_BOOLEAN", "Enumeration": "VI_INT64"}
 
 
-def header_name(component: Component) -> str:
+def header_name(component: ComponentDescription) -> str:
     """Return the file name of the generated header."""
     return f"{component.folder}_variables.h"
 
 
-def c_header(component: Component) -> str:
+def c_header(component: ComponentDescription) -> str:
     """Return the text of `<folder>_variables.h`; the index into the table is the value reference."""
     return "\n".join(_lines(component)) + "\n"
 
 
-def _lines(component: Component) -> Iterator[str]:
+def _lines(component: ComponentDescription) -> Iterator[str]:
     prefix = component.folder.upper()
     guard = f"{prefix}_VARIABLES_H"
     yield f"/* Generated from {component.folder}/variables.toml; edit that file and build again. */"
@@ -35,7 +35,7 @@ def _lines(component: Component) -> Iterator[str]:
     yield from ("};", "", "#endif")
 
 
-def _row(component: Component, variable: Variable) -> str:
+def _row(component: ComponentDescription, variable: Variable) -> str:
     offset = f"offsetof({component.struct}, {variable.field})"
     kind = f"{C_TYPES[variable.type]}, {_access(variable)}, {variable.count}u"
     return f"    {{{kind}, {offset}}}, /* {variable.name} */"

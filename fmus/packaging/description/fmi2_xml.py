@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element, SubElement
 
-from vibroimpact.fmus.packaging.description.model import Component, Enumeration, Variable
+from vibroimpact.fmus.packaging.description.model import ComponentDescription, Enumeration, Variable
 from vibroimpact.fmus.packaging.description.xml_text import (
     add_log_categories_and_experiment,
     add_units,
@@ -17,7 +17,7 @@ from vibroimpact.fmus.packaging.description.xml_text import (
 TYPE_NAMES = {"Float64": "Real", "Int64": "Integer", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 
 
-def fmi2_xml(component: Component) -> str:
+def fmi2_xml(component: ComponentDescription) -> str:
     """Return the FMI 2.0 model description of a component; variables that only FMI 3.0 knows are left out."""
     identity = {"fmiVersion": "2.0", "guid": component.token}
     root = Element("fmiModelDescription", identity | head_attributes(component))
@@ -32,7 +32,7 @@ def fmi2_xml(component: Component) -> str:
     return to_text(root)
 
 
-def _capabilities(component: Component) -> dict[str, str]:
+def _capabilities(component: ComponentDescription) -> dict[str, str]:
     return {
         "modelIdentifier": component.name,
         "canHandleVariableCommunicationStepSize": "true",
@@ -67,7 +67,7 @@ def _add_variable(parent: Element, variable: Variable) -> None:
     SubElement(scalar, TYPE_NAMES[variable.type], value_attributes(variable))
 
 
-def _add_structure(root: Element, component: Component) -> None:
+def _add_structure(root: Element, component: ComponentDescription) -> None:
     structure = SubElement(root, "ModelStructure")
     variables = component.variables_of(2)
     positions = {v.name: str(i) for i, v in enumerate(variables, 1)}

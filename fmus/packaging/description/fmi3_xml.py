@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element, SubElement
 
-from vibroimpact.fmus.packaging.description.model import Component, Enumeration, Variable
+from vibroimpact.fmus.packaging.description.model import ComponentDescription, Enumeration, Variable
 from vibroimpact.fmus.packaging.description.xml_text import (
     add_log_categories_and_experiment,
     add_units,
@@ -16,7 +16,7 @@ from vibroimpact.fmus.packaging.description.xml_text import (
 )
 
 
-def fmi3_xml(component: Component) -> str:
+def fmi3_xml(component: ComponentDescription) -> str:
     """Return the FMI 3.0 model description of a component."""
     identity = {"fmiVersion": "3.0", "instantiationToken": component.token}
     root = Element("fmiModelDescription", identity | head_attributes(component))
@@ -31,7 +31,7 @@ def fmi3_xml(component: Component) -> str:
     return to_text(root)
 
 
-def _capabilities(component: Component) -> dict[str, str]:
+def _capabilities(component: ComponentDescription) -> dict[str, str]:
     events = literal(component.event_mode)
     return {
         "modelIdentifier": component.name,
@@ -71,7 +71,7 @@ def _add_variable(parent: Element, variable: Variable) -> None:
         SubElement(element, "Dimension", start=str(size))
 
 
-def _add_structure(root: Element, component: Component) -> None:
+def _add_structure(root: Element, component: ComponentDescription) -> None:
     structure = SubElement(root, "ModelStructure")
     variables = component.variables_of(3)
     references = {v.name: str(v.value_reference) for v in variables}

@@ -36,7 +36,7 @@ DEFAULT_INITIAL = {
 
 
 @dataclass(frozen=True, slots=True)
-class Unit:
+class UnitDefinition:
     """A unit by its SI exponents: value in base units = factor * value + offset."""
 
     name: str
@@ -126,7 +126,7 @@ class Variable:
 
 
 @dataclass(frozen=True, slots=True)
-class Component:
+class ComponentDescription:
     """One component: what its two model descriptions, its C header and its README table are made of.
 
     Attributes
@@ -146,7 +146,7 @@ class Component:
     token: str
     source: Path
     repeats: Mapping[str, int]
-    units: tuple[Unit, ...]
+    units: tuple[UnitDefinition, ...]
     enumerations: tuple[Enumeration, ...]
     variables: tuple[Variable, ...]
 
@@ -159,7 +159,7 @@ class Component:
         inputs = {v.name for v in self.variables_of(version) if v.causality == "input"}
         return tuple(name for name in variable.dependencies or () if name in inputs)
 
-    def with_repeats(self, repeats: Mapping[str, int]) -> Component:
+    def with_repeats(self, repeats: Mapping[str, int]) -> ComponentDescription:
         """Return the component with fewer repeated blocks; the value references that stay are unchanged.
 
         A variable that counts such a block starts with that number, its largest value.

@@ -17,10 +17,10 @@ from typing import Any
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.description.model import (
     DEFAULT_INITIAL,
-    Component,
+    ComponentDescription,
     Enumeration,
     EnumerationItem,
-    Unit,
+    UnitDefinition,
     Variable,
     plural,
 )
@@ -39,7 +39,7 @@ OPTIONAL_KEYS = {
 ALL = "{*}"
 
 
-def read_component(path: Path) -> Component:
+def read_component(path: Path) -> ComponentDescription:
     """Read one component's `variables.toml`.
 
     Parameters
@@ -49,7 +49,7 @@ def read_component(path: Path) -> Component:
 
     Returns
     -------
-    Component
+    ComponentDescription
         All of its variables, repeated blocks written out.
 
     Raises
@@ -98,10 +98,10 @@ def _entry_name(dependency: str) -> str:
     return dependency.replace(ALL, "{k}")
 
 
-def _component(table: Mapping[str, Any], path: Path, token: str) -> Component:
+def _component(table: Mapping[str, Any], path: Path, token: str) -> ComponentDescription:
     head = table["component"]
     repeats = {name: _repeat_count(head, name) or 0 for name in _repeat_names(table)}
-    return Component(
+    return ComponentDescription(
         name=head["name"],
         folder=head["folder"],
         struct=head["struct"],
@@ -111,7 +111,7 @@ def _component(table: Mapping[str, Any], path: Path, token: str) -> Component:
         token=f"{{{token}}}",
         source=path,
         repeats=repeats,
-        units=tuple(Unit(**{"base": {}, **unit}) for unit in table.get("unit", ())),
+        units=tuple(UnitDefinition(**{"base": {}, **unit}) for unit in table.get("unit", ())),
         enumerations=tuple(_enumeration(entry) for entry in table.get("enumeration", ())),
         variables=tuple(_numbered(table["variable"], repeats)),
     )

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from vibroimpact.fmus.errors import ComponentFileError
-from vibroimpact.fmus.packaging.description.model import Component, Variable
+from vibroimpact.fmus.packaging.description.model import ComponentDescription, Variable
 from vibroimpact.fmus.packaging.description.xml_text import literal
 
 BEGIN = "<!-- variables: generated from variables.toml -->"
 END = "<!-- end of variables -->"
 
 
-def readme_table(component: Component) -> str:
+def readme_table(component: ComponentDescription) -> str:
     """Return the Markdown table; a repeated block is shown once, with index k."""
     head = ["| variable | causality | unit | start | meaning |", "|---|---|---|---|---|"]
     return "\n".join(head + [_row(component, v) for v in _shown_once(component)])
 
 
-def with_table(readme: str, component: Component) -> str:
+def with_table(readme: str, component: ComponentDescription) -> str:
     """Return a README with its table up to date.
 
     Raises
@@ -33,11 +33,11 @@ def with_table(readme: str, component: Component) -> str:
     return f"{before}{BEGIN}\n{readme_table(component)}\n{END}{after}"
 
 
-def _shown_once(component: Component) -> list[Variable]:
+def _shown_once(component: ComponentDescription) -> list[Variable]:
     return [v for v in component.variables if v.repeat_index <= 1]
 
 
-def _row(component: Component, variable: Variable) -> str:
+def _row(component: ComponentDescription, variable: Variable) -> str:
     only = " (FMI 3.0 only)" if variable.versions == (3,) and variable.causality != "independent" else ""
     kind = f"{variable.causality}, {variable.variability}"
     meaning = variable.shown_description.replace("|", "\\|")
@@ -51,7 +51,7 @@ def _row(component: Component, variable: Variable) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def _start(component: Component, variable: Variable) -> str:
+def _start(component: ComponentDescription, variable: Variable) -> str:
     if variable.start is None:
         return "-"
     items = (item for e in component.enumerations if e.name == variable.enumeration for item in e.items)

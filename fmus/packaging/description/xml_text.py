@@ -7,7 +7,12 @@ from collections.abc import Mapping
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from vibroimpact.fmus.packaging.description.model import Component, Number, Unit, Variable
+from vibroimpact.fmus.packaging.description.model import (
+    ComponentDescription,
+    Number,
+    UnitDefinition,
+    Variable,
+)
 
 LOG_CATEGORIES = {
     "logStatusError": "Why a call failed",
@@ -34,7 +39,7 @@ def number_literal(variable: Variable, value: Number) -> str:
     return literal(float(value) if variable.type == "Float64" else value)
 
 
-def head_attributes(component: Component) -> dict[str, str]:
+def head_attributes(component: ComponentDescription) -> dict[str, str]:
     """Return the attributes that both versions give to the root, without version and token."""
     return {
         "modelName": component.name,
@@ -46,7 +51,7 @@ def head_attributes(component: Component) -> dict[str, str]:
     }
 
 
-def add_units(root: Element, units: tuple[Unit, ...]) -> None:
+def add_units(root: Element, units: tuple[UnitDefinition, ...]) -> None:
     """Append UnitDefinitions, which are the same in both versions."""
     if not units:
         return

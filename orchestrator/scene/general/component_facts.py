@@ -15,11 +15,11 @@ from vibroimpact.fmus.packaging.archive import content_hash
 from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, read_description
 from vibroimpact.fmus.units import BASE_UNITS, Unit, declared_unit
 
-Kind = Literal["real", "integer", "enumeration", "boolean", "text", "binary", "clock"]
+VariableKind = Literal["real", "integer", "enumeration", "boolean", "text", "binary", "clock"]
 #: Kinds that are numbers in a dataset.
-NUMERIC_KINDS: tuple[Kind, ...] = ("real", "integer", "enumeration", "boolean")
+NUMERIC_KINDS: tuple[VariableKind, ...] = ("real", "integer", "enumeration", "boolean")
 
-_KINDS: dict[str, Kind] = {
+_KINDS: dict[str, VariableKind] = {
     "Enumeration": "enumeration",
     "Boolean": "boolean",
     "String": "text",
@@ -53,7 +53,7 @@ class VariableFacts:
 
     name: str
     reference: int
-    kind: Kind
+    kind: VariableKind
     type: str
     causality: str
     variability: str
@@ -151,7 +151,7 @@ def _variable(variable: Any, units: Mapping[str, Unit | None]) -> VariableFacts:
     )
 
 
-def _kind(fmi_type: str) -> Kind:
+def _kind(fmi_type: str) -> VariableKind:
     if fmi_type in _KINDS:
         return _KINDS[fmi_type]
     return "real" if fmi_type.startswith(("Real", "Float")) else "integer"

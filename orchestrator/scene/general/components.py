@@ -50,7 +50,7 @@ class DraftComponent:
     parameters: Mapping[str, StartValue] | None = None
 
 
-def read_components(raw: object, folder: Path, problems: list[Problem]) -> dict[str, DraftComponent]:
+def components_of(raw: object, folder: Path, problems: list[Problem]) -> dict[str, DraftComponent]:
     """Return the components of a document by name; what is wrong with them joins the problems.
 
     Parameters

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from vibroimpact.orchestrator.importer.specification import Direction
+from vibroimpact.orchestrator.importer.specification import Crossing
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.models import Finite, NotNegative, Positive, SceneTable
 
@@ -81,7 +81,7 @@ class EventTable(SceneTable):
         ),
     ]
     direction: Annotated[
-        Direction,
+        Crossing,
         Rule(
             hint="It says how the variable crosses the level.",
             doc='`"falling"`, `"rising"`, `"either"`',

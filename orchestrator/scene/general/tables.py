@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
-from vibroimpact.orchestrator.scene.general.components import DraftComponent, read_components
+from vibroimpact.orchestrator.scene.general.components import DraftComponent, components_of
 from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems, split
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
@@ -52,7 +52,7 @@ def read_general(document: Mapping[str, Any], folder: Path) -> tuple[GeneralTabl
     header = read_table(SceneHeader, document.get("scene", {}), ("scene",), problems)
     draft = GeneralDraft(
         document,
-        read_components(document.get("component"), folder, problems),
+        components_of(document.get("component"), folder, problems),
         read_array(ConnectionTable, document.get("connection", []), "connection", problems),
         read_array(EventTable, document.get("event", []), "event", problems),
         read_table(GeneralRecord, document.get("record", {}), ("record",), problems),

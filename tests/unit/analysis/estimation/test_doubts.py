@@ -13,7 +13,7 @@ from support.impact_records import CHAOTIC, THESIS, channel_of, record_of
 from vibroimpact.analysis.estimation import Forcing, Known, estimate_impacts, impacts, print_impacts
 from vibroimpact.analysis.estimation.coordinates import Coordinates
 from vibroimpact.analysis.estimation.doubts import _of_contradictions
-from vibroimpact.analysis.estimation.estimates import Estimate
+from vibroimpact.analysis.estimation.estimates import MethodEstimate
 from vibroimpact.analysis.estimation.physics import Parameters
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.fmus.errors import EstimationError
@@ -132,7 +132,7 @@ def test_methods_contradict_each_other_when_chance_does_not_explain_how_far_they
     name, apart, contradicts
 ):
     def around(value, error):
-        return {name: Estimate(value, error, value - 1.96 * error, value + 1.96 * error)}
+        return {name: MethodEstimate(value, error, value - 1.96 * error, value + 1.96 * error)}
 
     values = {"trajectory": around(0.8, 0.001), "energy_joint": around(0.8 + apart, 0.01)}
     found = list(_of_contradictions(values, 0.95))

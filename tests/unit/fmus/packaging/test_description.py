@@ -11,7 +11,7 @@ from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.build import NATIVE, fmi_headers, read_components, update_readmes
 from vibroimpact.fmus.packaging.compiler import find_compiler
 from vibroimpact.fmus.packaging.description import (
-    Component,
+    ComponentDescription,
     c_header,
     fmi2_xml,
     fmi3_xml,
@@ -127,7 +127,7 @@ typedef struct {
 
 
 @pytest.fixture
-def small(tmp_path: Path) -> Component:
+def small(tmp_path: Path) -> ComponentDescription:
     path = tmp_path / "variables.toml"
     path.write_text(SMALL, encoding="utf-8")
     return read_component(path)
@@ -147,7 +147,7 @@ def attributes(text: str, tag: str) -> list[dict[str, str]]:
     return [element.attrib for element in ElementTree.fromstring(text).iter(tag)]
 
 
-def test_value_references_count_through_the_file_block_by_block(small: Component) -> None:
+def test_value_references_count_through_the_file_block_by_block(small: ComponentDescription) -> None:
     assert [v.name for v in small.variables] == [
         *("time", "push", "contact[1].law", "contact[1].gap", "contact[2].law", "contact[2].gap"),
         *("rows", "moving", "gain"),
@@ -159,7 +159,7 @@ def test_value_references_count_through_the_file_block_by_block(small: Component
 @pytest.mark.parametrize("contacts", [0, 1, 2])
 @pytest.mark.parametrize("emit", [fmi2_xml, fmi3_xml])
 def test_fmpy_finds_nothing_wrong_with_either_version(
-    small: Component, tmp_path: Path, contacts: int, emit: object
+    small: ComponentDescription, tmp_path: Path, contacts: int, emit: object
 ) -> None:
     # two masses or modes stand for all: FMPy takes seconds over a thousand names, which test_fmu_check spends
     for component in (small, *read_components()):
@@ -169,21 +169,21 @@ def test_fmpy_finds_nothing_wrong_with_either_version(
         assert validate_fmu(str(tmp_path)) == []
 
 
-def test_fewer_contacts_leave_the_other_value_references_alone(small: Component) -> None:
+def test_fewer_contacts_leave_the_other_value_references_alone(small: ComponentDescription) -> None:
     names = {v.name: v.value_reference for v in small.with_repeats({"contact": 1}).variables}
     assert names == {
         v.name: v.value_reference for v in small.variables if not v.name.startswith("contact[2]")
     }
 
 
-def test_fmi_2_has_no_arrays_and_no_time(small: Component) -> None:
+def test_fmi_2_has_no_arrays_and_no_time(small: ComponentDescription) -> None:
     names = [a["name"] for a in attributes(fmi2_xml(small), "ScalarVariable")]
     assert "rows" not in names
     assert "time" not in names
     assert "gain" in names
 
 
-def test_outputs_depend_on_inputs_by_reference_or_by_position(small: Component) -> None:
+def test_outputs_depend_on_inputs_by_reference_or_by_position(small: ComponentDescription) -> None:
     three = attributes(fmi3_xml(small), "Output")
     assert {"valueReference": "3", "dependencies": "1"} in three
     assert {"valueReference": "7", "dependencies": ""} in three
@@ -193,14 +193,14 @@ def test_outputs_depend_on_inputs_by_reference_or_by_position(small: Component) 
     assert outputs[0].attrib == {"index": "3", "dependencies": "1"}
 
 
-def test_numbers_are_spelled_as_xml_schema_wants(small: Component) -> None:
+def test_numbers_are_spelled_as_xml_schema_wants(small: ComponentDescription) -> None:
     starts = {a["name"]: a.get("start") for a in attributes(fmi3_xml(small), "Float64")}
     assert starts["gain"] == "INF"
     assert starts["push"] == "0.0"
 
 
 def test_both_versions_and_the_c_code_have_one_token_that_follows_the_file(
-    small: Component, tmp_path: Path
+    small: ComponentDescription, tmp_path: Path
 ) -> None:
     assert f'instantiationToken="{small.token}"' in fmi3_xml(small)
     assert f'guid="{small.token}"' in fmi2_xml(small)
@@ -210,7 +210,9 @@ def test_both_versions_and_the_c_code_have_one_token_that_follows_the_file(
     assert read_component(other).token != small.token
 
 
-def test_the_generated_header_compiles_and_points_into_the_struct(small: Component, tmp_path: Path) -> None:
+def test_the_generated_header_compiles_and_points_into_the_struct(
+    small: ComponentDescription, tmp_path: Path
+) -> None:
     (tmp_path / "small.h").write_text(C_STRUCT)
     (tmp_path / header_name(small)).write_text(c_header(small))
     (tmp_path / "main.c").write_text(C_SOURCE)
@@ -221,7 +223,7 @@ def test_the_generated_header_compiles_and_points_into_the_struct(small: Compone
     assert subprocess.run([str(program)]).returncode == 0
 
 
-def test_the_readme_shows_a_repeated_block_once(small: Component) -> None:
+def test_the_readme_shows_a_repeated_block_once(small: ComponentDescription) -> None:
     table = readme_table(small)
     assert "| `contact[k].gap` | output, continuous | m | - | Gap to stop k |" in table
     assert "Law \\| of stop k" in table
@@ -229,7 +231,7 @@ def test_the_readme_shows_a_repeated_block_once(small: Component) -> None:
     assert table.count("contact[") == 2
 
 
-def test_a_readme_keeps_everything_but_its_table(small: Component) -> None:
+def test_a_readme_keeps_everything_but_its_table(small: ComponentDescription) -> None:
     frame = (
         "# Small\n<!-- variables: generated from variables.toml -->\nold\n<!-- end of variables -->\nafter\n"
     )
@@ -288,7 +290,7 @@ dependencies = ["load[{*}]", "push", "pull"]
 
 
 @pytest.fixture
-def joined(tmp_path: Path) -> Component:
+def joined(tmp_path: Path) -> ComponentDescription:
     """Return the small component with what it has in common with others."""
     (tmp_path / "core").mkdir()
     (tmp_path / "core" / "common.toml").write_text(COMMON, encoding="utf-8")
@@ -299,13 +301,15 @@ def joined(tmp_path: Path) -> Component:
     return read_component(path)
 
 
-def test_included_variables_follow_the_components_own(joined: Component, small: Component) -> None:
+def test_included_variables_follow_the_components_own(
+    joined: ComponentDescription, small: ComponentDescription
+) -> None:
     assert [v.name for v in joined.variables[: len(small.variables)]] == [v.name for v in small.variables]
     assert [v.name for v in joined.variables[9:12]] == ["size", "load[1]", "answer[1]"]
     assert joined.repeats == {"contact": 2, "mode": 6}
 
 
-def test_an_included_file_is_part_of_the_token(joined: Component) -> None:
+def test_an_included_file_is_part_of_the_token(joined: ComponentDescription) -> None:
     common = joined.source.parents[1] / "core" / "common.toml"
     common.write_text(COMMON + "# changed\n", encoding="utf-8")
     assert read_component(joined.source).token != joined.token
@@ -314,13 +318,13 @@ def test_an_included_file_is_part_of_the_token(joined: Component) -> None:
         read_component(joined.source)
 
 
-def test_a_dependency_may_stand_for_a_whole_block(joined: Component) -> None:
+def test_a_dependency_may_stand_for_a_whole_block(joined: ComponentDescription) -> None:
     answer = next(v for v in joined.with_repeats({"mode": 2}).variables if v.name == "answer[2]")
     # and one that this component does not have is left out
     assert joined.with_repeats({"mode": 2}).direct_inputs(answer, 3) == ("load[1]", "load[2]", "push")
 
 
-def test_what_counts_a_block_starts_with_the_number_asked_for(joined: Component) -> None:
+def test_what_counts_a_block_starts_with_the_number_asked_for(joined: ComponentDescription) -> None:
     for component, expected in (
         (joined, ("4", "1", "6")),
         (joined.with_repeats({"mode": 2}), ("2", "1", "2")),

@@ -11,10 +11,10 @@ from vibroimpact.orchestrator.campaign.schedule import (
     SHORTEST_SECONDS,
     ChunkSchedule,
 )
-from vibroimpact.orchestrator.scene.sweep import Branch, Path, SweepAxis, expand
+from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, SweepPath, expand
 
 
-def branches(points: int, path: Path = "independent", others: int = 1) -> tuple[Branch, ...]:
+def branches(points: int, path: SweepPath = "independent", others: int = 1) -> tuple[Branch, ...]:
     axes = (
         SweepAxis("forcing.amplitude", tuple(map(float, range(others)))),
         SweepAxis("forcing.angular_frequency", tuple(map(float, range(points))), path),
