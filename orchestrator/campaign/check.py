@@ -10,7 +10,7 @@ from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, BranchPoint, dataset_of, run_point
 from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.run.result_size import MOST_BYTES, bytes_of_a_run, size
-from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Point, run_count
 
 MOST_TRIAL_SECONDS = 20.0
@@ -107,6 +107,7 @@ def cost_of(scene: Scene) -> SceneCost:
 
     Examples
     --------
+    >>> from vibroimpact.orchestrator.scene import parse_scene
     >>> text = "[body]\\nmass = 1\\nstiffness = 1\\n[record]\\nrecorded_time = 5"
     >>> cost = cost_of(parse_scene(text, "free.toml"))
     >>> cost.points, cost.trial.outcome.name
@@ -128,7 +129,9 @@ def _why_untried(scene: Scene) -> str:
 
 def _tried(scene: Scene) -> Trial:
     deadline = min(MOST_TRIAL_SECONDS, scene.execution.deadline or math.inf)
-    limited = parse_scene(scene.text, scene.source, [f"execution.deadline={deadline}"])
+    limited = scene.model_copy(
+        update={"execution": scene.execution.model_copy(update={"deadline": deadline})}
+    )
     point = Point(0, {axis.key: axis.values[len(axis.values) // 2] for axis in scene.sweep})
     runner = named_runner(limited, DEFAULT_RUNNER)
     try:

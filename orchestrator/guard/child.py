@@ -14,7 +14,6 @@ from vibroimpact.fmus.errors import ComponentFileError, VibroimpactError
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
 from vibroimpact.orchestrator.guard.pipe import Failure, Identity, Order, PointTask, receive, send
 from vibroimpact.orchestrator.run import Runner, open_runner
-from vibroimpact.orchestrator.scene import parse_scene
 
 #: How often the child looks at its parent and at what it is doing itself, s.
 LOOK = 0.1
@@ -58,8 +57,7 @@ def _answer(runner: Runner, point: PointTask) -> Any:
 
 
 def _open(order: Order, notes: Breadcrumbs) -> Runner:
-    scene = parse_scene(order.scene_text, order.source)
-    return open_runner(scene, order.execution, log=notes.log, wrap=notes.wrap if order.noting else None)
+    return open_runner(order.scene, order.execution, log=notes.log, wrap=notes.wrap if order.noting else None)
 
 
 def main() -> None:

@@ -164,9 +164,7 @@ class GuardedRunner:
         Breadcrumbs.create(path)
         self._notes = Breadcrumbs(path)
         self._notes.begin()
-        self._child = _Child(
-            Order(self._scene.text, self._scene.source, self._wanted, str(path), self._noting)
-        )
+        self._child = _Child(Order(self._scene, self._wanted, str(path), self._noting))
         try:
             answer = self._child.answer(START_TIME)
         except TimeoutError:

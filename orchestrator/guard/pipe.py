@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import IO, Any
 
+from vibroimpact.orchestrator.scene import Scene
+
 LENGTH = struct.Struct("<Q")
 
 
@@ -18,8 +20,7 @@ LENGTH = struct.Struct("<Q")
 class Order:
     """What the child shall run: a scene, its execution, the file of notes, and whether to note every call there."""
 
-    scene_text: str
-    source: str
+    scene: Scene
     execution: str
     notes: str
     noting: bool
