@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 from pydantic import BaseModel
+from support.places import ROOT
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import UsageError
@@ -18,7 +18,7 @@ from vibroimpact.orchestrator.scene.general.component_facts import component_fac
 from vibroimpact.orchestrator.scene.key_tables import with_key_tables
 from vibroimpact.orchestrator.scene.models import BeamBody, ChainBody, OscillatorBody, Rayleigh
 
-REFERENCE = Path(__file__).parents[2] / "docs" / "scene.md"
+REFERENCE = ROOT / "docs" / "scene.md"
 MODELS = {
     found
     for module in (models, replay_models, general_models)
