@@ -189,7 +189,7 @@ def _licence() -> bytes:
 
 
 def _c_files(folder: Path) -> list[Path]:
-    return sorted(folder.glob("*.c"))
+    return sorted(folder.rglob("*.c"))
 
 
 def _replace(source: Path, target: Path) -> None:

@@ -1,6 +1,6 @@
 """What a body FMU of ours records during a run, and how it is fetched; the same for both drivers.
 
-The body keeps impacts, sticks and periods as rows of eight numbers (`core/record.h`), so that no call into Python
+The body keeps impacts, sticks and periods as rows of eight numbers (`core/body/record.h`), so that no call into Python
 or FMI is made for them.
 """
 

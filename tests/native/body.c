@@ -1,6 +1,6 @@
 /* Random bodies between random stops under random steps and inputs: never beyond a stop, never back in time, never for
  * ever; a copy goes on bit for bit; a mirror image is a mirror image. */
-#include "body.h"
+#include "body/one_mass/body.h"
 
 #include <math.h>
 #include <string.h>

@@ -1,12 +1,12 @@
 /* A step that ends early for want of budget, and is gone on with, is the same step bit for bit; a motion that does not
  * go on, or leaves the numbers, is given up. */
-#include "body.h"
+#include "body/one_mass/body.h"
 
 #include <math.h>
 #include <string.h>
 
+#include "body/modal/structure.h"
 #include "check.h"
-#include "structure.h"
 
 static vi_body body, whole;
 

@@ -1,5 +1,5 @@
 /* Instants: to time and back, sums, and the phase after ever so many periods. */
-#include "clock.h"
+#include "motion/clock.h"
 
 #include <float.h>
 #include <math.h>

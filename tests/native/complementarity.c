@@ -1,5 +1,5 @@
 /* Forces that only push: the conditions of the problem itself, in any order of contacts, redundant ones too. */
-#include "complementarity.h"
+#include "contact/complementarity.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,12 +1,12 @@
 /* Correlation sums against a count of all pairs, one by one. */
-#include "correlation.h"
+#include "door/correlation.h"
 
 #include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
 #include "check.h"
-#include "door_correlation.h"
+#include "door/door_correlation.h"
 
 enum { COUNT = 700, EMBEDDING = 5, RADII = 40, STRIDE = RADII + 1 };
 

@@ -1,5 +1,5 @@
 /* The coupled motion against a Runge-Kutta integration of the same equations in small steps, written here. */
-#include "coupled_flow.h"
+#include "body/modal/coupled_flow.h"
 
 #include <math.h>
 #include <string.h>

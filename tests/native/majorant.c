@@ -1,5 +1,5 @@
 /* A certified step never passes a root of any motion whose fourth derivative keeps its bound. */
-#include "majorant.h"
+#include "motion/majorant.h"
 
 #include <stdbool.h>
 

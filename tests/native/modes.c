@@ -1,9 +1,9 @@
 /* Modes of random chains, cut and graded at will, and of beams to high order: invariants that need no reference. */
 #include <math.h>
 
-#include "beam_modes.h"
-#include "chain_modes.h"
 #include "check.h"
+#include "modes/beam_modes.h"
+#include "modes/chain_modes.h"
 
 static double decades(uint64_t *seed, double low, double high)
 {

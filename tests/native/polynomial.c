@@ -1,5 +1,5 @@
 /* Where a polynomial first falls to zero: against all its roots, placed by hand, and against a fine grid. */
-#include "polynomial.h"
+#include "motion/polynomial.h"
 
 #include <float.h>
 #include <math.h>

@@ -1,5 +1,5 @@
 /* The record: what an importer takes, what it forgets to take, and what it claims to have taken. */
-#include "record.h"
+#include "body/record.h"
 
 #include <math.h>
 #include <string.h>

@@ -43,7 +43,7 @@ def options_for(sanitizers: Sequence[str]) -> list[str]:
 
 def compile_core(compiler: Sequence[str], options: Sequence[str], folder: Path) -> list[Path] | None:
     """Compile the core, which all tests share, side by side on all processors; None if that fails."""
-    sources = sorted((NATIVE / "core").glob("*.c"))
+    sources = sorted((NATIVE / "core").rglob("*.c"))
     objects = [folder / f"{source.stem}.core.o" for source in sources]
 
     def compiles(source: Path, target: Path) -> bool:

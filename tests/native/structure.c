@@ -1,6 +1,6 @@
 /* Random bodies of up to 64 modes with up to eight stops of every law, extreme ones too: finite, never beyond a rigid
  * stop, never back in time, never for ever; stops only push. */
-#include "structure.h"
+#include "body/modal/structure.h"
 
 #include <math.h>
 #include <string.h>

@@ -11,8 +11,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "complaint.h"
-#include "step.h"
+#include "body/complaint.h"
+#include "body/step.h"
 
 enum { VI_FLOAT64 = 0, VI_INT64 = 1, VI_BOOLEAN = 2 };
 

@@ -4,9 +4,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "beam_modes.h"
 #include "beam_variables.h"
 #include "component.h"
+#include "modes/beam_modes.h"
 
 enum { START_MODES = 4 };
 enum { STRIDE = BEAM_CONTACT_APPLIED_RESTITUTION_2 - BEAM_CONTACT_APPLIED_RESTITUTION_1 };

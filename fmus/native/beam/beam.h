@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-#include "amplitude.h"
-#include "structure_component.h"
+#include "body/modal/structure_component.h"
+#include "motion/amplitude.h"
 
 enum { BEAM_SENSORS = 4 };
 

@@ -4,8 +4,8 @@
 
 #include <stdint.h>
 
-#include "chain_modes.h"
-#include "structure_component.h"
+#include "body/modal/structure_component.h"
+#include "modes/chain_modes.h"
 
 /* All of a Chain's variables and state (variables.toml says what each is); copying it copies the Chain. */
 typedef struct {

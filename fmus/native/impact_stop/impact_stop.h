@@ -2,7 +2,7 @@
 #ifndef VIBROIMPACT_IMPACT_STOP_H
 #define VIBROIMPACT_IMPACT_STOP_H
 
-#include "contact_law.h"
+#include "contact/contact_law.h"
 
 /* All of an ImpactStop's variables (variables.toml says what each is). */
 typedef struct {

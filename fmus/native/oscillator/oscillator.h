@@ -4,9 +4,9 @@
 
 #include <stdint.h>
 
-#include "amplitude.h"
-#include "body.h"
-#include "structure.h"
+#include "body/modal/structure.h"
+#include "body/one_mass/body.h"
+#include "motion/amplitude.h"
 
 /* All of an Oscillator's variables and state (variables.toml says what each is); copying it copies the Oscillator. */
 typedef struct {

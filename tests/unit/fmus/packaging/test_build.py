@@ -50,7 +50,7 @@ def test_building_twice_in_different_places_gives_the_same_bytes(built_elsewhere
 @pytest.mark.slow
 def test_an_edit_of_the_c_makes_the_build_out_of_date(built_elsewhere: Path, sources: Path) -> None:
     assert is_current(built_elsewhere, native=sources)
-    source = next((sources / "core").glob("*.c"))
+    source = next((sources / "core").rglob("*.c"))
     source.write_text(source.read_text() + "\n")
     assert not is_current(built_elsewhere, native=sources)
     assert fingerprint(sources) != fingerprint()

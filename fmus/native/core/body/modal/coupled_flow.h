@@ -1,0 +1,56 @@
+/* The motion of a structure whose modes are coupled: by stops that hold it or yield to it, or by its own damping.
+ *
+ *     q'' = f cos(phase) + held + held_rate u - D q' - W q - sum_k sign_k shape_k F_k
+ *
+ * with each contact force F_k linear in the penetration and its rate, or a power of it, or whatever keeps the contact
+ * where it is. A Taylor series to the last bit, straight from the equation: exact for any damping and any stiffness, and
+ * contacts, forces and their zeros are polynomials in one variable. equations.md 3.4, 6.9, 6.10
+ */
+#ifndef VIBROIMPACT_COUPLED_FLOW_H
+#define VIBROIMPACT_COUPLED_FLOW_H
+
+#include "body/modal/structure.h"
+#include "motion/polynomial.h"
+
+typedef enum {
+    VI_PRESS_NONE = 0,
+    VI_PRESS_HOLD = 1,   /* the force that keeps the contact at rest */
+    VI_PRESS_LINEAR = 2, /* constant + stiffness d + damping d' */
+    VI_PRESS_POWER = 3   /* stiffness d^exponent (1 + damping d'), d > 0 */
+} vi_press_kind;
+
+/* How a contact presses; d = sign (displacement - position) is its penetration. */
+typedef struct {
+    vi_press_kind kind;
+    double constant, stiffness, damping, exponent;
+} vi_press;
+
+typedef struct {
+    const vi_structure_model *model;
+    double length;                              /* valid for 0 <= u <= length, s */
+    int order;                                  /* of the polynomials; VI_ORDER but for the first touch of a power law */
+    double modal[VI_ORDER + 1][VI_MODES];       /* modal displacements from the start; modal[0] = 0 */
+    double penetration[VI_PORTS][VI_ORDER + 1]; /* d of each contact; [0] is its value at the start */
+    double force[VI_PORTS][VI_ORDER + 1];       /* F of each contact, N; the last two coefficients are 0 */
+    double force_scale[VI_PORTS];               /* of holding forces: size of the terms added up, N */
+} vi_drift;
+
+/* What a drift starts from. */
+typedef struct {
+    const double *q, *p;
+    double cosine, sine; /* of the forcing phase */
+    const double *held, *held_rate;
+    const double *penetration; /* of each contact, exact where it is known */
+    const double *sign;        /* direction of each contact */
+    const vi_press *press;
+} vi_drift_start;
+
+void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_drift_start *start, double length);
+
+/* Modal state after u, from the state at the start. */
+void vi_drift_at(const vi_drift *drift, double u, const double q[], double p_end[], double q_end[]);
+
+/* Taylor polynomial of a point's displacement from the start. */
+void vi_drift_point(const vi_drift *drift, const double shape[], double polynomial[VI_ORDER + 1]);
+
+#endif

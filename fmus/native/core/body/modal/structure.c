@@ -1,0 +1,447 @@
+#include "body/modal/structure.h"
+
+#include <float.h>
+#include <math.h>
+
+#include "body/modal/structure_parts.h"
+#include "motion/majorant.h"
+
+/* A contact just released stays on its stop for this times (1 / fastest rate + |time|): others that are released with it
+ * are so at its instant but for the rounding of their forces. */
+static const double ONE_RELEASE = 16.0 * DBL_EPSILON;
+/* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
+static const double LANDING = 1e-13;
+/* A contact that leaves its stop, and within a radian of the fastest mode goes no further than this times its other
+ * displacements, is followed from where it is. Not one on its way in: its clearance is rounded already. */
+static const double LINGERING = 1e-6;
+/* A bounce shorter than this over the fastest rate is followed from the stop, not from the origin. */
+static const double LOW_BOUNCE = 0.1;
+/* Such a flight is at least this long over the fastest rate: its length is only the reach of the search. */
+static const double LEAST_BOUNCE = 1e-6;
+/* Of a segment, in periods: more than one, so that a flight of one period does not end in two segments. */
+static const double LONGEST_SEGMENT = 1.5;
+/* The last step to a contact is shorter than this over the fastest rate. */
+static const double LAST_STEP = 1e-5;
+/* A contact nearer than this over the fastest rate may be near enough to be told without another evaluation. */
+static const double NEAR_CONTACT = 1e-4;
+
+/* Modal displacements and velocities below this have squares below the smallest normal number. */
+static const double SMALLEST = 1e-154;
+
+/* ---- segments ---- */
+
+typedef enum { ENDS_ANYWHERE, ENDS_AT_TARGET, ENDS_AT_PERIOD } segment_end;
+
+/* How long one segment may be, and what its end is. */
+static double segment_length(const vi_structure *s, vi_instant target, segment_end *end)
+{
+    const vi_clock *clock = &s->model->clock;
+    const double remaining = vi_clock_elapsed(clock, s->state->now, target);
+    const double to_period = vi_clock_to_period_end(clock, s->state->now);
+    if (s->record->periods && to_period <= remaining) {
+        *end = ENDS_AT_PERIOD;
+        return to_period;
+    }
+    const double longest = LONGEST_SEGMENT * clock->period;
+    *end = remaining <= longest ? ENDS_AT_TARGET : ENDS_ANYWHERE;
+    return vi_min(remaining, longest);
+}
+
+static void record_period(const vi_structure *s)
+{
+    const double *observed = s->model->observed;
+    vi_record_period(s->record, vi_clock_time(&s->model->clock, s->state->now),
+                     vi_structure_at(s->model, observed, s->state->q),
+                     vi_structure_at(s->model, observed, s->state->p));
+}
+
+/* Move the instant by u seconds; the two named ends are met exactly. The modal state is there already. */
+static void move(const vi_structure *s, double u, segment_end end, vi_instant target)
+{
+    vi_structure_state *state = s->state;
+    const vi_instant after = end == ENDS_AT_TARGET ? target : vi_clock_after(&s->model->clock, state->now, u);
+    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 0.0;
+    const double one = ONE_RELEASE * (radian + fabs(vi_clock_time(&s->model->clock, state->now)));
+    for (int k = 0; k < s->model->contacts && u > 0.0; ++k) {
+        if (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k] && u <= one) {
+            continue;
+        }
+        if (state->status[k] == VI_CONTACT_TOUCHING) {
+            state->status[k] = VI_CONTACT_FREE;
+        }
+        state->leaving[k] = 0;
+    }
+    /* a contact may be so close before a period's end that rounding puts it there */
+    if (end == ENDS_AT_PERIOD || (s->record->periods && after.periods > state->now.periods)) {
+        state->now = (vi_instant){state->now.periods + 1, 0.0, 0.0};
+        record_period(s);
+    } else {
+        state->now = after;
+    }
+}
+
+static double landing_room(const vi_structure *s)
+{
+    bool external = false;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        external = external || s->contacts[k].law.law >= VI_LAW_EXTERNAL;
+    }
+    return external ? LANDING * (1.0 + fabs(vi_clock_time(&s->model->clock, s->state->now))) : 0.0;
+}
+
+/* A contact found by rounding just past the end of the period or of the step is at its end. */
+static segment_end landing(segment_end end, double u, double length, double room)
+{
+    const bool past = end == ENDS_AT_PERIOD ? u >= length : u > length + room;
+    return past ? end : ENDS_ANYWHERE;
+}
+
+/* ---- flight ---- */
+
+/* Land on the contact found at this approach: one step of the parabola that touches the motion there; none where the
+ * velocity is no more than rounding, as the clearance is. */
+static double land(const vi_structure_model *model, const vi_approach *p, double u)
+{
+    const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
+    const double step = square >= 0.0 ? 2.0 * p->clearance / (p->velocity + sqrt(square))
+                                      : -p->velocity / p->acceleration;
+    return step * model->fastest < LAST_STEP ? u + step : u;
+}
+
+/* Seconds to the contact when the parabola that touches the motion here tells it to the last bit; else HUGE_VAL. */
+static double seconds_to_landing(const vi_structure_model *model, const vi_point *point, const vi_approach *p)
+{
+    if (!(p->clearance * model->fastest < NEAR_CONTACT * p->velocity)) {
+        return HUGE_VAL;
+    }
+    const double t = vi_parabola_root(p->clearance, p->velocity, p->acceleration), cube = t * t * t;
+    const bool exact = fabs(p->jerk) * cube <= DBL_EPSILON * point->scale
+                       && p->bound * cube <= DBL_EPSILON * p->velocity;
+    return exact ? t : HUGE_VAL;
+}
+
+/* What a contact that leaves its stop does at once is known exactly. */
+static void correct_start(const vi_structure *s, int k, vi_approach *p)
+{
+    if (s->state->status[k] == VI_CONTACT_TOUCHING) {
+        p->clearance = 0.0;
+        p->velocity = s->state->leaving[k] ? 0.0 : p->velocity;
+        p->acceleration = s->state->leaving[k] >= 2 ? 0.0 : p->acceleration;
+    }
+}
+
+/* Does a contact that is at its stop but for rounding approach it by no more than rounding, before it is pulled off? */
+static bool turns_back(const vi_approach *p, double noise)
+{
+    return p->clearance <= noise && p->velocity > 0.0
+           && p->velocity * p->velocity <= -2.0 * p->acceleration * noise;
+}
+
+/* In place of a contact: the motion goes beyond the largest numbers. */
+enum { BEYOND_NUMBERS = -2 };
+
+/* First contact after the start of the flight: its index, with *u; -1 when there is none up to *u, the end of the flight
+ * or of a long search. */
+static int locate(const vi_structure *s, const vi_flight *flight, const vi_point points[], double *u)
+{
+    vi_part parts[VI_MODES];
+    vi_budget *budget = &s->state->budget;
+    *u = 0.0;
+    for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
+        double step = flight->length - *u;
+        int nearest = -1, landing_on = -1;
+        vi_budget_spend(budget, s->model->modes);
+        vi_flight_parts(flight, *u, parts);
+        for (int k = 0; k < s->model->contacts; ++k) {
+            if (!vi_structure_watched(s, k)) {
+                continue;
+            }
+            vi_approach p = vi_point_approach(&points[k], flight, parts, *u);
+            const bool starts = *u == 0.0 && s->state->status[k] == VI_CONTACT_TOUCHING;
+            if (starts) {
+                correct_start(s, k, &p);
+            }
+            if (!isfinite(p.bound) || !isfinite(p.jerk)) {
+                return BEYOND_NUMBERS;
+            }
+            p.clearance = vi_max(0.0, p.clearance);
+            if (*u == 0.0 && turns_back(&p, VI_ROUNDING * points[k].scale)) {
+                p.velocity = 0.0;
+            }
+            if (p.velocity > 0.0 && p.clearance <= VI_ROUNDING * points[k].scale) {
+                *u = land(s->model, &p, *u);
+                return k;
+            }
+            const double seconds = seconds_to_landing(s->model, &points[k], &p);
+            const double certified = vi_min(seconds, starts ? vi_certified_step(&p, step)
+                                                            : vi_point_step(&points[k], flight, parts, *u, step));
+            if (certified < step) {
+                step = certified;
+                nearest = k;
+                landing_on = certified == seconds ? k : -1;
+            }
+        }
+        if (nearest < 0) {
+            *u = flight->length;
+            return -1;
+        }
+        if (landing_on >= 0 || *u + step == *u) {
+            *u += step;
+            return nearest;
+        }
+        *u += step;
+    }
+    return -1;
+}
+
+static void start_points(const vi_structure *s, const vi_flight *flight, vi_point points[])
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_point_start(&points[k], flight, s->model->shape[k], vi_structure_direction(s, k),
+                       vi_structure_clearance(s, k));
+        points[k].scale += fabs(s->contacts[k].position);
+    }
+}
+
+/* Can no stop ever be reached again under the present input? Their envelopes prove it. */
+static bool out_of_reach(const vi_structure *s, const vi_flight *flight, const vi_point points[])
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        double reach;
+        if (vi_structure_watched(s, k)
+            && (!vi_point_reach(&points[k], flight, &reach) || !(reach < points[k].sign * s->contacts[k].position))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Is nothing wanted of the motion before the target, and one evaluation enough however far that is? */
+static bool only_end_matters(const vi_structure *s, const vi_flight *flight)
+{
+    for (int j = 0; j < s->model->modes; ++j) {
+        if (flight->segment[j].series) {
+            return false;
+        }
+    }
+    return !s->record->extrema && !s->record->periods && !s->state->follow_energies;
+}
+
+/* How long to follow the body from where it is, since a contact is about to meet its stop or slow to leave it, s;
+ * HUGE_VAL when that is not needed. */
+static double low_bounce(const vi_structure *s)
+{
+    const vi_structure_model *model = s->model;
+    double acceleration[VI_MODES], force[VI_PORTS], shortest = HUGE_VAL;
+    vi_structure_accelerate(s, acceleration, force);
+    for (int k = 0; k < model->contacts; ++k) {
+        if (!vi_structure_watched(s, k)) {
+            continue;
+        }
+        const double clearance = vi_max(0.0, vi_structure_clearance(s, k)), v = vi_structure_approach(s, k);
+        const double a = vi_structure_direction(s, k) * vi_structure_at(model, model->shape[k], acceleration);
+        const double flight = vi_parabola_root(clearance, v, a), time = 1.0 / model->fastest;
+        if (flight > 0.0 && flight * model->fastest < LOW_BOUNCE) {
+            /* no shorter than moves the body at all: what rounding calls a bounce need not come down */
+            shortest = vi_min(shortest, vi_max(2.0 * flight, LEAST_BOUNCE * time));
+        } else if (s->state->status[k] == VI_CONTACT_TOUCHING
+                   && (fabs(v) + fabs(a) * time) * time < LINGERING * vi_structure_displacement_size(s, k)) {
+            shortest = vi_min(shortest, time);
+        }
+    }
+    return shortest;
+}
+
+/* Contacts have changed the motion: the next flight begins anew. */
+static void forget_origins(const vi_structure *s)
+{
+    for (int j = 0; j < s->model->modes; ++j) {
+        s->state->origin[j].known = 0;
+    }
+}
+
+/* A flight to the target over which no stop can be met: one evaluation, however long. */
+static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant target)
+{
+    const vi_clock *clock = &s->model->clock;
+    const double u = vi_clock_elapsed(clock, s->state->now, target);
+    vi_flight_end(flight, u, clock->angular_frequency * target.rest, s->state->q, s->state->p);
+    vi_flight_reach(flight, s->state->now, s->state->q, s->state->p, s->state->origin);
+    move(s, u, ENDS_AT_TARGET, target);
+}
+
+/* Fly to the next contact, the end of the segment, or the target, whichever comes first; false where the motion goes
+ * beyond the largest numbers. */
+static bool fly(const vi_structure *s, vi_instant target, const vi_step_request *request)
+{
+    segment_end end;
+    const double length = segment_length(s, target, &end), bounce = low_bounce(s);
+    const double room = end == ENDS_AT_TARGET ? landing_room(s) : 0.0;
+    vi_structure_state *state = s->state;
+    double held[VI_MODES], u;
+    vi_flight flight;
+    vi_point points[VI_PORTS];
+    vi_structure_held_now(s, held);
+    vi_flight_start(&flight, s->model, state->q, state->p, vi_structure_phase(s), held, state->held_rate,
+                    vi_min(vi_min(length + room, bounce), vi_energies_reach(s)), bounce < HUGE_VAL);
+    vi_flight_follow(&flight, state->now, state->q, state->p, state->origin);
+    start_points(s, &flight, points);
+    const bool unreachable = out_of_reach(s, &flight, points);
+    if (unreachable && only_end_matters(s, &flight)) {
+        fly_free(s, &flight, target);
+        return true;
+    }
+    u = flight.length;
+    const int k = unreachable ? -1 : locate(s, &flight, points, &u);
+    if (k == BEYOND_NUMBERS) {
+        return false;
+    }
+    const bool whole = k < 0 && u >= length;
+    u = whole ? length : u; /* the room after the end was only searched */
+    if (s->record->extrema) {
+        vi_extremes_of_flight(s, &flight, u);
+    }
+    if (state->follow_energies) {
+        vi_energies_of_flight(s, &flight, held, u);
+    }
+    vi_flight_end(&flight, u, flight.angle + flight.angular_frequency * u, state->q, state->p);
+    if (k < 0) {
+        vi_flight_reach(&flight, state->now, state->q, state->p, state->origin);
+        move(s, u, whole ? end : ENDS_ANYWHERE, target);
+        return true;
+    }
+    forget_origins(s);
+    move(s, u, landing(end, u, length, room), target);
+    const double remaining = vi_clock_elapsed(&s->model->clock, state->now, target);
+    vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
+    return true;
+}
+
+/* ---- coupled motion ---- */
+
+/* A mode that moves less than numbers can square has come to rest: between stops that take a share of its speed each time
+ * it would go on until nothing is left of its digits. */
+static void end_smallest(const vi_structure *s)
+{
+    vi_structure_state *state = s->state;
+    for (int j = 0; j < s->model->modes; ++j) {
+        if (fabs(state->q[j]) < SMALLEST && fabs(state->p[j]) < SMALLEST) {
+            state->q[j] = state->p[j] = 0.0;
+        }
+    }
+}
+
+static void drift(const vi_structure *s, vi_instant target, const vi_step_request *request)
+{
+    segment_end end;
+    vi_drift_event event;
+    int k;
+    const double length = segment_length(s, target, &end);
+    const double room = end == ENDS_AT_TARGET ? landing_room(s) : 0.0;
+    const double u = vi_structure_drift(s, length, room, &event, &k);
+    forget_origins(s);
+    const bool whole = event == VI_DRIFT_NO_EVENT && u >= length;
+    move(s, u, whole ? end : event == VI_DRIFT_NO_EVENT ? ENDS_ANYWHERE : landing(end, u, length, room), target);
+    const double remaining = vi_clock_elapsed(&s->model->clock, s->state->now, target);
+    if (event != VI_DRIFT_NO_EVENT) {
+        end_smallest(s);
+    }
+    switch (event) {
+    case VI_DRIFT_NO_EVENT: break;
+    case VI_DRIFT_ARRIVAL:
+        vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
+        break;
+    /* a load that has changed at once lifts the contact off with an acceleration; else its force has fallen to 0 */
+    case VI_DRIFT_RELEASE: vi_structure_release(s, k, u > 0.0 ? 2 : 1); break;
+    case VI_DRIFT_SEPARATION: vi_structure_separate(s, k, true); break;
+    case VI_DRIFT_RETURN:
+        vi_structure_return(s, k);
+        break;
+    case VI_DRIFT_FREE: s->state->status[k] = VI_CONTACT_FREE; break;
+    }
+}
+
+bool vi_structure_is_coupled(const vi_structure *s)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const int32_t status = s->state->status[k];
+        if (status >= VI_CONTACT_HELD || (status == VI_CONTACT_TOUCHING && s->state->leaving[k] == 3)) {
+            return true;
+        }
+    }
+    return s->model->coupled;
+}
+
+/* ---- a step ---- */
+
+/* Is the motion still one of finite numbers? */
+static bool is_finite(const vi_structure *s)
+{
+    double sum = 0.0;
+    for (int j = 0; j < s->model->modes; ++j) {
+        sum += fabs(s->state->q[j]) + fabs(s->state->p[j]);
+    }
+    return sum <= DBL_MAX;
+}
+
+static void begin_step(const vi_structure *s, const vi_step_request *request)
+{
+    vi_record_begin_step(s->record, vi_structure_at(s->model, s->model->observed, s->state->q));
+    for (int k = 0; k < s->model->contacts; ++k) {
+        s->contacts[k].event_time = NAN;
+    }
+    if (!s->state->budget.unfinished) {
+        vi_structure_settle(s, request);
+    }
+    if (s->record->periods && !s->record->period_open && s->state->now.rest == 0.0) {
+        record_period(s);
+    }
+}
+
+/* One flight or drift and what follows at its end; VI_STEP_DONE when the step goes on. */
+static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi_step_request *request)
+{
+    vi_structure_state *state = s->state;
+    const vi_step_result looked = vi_budget_look(&state->budget, &s->model->clock, state->now, s->model->impact_limit,
+                                                 request);
+    if (looked != VI_STEP_DONE) {
+        return looked;
+    }
+    const bool coupled = vi_structure_is_coupled(s);
+    if (coupled) {
+        drift(s, target, request);
+    }
+    if ((!coupled && !fly(s, target, request)) || !is_finite(s)) {
+        return VI_STEP_NOT_FINITE;
+    }
+    vi_structure_settle(s, request);
+    return vi_clock_stands(&state->standstill, state->now) ? VI_STEP_STANDSTILL : VI_STEP_DONE;
+}
+
+vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, const vi_step_request *request)
+{
+    begin_step(s, request);
+    /* a record that is full already was not emptied by the importer: ending the step again would end it for ever */
+    const bool ends_when_full = request->early_return && !vi_record_full(s->record);
+    vi_step_result result = VI_STEP_DONE;
+    while (result == VI_STEP_DONE && !s->state->pending
+           && vi_clock_elapsed(&s->model->clock, s->state->now, target) > 0.0) {
+        result = ends_when_full && vi_record_full(s->record) ? VI_STEP_RECORD_FULL : move_on(s, target, request);
+    }
+    return vi_budget_end(&s->state->budget, result == VI_STEP_DONE && s->state->pending ? VI_STEP_CONTACT : result);
+}
+
+void vi_structure_outputs(const vi_structure *s, double acceleration[VI_MODES])
+{
+    double force[VI_PORTS];
+    vi_structure_accelerate(s, acceleration, force);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_contact *contact = &s->contacts[k];
+        const int32_t status = s->state->status[k];
+        const bool on_stop = status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD;
+        const double *shape = s->model->shape[k];
+        contact->displacement = on_stop ? contact->position : vi_structure_at(s->model, shape, s->state->q);
+        contact->velocity = status == VI_CONTACT_HELD ? 0.0 : vi_structure_at(s->model, shape, s->state->p);
+        contact->force = vi_max(0.0, force[k]);
+    }
+}

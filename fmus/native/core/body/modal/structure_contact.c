@@ -1,0 +1,240 @@
+/* The moments of a contact: arrival, rest, release, and compliant stops from touch-down to separation. */
+#include <float.h>
+#include <math.h>
+
+#include "body/modal/structure_parts.h"
+#include "motion/majorant.h"
+
+/* Contacts whose clearance is below this many roundings of their displacement meet at the same instant. */
+static const double SAME_INSTANT = 16.0;
+/* A contact whose force ends at a penetration of so many roundings, or of a power law with 1 + damping d' above so
+ * little, ends with its penetration. */
+static const double WITH_IT = 4.0, GONE = 1e-9;
+
+/* ---- rest and release ---- */
+
+void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_impulse)
+{
+    vi_structure_state *state = s->state;
+    vi_contact *contact = &s->contacts[k];
+    state->budget.events += 1;
+    state->status[k] = VI_CONTACT_HELD;
+    state->leaving[k] = 0;
+    state->tail_impulse[k] = tail_impulse;
+    state->fastest_impact[k] = 0.0;
+    state->low_impacts[k] = 0;
+    contact->stuck = 1;
+    contact->stick_start = vi_clock_time(&s->model->clock, vi_clock_after(&s->model->clock, state->now, delay));
+    contact->stick_end = NAN;
+}
+
+void vi_structure_release(const vi_structure *s, int k, int leaving)
+{
+    vi_contact *contact = &s->contacts[k];
+    contact->stick_end = vi_clock_time(&s->model->clock, s->state->now);
+    contact->stick_start = fmin(contact->stick_start, contact->stick_end); /* lifted before the chatter had ended */
+    if (contact->stick_end > contact->stick_start || s->state->tail_impulse[k] > 0.0) {
+        vi_record_stick(s->record, contact->stick_start, contact->stick_end, k + 1, s->state->tail_impulse[k]);
+    }
+    contact->stuck = 0;
+    s->state->status[k] = VI_CONTACT_TOUCHING;
+    s->state->leaving[k] = leaving;
+}
+
+/* ---- compliant stops ---- */
+
+void vi_structure_touch_down(const vi_structure *s, int k)
+{
+    vi_contact *contact = &s->contacts[k];
+    const vi_clock *clock = &s->model->clock;
+    const double v = vi_structure_approach(s, k), size = vi_structure_displacement_size(s, k);
+    const double approach = v > VI_ROUNDING * vi_structure_velocity_size(s, k) ? v : 0.0;
+    s->state->budget.events += 1;
+    s->state->status[k] = VI_CONTACT_YIELDING;
+    s->state->leaving[k] = 0;
+    /* a contact that begins now begins at depth 0: a graze is over before its depth would outgrow rounding */
+    if (fabs(vi_structure_clearance(s, k)) <= SAME_INSTANT * DBL_EPSILON * size) {
+        s->state->leaving[k] = approach > 0.0 ? 1 : 2;
+    }
+    s->state->touch_down[k] = (vi_touch_down){vi_clock_time(clock, s->state->now), vi_clock_phase(clock, s->state->now),
+                                              approach, 0.0};
+    contact->count += 1;
+    contact->last_time = s->state->touch_down[k].time;
+    contact->last_phase = s->state->touch_down[k].phase;
+    contact->last_velocity = approach;
+    contact->impulse = 0.0;
+}
+
+/* What has the sign of a compliant contact's force, whether it is pressed or not. */
+static double pressing_now(const vi_structure *s, int k)
+{
+    const vi_contact_law *law = &s->contacts[k].law;
+    const double depth = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
+    const double damping = law->law == VI_LAW_HERTZ ? 0.0 : law->damping;
+    return damping * rate + (law->law == VI_LAW_KELVIN_VOIGT ? law->stiffness * depth : 1.0);
+}
+
+/* A contact that ends at the instant at which it began without speed has only touched: it stays as it is until something moves. */
+static bool only_touched(const vi_structure *s, int k)
+{
+    if (s->state->leaving[k] != 2) {
+        return false;
+    }
+    s->contacts[k].count -= 1;
+    s->state->status[k] = VI_CONTACT_TOUCHING;
+    return true;
+}
+
+/* Is what ends now a touch of rounding size, with neither speed nor impulse? It is no impact. */
+static bool is_rounding(const vi_structure *s, int k)
+{
+    const vi_touch_down *touch = &s->state->touch_down[k];
+    const double noise = VI_ROUNDING * vi_structure_velocity_size(s, k);
+    return touch->velocity == 0.0 && touch->impulse * s->model->mobility[k][k] <= noise;
+}
+
+void vi_structure_separate(const vi_structure *s, int k, bool receding)
+{
+    vi_structure_state *state = s->state;
+    if (only_touched(s, k)) {
+        return;
+    }
+    const vi_touch_down *touch = &state->touch_down[k];
+    const double now = vi_clock_time(&s->model->clock, state->now), rebound = -vi_structure_approach(s, k);
+    const double restitution = touch->velocity > 0.0 ? vi_max(0.0, rebound) / touch->velocity : 0.0;
+    const double penetration = -vi_structure_clearance(s, k);
+    const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
+    /* the last push of a thin contact has thrown it out a little before this instant */
+    const double late = penetration < 0.0 && rebound > 0.0 ? -penetration / rebound : 0.0;
+    if (is_rounding(s, k)) {
+        s->contacts[k].count -= 1;
+    } else {
+        s->contacts[k].impulse = touch->impulse;
+        vi_record_contact(s->record, touch->time, touch->phase, touch->velocity, touch->impulse, k + 1, restitution,
+                          vi_max(0.0, now - touch->time - late));
+    }
+    const double surface = vi_max(0.0, penetration), tau = s->contacts[k].relaxation_time;
+    state->surface[k] = rebound * tau > surface ? surface : 0.0; /* a surface that is faster follows without force */
+    state->separated[k] = state->now;
+    const int64_t law = s->contacts[k].law.law;
+    const bool linear = law == VI_LAW_KELVIN_VOIGT || law == VI_LAW_EXTERNAL_FORCE;
+    /* the force is gone before the penetration, or with it */
+    if (receding && (linear ? penetration > WITH_IT * noise : pressing_now(s, k) <= GONE && penetration > noise)) {
+        state->status[k] = VI_CONTACT_RECEDING;
+    } else {
+        /* an impact elsewhere may have put it off its stop, and be on its way back */
+        state->status[k] = -penetration > SAME_INSTANT / 4.0 * noise ? VI_CONTACT_FREE : VI_CONTACT_TOUCHING;
+        state->leaving[k] = 0;
+    }
+}
+
+bool vi_structure_surface_lags(const vi_structure *s, int k)
+{
+    return s->contacts[k].relaxation_time > 0.0 && s->state->surface[k] > 0.0;
+}
+
+void vi_structure_return(const vi_structure *s, int k)
+{
+    if (vi_structure_surface_lags(s, k) && pressing_now(s, k) <= 0.0) {
+        s->state->surface[k] = 0.0;
+        return;
+    }
+    vi_structure_touch_down(s, k);
+}
+
+/* ---- arrival ---- */
+
+/* Put contact k on its stop to the last bit. */
+static void put_on_stop(const vi_structure *s, int k)
+{
+    const vi_structure_model *model = s->model;
+    const double displacement = vi_structure_at(model, model->shape[k], s->state->q);
+    const double beyond = (displacement - s->contacts[k].position) / model->compliance[k][k];
+    for (int j = 0; j < model->modes; ++j) {
+        s->state->q[j] -= model->shape[k][j] * beyond;
+    }
+    s->state->status[k] = VI_CONTACT_TOUCHING;
+    s->state->leaving[k] = 0;
+}
+
+bool vi_structure_meets_now(const vi_structure *s, int k)
+{
+    if (!vi_structure_watched(s, k) || s->state->status[k] != VI_CONTACT_FREE) {
+        return false;
+    }
+    const double v = vi_structure_approach(s, k);
+    const double room = SAME_INSTANT * DBL_EPSILON * (vi_structure_displacement_size(s, k) + v * s->state->now.rest);
+    return v > VI_ROUNDING * vi_structure_velocity_size(s, k) && vi_structure_clearance(s, k) <= room;
+}
+
+static bool is_external(const vi_structure *s, int k)
+{
+    return s->contacts[k].law.law == VI_LAW_EXTERNAL || s->contacts[k].law.law == VI_LAW_EXTERNAL_FORCE;
+}
+
+/* External laws among those that meet: stop there and wait, or (FMI 2.0) note the time and fly through. */
+bool vi_structure_ask(const vi_structure *s, const int hit[], bool stop_here)
+{
+    bool any = false;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (!hit[k] || !is_external(s, k)) {
+            continue;
+        }
+        s->contacts[k].event_time = vi_clock_time(&s->model->clock, s->state->now);
+        s->contacts[k].answered = 0;
+        s->state->asking[k] = stop_here;
+        if (!any) {
+            *(stop_here ? &s->state->pending : &s->state->passed) = k + 1;
+        }
+        any = true;
+    }
+    return any;
+}
+
+/* Resolve those that are hit: compliant stops begin to yield, rigid ones answer together. */
+void vi_structure_resolve_hits(const vi_structure *s, const int hit[])
+{
+    int rigid[VI_PORTS] = {0}, any = 0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const int64_t law = s->contacts[k].law.law;
+        if (hit[k] && (vi_contact_law_is_compliant(law) || law == VI_LAW_EXTERNAL_FORCE)) {
+            vi_structure_touch_down(s, k);
+        } else if (hit[k]) {
+            rigid[k] = any = 1;
+        }
+    }
+    if (any) {
+        vi_structure_collide(s, rigid);
+    }
+}
+
+void vi_structure_meet(const vi_structure *s, int k, bool stop_here)
+{
+    int hit[VI_PORTS] = {0};
+    put_on_stop(s, k);
+    hit[k] = 1;
+    for (int l = 0; l < s->model->contacts; ++l) {
+        if (l != k && vi_structure_meets_now(s, l)) {
+            s->state->status[l] = VI_CONTACT_TOUCHING;
+            s->state->leaving[l] = 0;
+            hit[l] = 1;
+        }
+    }
+    if (!vi_structure_ask(s, hit, stop_here)) {
+        vi_structure_resolve_hits(s, hit);
+    }
+}
+
+void vi_structure_resolve(const vi_structure *s)
+{
+    int hit[VI_PORTS] = {0};
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const bool touches = s->state->status[k] == VI_CONTACT_TOUCHING && !s->state->leaving[k];
+        hit[k] = s->state->asking[k]
+                 || (touches && vi_structure_approach(s, k) > VI_ROUNDING * vi_structure_velocity_size(s, k));
+        s->state->asking[k] = 0;
+        s->contacts[k].answered = 0;
+    }
+    s->state->pending = 0;
+    vi_structure_resolve_hits(s, hit);
+}

@@ -1,0 +1,179 @@
+/* What is recorded along a motion when it is asked for: extremes of the observed point, energies. */
+#include <float.h>
+#include <math.h>
+
+#include "body/modal/structure_parts.h"
+#include "motion/majorant.h"
+
+/* Nodes and weights of Gauss-Legendre quadrature with eight points, for -1 to 1 (the other half by symmetry). */
+static const double NODES[4] = {0.18343464249564980494, 0.52553240991632898582, 0.79666647741362673959,
+                                0.96028985649753623168};
+static const double WEIGHTS[4] = {0.36268378337836198297, 0.31370664587788728734, 0.22238103445337447054,
+                                  0.10122853629037625915};
+/* Length of a piece of quadrature times the fastest rate: eight points then integrate to the last digits. */
+static const double PIECE = 1.5;
+
+/* Evaluations that a climb is counted as. */
+enum { CLIMB = 8 };
+
+/* ---- extremes ---- */
+
+/* Climb from u to the next turning point of the observed displacement times sign; returns its time. */
+static double climb(const vi_flight *flight, const vi_point *point, double u, double end, double *top)
+{
+    vi_part parts[VI_MODES];
+    for (int evaluation = 0;; ++evaluation) {
+        vi_flight_parts(flight, u, parts);
+        const vi_approach p = vi_point_approach(point, flight, parts, u);
+        *top = p.clearance; /* of a stop above: falls as the point rises */
+        const double noise = 4.0 * DBL_EPSILON * (fabs(p.velocity) + point->scale * flight->model->fastest);
+        if (!(p.velocity > noise) || u >= end) {
+            return u;
+        }
+        /* the velocity falls to zero as a clearance does */
+        const vi_approach fall = {p.velocity, -p.acceleration, -p.jerk, p.bound, 0.0};
+        u = vi_min(end, u + vi_max(vi_certified_step(&fall, end - u), vi_least_step(end, 1e-12, evaluation)));
+    }
+}
+
+/* Largest displacement * sign over the flight: regions that stay below the largest one seen are passed over. */
+static void extreme(const vi_structure *s, const vi_flight *flight, double sign, double end)
+{
+    vi_part parts[VI_MODES];
+    vi_point point;
+    const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
+    double best = s->record->displacement_max, u = 0.0;
+    if (sign < 0.0) {
+        best = -s->record->displacement_min;
+    }
+    best = vi_max(best, sign * here);
+    vi_point_start(&point, flight, s->model->observed, sign, best - sign * here);
+    const double start = point.offset, least = VI_ROUNDING * point.scale;
+    for (int evaluation = 0; u < end; ++evaluation) {
+        const double least_step = vi_least_step(end, 1e-9, evaluation);
+        vi_budget_spend(&s->state->budget, s->model->modes);
+        vi_flight_parts(flight, u, parts);
+        const vi_approach p = vi_point_approach(&point, flight, parts, u);
+        if (p.clearance <= least && p.velocity > 0.0) {
+            double top;
+            u = climb(flight, &point, u, end, &top);
+            vi_budget_spend(&s->state->budget, CLIMB * s->model->modes);
+            point.offset += vi_max(0.0, -top); /* the bar is raised to what was reached */
+            u += least_step;
+            continue;
+        }
+        point.offset += least;
+        u += vi_max(vi_point_step(&point, flight, parts, u, end - u), least_step);
+        point.offset -= least;
+    }
+    vi_flight_parts(flight, end, parts);
+    point.offset += vi_max(0.0, -vi_point_approach(&point, flight, parts, end).clearance);
+    vi_record_extend(s->record, sign * (best + (point.offset - start)));
+}
+
+void vi_extremes_of_flight(const vi_structure *s, const vi_flight *flight, double u)
+{
+    vi_record_extend(s->record, vi_structure_at(s->model, s->model->observed, s->state->q));
+    if (u > 0.0) {
+        extreme(s, flight, 1.0, u);
+        extreme(s, flight, -1.0, u);
+    }
+}
+
+static void differentiate(const double c[VI_ORDER + 1], double sign, double slope[VI_ORDER + 1])
+{
+    for (int n = 0; n < VI_ORDER; ++n) {
+        slope[n] = sign * (double)(n + 1) * c[n + 1];
+    }
+    slope[VI_ORDER] = 0.0;
+}
+
+void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u)
+{
+    double polynomial[VI_ORDER + 1], slope[VI_ORDER + 1], value[4], from = 0.0;
+    const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
+    vi_drift_point(drift, s->model->observed, polynomial);
+    vi_record_extend(s->record, here);
+    vi_polynomial_at(polynomial, u, value);
+    vi_record_extend(s->record, here + value[0]);
+    if (vi_polynomial_size(polynomial, u) <= VI_ROUNDING * fabs(here)) {
+        return; /* it is held: what its polynomial says is rounding */
+    }
+    for (int turn = 0; turn < 16 && from < u; ++turn) {
+        vi_polynomial_at(polynomial, from, value);
+        const double sign = value[1] != 0.0 ? copysign(1.0, value[1]) : copysign(1.0, value[2]);
+        differentiate(polynomial, sign, slope);
+        const vi_fall fall = vi_polynomial_fall(slope, from, u, 4.0 * DBL_EPSILON * vi_polynomial_size(slope, u));
+        if (!fall.found) {
+            return;
+        }
+        vi_polynomial_at(polynomial, fall.time, value);
+        vi_record_extend(s->record, here + value[0]);
+        from = fall.time + 1e-3 * u;
+    }
+}
+
+/* ---- energies ---- */
+
+/* Power of the applied forces and of the damping at modal velocities p, the forcing phase being `angle`. */
+static void add_powers(const vi_structure *s, const double p[], const double held[], double u, double angle,
+                       double weight)
+{
+    const vi_structure_model *model = s->model;
+    const double cosine = cos(angle);
+    double work = 0.0, loss = 0.0;
+    for (int j = 0; j < model->modes; ++j) {
+        const vi_mode *mode = &model->mode[j];
+        work += (mode->force * cosine + held[j] + s->state->held_rate[j] * u) * p[j];
+        loss += p[j] * (model->coupled ? vi_structure_at(model, model->coupling[j], p) : 2.0 * mode->decay * p[j]);
+    }
+    s->state->energies.forcing_work += weight * work;
+    s->state->energies.damping_loss += weight * loss;
+}
+
+/* The i-th of the eight nodes of a piece from `start`, and its weight. */
+static double node(double start, double piece, int i, double *weight)
+{
+    const double middle = start + 0.5 * piece, half = 0.5 * piece;
+    *weight = half * WEIGHTS[i % 4];
+    return i < 4 ? middle - half * NODES[i] : middle + half * NODES[i % 4];
+}
+
+double vi_energies_reach(const vi_structure *s)
+{
+    return s->state->follow_energies ? VI_MOST_EVALUATIONS / 8 * PIECE / s->model->fastest : HUGE_VAL;
+}
+
+void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const double held[], double u)
+{
+    const double count = ceil(vi_max(1.0, u * s->model->fastest / PIECE)), piece = u / count;
+    double q[VI_MODES], p[VI_MODES], weight;
+    vi_budget_spend(&s->state->budget, (int64_t)(8.0 * count) * s->model->modes);
+    for (double n = 0.0; n < count; n += 1.0) {
+        for (int i = 0; i < 8; ++i) {
+            const double t = node(n * piece, piece, i, &weight), angle = flight->angle + flight->angular_frequency * t;
+            vi_flight_end(flight, t, angle, q, p);
+            add_powers(s, p, held, t, angle, weight);
+        }
+    }
+}
+
+void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], const int still[],
+                          double u)
+{
+    const double w = s->model->clock.angular_frequency, angle = w * s->state->now.rest;
+    double q[VI_MODES], p[VI_MODES], weight, value[4];
+    for (int i = 0; i < 8; ++i) {
+        const double t = node(0.0, u, i, &weight);
+        vi_drift_at(drift, t, s->state->q, p, q);
+        add_powers(s, p, held, t, angle + w * t, weight);
+        for (int k = 0; k < s->model->contacts; ++k) {
+            if (s->state->status[k] == VI_CONTACT_YIELDING && !still[k]) {
+                vi_polynomial_at(drift->force[k], t, value);
+                const double force = value[0];
+                vi_polynomial_at(drift->penetration[k], t, value);
+                s->state->energies.contact_loss += weight * force * value[1];
+            }
+        }
+    }
+}

@@ -1,0 +1,224 @@
+/* A structure by itself: its model, where it is now, its start, and the forces it is held by. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "body/modal/structure_parts.h"
+#include "motion/majorant.h"
+
+/* ---- the model ---- */
+
+void vi_structure_mode(vi_structure_model *model, int j, double natural, double damping_ratio, double force,
+                       double angular_frequency)
+{
+    vi_mode_start(&model->mode[j], 1.0, 2.0 * damping_ratio * natural, natural * natural, force, angular_frequency);
+}
+
+double vi_structure_at(const vi_structure_model *model, const double shape[], const double vector[])
+{
+    double sum = 0.0;
+    for (int j = 0; j < model->modes; ++j) {
+        sum += shape[j] * vector[j];
+    }
+    return sum;
+}
+
+/* A bound on the rates that a full damping matrix brings. */
+static double coupling_rate(const vi_structure_model *model)
+{
+    double most = 0.0;
+    for (int i = 0; i < model->modes && model->coupled; ++i) {
+        double sum = 0.0;
+        for (int j = 0; j < model->modes; ++j) {
+            sum += fabs(model->coupling[i][j]);
+        }
+        most = vi_max(most, sum);
+    }
+    return most;
+}
+
+/* shape . impulse to 32 digits: its rounded value is returned, what that leaves over is *low. */
+static double twofold_dot(const vi_structure_model *model, const double shape[], const double impulse[], double *low)
+{
+    double sum = 0.0, left = 0.0;
+    for (int j = 0; j < model->modes; ++j) {
+        const double product = shape[j] * impulse[j], total = sum + product, part = total - sum;
+        left += fma(shape[j], impulse[j], -product) + ((sum - (total - part)) + (product - part));
+        sum = total;
+    }
+    const double high = sum + left;
+    *low = left - (high - sum);
+    return high;
+}
+
+void vi_structure_prepare(vi_structure_model *model)
+{
+    for (int k = 0; k < model->contacts; ++k) {
+        for (int l = 0; l < model->contacts; ++l) {
+            model->mobility[k][l] = twofold_dot(model, model->shape[k], model->impulse[l], &model->mobility_low[k][l]);
+            model->compliance[k][l] = vi_structure_at(model, model->shape[k], model->shape[l]);
+        }
+    }
+    model->fastest = coupling_rate(model);
+    for (int j = 0; j < model->modes; ++j) {
+        const vi_mode *mode = &model->mode[j];
+        const double rate = model->coupled ? vi_max(mode->natural, mode->angular_frequency) : mode->fastest;
+        model->fastest = vi_max(model->fastest, rate);
+    }
+}
+
+/* ---- the present instant ---- */
+
+double vi_structure_direction(const vi_structure *s, int k)
+{
+    return vi_contact_direction(s->contacts[k].side);
+}
+
+vi_phase vi_structure_phase(const vi_structure *s)
+{
+    return vi_phase_of(s->model->clock.angular_frequency * s->state->now.rest);
+}
+
+void vi_structure_held_now(const vi_structure *s, double held[])
+{
+    const vi_structure_state *state = s->state;
+    const double elapsed = vi_clock_elapsed(&s->model->clock, state->held_since, state->now);
+    for (int j = 0; j < s->model->modes; ++j) {
+        held[j] = state->held[j] + state->held_rate[j] * elapsed;
+    }
+}
+
+double vi_structure_approach(const vi_structure *s, int k)
+{
+    return vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], s->state->p);
+}
+
+double vi_structure_clearance(const vi_structure *s, int k)
+{
+    const int32_t status = s->state->status[k];
+    const bool begins = status == VI_CONTACT_YIELDING && s->state->leaving[k];
+    if (status == VI_CONTACT_TOUCHING || status == VI_CONTACT_HELD || begins) {
+        return 0.0;
+    }
+    const double displacement = vi_structure_at(s->model, s->model->shape[k], s->state->q);
+    return vi_structure_direction(s, k) * (s->contacts[k].position - displacement);
+}
+
+static double size_at(const vi_structure_model *model, const double shape[], const double vector[])
+{
+    double sum = 0.0;
+    for (int j = 0; j < model->modes; ++j) {
+        sum += fabs(shape[j] * vector[j]);
+    }
+    return sum;
+}
+
+double vi_structure_push_size(const vi_structure_model *model, int k, int l)
+{
+    return size_at(model, model->shape[k], model->shape[l]);
+}
+
+double vi_structure_displacement_size(const vi_structure *s, int k)
+{
+    return fabs(s->contacts[k].position) + size_at(s->model, s->model->shape[k], s->state->q);
+}
+
+double vi_structure_velocity_size(const vi_structure *s, int k)
+{
+    const vi_structure_model *model = s->model;
+    const double radian = model->fastest > 0.0 ? 1.0 / model->fastest : 0.0;
+    double sum = 0.0;
+    for (int j = 0; j < model->modes; ++j) {
+        const vi_mode *mode = &model->mode[j];
+        const double loads = fabs(mode->force) + fabs(s->state->held[j]);
+        sum += fabs(model->shape[k][j])
+               * (fabs(s->state->p[j]) + mode->natural * fabs(s->state->q[j]) + loads * radian);
+    }
+    return sum;
+}
+
+bool vi_structure_watched(const vi_structure *s, int k)
+{
+    return s->contacts[k].law.law != VI_LAW_NONE && !s->state->passed;
+}
+
+int vi_structure_beyond(const vi_structure *s)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const int64_t law = s->contacts[k].law.law;
+        const bool rigid = !vi_contact_law_is_compliant(law) && law != VI_LAW_EXTERNAL_FORCE;
+        const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
+        if (law != VI_LAW_NONE && rigid && vi_structure_clearance(s, k) < -noise) {
+            return k + 1;
+        }
+    }
+    return 0;
+}
+
+void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH])
+{
+    int on_stop[VI_PORTS];
+    for (int k = 0; k < s->model->contacts; ++k) {
+        on_stop[k] = s->state->status[k] != VI_CONTACT_FREE;
+    }
+    vi_complain_of_standstill(message, vi_clock_time(&s->model->clock, s->state->now), on_stop, s->model->contacts);
+}
+
+/* ---- life ---- */
+
+static void place(const vi_structure *s, int k)
+{
+    vi_structure_state *state = s->state;
+    const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k), clearance = vi_structure_clearance(s, k);
+    if (s->contacts[k].law.law == VI_LAW_NONE || clearance > noise) {
+        return;
+    }
+    state->status[k] = VI_CONTACT_TOUCHING;
+    if (clearance < -noise) { /* only a compliant stop may be pressed in at the start */
+        state->status[k] = VI_CONTACT_YIELDING;
+        vi_structure_touch_down(s, k);
+    }
+}
+
+void vi_structure_start(const vi_structure *s, vi_instant now)
+{
+    vi_structure_state *state = s->state, fresh;
+    memset(&fresh, 0, sizeof fresh);
+    memcpy(fresh.q, state->q, sizeof fresh.q);
+    memcpy(fresh.p, state->p, sizeof fresh.p);
+    memcpy(fresh.held, state->held, sizeof fresh.held);
+    memcpy(fresh.held_rate, state->held_rate, sizeof fresh.held_rate);
+    fresh.follow_energies = state->follow_energies;
+    fresh.now = fresh.held_since = now;
+    vi_budget_start(&fresh.budget, now);
+    *state = fresh;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_contact_clear(&s->contacts[k]);
+        s->contacts[k].mass = s->model->mobility[k][k] > 0.0 ? 1.0 / s->model->mobility[k][k] : HUGE_VAL;
+        place(s, k);
+    }
+}
+
+void vi_structure_hold(const vi_structure *s, const double held[], const double held_rate[])
+{
+    vi_structure_state *state = s->state;
+    memcpy(state->held, held, (size_t)s->model->modes * sizeof held[0]);
+    memcpy(state->held_rate, held_rate, (size_t)s->model->modes * sizeof held_rate[0]);
+    state->held_since = state->now;
+    state->budget.unfinished = 0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const vi_contact *contact = &s->contacts[k];
+        if (contact->law.law == VI_LAW_EXTERNAL_FORCE) {
+            state->reference_penetration[k] = -vi_structure_clearance(s, k);
+            state->reference_rate[k] = vi_structure_approach(s, k);
+            if (state->status[k] == VI_CONTACT_RECEDING && contact->applied_force > 0.0) {
+                state->status[k] = VI_CONTACT_YIELDING;
+            }
+            continue;
+        }
+        const double push = vi_structure_direction(s, k) * contact->applied_force;
+        for (int j = 0; j < s->model->modes && push != 0.0; ++j) {
+            state->held[j] -= s->model->shape[k][j] * push;
+        }
+    }
+}

@@ -1,0 +1,100 @@
+#include "body/record.h"
+
+#include <math.h>
+#include <string.h>
+
+void vi_record_take(vi_record *record)
+{
+    if (record->taken > 0) {
+        const int64_t left = record->count > record->taken ? record->count - record->taken : 0;
+        memmove(record->rows, record->rows + (record->count - left) * VI_RECORD_WIDTH,
+                (size_t)left * VI_RECORD_WIDTH * sizeof(double));
+        record->count = left;
+    }
+    record->taken = 0;
+}
+
+void vi_record_begin_step(vi_record *record, double displacement)
+{
+    if (record->extrema && !record->open) {
+        record->displacement_max = record->displacement_min = displacement;
+    }
+    record->open = record->extrema;
+    if (!record->periods) {
+        record->period_open = 0;
+    }
+}
+
+bool vi_record_full(const vi_record *record)
+{
+    return record->count > VI_RECORD_CAPACITY - VI_RECORD_RESERVE;
+}
+
+static void append(vi_record *record, const double row[VI_RECORD_WIDTH])
+{
+    if (record->count >= VI_RECORD_CAPACITY) {
+        record->dropped += 1;
+        return;
+    }
+    memcpy(record->rows + record->count * VI_RECORD_WIDTH, row, VI_RECORD_WIDTH * sizeof(double));
+    record->count += 1;
+}
+
+void vi_record_contact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
+                       double restitution, double duration)
+{
+    record->period_impacts += 1;
+    if (record->impacts) {
+        const double row[] = {VI_ROW_IMPACT, time, phase, velocity, impulse, (double)contact, restitution, duration};
+        append(record, row);
+    }
+}
+
+void vi_record_impact(vi_record *record, double time, double phase, double velocity, double impulse, int contact,
+                      double restitution)
+{
+    vi_record_contact(record, time, phase, velocity, impulse, contact, restitution, 0.0);
+}
+
+void vi_record_stick(vi_record *record, double start, double end, int contact, double tail_impulse)
+{
+    if (record->impacts) {
+        const double row[] = {VI_ROW_STICK, start, end, (double)contact, tail_impulse, 0.0, 0.0, 0.0};
+        append(record, row);
+    }
+}
+
+void vi_record_extend(vi_record *record, double displacement)
+{
+    if (displacement > record->displacement_max) {
+        record->displacement_max = displacement;
+    }
+    if (displacement < record->displacement_min) {
+        record->displacement_min = displacement;
+    }
+}
+
+void vi_record_period(vi_record *record, double time, double displacement, double velocity)
+{
+    if (record->period_open) {
+        const double high = record->extrema ? record->displacement_max : NAN;
+        const double low = record->extrema ? record->displacement_min : NAN;
+        const double row[] = {VI_ROW_PERIOD, record->period_start, high, low,
+                              record->strobe_displacement, record->strobe_velocity,
+                              (double)record->period_impacts, 0.0};
+        append(record, row);
+    }
+    record->period_open = 1;
+    record->period_start = time;
+    record->strobe_displacement = displacement;
+    record->strobe_velocity = velocity;
+    record->period_impacts = 0;
+    if (record->extrema) {
+        record->displacement_max = record->displacement_min = displacement;
+    }
+}
+
+size_t vi_record_unused(const vi_record *record)
+{
+    return (size_t)(VI_RECORD_CAPACITY - record->count) * VI_RECORD_WIDTH * sizeof(double);
+}

@@ -1,0 +1,164 @@
+#include "contact/complementarity.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+/* Pivots smaller than this times the largest diagonal mean that contacts are redundant. */
+static const double REDUNDANT = 1e-13;
+/* Redundant contacts share their load as if each had this times the largest mobility of its own; what that leaves over
+ * is solved for again, so many times. */
+static const double SOFTENING = 1e-6;
+enum { REFINEMENTS = 4 };
+
+/* Gaussian elimination with partial pivoting; 0 when a pivot is too small. */
+static int eliminate(int n, double a[VI_PORTS][VI_PORTS + 1], double smallest)
+{
+    for (int column = 0; column < n; ++column) {
+        int pivot = column;
+        for (int row = column + 1; row < n; ++row) {
+            pivot = fabs(a[row][column]) > fabs(a[pivot][column]) ? row : pivot;
+        }
+        if (!(fabs(a[pivot][column]) > smallest)) {
+            return 0;
+        }
+        for (int k = column; k <= n; ++k) {
+            const double moved = a[column][k];
+            a[column][k] = a[pivot][k];
+            a[pivot][k] = moved;
+        }
+        for (int row = 0; row < n; ++row) {
+            const double factor = row == column ? 0.0 : a[row][column] / a[column][column];
+            for (int k = column; k <= n && factor != 0.0; ++k) {
+                a[row][k] -= factor * a[column][k];
+            }
+        }
+    }
+    return 1;
+}
+
+/* Solve for the contacts in `index`, softened or not, with right-hand side b; 0 when they are redundant. */
+static int solve(int count, double g[VI_PORTS][VI_PORTS], const int index[], const double b[], double softening,
+                 double smallest, double p[])
+{
+    double a[VI_PORTS][VI_PORTS + 1];
+    for (int i = 0; i < count; ++i) {
+        for (int j = 0; j < count; ++j) {
+            a[i][j] = g[index[i]][index[j]] + (i == j ? softening : 0.0);
+        }
+        a[i][count] = b[i];
+    }
+    if (!eliminate(count, a, smallest)) {
+        return 0;
+    }
+    for (int i = 0; i < count; ++i) {
+        p[i] = a[i][count] / a[i][i];
+    }
+    return 1;
+}
+
+/* Redundant contacts: softened, and what that leaves over solved for again. */
+static void share(int count, double g[VI_PORTS][VI_PORTS], const int index[], const double b[], double largest,
+                  double p[])
+{
+    double left[VI_PORTS], more[VI_PORTS] = {0.0};
+    for (int i = 0; i < count; ++i) {
+        p[i] = 0.0;
+    }
+    for (int turn = 0; turn < REFINEMENTS; ++turn) {
+        for (int i = 0; i < count; ++i) {
+            left[i] = b[i];
+            for (int j = 0; j < count; ++j) {
+                left[i] -= g[index[i]][index[j]] * p[j];
+            }
+        }
+        if (!solve(count, g, index, left, SOFTENING * largest, 0.0, more)) {
+            return;
+        }
+        for (int i = 0; i < count; ++i) {
+            p[i] += more[i];
+        }
+    }
+}
+
+void vi_solve_active(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], const int active[VI_PORTS],
+                     double p[VI_PORTS])
+{
+    int index[VI_PORTS], count = 0;
+    double largest = 0.0, wanted[VI_PORTS], found[VI_PORTS];
+    for (int k = 0; k < n; ++k) {
+        p[k] = 0.0;
+        if (active[k]) {
+            wanted[count] = b[k];
+            index[count++] = k;
+            largest = fmax(largest, fabs(g[k][k]));
+        }
+    }
+    if (count == 0 || !(largest > 0.0)) {
+        return;
+    }
+    if (!solve(count, g, index, wanted, 0.0, REDUNDANT * largest, found)) {
+        share(count, g, index, wanted, largest, found);
+    }
+    for (int i = 0; i < count; ++i) {
+        p[index[i]] = found[i];
+    }
+}
+
+/* Murty's principal pivoting: the first contact that pulls, or is passed through, changes sides. Finite for positive
+ * definite g; the bound on the turns is that of its proof. 0 when it was not: redundant
+ * contacts may send it in circles. */
+static int pivot_to_answer(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], int active[VI_PORTS],
+                           double p[VI_PORTS])
+{
+    double scale = 0.0;
+    for (int k = 0; k < n; ++k) {
+        active[k] = b[k] > 0.0;
+        scale = fmax(scale, fabs(b[k]));
+    }
+    for (int turn = 0; turn < 1 << VI_PORTS; ++turn) {
+        vi_solve_active(n, g, b, active, p);
+        int wrong = -1;
+        for (int k = 0; k < n && wrong < 0; ++k) {
+            double gap = -b[k];
+            for (int l = 0; l < n; ++l) {
+                gap += g[k][l] * p[l];
+            }
+            if (active[k] ? p[k] < 0.0 : gap < -8.0 * DBL_EPSILON * scale) {
+                wrong = k;
+            }
+        }
+        if (wrong < 0) {
+            return 1;
+        }
+        active[wrong] = !active[wrong];
+    }
+    return 0;
+}
+
+void vi_complementary(int n, double g[VI_PORTS][VI_PORTS], const double b[VI_PORTS], double p[VI_PORTS])
+{
+    int active[VI_PORTS];
+    if (!pivot_to_answer(n, g, b, active, p)) {
+        /* all softened, so that every set of contacts has one answer; what that leaves over is solved for again */
+        double soft[VI_PORTS][VI_PORTS], found[VI_PORTS], largest = 0.0, least = 0.0;
+        for (int k = 0; k < n; ++k) {
+            largest = fmax(largest, fabs(g[k][k]));
+        }
+        memcpy(soft, g, sizeof soft);
+        for (int k = 0; k < n; ++k) {
+            soft[k][k] += SOFTENING * largest;
+        }
+        pivot_to_answer(n, soft, b, active, p);
+        vi_solve_active(n, g, b, active, found);
+        for (int k = 0; k < n; ++k) {
+            least = fmin(least, found[k]);
+        }
+        if (least >= 0.0) {
+            memcpy(p, found, sizeof found);
+        }
+    }
+    for (int k = 0; k < n; ++k) {
+        p[k] = fmax(0.0, p[k]);
+    }
+}

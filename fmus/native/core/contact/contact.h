@@ -1,0 +1,37 @@
+/* A contact port of a body: where it may meet a stop. Units: SI. */
+#ifndef VIBROIMPACT_CONTACT_H
+#define VIBROIMPACT_CONTACT_H
+
+#include <math.h>
+#include <stdint.h>
+
+#include "contact/contact_law.h"
+
+typedef struct {
+    /* parameters */
+    vi_contact_law law;
+    int64_t side;
+    double position;
+    double relaxation_time; /* of a compliant stop's surface after separation, s; 0: at once */
+    /* the importer's answers for the external laws */
+    double applied_restitution;
+    double applied_force, applied_stiffness, applied_damping;
+    int32_t answered; /* applied_restitution was set since the pending contact was reported */
+    /* outputs */
+    int32_t stuck;
+    double displacement, velocity, mass, force, impulse;
+    int64_t count, graze_count;
+    double last_time, last_phase, last_velocity, stick_start, stick_end, event_time;
+} vi_contact;
+
+/* Nothing has happened at this contact yet. */
+static inline void vi_contact_clear(vi_contact *contact)
+{
+    contact->stuck = contact->answered = 0;
+    contact->count = contact->graze_count = 0;
+    contact->force = contact->impulse = contact->last_velocity = 0.0;
+    contact->last_time = contact->last_phase = contact->stick_start = contact->stick_end = NAN;
+    contact->event_time = NAN;
+}
+
+#endif

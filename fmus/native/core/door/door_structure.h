@@ -1,0 +1,45 @@
+/* A structure of any modes and stops, for Python: analyses fit and follow orbits with the physics of the FMUs. */
+#ifndef VIBROIMPACT_DOOR_STRUCTURE_H
+#define VIBROIMPACT_DOOR_STRUCTURE_H
+
+#include "door/door.h"
+#include "sizes.h"
+
+typedef struct vi_door_structure vi_door_structure;
+
+/* One stop; `law` and `side` are numbers of ContactLaw and ContactSide. */
+typedef struct {
+    double law, side, position, restitution, yield_velocity, stiffness, damping, exponent, relaxation_time;
+} vi_door_stop;
+
+/* A structure of `modes` mass-normalised modes with `contacts` stops, at time 0. `coupling` is its modal damping matrix
+ * (row-major) or NULL for damping ratios; shapes and impulses are (contacts, modes), row-major, `impulses` NULL for the
+ * variational rule. NULL when an argument is out of range, or memory is out. */
+VI_DOOR vi_door_structure *vi_door_structure_new(int modes, const double natural[], const double damping_ratio[],
+                                                 const double force[], double angular_frequency, double phase,
+                                                 const double coupling[], int contacts, const vi_door_stop stops[],
+                                                 const double shapes[], const double impulses[], const double q[],
+                                                 const double p[], double tolerance);
+VI_DOOR void vi_door_structure_free(vi_door_structure *structure);
+
+/* Record impacts and sticks, extremes of the point `observed`, periods; follow energies. */
+VI_DOOR void vi_door_structure_record(vi_door_structure *structure, const double observed[], int impacts, int extrema,
+                                      int periods, int energies);
+
+/* Advance by up to `duration` s under constant modal forces; returns a vi_step_result. The time reached is in
+ * vi_door_structure_state. */
+VI_DOOR int vi_door_structure_advance(vi_door_structure *structure, double duration, const double held[],
+                                      const double held_rate[], double most_impacts);
+
+/* Why the last advance was given up with this result; message has room for VI_MESSAGE_LENGTH. */
+VI_DOOR void vi_door_structure_complaint(vi_door_structure *structure, int result, char message[]);
+
+/* Modal displacements and velocities, contact statuses and forces; facts: time, forcing work, damping loss, contact
+ * loss, displacement_max, displacement_min. */
+VI_DOOR void vi_door_structure_state(vi_door_structure *structure, double q[], double p[], int status[], double force[],
+                                     double facts[6]);
+
+/* Move up to `room` rows of eight numbers (record.h) out of the record; returns how many. */
+VI_DOOR int vi_door_structure_rows(vi_door_structure *structure, double rows[], int room);
+
+#endif

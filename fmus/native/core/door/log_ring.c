@@ -1,0 +1,48 @@
+#include "door/log_ring.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "door/door.h"
+
+static char *next_line(vi_log_ring *ring)
+{
+    char *line = ring->lines[ring->count % VI_LOG_LINES];
+    ring->count += 1;
+    return line;
+}
+
+VI_DOOR void vi_log_ring_fmi3(void *environment, int status, const char *category, const char *message)
+{
+    (void)status;
+    (void)category;
+    if (environment != NULL && message != NULL) {
+        (void)snprintf(next_line(environment), VI_LOG_LENGTH, "%s", message);
+    }
+}
+
+VI_DOOR void vi_log_ring_fmi2(void *environment, const char *instance, int status, const char *category,
+                              const char *message, ...)
+{
+    (void)instance;
+    (void)status;
+    (void)category;
+    if (environment == NULL || message == NULL) {
+        return;
+    }
+    va_list arguments;
+    va_start(arguments, message);
+    (void)vsnprintf(next_line(environment), VI_LOG_LENGTH, message, arguments);
+    va_end(arguments);
+}
+
+VI_DOOR void *vi_log_ring_allocate(size_t count, size_t size)
+{
+    return calloc(count, size);
+}
+
+VI_DOOR void vi_log_ring_free(void *memory)
+{
+    free(memory);
+}

@@ -1,0 +1,265 @@
+#include "modes/singular.h"
+
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+/* Two vectors are orthogonal when their cosine is below this: the rounding of a scalar product of 64 terms. */
+static const double ORTHOGONAL = 8.0 * DBL_EPSILON;
+enum { MOST_SWEEPS = 60 }; /* ten are usual */
+
+/* The matrix as P_rows X D Y' P_columns: below the diagonal X, on it D, above it Y'. */
+typedef struct {
+    int rows, columns;
+    double (*a)[VI_MODES];
+    int row[VI_MODES + 1], column[VI_MODES]; /* where the rows and columns came from */
+} elimination;
+
+static double dot(int n, const double x[], const double y[])
+{
+    double sum = 0.0;
+    for (int i = 0; i < n; ++i) {
+        sum += x[i] * y[i];
+    }
+    return sum;
+}
+
+static void swap_vectors(int n, double x[], double y[])
+{
+    for (int i = 0; i < n; ++i) {
+        const double kept = x[i];
+        x[i] = y[i];
+        y[i] = kept;
+    }
+}
+
+static void bring_pivot(elimination *e, int step, int pivot_row, int pivot_column)
+{
+    swap_vectors(e->columns, e->a[step], e->a[pivot_row]);
+    for (int i = 0; i < e->rows; ++i) {
+        const double kept = e->a[i][step];
+        e->a[i][step] = e->a[i][pivot_column];
+        e->a[i][pivot_column] = kept;
+    }
+    const int row = e->row[step], column = e->column[step];
+    e->row[step] = e->row[pivot_row];
+    e->row[pivot_row] = row;
+    e->column[step] = e->column[pivot_column];
+    e->column[pivot_column] = column;
+}
+
+/* Bring the largest entry of what is left to the diagonal; false when there is none above 0. */
+static bool pivot(elimination *e, int step)
+{
+    double largest = 0.0;
+    int row = step, column = step;
+    for (int i = step; i < e->rows; ++i) {
+        for (int j = step; j < e->columns; ++j) {
+            if (fabs(e->a[i][j]) > largest) {
+                largest = fabs(e->a[i][j]);
+                row = i;
+                column = j;
+            }
+        }
+    }
+    bring_pivot(e, step, row, column);
+    return largest > 0.0;
+}
+
+/* Gauss with complete pivoting. Without cycles an entry that fills in was 0: nothing is ever subtracted from a
+ * number, so every entry of X, D, Y keeps its relative accuracy, and what is 0 is exactly 0. Returns the rank. */
+static int eliminate(elimination *e)
+{
+    int step = 0;
+    for (; step < e->rows && step < e->columns && pivot(e, step); ++step) {
+        const double *from = e->a[step];
+        for (int i = step + 1; i < e->rows; ++i) {
+            double *into = e->a[i];
+            into[step] /= from[step];
+            for (int j = step + 1; j < e->columns; ++j) {
+                into[j] -= into[step] * from[j];
+            }
+        }
+        for (int j = step + 1; j < e->columns; ++j) {
+            e->a[step][j] /= from[step];
+        }
+    }
+    return step;
+}
+
+/* x - 2 v (v.x), v a unit vector: vectors start at component `first`. */
+static void reflect(int first, int last, const double v[], double x[])
+{
+    const double twice = 2.0 * dot(last - first, v + first, x + first);
+    for (int i = first; i < last; ++i) {
+        x[i] -= twice * v[i];
+    }
+}
+
+/* X = Q R by Householder's reflections; x[k] is column k on entry, and the unit vector of reflection k after it. R, an
+ * upper triangle, is left in r[k], its column k. */
+static void factor(int rows, int rank, double x[][VI_MODES + 1], double r[][VI_MODES + 1])
+{
+    for (int k = 0; k < rank; ++k) {
+        double *v = x[k];
+        const double length = sqrt(dot(rows - k, v + k, v + k));
+        const double diagonal = v[k] > 0.0 ? -length : length;
+        memcpy(r[k], v, (size_t)k * sizeof *v);
+        r[k][k] = diagonal;
+        v[k] -= diagonal;
+        const double size = sqrt(dot(rows - k, v + k, v + k)); /* >= length, and X has full rank */
+        for (int i = k; i < rows; ++i) {
+            v[i] /= size;
+        }
+        for (int later = k + 1; later < rank; ++later) {
+            reflect(k, rows, v, x[later]);
+        }
+    }
+}
+
+/* Row k of R D Y', in the order of the columns of a. The pivots do not grow with j, so that the terms of a row are
+ * at most of the size of its pivot and their rounding is small beside it. */
+static void product_row(const elimination *e, int rank, int k, const double (*r)[VI_MODES + 1], double row[])
+{
+    for (int i = 0; i < e->columns; ++i) {
+        double sum = 0.0;
+        for (int j = k; j < rank && j <= i; ++j) {
+            const double y = i == j ? 1.0 : e->a[j][i];
+            sum += r[j][k] * e->a[j][j] * y;
+        }
+        row[e->column[i]] = sum;
+    }
+}
+
+static void rotate(int n, double cosine, double sine, double x[], double y[])
+{
+    for (int i = 0; i < n; ++i) {
+        const double kept = x[i];
+        x[i] = cosine * kept - sine * y[i];
+        y[i] = sine * kept + cosine * y[i];
+    }
+}
+
+/* Make two vectors orthogonal, the longer one first; the same rotation for their left companions. Returns whether
+ * there was something to do. */
+static bool orthogonalise(int columns, int rank, vi_singular *s, int first, int second)
+{
+    double *x = s->right[first], *y = s->right[second];
+    if (dot(columns, x, x) < dot(columns, y, y)) {
+        swap_vectors(columns, x, y);
+        swap_vectors(rank, s->left[first], s->left[second]);
+    }
+    const double a = dot(columns, x, x), b = dot(columns, y, y), c = dot(columns, x, y);
+    if (!(fabs(c) > ORTHOGONAL * sqrt(a) * sqrt(b))) {
+        return false;
+    }
+    const double cotangent = (b - a) / (2.0 * c); /* of twice the angle */
+    const double tangent = copysign(1.0, cotangent) / (fabs(cotangent) + sqrt(1.0 + cotangent * cotangent));
+    const double cosine = 1.0 / sqrt(1.0 + tangent * tangent);
+    rotate(columns, cosine, cosine * tangent, x, y);
+    rotate(rank, cosine, cosine * tangent, s->left[first], s->left[second]);
+    return true;
+}
+
+/* One-sided Jacobi: afterwards right[k] = value k times its vector, and left[k] are orthonormal. */
+static bool orthogonalise_all(int columns, int rank, vi_singular *s)
+{
+    bool moved = true;
+    for (int sweep = 0; moved && sweep < MOST_SWEEPS; ++sweep) {
+        moved = false;
+        for (int first = 0; first < rank; ++first) {
+            for (int second = first + 1; second < rank; ++second) {
+                moved = orthogonalise(columns, rank, s, first, second) || moved;
+            }
+        }
+    }
+    return !moved;
+}
+
+/* Left vectors from their coordinates in the columns of Q. */
+static void leave_reflections(const elimination *e, int rank, const double (*reflection)[VI_MODES + 1], double left[])
+{
+    double x[VI_MODES + 1] = {0.0};
+    memcpy(x, left, (size_t)rank * sizeof *x);
+    for (int k = rank - 1; k >= 0; --k) {
+        reflect(k, e->rows, reflection[k], x);
+    }
+    for (int i = 0; i < e->rows; ++i) {
+        left[e->row[i]] = x[i];
+    }
+}
+
+static void sort_and_normalise(int rows, int columns, vi_singular *s)
+{
+    for (int k = 0; k < s->rank; ++k) {
+        s->value[k] = sqrt(dot(columns, s->right[k], s->right[k]));
+        for (int i = 0; i < columns; ++i) {
+            s->right[k][i] /= s->value[k];
+        }
+        for (int lower = k; lower > 0 && s->value[lower] < s->value[lower - 1]; --lower) {
+            swap_vectors(1, &s->value[lower], &s->value[lower - 1]);
+            swap_vectors(columns, s->right[lower], s->right[lower - 1]);
+            swap_vectors(rows, s->left[lower], s->left[lower - 1]);
+        }
+    }
+}
+
+static bool finite_matrix(int rows, int columns, double (*a)[VI_MODES])
+{
+    for (int i = 0; i < rows; ++i) {
+        for (int j = 0; j < columns; ++j) {
+            if (!isfinite(a[i][j])) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+static elimination begin(int rows, int columns, double (*a)[VI_MODES])
+{
+    elimination e = {.rows = rows, .columns = columns, .a = a};
+    for (int i = 0; i < rows; ++i) {
+        e.row[i] = i;
+    }
+    for (int j = 0; j < columns; ++j) {
+        e.column[j] = j;
+    }
+    return e;
+}
+
+/* Columns of the unit lower triangle X. */
+static void columns_of_x(const elimination *e, int rank, double x[][VI_MODES + 1])
+{
+    for (int k = 0; k < rank; ++k) {
+        for (int i = 0; i < e->rows; ++i) {
+            x[k][i] = i < k ? 0.0 : i == k ? 1.0 : e->a[i][k];
+        }
+    }
+}
+
+bool vi_singular_find(int rows, int columns, double a[][VI_MODES], vi_singular *singular)
+{
+    if (!finite_matrix(rows, columns, a)) {
+        return false;
+    }
+    memset(singular, 0, sizeof *singular);
+    elimination e = begin(rows, columns, a);
+    const int rank = singular->rank = eliminate(&e);
+    double x[VI_MODES][VI_MODES + 1];
+    columns_of_x(&e, rank, x);
+    factor(rows, rank, x, singular->left); /* R, until the next loop is through with it */
+    for (int k = 0; k < rank; ++k) {
+        product_row(&e, rank, k, (const double (*)[VI_MODES + 1])singular->left, singular->right[k]);
+    }
+    memset(singular->left, 0, sizeof singular->left);
+    for (int k = 0; k < rank; ++k) {
+        singular->left[k][k] = 1.0;
+    }
+    const bool converged = orthogonalise_all(columns, rank, singular);
+    for (int k = 0; k < rank; ++k) {
+        leave_reflections(&e, rank, (const double (*)[VI_MODES + 1])x, singular->left[k]);
+    }
+    sort_and_normalise(rows, columns, singular);
+    return converged;
+}

@@ -1,0 +1,30 @@
+#include "motion/amplitude.h"
+
+#include <math.h>
+
+/* The law is a first-order one: beyond these it says nothing. */
+static const double LEAST_FREQUENCY = 0.1, MOST_ADDED_RATIO = 1.0;
+
+bool vi_amplitude_acts(const vi_amplitude_law *law)
+{
+    return law->frequency_slope != 0.0 || law->damping_slope != 0.0 || law->damping_reciprocal != 0.0;
+}
+
+double vi_amplitude_of(double displacement, double velocity, double natural)
+{
+    return hypot(displacement, velocity / natural);
+}
+
+double vi_amplitude_natural(const vi_amplitude_law *law, double natural, double amplitude)
+{
+    return natural * fmax(LEAST_FREQUENCY, 1.0 + law->frequency_slope * amplitude);
+}
+
+double vi_amplitude_ratio(const vi_amplitude_law *law, double ratio, double amplitude)
+{
+    double added = law->damping_slope * amplitude;
+    if (law->damping_reciprocal != 0.0) {
+        added += amplitude > 0.0 ? law->damping_reciprocal / amplitude : MOST_ADDED_RATIO;
+    }
+    return fmax(0.0, ratio + fmin(added, MOST_ADDED_RATIO));
+}

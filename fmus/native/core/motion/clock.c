@@ -1,0 +1,151 @@
+#include "motion/clock.h"
+
+#include <float.h>
+#include <math.h>
+
+static const double TWO_PI = 6.283185307179586232;
+static const double TWO_PI_LOW = 2.449293598294706414e-16;
+static const double MOST_PERIODS = 9007199254740992.0; /* 2^53: beyond, a double cannot count them */
+
+/* Rounding error of the sum `sum` = a + b (Knuth). */
+static double sum_error(double a, double b, double sum)
+{
+    const double b_part = sum - a;
+    return (a - (sum - b_part)) + (b - b_part);
+}
+
+static void start_forced(vi_clock *clock, double angular_frequency, double phase)
+{
+    clock->period = TWO_PI / angular_frequency;
+    clock->period_low = (fma(-clock->period, angular_frequency, TWO_PI) + TWO_PI_LOW) / angular_frequency;
+    double turn = remainder(phase, TWO_PI);
+    if (turn < 0.0) {
+        turn += TWO_PI;
+    }
+    clock->origin = turn / angular_frequency;
+    clock->origin_low = fma(-clock->origin, angular_frequency, turn) / angular_frequency;
+}
+
+bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, double natural)
+{
+    clock->angular_frequency = angular_frequency;
+    if (angular_frequency > 0.0) {
+        start_forced(clock, angular_frequency, phase);
+    } else {
+        clock->period = natural > 0.0 ? exp2(rint(log2(TWO_PI / natural))) : 1.0;
+        clock->period_low = clock->origin = clock->origin_low = 0.0;
+    }
+    return clock->period >= DBL_MIN && clock->period <= DBL_MAX;
+}
+
+/* The instant `periods` and high + low seconds, as a sum without overlap. */
+static vi_instant instant_of(int64_t periods, double high, double low)
+{
+    const double rest = high + low;
+    return (vi_instant){periods, rest, low - (rest - high)};
+}
+
+/* Bring 0 <= rest < period; the numbers come from sums that may leave this range by one period. */
+static vi_instant normalized(const vi_clock *clock, vi_instant instant)
+{
+    while (instant.rest >= clock->period) {
+        instant = instant_of(instant.periods + 1, instant.rest - clock->period, instant.rest_low - clock->period_low);
+    }
+    while (instant.rest < 0.0) {
+        instant = instant_of(instant.periods - 1, instant.rest + clock->period, instant.rest_low + clock->period_low);
+        if (instant.rest >= clock->period) { /* a negative rest below the rounding of one period */
+            instant = (vi_instant){instant.periods + 1, 0.0, 0.0};
+        }
+    }
+    return instant;
+}
+
+bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant *instant)
+{
+    const double count = floor((high + clock->origin) / clock->period);
+    if (!(fabs(count) < MOST_PERIODS)) {
+        return false;
+    }
+    const double whole = count * clock->period, since = high - whole, rest = since + clock->origin;
+    low += clock->origin_low - count * clock->period_low - fma(count, clock->period, -whole);
+    low += sum_error(high, -whole, since) + sum_error(since, clock->origin, rest);
+    const double resolution = 2.0 * DBL_EPSILON * fabs(high);
+    if (fabs(rest + low) <= resolution) {
+        *instant = (vi_instant){(int64_t)count, 0.0, 0.0};
+    } else if (fabs((rest - clock->period) + low) <= resolution) {
+        *instant = (vi_instant){(int64_t)count + 1, 0.0, 0.0};
+    } else {
+        *instant = normalized(clock, instant_of((int64_t)count, rest, low));
+    }
+    return true;
+}
+
+double vi_clock_time(const vi_clock *clock, vi_instant instant)
+{
+    const double count = (double)instant.periods;
+    const double whole = count * clock->period;
+    double low = fma(count, clock->period, -whole) + count * clock->period_low - clock->origin_low + instant.rest_low;
+    const double sum = whole + instant.rest;
+    low += sum_error(whole, instant.rest, sum);
+    const double shifted = sum - clock->origin;
+    low += sum_error(sum, -clock->origin, shifted);
+    return shifted + low;
+}
+
+double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b)
+{
+    const double rests = b.rest - a.rest, low = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, rests);
+    if (a.periods == b.periods) {
+        return rests + low;
+    }
+    const double count = (double)(b.periods - a.periods), whole = count * clock->period;
+    return (whole + rests) + (count * clock->period_low + fma(count, clock->period, -whole) + low);
+}
+
+bool vi_clock_stands(vi_standstill *standstill, vi_instant now)
+{
+    const vi_instant *last = &standstill->instant;
+    if (now.periods != last->periods || now.rest != last->rest || now.rest_low != last->rest_low) {
+        *standstill = (vi_standstill){now, 0};
+    }
+    standstill->events += 1;
+    return standstill->events >= VI_MOST_EVENTS;
+}
+
+double vi_clock_elapsed_twofold(const vi_clock *clock, vi_instant a, vi_instant b, double *low)
+{
+    const double count = (double)(b.periods - a.periods), whole = count * clock->period;
+    const double rests = b.rest - a.rest, sum = whole + rests;
+    double rounding = (b.rest_low - a.rest_low) + sum_error(b.rest, -a.rest, rests) + sum_error(whole, rests, sum);
+    rounding += count * clock->period_low + fma(count, clock->period, -whole);
+    const double high = sum + rounding;
+    *low = rounding - (high - sum);
+    return high;
+}
+
+double vi_clock_to_period_end(const vi_clock *clock, vi_instant instant)
+{
+    return (clock->period - instant.rest) + (clock->period_low - instant.rest_low);
+}
+
+vi_instant vi_clock_after(const vi_clock *clock, vi_instant instant, double seconds)
+{
+    double count = 0.0, low = instant.rest_low;
+    if (seconds >= 2.0 * clock->period) {
+        count = floor(seconds / clock->period);
+        low -= count * clock->period_low;
+        seconds = fma(-count, clock->period, seconds);
+    }
+    const double rest = instant.rest + seconds;
+    low += sum_error(instant.rest, seconds, rest);
+    return normalized(clock, instant_of(instant.periods + (int64_t)count, rest, low));
+}
+
+double vi_clock_phase(const vi_clock *clock, vi_instant instant)
+{
+    if (clock->angular_frequency == 0.0) {
+        return NAN;
+    }
+    const double phase = clock->angular_frequency * instant.rest;
+    return phase < TWO_PI ? phase : 0.0;
+}

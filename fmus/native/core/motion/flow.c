@@ -1,0 +1,395 @@
+#include "motion/flow.h"
+
+#include <math.h>
+
+/* The steady response may be this many times larger than the motion before the split loses too many digits. */
+static const double LARGEST_SPLIT = 8.0;
+/* A stiff dashpot may cost more than this many units of 1 / fastest rate to follow by series; then the split is taken
+ * up to the second ratio: its error, 1e-16 of the steady response, is a time error of 1e-16 of the slow decay time. */
+static const double LONGEST_SERIES = 1e4;
+static const double LARGEST_SPLIT_OVERDAMPED = 1e10;
+/* Length of a series segment times the fastest rate: the 21st term is below 1e-17 of the first. */
+static const double SERIES_REACH = 0.7;
+
+/* stiffness/mass - (damping/(2 mass))^2 without cancellation: critical damping is recognized exactly. */
+static double discriminant(double mass, double damping, double stiffness)
+{
+    const double square = damping * damping;
+    const double square_error = fma(damping, damping, -square);
+    const double product = 4.0 * stiffness * mass;
+    const double product_error = fma(4.0 * stiffness, mass, -product);
+    return ((product - square) + (product_error - square_error)) / (4.0 * mass * mass);
+}
+
+static void start_steady(vi_mode *mode)
+{
+    const double w = mode->angular_frequency;
+    const double detuning = (mode->natural - w) * (mode->natural + w);
+    const double drag = 2.0 * mode->decay * w;
+    const double size = hypot(detuning, drag);
+    mode->steady_exists = size > 0.0 && mode->force != 0.0;
+    mode->steady_cos = mode->steady_sin = mode->steady_amplitude = 0.0;
+    if (mode->steady_exists) {
+        mode->steady_cos = mode->force * (detuning / size) / size;
+        mode->steady_sin = mode->force * (drag / size) / size;
+        mode->steady_amplitude = fabs(mode->force) / size;
+        mode->steady_exists = isfinite(mode->steady_amplitude);
+    }
+    mode->steady_snap = w * w * w * w * mode->steady_amplitude;
+}
+
+void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness, double amplitude,
+                   double angular_frequency)
+{
+    mode->stiffness = stiffness / mass;
+    mode->natural = sqrt(mode->stiffness);
+    mode->decay = damping / (2.0 * mass);
+    const double d = discriminant(mass, damping, stiffness);
+    mode->regime = d > 0.0 ? VI_UNDERDAMPED : d < 0.0 ? VI_OVERDAMPED : VI_CRITICAL;
+    mode->rate = sqrt(fabs(d));
+    mode->fast = mode->decay + mode->rate;
+    mode->slow = mode->regime == VI_OVERDAMPED ? mode->stiffness / mode->fast : mode->decay;
+    mode->force = amplitude / mass;
+    mode->angular_frequency = angular_frequency;
+    mode->fastest = fmax(fmax(mode->natural, 2.0 * mode->decay), angular_frequency);
+    start_steady(mode);
+}
+
+/* ---- homogeneous flow: e_cos = Ce, e_sin = Se of equations.md 1.2 ---- */
+
+typedef struct {
+    double e_cos, e_sin; /* Phi11 = e_cos + decay e_sin, Phi12 = e_sin */
+    double back;         /* Phi22 */
+    double slow, fast;   /* the two decaying exponentials */
+} propagator;
+
+static propagator propagate_overdamped(const vi_mode *mode, double u)
+{
+    propagator p;
+    p.slow = exp(-mode->slow * u);
+    p.fast = exp(-mode->fast * u);
+    p.e_cos = 0.5 * (p.slow + p.fast);
+    p.e_sin = p.slow * (-expm1(-2.0 * mode->rate * u) / (2.0 * mode->rate));
+    /* far from critical Ce - decay Se cancels; near it the two exponentials do */
+    p.back = mode->rate > 0.5 * mode->decay
+                 ? (mode->fast * p.fast - mode->slow * p.slow) / (2.0 * mode->rate)
+                 : p.e_cos - mode->decay * p.e_sin;
+    return p;
+}
+
+static inline propagator propagate(const vi_mode *mode, double u)
+{
+    if (mode->regime == VI_OVERDAMPED) {
+        return propagate_overdamped(mode, u);
+    }
+    propagator p;
+    p.slow = p.fast = exp(-mode->decay * u);
+    if (mode->regime == VI_UNDERDAMPED) {
+        p.e_cos = p.slow * cos(mode->rate * u);
+        p.e_sin = p.slow * (sin(mode->rate * u) / mode->rate);
+    } else {
+        p.e_cos = p.slow;
+        p.e_sin = p.slow * u;
+    }
+    p.back = p.e_cos - mode->decay * p.e_sin;
+    return p;
+}
+
+/* `u` seconds after the start of a segment that is counted from before: the phase angle to twice the digits, so that it
+ * is as exact after 10^6 periods as after one. */
+static propagator propagate_from_before(const vi_segment *s, double u)
+{
+    const vi_mode *mode = s->mode;
+    const double time = s->since + u, part = time - s->since;
+    const double low = (s->since - (time - part)) + (u - part) + s->since_low;
+    const double angle = mode->rate * time, rest = fma(mode->rate, time, -angle) + mode->rate * low;
+    const double c = cos(angle), sn = sin(angle);
+    propagator p;
+    p.slow = p.fast = exp(-mode->decay * time);
+    p.e_cos = p.slow * (c - rest * sn);
+    p.e_sin = p.slow * ((sn + rest * c) / mode->rate);
+    p.back = p.e_cos - mode->decay * p.e_sin;
+    return p;
+}
+
+static inline propagator propagate_segment(const vi_segment *s, double u)
+{
+    return s->since > 0.0 ? propagate_from_before(s, u) : propagate(s->mode, u);
+}
+
+/* ---- the split form ---- */
+
+/* The steady response that may be split off: a multiple of the displacements that the segment shows. */
+static double largest_split(const vi_segment *s, double x, double v)
+{
+    const vi_mode *mode = s->mode;
+    const double load = fabs(mode->force) + fabs(s->held);
+    if (mode->regime == VI_OVERDAMPED && mode->fastest * s->length > LONGEST_SERIES) {
+        return LARGEST_SPLIT_OVERDAMPED * (fabs(x) + (fabs(v) + load * s->length) / mode->fast);
+    }
+    const double time = mode->fastest * s->length > 1.0 ? 1.0 / mode->fastest : s->length;
+    return LARGEST_SPLIT * (fabs(x) + (fabs(v) + load * time) * time);
+}
+
+/* Try to split off the steady response and the level of the held input; false when digits would be lost. */
+static bool split(vi_segment *s, double x, double v)
+{
+    const vi_mode *mode = s->mode;
+    const double most = largest_split(s, x, v);
+    if ((mode->force != 0.0 && !mode->steady_exists) || mode->steady_amplitude > most) {
+        return false;
+    }
+    s->level = s->level_rate = 0.0;
+    if (s->held != 0.0 || s->held_rate != 0.0) {
+        s->level_rate = s->held_rate / mode->stiffness;
+        s->level = (s->held - 2.0 * mode->decay * s->level_rate) / mode->stiffness;
+        if (!(fabs(s->level) <= most && fabs(s->level_rate) * s->length <= most)) {
+            return false;
+        }
+    }
+    const double c = s->phase.cosine, sn = s->phase.sine;
+    s->x = x - s->level - (mode->steady_cos * c + mode->steady_sin * sn);
+    s->v = v - s->level_rate - mode->angular_frequency * (mode->steady_sin * c - mode->steady_cos * sn);
+    return true;
+}
+
+static void bound_split(vi_segment *s)
+{
+    const vi_mode *mode = s->mode;
+    const double turned = s->v + mode->decay * s->x;
+    s->amplitude = s->slow_part = s->fast_part = 0.0;
+    if (mode->regime == VI_UNDERDAMPED) {
+        s->amplitude = sqrt(s->x * s->x + (turned / mode->rate) * (turned / mode->rate));
+    } else if (mode->regime == VI_OVERDAMPED) {
+        s->slow_part = fabs(s->v + mode->fast * s->x) / (2.0 * mode->rate);
+        s->fast_part = fabs(s->v + mode->slow * s->x) / (2.0 * mode->rate);
+    }
+    s->scale = fabs(s->x) + mode->steady_amplitude + fabs(s->level) + fabs(s->level_rate) * s->length;
+}
+
+/* Bound on the homogeneous |x''''| from the energy of the present state, which never grows. */
+static double energy_bound(const vi_mode *mode, double x, double v)
+{
+    const double damping = 2.0 * mode->decay;
+    const double energy = sqrt(v * v + mode->stiffness * x * x);
+    const double second = sqrt(damping * damping + mode->stiffness) * energy;
+    const double third = damping * second + mode->stiffness * energy;
+    return damping * third + mode->stiffness * second;
+}
+
+/* Bound on the homogeneous |x''''| from here on: equations.md 2.2, one order up. */
+static inline double homogeneous_bound(const vi_segment *s, double slow_left, double fast_left, double x, double v)
+{
+    const vi_mode *mode = s->mode;
+    const double amplitude_bound = mode->stiffness * mode->stiffness * s->amplitude * slow_left;
+    if (mode->regime == VI_UNDERDAMPED && mode->rate > 0.1 * mode->natural) {
+        return amplitude_bound; /* tight away from critical damping */
+    }
+    const double energy = energy_bound(mode, x, v);
+    if (mode->regime == VI_CRITICAL) {
+        return energy;
+    }
+    const double slow = mode->slow * mode->slow, fast = mode->fast * mode->fast;
+    const double parts = s->slow_part * slow_left * slow * slow + s->fast_part * fast_left * fast * fast;
+    return fmin(energy, mode->regime == VI_UNDERDAMPED ? amplitude_bound : parts);
+}
+
+static void split_at(const vi_segment *s, double u, vi_motion *m)
+{
+    const vi_mode *mode = s->mode;
+    const double w = mode->angular_frequency;
+    const propagator p = propagate_segment(s, u);
+    const double x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
+    const double v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
+    const double angle = s->phase.angle + w * u;
+    const double c = cos(angle), sn = sin(angle);
+    m->snap_bound = homogeneous_bound(s, p.slow, p.fast, x, v) + mode->steady_snap;
+    m->x = x + (mode->steady_cos * c + mode->steady_sin * sn) + (s->level + s->level_rate * u);
+    m->v = v + w * (mode->steady_sin * c - mode->steady_cos * sn) + s->level_rate;
+    m->a = mode->force * c + (s->held + s->held_rate * u) - 2.0 * mode->decay * m->v - mode->stiffness * m->x;
+    m->j = s->held_rate - mode->force * w * sn - 2.0 * mode->decay * m->a - mode->stiffness * m->v;
+}
+
+/* ---- the series form ---- */
+
+/* Taylor coefficients from the differential equation itself. */
+static void start_series(vi_segment *s, double x, double v)
+{
+    const vi_mode *mode = s->mode;
+    const double w = mode->angular_frequency;
+    double drive[2] = {mode->force * s->phase.cosine, -mode->force * w * s->phase.sine};
+    double *c = s->coefficient;
+    s->origin = x;
+    c[0] = 0.0;
+    c[1] = v;
+    for (int n = 0; n + 2 <= VI_SERIES_ORDER; ++n) {
+        const double k = (double)n;
+        const double held = n == 0 ? s->held - mode->stiffness * x : n == 1 ? s->held_rate : 0.0;
+        const double load = drive[0] + held - 2.0 * mode->decay * (k + 1.0) * c[n + 1] - mode->stiffness * c[n];
+        c[n + 2] = load / ((k + 1.0) * (k + 2.0));
+        const double next = -drive[0] * w * w / ((k + 1.0) * (k + 2.0));
+        drive[0] = drive[1];
+        drive[1] = next;
+    }
+}
+
+static void bound_series(vi_segment *s)
+{
+    const double *c = s->coefficient;
+    double snap = 0.0, scale = 0.0;
+    for (int n = VI_SERIES_ORDER; n >= 0; --n) {
+        const double k = (double)n;
+        scale = scale * s->length + fabs(c[n]);
+        if (n >= 4) {
+            snap = snap * s->length + k * (k - 1.0) * (k - 2.0) * (k - 3.0) * fabs(c[n]);
+        }
+    }
+    s->series_snap_bound = snap;
+    s->scale = scale;
+}
+
+static void series_at(const vi_segment *s, double u, vi_motion *m)
+{
+    const vi_mode *mode = s->mode;
+    const double *c = s->coefficient;
+    double x = c[VI_SERIES_ORDER], v = (double)VI_SERIES_ORDER * c[VI_SERIES_ORDER];
+    for (int n = VI_SERIES_ORDER - 1; n >= 1; --n) {
+        x = x * u + c[n];
+        v = v * u + (double)n * c[n];
+    }
+    m->x = x * u;
+    m->v = v;
+    const double angle = s->phase.angle + mode->angular_frequency * u;
+    m->a = mode->force * cos(angle) + (s->held + s->held_rate * u) - 2.0 * mode->decay * m->v
+           - mode->stiffness * (s->origin + m->x);
+    m->j = s->held_rate - mode->force * mode->angular_frequency * sin(angle) - 2.0 * mode->decay * m->a
+           - mode->stiffness * m->v;
+    m->snap_bound = s->series_snap_bound;
+}
+
+static void series_part(const vi_segment *s, double u, vi_part *part)
+{
+    const double *c = s->coefficient;
+    double x = c[VI_SERIES_ORDER], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
+    for (int n = VI_SERIES_ORDER - 1; n >= 0; --n) {
+        j = j * u + a;
+        a = a * u + v;
+        v = v * u + x;
+        x = x * u + c[n];
+    }
+    *part = (vi_part){x, v, 2.0 * a, 6.0 * j, s->series_snap_bound, s->scale};
+}
+
+void vi_segment_part(const vi_segment *s, double u, vi_part *part)
+{
+    if (s->series) {
+        series_part(s, u, part);
+        return;
+    }
+    const vi_mode *mode = s->mode;
+    const propagator p = propagate_segment(s, u);
+    part->x = (p.e_cos + mode->decay * p.e_sin) * s->x + p.e_sin * s->v;
+    part->v = -mode->stiffness * p.e_sin * s->x + p.back * s->v;
+    part->a = -2.0 * mode->decay * part->v - mode->stiffness * part->x;
+    part->j = -2.0 * mode->decay * part->a - mode->stiffness * part->v;
+    part->snap_bound = homogeneous_bound(s, p.slow, p.fast, part->x, part->v);
+    if (mode->regime == VI_UNDERDAMPED && mode->rate > 0.1 * mode->natural) {
+        part->reach = s->amplitude * p.slow;
+    } else {
+        part->reach = mode->stiffness > 0.0 ? sqrt(part->x * part->x + part->v * part->v / mode->stiffness) : HUGE_VAL;
+    }
+}
+
+/* ---- the door ---- */
+
+vi_phase vi_phase_of(double angle)
+{
+    return (vi_phase){angle, cos(angle), sin(angle)};
+}
+
+void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *m)
+{
+    const vi_mode *mode = segment->mode;
+    const double damping = 2.0 * mode->decay;
+    m->x = x - segment->origin;
+    m->v = v;
+    m->a = mode->force * segment->phase.cosine + segment->held - damping * v - mode->stiffness * x;
+    m->j = segment->held_rate - mode->force * mode->angular_frequency * segment->phase.sine - damping * m->a
+           - mode->stiffness * v;
+    m->snap_bound = segment->series ? segment->series_snap_bound
+                                    : homogeneous_bound(segment, 1.0, 1.0, segment->x, segment->v) + mode->steady_snap;
+}
+
+void vi_segment_start(vi_segment *segment, const vi_mode *mode, double x, double v, vi_phase phase, double held,
+                      double held_rate, double length, bool local)
+{
+    segment->mode = mode;
+    segment->origin = 0.0;
+    segment->phase = phase;
+    segment->held = held;
+    segment->held_rate = held_rate;
+    segment->length = length;
+    segment->since = segment->since_low = 0.0;
+    segment->series = local || !split(segment, x, v);
+    if (segment->series) {
+        if (mode->fastest > 0.0) {
+            segment->length = fmin(length, SERIES_REACH / mode->fastest);
+        }
+        start_series(segment, x, v);
+        bound_series(segment);
+    } else {
+        segment->start = segment->x;
+        bound_split(segment);
+    }
+}
+
+void vi_segment_continue(vi_segment *segment, double x, double v, double amplitude, double since, double since_low)
+{
+    segment->scale += fabs(x) - fabs(segment->x);
+    segment->x = x;
+    segment->v = v;
+    segment->amplitude = amplitude;
+    segment->since = since;
+    segment->since_low = since_low;
+}
+
+void vi_segment_at(const vi_segment *segment, double u, vi_motion *motion)
+{
+    if (segment->series) {
+        series_at(segment, u, motion);
+    } else {
+        split_at(segment, u, motion);
+    }
+}
+
+void vi_segment_end(const vi_segment *segment, double u, double phase, double *x, double *v)
+{
+    const vi_mode *mode = segment->mode;
+    const double w = mode->angular_frequency;
+    const propagator p = propagate_segment(segment, u);
+    const double c = cos(phase), sn = sin(phase);
+    *x = (p.e_cos + mode->decay * p.e_sin) * segment->x + p.e_sin * segment->v
+         + (mode->steady_cos * c + mode->steady_sin * sn) + (segment->level + segment->level_rate * u);
+    *v = -mode->stiffness * p.e_sin * segment->x + p.back * segment->v
+         + w * (mode->steady_sin * c - mode->steady_cos * sn) + segment->level_rate;
+}
+
+bool vi_segment_range(const vi_segment *segment, double *lowest, double *highest)
+{
+    const vi_mode *mode = segment->mode;
+    if (segment->series || mode->natural == 0.0 || segment->level_rate != 0.0) {
+        return false;
+    }
+    const double reach = sqrt(segment->x * segment->x + segment->v * segment->v / mode->stiffness)
+                         + mode->steady_amplitude;
+    *lowest = segment->level - reach;
+    *highest = segment->level + reach;
+    return isfinite(reach);
+}
+
+void vi_mode_held(const vi_mode *mode, double x, vi_phase phase, double held, double held_rate, double *acceleration,
+                  double *slope)
+{
+    *acceleration = mode->force * phase.cosine + held - mode->stiffness * x;
+    *slope = held_rate - mode->force * mode->angular_frequency * phase.sine;
+}

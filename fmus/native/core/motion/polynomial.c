@@ -1,0 +1,87 @@
+#include "motion/polynomial.h"
+
+#include <math.h>
+
+#include "motion/majorant.h"
+
+/* After so many steps below the noise a value counts as zero also where it rises: of a value that is nothing but
+ * rounding, each step would certify only the next few roundings. */
+static const int LONGEST_CRAWL = 64;
+
+void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4])
+{
+    double x = c[VI_ORDER], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
+    for (int n = VI_ORDER - 1; n >= 0; --n) {
+        j = j * u + a;
+        a = a * u + v;
+        v = v * u + x;
+        x = x * u + c[n];
+    }
+    value[0] = x;
+    value[1] = v;
+    value[2] = 2.0 * a;
+    value[3] = 6.0 * j;
+}
+
+double vi_polynomial_snap(const double c[VI_ORDER + 1], double length)
+{
+    double snap = 0.0;
+    for (int n = VI_ORDER; n >= 4; --n) {
+        const double k = (double)n;
+        snap = snap * length + k * (k - 1.0) * (k - 2.0) * (k - 3.0) * fabs(c[n]);
+    }
+    return snap;
+}
+
+double vi_polynomial_size(const double c[VI_ORDER + 1], double length)
+{
+    double size = 0.0;
+    for (int n = VI_ORDER; n >= 0; --n) {
+        size = size * length + fabs(c[n]);
+    }
+    return size;
+}
+
+/* The last step to a zero that is nearer than rounding can tell. */
+static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p, double length, double noise)
+{
+    const double square = p->velocity * p->velocity + 2.0 * p->acceleration * p->clearance;
+    const double step = square < 0.0 ? -p->velocity / p->acceleration : 2.0 * p->clearance / (p->velocity + sqrt(square));
+    double value[4];
+    const double root = vi_min(length, u + step);
+    vi_polynomial_at(c, root, value);
+    if (!(fabs(value[0]) <= 2.0 * noise)) { /* the velocity is no more than rounding, as the value is */
+        return (vi_fall){true, u, p->velocity};
+    }
+    return (vi_fall){true, root, square < 0.0 ? 0.0 : vi_max(0.0, -value[1])};
+}
+
+vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double length, double noise)
+{
+    const double bound = vi_polynomial_snap(c, length);
+    double u = from;
+    int crawl = 0;
+    for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
+        double value[4];
+        vi_polynomial_at(c, u, value);
+        vi_approach p = {vi_max(0.0, value[0]), -value[1], -value[2], -value[3], bound};
+        if (p.velocity > 0.0 && p.clearance <= noise) {
+            return land(c, u, &p, length, noise);
+        }
+        double horizon = length - u;
+        crawl = p.clearance <= noise ? crawl + 1 : 0;
+        if (crawl > LONGEST_CRAWL && bound > 0.0) {
+            p.clearance += noise;
+            horizon = vi_min(horizon, sqrt(sqrt(24.0 * noise / bound)));
+        }
+        const double step = vi_certified_step(&p, horizon);
+        if (!(step < length - u)) {
+            return (vi_fall){false, length, 0.0};
+        }
+        if (u + step == u) {
+            return (vi_fall){true, u, vi_max(0.0, p.velocity)};
+        }
+        u += step;
+    }
+    return (vi_fall){false, u, 0.0};
+}
