@@ -63,16 +63,16 @@ def build(folder: Path, *, watched: bool) -> CDLL:
     source = shutil.copytree(NATIVE / "core", folder / "core")
     if not watched:
         (inline, counted), (looked, other) = UNWATCHED.items()
-        for name, old, new in (("budget.h", inline, counted), ("budget.c", looked, other)):
+        for name, old, new in (("body/budget.h", inline, counted), ("body/budget.c", looked, other)):
             text = (source / name).read_text()
             if text.count(old) != 1:
                 raise SystemExit(f"{name}: expected `{old}` once. Bring this benchmark up to date.")
             (source / name).write_text(text.replace(old, new))
-        with (source / "budget.c").open("a") as file:
+        with (source / "body" / "budget.c").open("a") as file:
             file.write(LOOKS_AT_NOTHING)
     (folder / "built").mkdir()
     library = folder / "built" / Path(core.core_library()._name).name
-    compile_library(library, sorted(source.glob("*.c")), [source], export_all=True, strict=False)
+    compile_library(library, sorted(source.rglob("*.c")), [source], export_all=True, strict=False)
     with patch.object(core, "files", lambda _package: folder):
         return core.core_library.__wrapped__()
 

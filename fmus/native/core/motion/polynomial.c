@@ -23,7 +23,8 @@ void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4])
     value[3] = 6.0 * j;
 }
 
-double vi_polynomial_snap(const double c[VI_ORDER + 1], double length)
+/* Largest modulus of the fourth derivative over 0 <= u <= length. */
+static double largest_snap(const double c[VI_ORDER + 1], double length)
 {
     double snap = 0.0;
     for (int n = VI_ORDER; n >= 4; --n) {
@@ -58,7 +59,7 @@ static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p
 
 vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double length, double noise)
 {
-    const double bound = vi_polynomial_snap(c, length);
+    const double bound = largest_snap(c, length);
     double u = from;
     int crawl = 0;
     for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {

@@ -10,9 +10,6 @@ enum { VI_ORDER = 26 };
 /* Value, and the first three derivatives, of c[0] + c[1] u + ... + c[VI_ORDER] u^VI_ORDER. */
 void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4]);
 
-/* Largest modulus of the fourth derivative over 0 <= u <= length. */
-double vi_polynomial_snap(const double c[VI_ORDER + 1], double length);
-
 /* Sum of the moduli of the terms at `length`: their rounding is 1e-16 of this. */
 double vi_polynomial_size(const double c[VI_ORDER + 1], double length);
 

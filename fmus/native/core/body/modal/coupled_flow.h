@@ -9,7 +9,7 @@
 #ifndef VIBROIMPACT_COUPLED_FLOW_H
 #define VIBROIMPACT_COUPLED_FLOW_H
 
-#include "body/modal/structure.h"
+#include "body/modal/structure_state.h"
 #include "motion/polynomial.h"
 
 typedef enum {

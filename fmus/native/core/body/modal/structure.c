@@ -2,49 +2,43 @@
 
 #include <float.h>
 #include <math.h>
+#include <string.h>
 
-#include "body/modal/structure_parts.h"
+#include "body/landing.h"
+#include "body/modal/modal_flight.h"
+#include "body/modal/structure_arrival.h"
+#include "body/modal/structure_contact.h"
+#include "body/modal/structure_drift.h"
+#include "body/modal/structure_forces.h"
+#include "body/modal/structure_record.h"
+#include "body/modal/structure_settle.h"
 #include "motion/majorant.h"
 
 /* A contact just released stays on its stop for this times (1 / fastest rate + |time|): others that are released with it
  * are so at its instant but for the rounding of their forces. */
 static const double ONE_RELEASE = 16.0 * DBL_EPSILON;
-/* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
-static const double LANDING = 1e-13;
-/* A contact that leaves its stop, and within a radian of the fastest mode goes no further than this times its other
- * displacements, is followed from where it is. Not one on its way in: its clearance is rounded already. */
-static const double LINGERING = 1e-6;
-/* A bounce shorter than this over the fastest rate is followed from the stop, not from the origin. */
-static const double LOW_BOUNCE = 0.1;
-/* Such a flight is at least this long over the fastest rate: its length is only the reach of the search. */
+/* Least length of a low bounce's flight, in radians of the fastest rate: it is only the reach of the search. */
 static const double LEAST_BOUNCE = 1e-6;
-/* Of a segment, in periods: more than one, so that a flight of one period does not end in two segments. */
-static const double LONGEST_SEGMENT = 1.5;
 /* The last step to a contact is shorter than this over the fastest rate. */
 static const double LAST_STEP = 1e-5;
-/* A contact nearer than this over the fastest rate may be near enough to be told without another evaluation. */
-static const double NEAR_CONTACT = 1e-4;
-
 /* Modal displacements and velocities below this have squares below the smallest normal number. */
 static const double SMALLEST = 1e-154;
 
 /* ---- segments ---- */
 
-typedef enum { ENDS_ANYWHERE, ENDS_AT_TARGET, ENDS_AT_PERIOD } segment_end;
-
 /* How long one segment may be, and what its end is. */
-static double segment_length(const vi_structure *s, vi_instant target, segment_end *end)
+static double segment_length(const vi_structure *s, vi_instant target, vi_ending *end)
 {
-    const vi_clock *clock = &s->model->clock;
-    const double remaining = vi_clock_elapsed(clock, s->state->now, target);
-    const double to_period = vi_clock_to_period_end(clock, s->state->now);
-    if (s->record->periods && to_period <= remaining) {
-        *end = ENDS_AT_PERIOD;
-        return to_period;
+    return vi_segment_length(&s->model->clock, s->state->now, target, s->record->periods, end);
+}
+
+static double landing_room(const vi_structure *s)
+{
+    bool external = false;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        external = external || s->contacts[k].law.law >= VI_LAW_EXTERNAL;
     }
-    const double longest = LONGEST_SEGMENT * clock->period;
-    *end = remaining <= longest ? ENDS_AT_TARGET : ENDS_ANYWHERE;
-    return vi_min(remaining, longest);
+    return external ? vi_landing_room(vi_clock_time(&s->model->clock, s->state->now)) : 0.0;
 }
 
 static void record_period(const vi_structure *s)
@@ -56,10 +50,10 @@ static void record_period(const vi_structure *s)
 }
 
 /* Move the instant by u seconds; the two named ends are met exactly. The modal state is there already. */
-static void move(const vi_structure *s, double u, segment_end end, vi_instant target)
+static void move(const vi_structure *s, double u, vi_ending end, vi_instant target)
 {
     vi_structure_state *state = s->state;
-    const vi_instant after = end == ENDS_AT_TARGET ? target : vi_clock_after(&s->model->clock, state->now, u);
+    const vi_instant after = end == VI_ENDS_AT_TARGET ? target : vi_clock_after(&s->model->clock, state->now, u);
     const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 0.0;
     const double one = ONE_RELEASE * (radian + fabs(vi_clock_time(&s->model->clock, state->now)));
     for (int k = 0; k < s->model->contacts && u > 0.0; ++k) {
@@ -72,28 +66,12 @@ static void move(const vi_structure *s, double u, segment_end end, vi_instant ta
         state->leaving[k] = 0;
     }
     /* a contact may be so close before a period's end that rounding puts it there */
-    if (end == ENDS_AT_PERIOD || (s->record->periods && after.periods > state->now.periods)) {
+    if (end == VI_ENDS_AT_PERIOD || (s->record->periods && after.periods > state->now.periods)) {
         state->now = (vi_instant){state->now.periods + 1, 0.0, 0.0};
         record_period(s);
     } else {
         state->now = after;
     }
-}
-
-static double landing_room(const vi_structure *s)
-{
-    bool external = false;
-    for (int k = 0; k < s->model->contacts; ++k) {
-        external = external || s->contacts[k].law.law >= VI_LAW_EXTERNAL;
-    }
-    return external ? LANDING * (1.0 + fabs(vi_clock_time(&s->model->clock, s->state->now))) : 0.0;
-}
-
-/* A contact found by rounding just past the end of the period or of the step is at its end. */
-static segment_end landing(segment_end end, double u, double length, double room)
-{
-    const bool past = end == ENDS_AT_PERIOD ? u >= length : u > length + room;
-    return past ? end : ENDS_ANYWHERE;
 }
 
 /* ---- flight ---- */
@@ -106,18 +84,6 @@ static double land(const vi_structure_model *model, const vi_approach *p, double
     const double step = square >= 0.0 ? 2.0 * p->clearance / (p->velocity + sqrt(square))
                                       : -p->velocity / p->acceleration;
     return step * model->fastest < LAST_STEP ? u + step : u;
-}
-
-/* Seconds to the contact when the parabola that touches the motion here tells it to the last bit; else HUGE_VAL. */
-static double seconds_to_landing(const vi_structure_model *model, const vi_point *point, const vi_approach *p)
-{
-    if (!(p->clearance * model->fastest < NEAR_CONTACT * p->velocity)) {
-        return HUGE_VAL;
-    }
-    const double t = vi_parabola_root(p->clearance, p->velocity, p->acceleration), cube = t * t * t;
-    const bool exact = fabs(p->jerk) * cube <= DBL_EPSILON * point->scale
-                       && p->bound * cube <= DBL_EPSILON * p->velocity;
-    return exact ? t : HUGE_VAL;
 }
 
 /* What a contact that leaves its stop does at once is known exactly. */
@@ -172,7 +138,7 @@ static int locate(const vi_structure *s, const vi_flight *flight, const vi_point
                 *u = land(s->model, &p, *u);
                 return k;
             }
-            const double seconds = seconds_to_landing(s->model, &points[k], &p);
+            const double seconds = vi_seconds_to_landing(&p, s->model->fastest, points[k].scale);
             const double certified = vi_min(seconds, starts ? vi_certified_step(&p, step)
                                                             : vi_point_step(&points[k], flight, parts, *u, step));
             if (certified < step) {
@@ -241,11 +207,11 @@ static double low_bounce(const vi_structure *s)
         const double clearance = vi_max(0.0, vi_structure_clearance(s, k)), v = vi_structure_approach(s, k);
         const double a = vi_structure_direction(s, k) * vi_structure_at(model, model->shape[k], acceleration);
         const double flight = vi_parabola_root(clearance, v, a), time = 1.0 / model->fastest;
-        if (flight > 0.0 && flight * model->fastest < LOW_BOUNCE) {
+        if (flight > 0.0 && flight * model->fastest < VI_LOW_BOUNCE) {
             /* no shorter than moves the body at all: what rounding calls a bounce need not come down */
             shortest = vi_min(shortest, vi_max(2.0 * flight, LEAST_BOUNCE * time));
         } else if (s->state->status[k] == VI_CONTACT_TOUCHING
-                   && (fabs(v) + fabs(a) * time) * time < LINGERING * vi_structure_displacement_size(s, k)) {
+                   && (fabs(v) + fabs(a) * time) * time < VI_LINGERING * vi_structure_displacement_size(s, k)) {
             shortest = vi_min(shortest, time);
         }
     }
@@ -267,16 +233,16 @@ static void fly_free(const vi_structure *s, const vi_flight *flight, vi_instant 
     const double u = vi_clock_elapsed(clock, s->state->now, target);
     vi_flight_end(flight, u, clock->angular_frequency * target.rest, s->state->q, s->state->p);
     vi_flight_reach(flight, s->state->now, s->state->q, s->state->p, s->state->origin);
-    move(s, u, ENDS_AT_TARGET, target);
+    move(s, u, VI_ENDS_AT_TARGET, target);
 }
 
 /* Fly to the next contact, the end of the segment, or the target, whichever comes first; false where the motion goes
  * beyond the largest numbers. */
 static bool fly(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
-    segment_end end;
+    vi_ending end;
     const double length = segment_length(s, target, &end), bounce = low_bounce(s);
-    const double room = end == ENDS_AT_TARGET ? landing_room(s) : 0.0;
+    const double room = end == VI_ENDS_AT_TARGET ? landing_room(s) : 0.0;
     vi_structure_state *state = s->state;
     double held[VI_MODES], u;
     vi_flight flight;
@@ -307,11 +273,11 @@ static bool fly(const vi_structure *s, vi_instant target, const vi_step_request 
     vi_flight_end(&flight, u, flight.angle + flight.angular_frequency * u, state->q, state->p);
     if (k < 0) {
         vi_flight_reach(&flight, state->now, state->q, state->p, state->origin);
-        move(s, u, whole ? end : ENDS_ANYWHERE, target);
+        move(s, u, whole ? end : VI_ENDS_ANYWHERE, target);
         return true;
     }
     forget_origins(s);
-    move(s, u, landing(end, u, length, room), target);
+    move(s, u, vi_ending_at(end, u, length, room), target);
     const double remaining = vi_clock_elapsed(&s->model->clock, state->now, target);
     vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
     return true;
@@ -333,15 +299,15 @@ static void end_smallest(const vi_structure *s)
 
 static void drift(const vi_structure *s, vi_instant target, const vi_step_request *request)
 {
-    segment_end end;
+    vi_ending end;
     vi_drift_event event;
     int k;
     const double length = segment_length(s, target, &end);
-    const double room = end == ENDS_AT_TARGET ? landing_room(s) : 0.0;
+    const double room = end == VI_ENDS_AT_TARGET ? landing_room(s) : 0.0;
     const double u = vi_structure_drift(s, length, room, &event, &k);
     forget_origins(s);
     const bool whole = event == VI_DRIFT_NO_EVENT && u >= length;
-    move(s, u, whole ? end : event == VI_DRIFT_NO_EVENT ? ENDS_ANYWHERE : landing(end, u, length, room), target);
+    move(s, u, whole ? end : event == VI_DRIFT_NO_EVENT ? VI_ENDS_ANYWHERE : vi_ending_at(end, u, length, room), target);
     const double remaining = vi_clock_elapsed(&s->model->clock, s->state->now, target);
     if (event != VI_DRIFT_NO_EVENT) {
         end_smallest(s);
@@ -361,7 +327,8 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     }
 }
 
-bool vi_structure_is_coupled(const vi_structure *s)
+/* Is any contact held, yielding, receding, or lifted by a high derivative only, or is the damping coupled? */
+static bool is_coupled(const vi_structure *s)
 {
     for (int k = 0; k < s->model->contacts; ++k) {
         const int32_t status = s->state->status[k];
@@ -370,6 +337,41 @@ bool vi_structure_is_coupled(const vi_structure *s)
         }
     }
     return s->model->coupled;
+}
+
+/* ---- start ---- */
+
+static void place(const vi_structure *s, int k)
+{
+    vi_structure_state *state = s->state;
+    const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k), clearance = vi_structure_clearance(s, k);
+    if (s->contacts[k].law.law == VI_LAW_NONE || clearance > noise) {
+        return;
+    }
+    state->status[k] = VI_CONTACT_TOUCHING;
+    if (clearance < -noise) { /* only a compliant stop may be pressed in at the start */
+        state->status[k] = VI_CONTACT_YIELDING;
+        vi_structure_touch_down(s, k);
+    }
+}
+
+void vi_structure_start(const vi_structure *s, vi_instant now)
+{
+    vi_structure_state *state = s->state, fresh;
+    memset(&fresh, 0, sizeof fresh);
+    memcpy(fresh.q, state->q, sizeof fresh.q);
+    memcpy(fresh.p, state->p, sizeof fresh.p);
+    memcpy(fresh.held, state->held, sizeof fresh.held);
+    memcpy(fresh.held_rate, state->held_rate, sizeof fresh.held_rate);
+    fresh.follow_energies = state->follow_energies;
+    fresh.now = fresh.held_since = now;
+    vi_budget_start(&fresh.budget, now);
+    *state = fresh;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_contact_clear(&s->contacts[k]);
+        s->contacts[k].mass = s->model->mobility[k][k] > 0.0 ? 1.0 / s->model->mobility[k][k] : HUGE_VAL;
+        place(s, k);
+    }
 }
 
 /* ---- a step ---- */
@@ -407,7 +409,7 @@ static vi_step_result move_on(const vi_structure *s, vi_instant target, const vi
     if (looked != VI_STEP_DONE) {
         return looked;
     }
-    const bool coupled = vi_structure_is_coupled(s);
+    const bool coupled = is_coupled(s);
     if (coupled) {
         drift(s, target, request);
     }
@@ -444,4 +446,18 @@ void vi_structure_outputs(const vi_structure *s, double acceleration[VI_MODES])
         contact->velocity = status == VI_CONTACT_HELD ? 0.0 : vi_structure_at(s->model, shape, s->state->p);
         contact->force = vi_max(0.0, force[k]);
     }
+}
+
+void vi_structure_resolve(const vi_structure *s)
+{
+    int hit[VI_PORTS] = {0};
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const bool touches = s->state->status[k] == VI_CONTACT_TOUCHING && !s->state->leaving[k];
+        hit[k] = s->state->asking[k]
+                 || (touches && vi_structure_approach(s, k) > VI_ROUNDING * vi_structure_velocity_size(s, k));
+        s->state->asking[k] = 0;
+        s->contacts[k].answered = 0;
+    }
+    s->state->pending = 0;
+    vi_structure_resolve_hits(s, hit);
 }

@@ -1,141 +1,21 @@
-/* A body of N modes with stops: flies on the exact flow of its modes, meets its stops (several at once too), yields
- * to compliant ones, chatters, sticks and is released.
- *
- * Modes are mass-normalised: a modal displacement q_j has the unit kg^(1/2) m, a shape (the displacement of a point
- * for q_j = 1) kg^(-1/2), a modal force N kg^(-1/2). equations.md 5, 6.
- *
- * A component keeps the parts (model, state, contacts, record) in its one flat struct and calls with pointers to
- * them; copying the struct copies the body.
- */
+/* A body of N modes with stops: flies on the exact flow of its modes, meets its stops (several at once too), yields to
+ * compliant ones, chatters, sticks and is released. structure_state.h says what it is made of. */
 #ifndef VIBROIMPACT_STRUCTURE_H
 #define VIBROIMPACT_STRUCTURE_H
 
-#include <stdbool.h>
-#include <stdint.h>
-
-#include "body/budget.h"
-#include "body/complaint.h"
-#include "body/record.h"
+#include "body/modal/structure_state.h"
 #include "body/step.h"
-#include "contact/contact.h"
-#include "motion/clock.h"
-#include "motion/flow.h"
-#include "motion/origin.h"
-#include "sizes.h"
-
-/* What does not change after the start. */
-typedef struct {
-    /* set by the component */
-    int32_t modes;         /* in use, 1 to VI_MODES */
-    int32_t contacts;      /* ports in use, 0 to VI_PORTS */
-    int64_t impact_limit;  /* most events of contacts since the start; 0: no limit */
-    double tolerance;      /* relative error of a nonlinear contact (hertz, hunt_crossley) */
-    vi_clock clock;
-    vi_mode mode[VI_MODES]; /* by vi_structure_mode, in ascending order of natural frequency */
-    double shape[VI_PORTS][VI_MODES];
-    /* modal velocities that a unit impulse at the contact gives, kg^(-1/2); equal to shape but for collocation */
-    double impulse[VI_PORTS][VI_MODES];
-    double observed[VI_MODES]; /* shape of the point whose extremes and strobe the record keeps */
-    int32_t coupled;           /* the damping couples the modes: coupling[][] holds all of it */
-    double coupling[VI_MODES][VI_MODES]; /* modal damping matrix, 1/s; only read when coupled */
-    /* derived by vi_structure_prepare */
-    double mobility[VI_PORTS][VI_PORTS];   /* velocity of contact i for a unit impulse at contact j, 1/kg */
-    double mobility_low[VI_PORTS][VI_PORTS]; /* its rounding: else it adds up over elastic impacts, always one way */
-    double compliance[VI_PORTS][VI_PORTS]; /* acceleration of contact i for a unit force at contact j, 1/kg */
-    double fastest;                      /* largest rate of any mode, rad/s */
-} vi_structure_model;
-
-/* How a contact of a structure stands. */
-typedef enum {
-    VI_CONTACT_FREE = 0,
-    VI_CONTACT_TOUCHING = 1, /* on the stop, neither pressed nor penetrating: the next motion decides */
-    VI_CONTACT_HELD = 2,     /* rests on a rigid stop */
-    VI_CONTACT_YIELDING = 3, /* a compliant stop is pressed in */
-    VI_CONTACT_RECEDING = 4  /* beyond the rest position of a compliant stop, whose surface it has left */
-} vi_contact_status;
-
-typedef struct {
-    double forcing_work;  /* of all applied forces, J */
-    double damping_loss;  /* J */
-    double contact_loss;  /* work done on the stops, J */
-} vi_energies;
-
-/* The contact with a compliant stop that is going on. */
-typedef struct {
-    double time, phase, velocity; /* when and how fast it began, s, rad, m/s */
-    double impulse;               /* so far, N s */
-} vi_touch_down;
-
-typedef struct {
-    vi_instant now;
-    vi_standstill standstill;
-    vi_budget budget;
-    double q[VI_MODES], p[VI_MODES]; /* modal displacements and velocities */
-    vi_origin origin[VI_MODES];
-    vi_instant held_since;
-    double held[VI_MODES], held_rate[VI_MODES]; /* modal forces of the inputs at held_since, and their slopes */
-    int32_t status[VI_PORTS];   /* vi_contact_status */
-    int32_t pending;            /* 0, or the contact (1-based) whose external law must answer */
-    int32_t passed;             /* 0, or the external contact that the last step passed through (FMI 2.0) */
-    int32_t follow_energies;    /* input: integrate `energies` */
-    vi_energies energies;
-    double fastest_impact[VI_PORTS]; /* largest approach since the last stick, m/s */
-    int64_t low_impacts[VI_PORTS];   /* impacts in a row that are far below it */
-    double tail_impulse[VI_PORTS];   /* of the chatter summed at the last stick, N s */
-    /* touching: leaves with velocity exactly 0 (1), with acceleration 0 too (2), with its rate 0 but for rounding (3);
-     * yielding: began at this instant, at depth exactly 0, with speed (1) or without (2) */
-    int32_t leaving[VI_PORTS];
-    int32_t asking[VI_PORTS];        /* external contacts that wait for an answer at this instant */
-    vi_touch_down touch_down[VI_PORTS];
-    double surface[VI_PORTS];        /* compliant stops: penetration at the last separation, m */
-    vi_instant separated[VI_PORTS];  /* and when */
-    double reference_penetration[VI_PORTS], reference_rate[VI_PORTS]; /* external force: where it was given */
-} vi_structure_state;
-
-/* The parts of one body, for the length of a call. */
-typedef struct {
-    vi_structure_model *model;
-    vi_structure_state *state;
-    vi_contact *contacts; /* model->contacts of them */
-    vi_record *record;
-} vi_structure;
-
-/* Mode j: natural angular frequency (rad/s, >= 0), damping ratio (>= 0) and modal amplitude of the harmonic force.
- * A mode of frequency 0 has no damping. The clock must be started with the same angular frequency. */
-void vi_structure_mode(vi_structure_model *model, int j, double natural, double damping_ratio, double force,
-                       double angular_frequency);
-
-/* After modes, shapes and impulses are set. */
-void vi_structure_prepare(vi_structure_model *model);
 
 /* Begin at an instant; q and p, the contacts' parameters are set. Clears everything else of the state but `held`. */
 void vi_structure_start(const vi_structure *s, vi_instant now);
 
-/* New modal input forces from now on, with slopes; the applied forces of external stops are read from the contacts. */
-void vi_structure_hold(const vi_structure *s, const double held[], const double held_rate[]);
-
 /* Advance to `target`. See step.h for what may end it earlier. */
 vi_step_result vi_structure_advance(const vi_structure *s, vi_instant target, const vi_step_request *request);
-
-/* Say where it stands after VI_STEP_STANDSTILL. */
-void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH]);
 
 /* Resolve the pending contact with its answer. */
 void vi_structure_resolve(const vi_structure *s);
 
 /* Contacts' outputs, and the modal accelerations, at the present instant. */
 void vi_structure_outputs(const vi_structure *s, double acceleration[VI_MODES]);
-
-/* Does a contact lie beyond its stop by more than rounding? (a start state is refused then); its number or 0 */
-int vi_structure_beyond(const vi_structure *s);
-
-/* Entry of the modal damping matrix, 1/s. */
-static inline double vi_structure_damping(const vi_structure_model *model, int i, int j)
-{
-    return model->coupled ? model->coupling[i][j] : i == j ? 2.0 * model->mode[j].decay : 0.0;
-}
-
-/* shape . vector */
-double vi_structure_at(const vi_structure_model *model, const double shape[], const double vector[]);
 
 #endif

@@ -1,8 +1,10 @@
-/* The moments of a contact: arrival, rest, release, and compliant stops from touch-down to separation. */
+#include "body/modal/structure_contact.h"
+
 #include <float.h>
 #include <math.h>
 
-#include "body/modal/structure_parts.h"
+#include "body/contact_events.h"
+#include "body/landing.h"
 #include "motion/majorant.h"
 
 /* Contacts whose clearance is below this many roundings of their displacement meet at the same instant. */
@@ -16,27 +18,22 @@ static const double WITH_IT = 4.0, GONE = 1e-9;
 void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_impulse)
 {
     vi_structure_state *state = s->state;
-    vi_contact *contact = &s->contacts[k];
     state->budget.events += 1;
     state->status[k] = VI_CONTACT_HELD;
     state->leaving[k] = 0;
     state->tail_impulse[k] = tail_impulse;
     state->fastest_impact[k] = 0.0;
     state->low_impacts[k] = 0;
-    contact->stuck = 1;
-    contact->stick_start = vi_clock_time(&s->model->clock, vi_clock_after(&s->model->clock, state->now, delay));
-    contact->stick_end = NAN;
+    vi_contact_stick(&s->contacts[k], &s->model->clock, state->now, delay);
 }
 
 void vi_structure_release(const vi_structure *s, int k, int leaving)
 {
     vi_contact *contact = &s->contacts[k];
-    contact->stick_end = vi_clock_time(&s->model->clock, s->state->now);
-    contact->stick_start = fmin(contact->stick_start, contact->stick_end); /* lifted before the chatter had ended */
+    vi_contact_lift(contact, &s->model->clock, s->state->now);
     if (contact->stick_end > contact->stick_start || s->state->tail_impulse[k] > 0.0) {
         vi_record_stick(s->record, contact->stick_start, contact->stick_end, k + 1, s->state->tail_impulse[k]);
     }
-    contact->stuck = 0;
     s->state->status[k] = VI_CONTACT_TOUCHING;
     s->state->leaving[k] = leaving;
 }
@@ -142,10 +139,9 @@ void vi_structure_return(const vi_structure *s, int k)
     vi_structure_touch_down(s, k);
 }
 
-/* ---- arrival ---- */
+/* ---- on the stop ---- */
 
-/* Put contact k on its stop to the last bit. */
-static void put_on_stop(const vi_structure *s, int k)
+void vi_structure_put_on_stop(const vi_structure *s, int k)
 {
     const vi_structure_model *model = s->model;
     const double displacement = vi_structure_at(model, model->shape[k], s->state->q);
@@ -165,76 +161,4 @@ bool vi_structure_meets_now(const vi_structure *s, int k)
     const double v = vi_structure_approach(s, k);
     const double room = SAME_INSTANT * DBL_EPSILON * (vi_structure_displacement_size(s, k) + v * s->state->now.rest);
     return v > VI_ROUNDING * vi_structure_velocity_size(s, k) && vi_structure_clearance(s, k) <= room;
-}
-
-static bool is_external(const vi_structure *s, int k)
-{
-    return s->contacts[k].law.law == VI_LAW_EXTERNAL || s->contacts[k].law.law == VI_LAW_EXTERNAL_FORCE;
-}
-
-/* External laws among those that meet: stop there and wait, or (FMI 2.0) note the time and fly through. */
-bool vi_structure_ask(const vi_structure *s, const int hit[], bool stop_here)
-{
-    bool any = false;
-    for (int k = 0; k < s->model->contacts; ++k) {
-        if (!hit[k] || !is_external(s, k)) {
-            continue;
-        }
-        s->contacts[k].event_time = vi_clock_time(&s->model->clock, s->state->now);
-        s->contacts[k].answered = 0;
-        s->state->asking[k] = stop_here;
-        if (!any) {
-            *(stop_here ? &s->state->pending : &s->state->passed) = k + 1;
-        }
-        any = true;
-    }
-    return any;
-}
-
-/* Resolve those that are hit: compliant stops begin to yield, rigid ones answer together. */
-void vi_structure_resolve_hits(const vi_structure *s, const int hit[])
-{
-    int rigid[VI_PORTS] = {0}, any = 0;
-    for (int k = 0; k < s->model->contacts; ++k) {
-        const int64_t law = s->contacts[k].law.law;
-        if (hit[k] && (vi_contact_law_is_compliant(law) || law == VI_LAW_EXTERNAL_FORCE)) {
-            vi_structure_touch_down(s, k);
-        } else if (hit[k]) {
-            rigid[k] = any = 1;
-        }
-    }
-    if (any) {
-        vi_structure_collide(s, rigid);
-    }
-}
-
-void vi_structure_meet(const vi_structure *s, int k, bool stop_here)
-{
-    int hit[VI_PORTS] = {0};
-    put_on_stop(s, k);
-    hit[k] = 1;
-    for (int l = 0; l < s->model->contacts; ++l) {
-        if (l != k && vi_structure_meets_now(s, l)) {
-            s->state->status[l] = VI_CONTACT_TOUCHING;
-            s->state->leaving[l] = 0;
-            hit[l] = 1;
-        }
-    }
-    if (!vi_structure_ask(s, hit, stop_here)) {
-        vi_structure_resolve_hits(s, hit);
-    }
-}
-
-void vi_structure_resolve(const vi_structure *s)
-{
-    int hit[VI_PORTS] = {0};
-    for (int k = 0; k < s->model->contacts; ++k) {
-        const bool touches = s->state->status[k] == VI_CONTACT_TOUCHING && !s->state->leaving[k];
-        hit[k] = s->state->asking[k]
-                 || (touches && vi_structure_approach(s, k) > VI_ROUNDING * vi_structure_velocity_size(s, k));
-        s->state->asking[k] = 0;
-        s->contacts[k].answered = 0;
-    }
-    s->state->pending = 0;
-    vi_structure_resolve_hits(s, hit);
 }

@@ -1,10 +1,15 @@
-/* The motion of a structure while stops hold it or yield to it: one Taylor segment at a time, up to its first event. */
+#include "body/modal/structure_drift.h"
+
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-#include "body/modal/structure_parts.h"
-#include "contact/complementarity.h"
+#include "body/landing.h"
+#include "body/modal/structure_contact.h"
+#include "body/modal/structure_forces.h"
+#include "body/modal/structure_held.h"
+#include "body/modal/structure_record.h"
+#include "body/modal/structure_thin.h"
 #include "motion/majorant.h"
 
 /* A surface that has relaxed to less than this times the displacements is at rest. */
@@ -144,47 +149,6 @@ static bool stays(const vi_structure *s, const vi_drift *drift, int k, const dou
     return moved <= VI_ROUNDING * terms;
 }
 
-double vi_structure_series_noise(const vi_structure *s, const vi_drift *drift, int k, int n)
-{
-    const vi_structure_model *model = s->model;
-    double terms = 0.0, drive = 1.0, turn = 1.0;
-    for (int i = 1; i <= n - 2; ++i) {
-        drive *= model->clock.angular_frequency / (double)i;
-        turn *= (i == 1 ? 1.0 : model->fastest) / (double)i;
-    }
-    for (int j = 0; j < model->modes; ++j) {
-        const vi_mode *mode = &model->mode[j];
-        double size = fabs(mode->force) * drive + mode->stiffness * fabs(drift->modal[n - 2][j]);
-        size += n == 3 ? fabs(s->state->held_rate[j]) : 0.0;
-        for (int i = 0; i < model->modes; ++i) {
-            const double damping = vi_structure_damping(model, j, i);
-            size += fabs(damping * drift->modal[n - 1][i]) * (double)(n - 1);
-        }
-        terms += fabs(model->shape[k][j]) * size;
-    }
-    for (int l = 0; l < model->contacts; ++l) {
-        double force = fabs(drift->force[l][n - 2]);
-        if (s->state->status[l] == VI_CONTACT_YIELDING) { /* which turns the rounding of its rate into force */
-            const vi_contact_force slopes = vi_structure_yield(s, l);
-            const double stiffness = slopes.stiffness + slopes.damping * model->fastest;
-            force += stiffness * vi_structure_velocity_size(s, l) * turn;
-        }
-        terms += vi_structure_push_size(model, k, l) * force;
-    }
-    return VI_ROUNDING * terms / ((double)n * (double)(n - 1));
-}
-
-int vi_structure_first_of_force(const vi_structure *s, const vi_drift *drift, int k)
-{
-    for (int n = 1; n <= VI_ORDER - 2; ++n) {
-        const double pressure = drift->force[k][n] * s->model->compliance[k][k] / (double)((n + 1) * (n + 2));
-        if (fabs(pressure) > vi_structure_series_noise(s, drift, k, n + 2)) {
-            return n;
-        }
-    }
-    return VI_ORDER + 1;
-}
-
 /* Let the series of what is 0 at the start, but for rounding, begin with coefficient `first`: divided by that power of time
  * it has the same zeros but that one. */
 static void divide(double c[VI_ORDER + 1], int first)
@@ -295,7 +259,8 @@ static void releases(const vi_structure *s, const vi_drift *drift, const situati
     consider(first, &fall, VI_DRIFT_RELEASE, k);
 }
 
-double vi_structure_pressing_noise(const vi_structure *s, int k)
+/* Rounding of what has the sign of a compliant contact's force: the force itself or, of a power law, 1 + damping d'. */
+static double pressing_noise(const vi_structure *s, int k)
 {
     const vi_contact_law *law = &s->contacts[k].law;
     const bool linear = law->law == VI_LAW_KELVIN_VOIGT || law->law == VI_LAW_EXTERNAL_FORCE;
@@ -335,7 +300,7 @@ static void separations(const vi_structure *s, const vi_drift *drift, const situ
         const double rounding = VI_ROUNDING * vi_polynomial_size(force, length);
         vi_fall fall = {true, 0.0, 1.0};
         /* else an impact elsewhere, or the start, has thrown the point off its stop */
-        if (force[0] >= -vi_max(rounding, vi_structure_pressing_noise(s, k))) {
+        if (force[0] >= -vi_max(rounding, pressing_noise(s, k))) {
             fall = fall_through(force, length, rounding);
         }
         consider(first, &fall, VI_DRIFT_SEPARATION, k);
@@ -381,7 +346,7 @@ static void returns(const vi_structure *s, const vi_drift *drift, int k, double 
         vi_fall fall = {true, 0.0, 1.0};
         const bool lags = vi_structure_surface_lags(s, k);
         /* else an impact elsewhere has thrown the point back */
-        if (gap[0] >= -THROWN * vi_max(small, lags ? noise : vi_structure_pressing_noise(s, k))) {
+        if (gap[0] >= -THROWN * vi_max(small, lags ? noise : pressing_noise(s, k))) {
             fall = vi_polynomial_fall(gap, 0.0, length, small);
         }
         consider(first, &fall, VI_DRIFT_RETURN, k);

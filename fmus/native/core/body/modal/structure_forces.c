@@ -1,8 +1,5 @@
-/* The forces on a structure now: of its modes, its inputs and the contacts that press. */
-#include <float.h>
-#include <math.h>
+#include "body/modal/structure_forces.h"
 
-#include "body/modal/structure_parts.h"
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 

@@ -1,32 +1,21 @@
-/* Joint impulses of the contacts that are hit, and chatter summed to its end. */
+#include "body/modal/structure_impact.h"
+
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-#include "body/modal/structure_parts.h"
+#include "body/chatter.h"
+#include "body/contact_events.h"
+#include "body/landing.h"
+#include "body/modal/structure_contact.h"
+#include "body/modal/structure_forces.h"
+#include "body/modal/structure_held.h"
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 
-/* Chatter is summed only far down a sequence, so that its impacts are seen one by one before. */
-static const double TAIL_VELOCITY = 1e-4;
-/* Largest error of the summed time, in units of 1 / fastest rate. */
-static const double TAIL_ERROR = 1e-16;
-/* A bounce lower than this times the resolution of displacements cannot be followed: the body rests. */
-static const double LOWEST_BOUNCE = 8.0;
-/* After so many low impacts in a row the body rests: only restitution (almost) 1 gets there. */
-static const int64_t MOST_LOW_IMPACTS = 4000000;
-/* Low: bounces not higher than this times the displacements, or this short in radians of the fastest rate. */
-static const double LOW_HEIGHT = 1e-10, SHORT_FLIGHT = 1e-7;
-/* A bounce shorter than this over the fastest rate is followed from the stop: of it only the position is rounded. */
-static const double LOW_BOUNCE = 0.1;
 /* A joint impact may set off others at the same instant; each round loses energy or ends, but between stops that leave
  * no room it would go on for ever. */
 static const int MOST_ROUNDS = 64;
-
-double vi_structure_kinetic(const vi_structure *s)
-{
-    return 0.5 * vi_structure_at(s->model, s->state->p, s->state->p);
-}
 
 static double restitution_of(const vi_structure *s, int k, double approach)
 {
@@ -34,55 +23,6 @@ static double restitution_of(const vi_structure *s, int k, double approach)
     return contact->law.law == VI_LAW_EXTERNAL ? contact->applied_restitution
                                                : vi_contact_law_restitution(&contact->law, approach);
 }
-
-void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
-{
-    const vi_structure_model *model = s->model;
-    vi_structure_state *state = s->state;
-    double g[VI_PORTS][VI_PORTS], x[VI_PORTS] = {0.0}, unit[VI_PORTS], held[VI_MODES], at[VI_PORTS], sign[VI_PORTS];
-    int active[VI_PORTS] = {0};
-    vi_press press[VI_PORTS];
-    for (int l = 0; l < model->contacts; ++l) {
-        press[l] = vi_structure_press(s, l);
-        at[l] = -vi_structure_clearance(s, l);
-        sign[l] = vi_structure_direction(s, l);
-        if (l == k) {
-            press[l] = (vi_press){.kind = VI_PRESS_HOLD};
-        } else if (press[l].kind == VI_PRESS_POWER && !(at[l] > 0.0)) {
-            press[l] = (vi_press){.kind = VI_PRESS_NONE};
-        }
-        active[l] = press[l].kind == VI_PRESS_HOLD;
-    }
-    vi_structure_signed(s, s->model->compliance, g);
-    x[k] = 1.0;
-    vi_solve_active(model->contacts, g, x, active, unit); /* 1 / effective mobility = the diagonal of the inverse */
-    view->mobility = unit[k] > 0.0 ? 1.0 / unit[k] : HUGE_VAL;
-    x[k] = vi_structure_approach(s, k);
-    vi_solve_active(model->contacts, g, x, active, unit);
-    memcpy(view->p, state->p, sizeof view->p);
-    for (int l = 0; l < model->contacts; ++l) {
-        vi_structure_push(s, l, unit[l], view->p);
-    }
-    const vi_phase phase = vi_structure_phase(s);
-    vi_structure_held_now(s, held);
-    at[k] = 0.0;
-    const vi_drift_start start = {state->q, view->p, phase.cosine, phase.sine, held, state->held_rate, at, sign, press};
-    vi_drift drift;
-    vi_drift_begin(&drift, model, &start, 1.0);
-    view->pressure = drift.force[k][0] * view->mobility;
-    view->slope = drift.force[k][1] * view->mobility;
-    view->bend = 2.0 * drift.force[k][2] * view->mobility;
-    view->noise = VI_ROUNDING * drift.force_scale[k] * view->mobility;
-    view->free_noise = VI_ROUNDING * drift.force_scale[k] * fabs(model->mobility[k][k]);
-    view->first = vi_structure_first_of_force(s, &drift, k);
-    view->lead = view->first <= VI_ORDER ? drift.force[k][view->first] : 0.0;
-}
-
-/* The end of a chatter sequence: equations.md 3.1. */
-typedef struct {
-    double duration, error; /* s */
-    bool complete;          /* the pressure lasts to the end */
-} chatter_tail;
 
 static double drag_at(const vi_structure *s, int k)
 {
@@ -96,23 +36,10 @@ static double drag_at(const vi_structure *s, int k)
     return drag / model->mobility[k][k];
 }
 
-static chatter_tail sum_tail(const vi_structure *s, int k, const vi_held_view *view, double rebound, double restitution)
-{
-    const double t = 2.0 * rebound / (view->pressure * (1.0 - restitution)), drag = drag_at(s, k);
-    const double relative = (fabs(view->slope) / view->pressure + drag) * t;
-    const double bend = fabs(view->bend) * t * t / view->pressure, dragged = drag * t / 3.0;
-    chatter_tail tail;
-    /* second order in t; for r near 1, where t is long, drag turns it into ln(1 + g t/3)/(g/3) */
-    tail.duration = (dragged > 0.0 ? t * (log1p(dragged) / dragged) : t) - t * t / 3.0 * (view->slope / view->pressure);
-    tail.error = t * (relative * relative + bend);
-    tail.complete = relative + bend < 0.25 && t * s->model->fastest < 0.5;
-    return tail;
-}
-
 /* Size of displacements that double precision cannot tell apart at a contact, m. */
 static double resolution(const vi_structure *s, int k, double pressure, double approach)
 {
-    const bool low = pressure > 0.0 && 2.0 * approach * s->model->fastest < LOW_BOUNCE * pressure;
+    const bool low = vi_chatter_is_low(pressure, approach, s->model->fastest);
     return DBL_EPSILON * (low ? fabs(s->contacts[k].position) : vi_structure_displacement_size(s, k));
 }
 
@@ -137,33 +64,21 @@ static void rest_if_summable(const vi_structure *s, int k, double rebound, doubl
     if (!(view.pressure > 0.0)) {
         return;
     }
-    const double resolved = resolution(s, k, view.pressure, rebound);
-    const bool lowest = rebound * rebound <= 2.0 * view.pressure * LOWEST_BOUNCE * resolved;
-    const bool loses = restitution < 1.0 || drag_at(s, k) > 0.0;
-    const bool endless = s->state->low_impacts[k] > MOST_LOW_IMPACTS && (loses || tiny);
-    if (restitution < 1.0) {
-        const chatter_tail tail = sum_tail(s, k, &view, rebound, restitution);
-        const double precise = s->model->fastest > 0.0 ? TAIL_ERROR / s->model->fastest : HUGE_VAL;
-        if (tail.complete && (lowest || endless || tail.error <= precise)) {
-            const double impulse = (1.0 + restitution) * rebound / (view.mobility * (1.0 - restitution));
-            come_to_rest(s, k, &view, vi_max(0.0, tail.duration), impulse);
-            return;
-        }
+    const vi_bounces b = {.rebound = rebound,
+                          .restitution = restitution,
+                          .pressure = view.pressure,
+                          .slope = view.slope,
+                          .bend = view.bend,
+                          .drag = drag_at(s, k),
+                          .fastest = s->model->fastest,
+                          .moving = s->model->fastest,
+                          .resolution = resolution(s, k, view.pressure, rebound),
+                          .tiny = tiny};
+    const vi_chatter chatter = vi_chatter_look(&b, s->state->low_impacts[k]);
+    if (chatter.rests) {
+        const double impulse = (1.0 + restitution) * rebound / (view.mobility * (1.0 - restitution));
+        come_to_rest(s, k, &view, chatter.duration, chatter.summed ? impulse : 0.0);
     }
-    if (endless || (lowest && restitution == 1.0)) {
-        come_to_rest(s, k, &view, 0.0, 0.0);
-    }
-}
-
-static void count_impact(const vi_structure *s, int k, double approach, double impulse, double restitution)
-{
-    vi_contact *contact = &s->contacts[k];
-    contact->count += 1;
-    contact->last_time = vi_clock_time(&s->model->clock, s->state->now);
-    contact->last_phase = vi_clock_phase(&s->model->clock, s->state->now);
-    contact->last_velocity = approach;
-    contact->impulse = impulse;
-    vi_record_impact(s->record, contact->last_time, contact->last_phase, approach, impulse, k + 1, restitution);
 }
 
 /* Speed at which contact k leaves after the impulses: that of its law, or more where others have thrown it off. */
@@ -182,24 +97,19 @@ static void after_impact(const vi_structure *s, int k, double approach, double i
     double acceleration[VI_MODES], force[VI_PORTS];
     vi_structure_accelerate(s, acceleration, force);
     const double a = vi_structure_direction(s, k) * vi_structure_at(s->model, s->model->shape[k], acceleration);
-    const double resolved = resolution(s, k, a, approach);
-    /* below this speed a touch cannot be told from a miss: it stands for less penetration than can be resolved */
-    const bool graze = approach * approach <= 2.0 * fabs(a) * resolved;
+    const bool graze = vi_chatter_is_graze(approach, a, resolution(s, k, a, approach));
     state->budget.events += 1;
     if (graze) {
         s->contacts[k].graze_count += 1;
     } else {
-        count_impact(s, k, approach, impulse, restitution);
+        vi_contact_hit(&s->contacts[k], s->record, &s->model->clock, state->now, k + 1, approach, impulse, restitution);
     }
-    const double height = LOW_HEIGHT * vi_structure_displacement_size(s, k);
+    const double height = VI_LOW_HEIGHT * vi_structure_displacement_size(s, k);
     const bool tiny = a > 0.0 && (rebound * rebound <= 2.0 * a * height
-                                  || 2.0 * rebound * s->model->fastest <= SHORT_FLIGHT * a);
-    state->fastest_impact[k] = vi_max(state->fastest_impact[k], approach);
-    const bool far_down = rebound <= TAIL_VELOCITY * state->fastest_impact[k] || graze;
-    state->low_impacts[k] = far_down || tiny ? state->low_impacts[k] + 1 : 0;
+                                  || 2.0 * rebound * s->model->fastest <= VI_SHORT_FLIGHT * a);
     state->status[k] = VI_CONTACT_TOUCHING;
     state->leaving[k] = rebound == 0.0 ? 1 : 0;
-    if (far_down || state->low_impacts[k] > MOST_LOW_IMPACTS) {
+    if (vi_chatter_count(&state->fastest_impact[k], &state->low_impacts[k], approach, rebound, graze, tiny)) {
         rest_if_summable(s, k, rebound, restitution, tiny);
     }
 }

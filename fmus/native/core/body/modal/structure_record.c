@@ -1,8 +1,9 @@
-/* What is recorded along a motion when it is asked for: extremes of the observed point, energies. */
+#include "body/modal/structure_record.h"
+
 #include <float.h>
 #include <math.h>
 
-#include "body/modal/structure_parts.h"
+#include "body/landing.h"
 #include "motion/majorant.h"
 
 /* Nodes and weights of Gauss-Legendre quadrature with eight points, for -1 to 1 (the other half by symmetry). */

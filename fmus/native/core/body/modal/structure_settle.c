@@ -1,45 +1,16 @@
-/* Contacts that touch, at the start of a step or after something has happened: hit, rest, yield or leave. */
-#include <float.h>
+#include "body/modal/structure_settle.h"
+
 #include <math.h>
 
-#include "body/modal/structure_parts.h"
+#include "body/landing.h"
+#include "body/modal/structure_arrival.h"
+#include "body/modal/structure_contact.h"
+#include "body/modal/structure_forces.h"
+#include "body/modal/structure_held.h"
 #include "contact/complementarity.h"
-#include "motion/majorant.h"
 
-/* Of its own mobility, what is left to a contact whose point others hold. */
-static const double KEPT = 1e-9;
 /* Of a contact whose point others hold, a force of so many roundings is none. */
 static const double LITTLE = 16.0;
-
-static bool others_hold(const vi_structure *s, int k)
-{
-    for (int l = 0; l < s->model->contacts; ++l) {
-        if (l != k && s->state->status[l] == VI_CONTACT_HELD) {
-            return true;
-        }
-    }
-    return false;
-}
-
-bool vi_structure_is_kept(const vi_structure *s, int k)
-{
-    if (!others_hold(s, k)) {
-        return false;
-    }
-    double g[VI_PORTS][VI_PORTS];
-    vi_structure_signed(s, s->model->compliance, g);
-    double column[VI_PORTS], share[VI_PORTS], left = g[k][k];
-    int held[VI_PORTS] = {0};
-    for (int l = 0; l < s->model->contacts; ++l) {
-        held[l] = l != k && s->state->status[l] == VI_CONTACT_HELD;
-        column[l] = g[l][k];
-    }
-    vi_solve_active(s->model->contacts, g, column, held, share);
-    for (int l = 0; l < s->model->contacts; ++l) {
-        left -= g[k][l] * share[l];
-    }
-    return left <= KEPT * g[k][k];
-}
 
 static bool gives_way(const vi_structure *s, int k)
 {
@@ -127,20 +98,6 @@ static void settle_resting(const vi_structure *s, const int candidate[])
         const double push = i >= resting.rigid ? -resting.gap[i] : resting.push[i];
         decide(s, resting.index[i], resting.gap[i], push);
     }
-}
-
-bool vi_structure_only_touches(const vi_structure *s, int k)
-{
-    if (!others_hold(s, k)) {
-        return false;
-    }
-    const double speed = vi_structure_velocity_size(s, k);
-    const double reach = s->model->fastest > 0.0 ? speed / s->model->fastest : 0.0; /* within a radian */
-    if (fabs(vi_structure_clearance(s, k)) > VI_ROUNDING * (vi_structure_displacement_size(s, k) + reach)
-        || fabs(vi_structure_approach(s, k)) > VI_ROUNDING * speed) {
-        return false;
-    }
-    return vi_structure_is_kept(s, k);
 }
 
 void vi_structure_settle(const vi_structure *s, const vi_step_request *request)

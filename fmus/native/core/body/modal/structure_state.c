@@ -1,10 +1,9 @@
-/* A structure by itself: its model, where it is now, its start, and the forces it is held by. */
-#include <float.h>
+#include "body/modal/structure_state.h"
+
 #include <math.h>
 #include <string.h>
 
-#include "body/modal/structure_parts.h"
-#include "motion/majorant.h"
+#include "body/landing.h"
 
 /* ---- the model ---- */
 
@@ -137,6 +136,11 @@ double vi_structure_velocity_size(const vi_structure *s, int k)
     return sum;
 }
 
+double vi_structure_kinetic(const vi_structure *s)
+{
+    return 0.5 * vi_structure_at(s->model, s->state->p, s->state->p);
+}
+
 bool vi_structure_watched(const vi_structure *s, int k)
 {
     return s->contacts[k].law.law != VI_LAW_NONE && !s->state->passed;
@@ -164,40 +168,7 @@ void vi_structure_complain(const vi_structure *s, char message[VI_MESSAGE_LENGTH
     vi_complain_of_standstill(message, vi_clock_time(&s->model->clock, s->state->now), on_stop, s->model->contacts);
 }
 
-/* ---- life ---- */
-
-static void place(const vi_structure *s, int k)
-{
-    vi_structure_state *state = s->state;
-    const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k), clearance = vi_structure_clearance(s, k);
-    if (s->contacts[k].law.law == VI_LAW_NONE || clearance > noise) {
-        return;
-    }
-    state->status[k] = VI_CONTACT_TOUCHING;
-    if (clearance < -noise) { /* only a compliant stop may be pressed in at the start */
-        state->status[k] = VI_CONTACT_YIELDING;
-        vi_structure_touch_down(s, k);
-    }
-}
-
-void vi_structure_start(const vi_structure *s, vi_instant now)
-{
-    vi_structure_state *state = s->state, fresh;
-    memset(&fresh, 0, sizeof fresh);
-    memcpy(fresh.q, state->q, sizeof fresh.q);
-    memcpy(fresh.p, state->p, sizeof fresh.p);
-    memcpy(fresh.held, state->held, sizeof fresh.held);
-    memcpy(fresh.held_rate, state->held_rate, sizeof fresh.held_rate);
-    fresh.follow_energies = state->follow_energies;
-    fresh.now = fresh.held_since = now;
-    vi_budget_start(&fresh.budget, now);
-    *state = fresh;
-    for (int k = 0; k < s->model->contacts; ++k) {
-        vi_contact_clear(&s->contacts[k]);
-        s->contacts[k].mass = s->model->mobility[k][k] > 0.0 ? 1.0 / s->model->mobility[k][k] : HUGE_VAL;
-        place(s, k);
-    }
-}
+/* ---- inputs ---- */
 
 void vi_structure_hold(const vi_structure *s, const double held[], const double held_rate[])
 {

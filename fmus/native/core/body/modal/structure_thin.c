@@ -1,8 +1,9 @@
-/* Thin contacts: the first and last instants of a power law, where the Taylor series of its force does not converge. */
+#include "body/modal/structure_thin.h"
+
 #include <float.h>
 #include <math.h>
 
-#include "body/modal/structure_parts.h"
+#include "body/modal/structure_forces.h"
 #include "contact/complementarity.h"
 #include "motion/majorant.h"
 

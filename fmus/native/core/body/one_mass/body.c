@@ -3,41 +3,16 @@
 #include <float.h>
 #include <math.h>
 
+#include "body/contact_events.h"
+#include "body/landing.h"
 #include "body/one_mass/impact.h"
 #include "body/one_mass/rest.h"
 #include "motion/majorant.h"
 
-/* A step's end and a contact that lie closer than this times (1 + |time|) are one instant, s. */
-static const double LANDING = 1e-13;
-/* A body that within a radian does not go further from its stop than this times its other displacements is followed
- * from where it is. */
-static const double LINGERING = 1e-6;
-/* Of a segment, in periods: more than one, so that a flight of one period does not end in two segments. */
-static const double LONGEST_SEGMENT = 1.5;
-/* A contact nearer than this over the fastest rate may be near enough to be told without another evaluation. */
-static const double NEAR_CONTACT = 1e-4;
-/* Rounding of a displacement, in units of the terms it is the sum of. */
-static const double ROUNDING = 4.0 * DBL_EPSILON;
-
-static double direction(const vi_body *body, int k)
-{
-    return vi_contact_direction(body->contacts[k].side);
-}
-
-double vi_body_held_now(const vi_body *body)
-{
-    return body->held + body->held_rate * vi_clock_elapsed(&body->clock, body->held_since, body->now);
-}
-
-vi_phase vi_body_phase_now(const vi_body *body)
-{
-    return vi_phase_of(body->clock.angular_frequency * body->now.rest);
-}
-
 void vi_body_hold(vi_body *body, double held, double held_rate)
 {
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        held -= direction(body, k) * body->contacts[k].applied_force / body->mass;
+        held -= vi_body_direction(body, k) * body->contacts[k].applied_force / body->mass;
     }
     body->held = held;
     body->held_rate = held_rate;
@@ -45,38 +20,12 @@ void vi_body_hold(vi_body *body, double held, double held_rate)
     body->budget.unfinished = 0;
 }
 
-static bool watched(const vi_body *body, int k)
-{
-    return body->contacts[k].law.law != VI_LAW_NONE && !body->passed;
-}
-
-double vi_body_within(const vi_body *body, double displacement)
-{
-    for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        const double sign = direction(body, k), stop = body->contacts[k].position;
-        if (watched(body, k) && sign * displacement > sign * stop) {
-            displacement = stop;
-        }
-    }
-    return displacement;
-}
-
 /* ---- flight ---- */
 
-typedef enum { ENDS_ANYWHERE, ENDS_AT_TARGET, ENDS_AT_PERIOD } segment_end;
-
 /* How long one segment may be, and what its end is. */
-static double segment_length(const vi_body *body, vi_instant target, segment_end *end)
+static double segment_length(const vi_body *body, vi_instant target, vi_ending *end)
 {
-    const double remaining = vi_clock_elapsed(&body->clock, body->now, target);
-    const double to_period = vi_clock_to_period_end(&body->clock, body->now);
-    if (body->record.periods && to_period <= remaining) {
-        *end = ENDS_AT_PERIOD;
-        return to_period;
-    }
-    const double longest = LONGEST_SEGMENT * body->clock.period;
-    *end = remaining <= longest ? ENDS_AT_TARGET : ENDS_ANYWHERE;
-    return vi_min(remaining, longest);
+    return vi_segment_length(&body->clock, body->now, target, body->record.periods, end);
 }
 
 /* Land on the contact found at clearance d and approach v: one step of the parabola that touches the motion there.
@@ -93,19 +42,6 @@ static double land(const vi_segment *segment, double sign, double clearance, vi_
     return fmax(0.0, sign * m->v);
 }
 
-/* Seconds to the contact when the parabola that touches the motion here tells it, and the speed there, to the last
- * bit: no further evaluation is needed. HUGE_VAL otherwise. */
-static double seconds_to_landing(const vi_segment *segment, double stop, const vi_approach *p)
-{
-    if (!(p->clearance * segment->mode->fastest < NEAR_CONTACT * p->velocity)) {
-        return HUGE_VAL;
-    }
-    const double s = vi_parabola_root(p->clearance, p->velocity, p->acceleration), cube = s * s * s;
-    const bool exact = fabs(p->jerk) * cube <= DBL_EPSILON * (fabs(stop) + segment->scale)
-                       && p->bound * cube <= DBL_EPSILON * p->velocity;
-    return exact ? s : HUGE_VAL;
-}
-
 /* First contact at or after `u` in the segment: its index, with *u and the approach velocity; -1 when there is none up to
  * *u, the end of the segment or of a long search. */
 static int locate(vi_body *body, const vi_segment *segment, double *u, vi_motion *m, double *approach)
@@ -115,17 +51,18 @@ static int locate(vi_body *body, const vi_segment *segment, double *u, vi_motion
         int nearest = -1, landing = -1;
         vi_budget_spend(&body->budget, 1);
         for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-            if (!watched(body, k)) {
+            if (!vi_body_watched(body, k)) {
                 continue;
             }
-            const double sign = direction(body, k), stop = body->contacts[k].position - segment->origin;
+            const double sign = vi_body_direction(body, k), stop = body->contacts[k].position - segment->origin;
             const double clearance = vi_max(0.0, sign * (stop - m->x)), v = sign * m->v;
-            if (v > 0.0 && clearance <= ROUNDING * (fabs(stop) + segment->scale)) {
+            const double scale = fabs(stop) + segment->scale;
+            if (v > 0.0 && clearance <= VI_ROUNDING * scale) {
                 *approach = land(segment, sign, clearance, m, u);
                 return k;
             }
             const vi_approach state = {clearance, v, sign * m->a, sign * m->j, m->snap_bound};
-            const double seconds = seconds_to_landing(segment, stop, &state);
+            const double seconds = vi_seconds_to_landing(&state, segment->mode->fastest, scale);
             const double certified = vi_min(seconds, vi_certified_step(&state, step));
             if (certified < step) {
                 step = certified;
@@ -135,11 +72,11 @@ static int locate(vi_body *body, const vi_segment *segment, double *u, vi_motion
         }
         if (landing >= 0) {
             *u += step;
-            *approach = direction(body, landing) * (m->v + step * (m->a + 0.5 * step * m->j));
+            *approach = vi_body_direction(body, landing) * (m->v + step * (m->a + 0.5 * step * m->j));
             return landing;
         }
         if (nearest >= 0 && *u + step == *u) {
-            *approach = fmax(0.0, direction(body, nearest) * m->v);
+            *approach = fmax(0.0, vi_body_direction(body, nearest) * m->v);
             return nearest;
         }
         *u = nearest >= 0 ? *u + step : segment->length;
@@ -160,9 +97,9 @@ static bool free_for_ever(const vi_body *body, const vi_segment *segment)
         return false;
     }
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        const double sign = direction(body, k);
+        const double sign = vi_body_direction(body, k);
         const double furthest = sign > 0.0 ? highest : lowest;
-        if (watched(body, k) && sign * (body->contacts[k].position - furthest) <= 0.0) {
+        if (vi_body_watched(body, k) && sign * (body->contacts[k].position - furthest) <= 0.0) {
             return false;
         }
     }
@@ -170,14 +107,14 @@ static bool free_for_ever(const vi_body *body, const vi_segment *segment)
 }
 
 /* Move the body by u seconds to displacement x and velocity v; the two named ends are met exactly. */
-static void move(vi_body *body, double u, double x, double v, segment_end end, vi_instant target)
+static void move(vi_body *body, double u, double x, double v, vi_ending end, vi_instant target)
 {
-    const vi_instant after = end == ENDS_AT_TARGET ? target : vi_clock_after(&body->clock, body->now, u);
+    const vi_instant after = end == VI_ENDS_AT_TARGET ? target : vi_clock_after(&body->clock, body->now, u);
     body->displacement = x;
     body->velocity = v;
     body->leaving = 0;
     /* a contact may be so close before a period's end that rounding puts it there */
-    if (end == ENDS_AT_PERIOD || (body->record.periods && after.periods > body->now.periods)) {
+    if (end == VI_ENDS_AT_PERIOD || (body->record.periods && after.periods > body->now.periods)) {
         body->now = (vi_instant){body->now.periods + 1, 0.0, 0.0};
         vi_record_period(&body->record, vi_clock_time(&body->clock, body->now), x, v);
     } else {
@@ -191,14 +128,7 @@ static double landing_room(const vi_body *body)
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
         external = external || body->contacts[k].law.law == VI_LAW_EXTERNAL;
     }
-    return external ? LANDING * (1.0 + fabs(vi_clock_time(&body->clock, body->now))) : 0.0;
-}
-
-/* A contact found by rounding just past the end of the period or of the step is at its end. */
-static segment_end landing(segment_end end, double u, double length, double room)
-{
-    const bool past = end == ENDS_AT_PERIOD ? u >= length : u > length + room;
-    return past ? end : ENDS_ANYWHERE;
+    return external ? vi_landing_room(vi_clock_time(&body->clock, body->now)) : 0.0;
 }
 
 /* A contact with an external law: stop there and wait, or (FMI 2.0) note its time and fly through. */
@@ -208,7 +138,7 @@ static void meet_external(vi_body *body, int k, double approach, bool stop_here)
     contact->event_time = vi_clock_time(&body->clock, body->now);
     contact->answered = 0;
     body->displacement = contact->position;
-    body->velocity = direction(body, k) * approach;
+    body->velocity = vi_body_direction(body, k) * approach;
     if (stop_here) {
         body->pending = k + 1;
     } else {
@@ -230,7 +160,7 @@ static bool lingers(const vi_body *body, double position, double clearance, doub
 {
     const double time = 1.0 / body->mode.fastest;
     const double size = fabs(position) + body->mode.steady_amplitude + fabs(held) * time * time;
-    return clearance + (fabs(body->velocity) + fabs(acceleration) * time) * time < LINGERING * size;
+    return clearance + (fabs(body->velocity) + fabs(acceleration) * time) * time < VI_LINGERING * size;
 }
 
 /* A body about to meet a stop, or slow to leave it: how long to follow it from where it is, s; HUGE_VAL when that is
@@ -240,10 +170,10 @@ static double low_bounce(const vi_body *body, vi_phase phase, double held)
     double free_acceleration, slope;
     vi_mode_held(&body->mode, body->displacement, phase, held, body->held_rate, &free_acceleration, &slope);
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        if (!watched(body, k)) {
+        if (!vi_body_watched(body, k)) {
             continue;
         }
-        const double sign = direction(body, k);
+        const double sign = vi_body_direction(body, k);
         const double clearance = fmax(0.0, sign * (body->contacts[k].position - body->displacement));
         const double flight = vi_parabola_root(clearance, sign * body->velocity, sign * free_acceleration);
         if (flight > 0.0 && flight * body->mode.fastest < VI_LOW_BOUNCE) {
@@ -263,7 +193,7 @@ static void fly_free(vi_body *body, const vi_segment *segment, vi_instant target
     double x, v;
     vi_segment_end(segment, vi_clock_elapsed(&body->clock, body->now, target),
                    body->clock.angular_frequency * target.rest, &x, &v);
-    move(body, 0.0, x, v, ENDS_AT_TARGET, target);
+    move(body, 0.0, x, v, VI_ENDS_AT_TARGET, target);
     vi_origin_reach(&body->origin, segment, start, x, v);
 }
 
@@ -271,9 +201,9 @@ static void fly_free(vi_body *body, const vi_segment *segment, vi_instant target
  * beyond the largest numbers. */
 static bool fly(vi_body *body, vi_instant target, const vi_step_request *request)
 {
-    segment_end end;
+    vi_ending end;
     const double length = segment_length(body, target, &end);
-    const double room = end == ENDS_AT_TARGET ? landing_room(body) : 0.0;
+    const double room = end == VI_ENDS_AT_TARGET ? landing_room(body) : 0.0;
     const vi_phase phase = vi_body_phase_now(body);
     const double held = vi_body_held_now(body), bounce = low_bounce(body, phase, held);
     vi_segment segment;
@@ -307,11 +237,12 @@ static bool fly(vi_body *body, vi_instant target, const vi_step_request *request
         vi_record_extend(&body->record, k < 0 ? end_displacement : body->contacts[k].position);
     }
     if (k < 0) {
-        move(body, u, end_displacement, m.v, whole ? end : ENDS_ANYWHERE, target);
+        move(body, u, end_displacement, m.v, whole ? end : VI_ENDS_ANYWHERE, target);
         vi_origin_reach(&body->origin, &segment, start, segment.origin + m.x, m.v);
     } else {
         body->origin.known = 0;
-        move(body, u, body->contacts[k].position, direction(body, k) * approach, landing(end, u, length, room), target);
+        move(body, u, body->contacts[k].position, vi_body_direction(body, k) * approach,
+             vi_ending_at(end, u, length, room), target);
         meet(body, k, approach, vi_clock_elapsed(&body->clock, body->now, target), request);
     }
     return isfinite(body->displacement) && isfinite(body->velocity);
@@ -322,10 +253,8 @@ static bool fly(vi_body *body, vi_instant target, const vi_step_request *request
 static void release(vi_body *body)
 {
     vi_contact *contact = &body->contacts[body->stuck - 1];
-    contact->stick_end = vi_clock_time(&body->clock, body->now);
-    contact->stick_start = fmin(contact->stick_start, contact->stick_end); /* lifted before the chatter had ended */
+    vi_contact_lift(contact, &body->clock, body->now);
     vi_record_stick(&body->record, contact->stick_start, contact->stick_end, body->stuck, body->tail_impulse);
-    contact->stuck = 0;
     body->stuck = 0;
     body->leaving = 1;
 }
@@ -343,11 +272,11 @@ static void stay(vi_body *body, vi_instant target)
         body->now = target;
         return;
     }
-    segment_end end;
+    vi_ending end;
     bool released;
     const double length = segment_length(body, target, &end);
     const double u = vi_body_time_to_release(body, k, length, &released);
-    move(body, u, stop, 0.0, u >= length ? end : ENDS_ANYWHERE, target);
+    move(body, u, stop, 0.0, u >= length ? end : VI_ENDS_ANYWHERE, target);
     if (released) {
         release(body);
     }
@@ -359,7 +288,7 @@ static void stay(vi_body *body, vi_instant target)
 static void settle(vi_body *body, int k, const vi_step_request *request)
 {
     const vi_contact *contact = &body->contacts[k];
-    const double sign = direction(body, k), approach = sign * body->velocity;
+    const double sign = vi_body_direction(body, k), approach = sign * body->velocity;
     if (approach > 0.0) {
         meet(body, k, approach, 0.0, request);
         return;
@@ -383,7 +312,7 @@ static void settle(vi_body *body, int k, const vi_step_request *request)
 static void settle_all(vi_body *body, const vi_step_request *request)
 {
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        if (!body->stuck && !body->pending && watched(body, k)
+        if (!body->stuck && !body->pending && vi_body_watched(body, k)
             && body->displacement == body->contacts[k].position) {
             settle(body, k, request);
         }
@@ -461,7 +390,7 @@ void vi_body_complain(const vi_body *body, char message[VI_MESSAGE_LENGTH])
 {
     int on_stop[VI_BODY_CONTACTS];
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
-        on_stop[k] = watched(body, k) && body->displacement == body->contacts[k].position;
+        on_stop[k] = vi_body_watched(body, k) && body->displacement == body->contacts[k].position;
     }
     vi_complain_of_standstill(message, vi_clock_time(&body->clock, body->now), on_stop, VI_BODY_CONTACTS);
 }
@@ -484,7 +413,7 @@ double vi_body_outputs(vi_body *body)
         vi_contact *contact = &body->contacts[k];
         contact->displacement = body->displacement;
         contact->velocity = body->velocity;
-        const double pressure = direction(body, k) * free_acceleration;
+        const double pressure = vi_body_direction(body, k) * free_acceleration;
         contact->force = body->stuck == k + 1 ? fmax(0.0, body->mass * pressure) : 0.0;
     }
     return body->stuck ? 0.0 : free_acceleration - 2.0 * mode->decay * body->velocity;

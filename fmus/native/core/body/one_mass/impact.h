@@ -2,26 +2,11 @@
 #ifndef VIBROIMPACT_IMPACT_H
 #define VIBROIMPACT_IMPACT_H
 
-#include "body/one_mass/body.h"
-
-/* Held input per unit mass at the present instant, m/s^2. */
-double vi_body_held_now(const vi_body *body);
-
-/* Forcing phase at the present instant. */
-vi_phase vi_body_phase_now(const vi_body *body);
+#include "body/one_mass/body_state.h"
 
 /* The body, on stop k (0-based), has this speed of approach (>= 0): apply the law with restitution r in [0, 1], and
  * let the body rest when the chatter that follows can be summed. equations.md 1.6, 3.1. */
 void vi_body_impact(vi_body *body, int k, double approach, double restitution);
-
-/* A displacement that is known not to be beyond a stop, without the rounding that may put it there. */
-double vi_body_within(const vi_body *body, double displacement);
-
-/* Rounding of the contact acceleration of a body held at `position`, m/s^2. */
-double vi_body_pressure_noise(const vi_body *body, double position);
-
-/* A bounce shorter than this over the fastest rate is followed from the stop, not from the origin. */
-#define VI_LOW_BOUNCE 0.1
 
 /* Rest on stop k; the stick begins `delay` seconds from now (the summed chatter), with that chatter's impulse, N s. */
 void vi_body_stick(vi_body *body, int k, double delay, double tail_impulse);

@@ -2,7 +2,6 @@
 
 #include <math.h>
 
-#include "body/one_mass/impact.h"
 #include "motion/majorant.h"
 
 double vi_body_time_to_release(const vi_body *body, int k, double length, bool *released)

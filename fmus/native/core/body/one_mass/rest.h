@@ -2,7 +2,7 @@
 #ifndef VIBROIMPACT_REST_H
 #define VIBROIMPACT_REST_H
 
-#include "body/one_mass/body.h"
+#include "body/one_mass/body_state.h"
 
 /* Seconds until the contact force on stop k (0-based) falls through zero, at most `length`; *released says whether it
  * does. A force that falls to zero and rises again holds. */

@@ -1,0 +1,60 @@
+#include "body/modal/structure_arrival.h"
+
+#include "body/modal/structure_contact.h"
+#include "body/modal/structure_impact.h"
+
+static bool is_external(const vi_structure *s, int k)
+{
+    return s->contacts[k].law.law == VI_LAW_EXTERNAL || s->contacts[k].law.law == VI_LAW_EXTERNAL_FORCE;
+}
+
+bool vi_structure_ask(const vi_structure *s, const int hit[], bool stop_here)
+{
+    bool any = false;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (!hit[k] || !is_external(s, k)) {
+            continue;
+        }
+        s->contacts[k].event_time = vi_clock_time(&s->model->clock, s->state->now);
+        s->contacts[k].answered = 0;
+        s->state->asking[k] = stop_here;
+        if (!any) {
+            *(stop_here ? &s->state->pending : &s->state->passed) = k + 1;
+        }
+        any = true;
+    }
+    return any;
+}
+
+void vi_structure_resolve_hits(const vi_structure *s, const int hit[])
+{
+    int rigid[VI_PORTS] = {0}, any = 0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const int64_t law = s->contacts[k].law.law;
+        if (hit[k] && (vi_contact_law_is_compliant(law) || law == VI_LAW_EXTERNAL_FORCE)) {
+            vi_structure_touch_down(s, k);
+        } else if (hit[k]) {
+            rigid[k] = any = 1;
+        }
+    }
+    if (any) {
+        vi_structure_collide(s, rigid);
+    }
+}
+
+void vi_structure_meet(const vi_structure *s, int k, bool stop_here)
+{
+    int hit[VI_PORTS] = {0};
+    vi_structure_put_on_stop(s, k);
+    hit[k] = 1;
+    for (int l = 0; l < s->model->contacts; ++l) {
+        if (l != k && vi_structure_meets_now(s, l)) {
+            s->state->status[l] = VI_CONTACT_TOUCHING;
+            s->state->leaving[l] = 0;
+            hit[l] = 1;
+        }
+    }
+    if (!vi_structure_ask(s, hit, stop_here)) {
+        vi_structure_resolve_hits(s, hit);
+    }
+}

@@ -1,0 +1,10 @@
+/* Joint impulses of the contacts that are hit, and chatter summed to its end. */
+#ifndef VIBROIMPACT_STRUCTURE_IMPACT_H
+#define VIBROIMPACT_STRUCTURE_IMPACT_H
+
+#include "body/modal/structure_state.h"
+
+/* Joint impulses of all contacts that touch with an approach; answers of external laws are used where `answered`. */
+void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS]);
+
+#endif

@@ -1,0 +1,23 @@
+/* What is recorded along a motion when it is asked for: extremes of the observed point, energies. */
+#ifndef VIBROIMPACT_STRUCTURE_RECORD_H
+#define VIBROIMPACT_STRUCTURE_RECORD_H
+
+#include "body/modal/coupled_flow.h"
+#include "body/modal/modal_flight.h"
+#include "body/modal/structure_state.h"
+
+/* ---- energies, when they are followed ---- */
+
+/* How long a flight may be for its energies, s: HUGE_VAL when they are not followed. */
+double vi_energies_reach(const vi_structure *s);
+void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const double held[], double u);
+/* Contacts that are `still` do no work: what their series say of their motion is rounding. */
+void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], const int still[],
+                          double u);
+
+/* ---- extremes of the observed point ---- */
+
+void vi_extremes_of_flight(const vi_structure *s, const vi_flight *flight, double u);
+void vi_extremes_of_drift(const vi_structure *s, const vi_drift *drift, double u);
+
+#endif
