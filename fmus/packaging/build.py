@@ -89,9 +89,11 @@ def fingerprint(native: Path = NATIVE) -> str:
     """Return the SHA-256 of everything that an FMU is made from, except the compiler."""
     digest = hashlib.sha256(repr((LANGUAGE, WARNINGS, sys.platform)).encode())
     sources = [p for p in native.rglob("*") if p.suffix in {".c", ".h", ".toml", ".md"}]
-    # sorted one folder at a time: the order must not depend on where the folders lie
-    for path in (*sorted(sources), *sorted((HERE / "description").glob("*.py")), HERE / "build.py"):
-        digest.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+    builders = [*(HERE / "description").glob("*.py"), HERE / "build.py"]
+    # by places inside the folders: where these lie does not matter, where a file lies in them does
+    for folder, paths in ((native, sources), (HERE, builders)):
+        for place, path in sorted((path.relative_to(folder).as_posix(), path) for path in paths):
+            digest.update(place.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
 
 

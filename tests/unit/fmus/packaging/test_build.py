@@ -56,6 +56,12 @@ def test_an_edit_of_the_c_makes_the_build_out_of_date(built_elsewhere: Path, sou
     assert fingerprint(sources) != fingerprint()
 
 
+def test_a_source_that_moves_makes_the_build_out_of_date(built_elsewhere: Path, sources: Path) -> None:
+    header = sources / "core" / "motion" / "flow.h"
+    header.rename(sources / "core" / "contact" / "flow.h")
+    assert not is_current(built_elsewhere, native=sources)
+
+
 @pytest.mark.slow
 def test_an_error_in_the_c_is_told_in_the_compilers_words(sources: Path, tmp_path: Path) -> None:
     (sources / "core" / "zz_wrong.c").write_text("int wrong(void) { return undeclared_name; }\n")
