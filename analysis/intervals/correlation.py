@@ -2,7 +2,7 @@
 
 C(eps) is the part of all pairs of delay vectors (x_i, ..., x_{i+m-1}) nearer than eps in the max norm; its slope in
 logarithms is the correlation dimension where it is the same over a range of radii and stops growing with m. Pairs are
-counted exactly, by the C function behind `fmus.correlation`.
+counted exactly, by the C function behind `fmus.core`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.intervals.trains import Floats, Span
-from vibroimpact.fmus.correlation import MOST_RADII, RADII_PER_OCTAVE, near_pairs, radius_ladder
+from vibroimpact.fmus.core import MOST_RADII, RADII_PER_OCTAVE, near_pairs, radius_ladder
 from vibroimpact.fmus.errors import EstimationError
 
 # C between which a slope is fitted, and the fewest pairs and radii that make one.
@@ -79,7 +79,7 @@ def correlation_sums(
         Pairs i < j with j - i <= `theiler` do not count; 0: all do, but none with itself. At least 1 for maps; a few
         correlation times for samples of a flow.
     radii : ndarray of float, optional
-        From `fmus.correlation.radius_ladder`; by default 15 octaves down from the range of the values.
+        From `fmus.core.radius_ladder`; by default 15 octaves down from the range of the values.
 
     Raises
     ------

@@ -21,7 +21,7 @@ from vibroimpact.analysis.intervals.correlation import (
     fitted_slopes,
 )
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain, Span
-from vibroimpact.fmus.correlation import RADII_PER_OCTAVE
+from vibroimpact.fmus.core import RADII_PER_OCTAVE
 
 Scale = Literal["raw", "log"]
 SCALES: tuple[Scale, ...] = ("raw", "log")

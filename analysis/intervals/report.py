@@ -20,7 +20,7 @@ from vibroimpact.analysis.intervals.report_parts import (
     variability_part,
 )
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain, Span, interval_train
-from vibroimpact.fmus.correlation import MOST_EMBEDDING
+from vibroimpact.fmus.core import MOST_EMBEDDING
 from vibroimpact.fmus.errors import UsageError
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.modes import beam_modes
+from vibroimpact.fmus.core import beam_modes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.models import BeamBody, ChainBody, RestitutionStop
 from vibroimpact.orchestrator.scene.places import stop_location, stop_mass

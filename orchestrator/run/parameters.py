@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.scene.places import (
 )
 
 if TYPE_CHECKING:
-    from vibroimpact.fmus.modes import Boundary
+    from vibroimpact.fmus.core import Boundary
 
 FMU_NAMES = {"oscillator": "Oscillator", "chain": "Chain", "beam": "Beam"}
 LAW_NUMBERS = {"none": 0, "restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossley": 4}
@@ -230,7 +230,7 @@ def rigidity_of_frequency(body: BeamBody) -> float:
 
     w_1 = (xi_1 / length)^2 sqrt(rigidity / mass_per_length), xi_1 the first eigenvalue of its boundary.
     """
-    from vibroimpact.fmus.modes import beam_modes  # loads numpy and the core; few scenes need it
+    from vibroimpact.fmus.core import beam_modes  # loads numpy and the core; few scenes need it
 
     assert body.frequency is not None
     assert body.mass_per_length is not None

@@ -1,4 +1,4 @@
-"""What correlation sums cost: the C function behind `fmus.correlation`, a k-d tree, and nolds 0.6.2.
+"""What correlation sums cost: the C function behind `fmus.core.near_pairs`, a k-d tree, and nolds 0.6.2.
 
 Delay vectors of the Henon map, the max norm, every pair counted exactly at the same 41 radii (five octaves, C from
 about .001 to .1). The C function gives all embeddings from 1 to m in one pass; the others are asked for the largest
@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from vibroimpact.analysis.dataset.results import write_results
-from vibroimpact.fmus.correlation import near_pairs, radius_ladder
+from vibroimpact.fmus.core import near_pairs, radius_ladder
 
 Floats = NDArray[np.float64]
 

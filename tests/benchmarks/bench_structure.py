@@ -25,8 +25,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.modes import beam_modes
-from vibroimpact.fmus.structure import Modes, Stop, Structure
+from vibroimpact.fmus.core import beam_modes
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from support.structure import Modes, Stop, Structure
 
 FREQUENCY, DAMPING, RESTITUTION, GAP = 0.9, 0.02, 0.7, 0.98
 HIGH_DAMPING, GAPS = 0.3, {4: 0.999, 8: 0.999, 16: 0.9999, 32: 0.99999}

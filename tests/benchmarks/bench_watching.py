@@ -28,14 +28,17 @@ from bench_dask import SCENE, WORKERS
 from bench_structure import PERIOD, SETTLING, beam, restitution
 
 from vibroimpact.analysis.files.fingerprints import matches_recorded_hash
-from vibroimpact.fmus import core, structure
-from vibroimpact.fmus.core import Oscillator, motion
+from vibroimpact.fmus.core import Oscillator, motion, oscillator
 from vibroimpact.fmus.packaging.build import NATIVE
-from vibroimpact.fmus.packaging.compiler import compile_library
-from vibroimpact.fmus.structure import Structure
+from vibroimpact.fmus.packaging.platform_names import library_suffix
 from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.campaign.chunks import Work, get_ready, run_chunk
 from vibroimpact.orchestrator.scene import parse_scene
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from support import structure
+from support.core_doors import compile_with_doors
+from support.structure import Structure
 
 #: The goal of each, %.
 MOST_PERCENT = 3.0
@@ -70,11 +73,9 @@ def build(folder: Path, *, watched: bool) -> CDLL:
             (source / name).write_text(text.replace(old, new))
         with (source / "body" / "budget.c").open("a") as file:
             file.write(LOOKS_AT_NOTHING)
-    (folder / "built").mkdir()
-    library = folder / "built" / Path(core.core_library()._name).name
-    compile_library(library, sorted(source.rglob("*.c")), [source], export_all=True, strict=False)
-    with patch.object(core, "files", lambda _package: folder):
-        return core.core_library.__wrapped__()
+    library = folder / f"core{library_suffix()}"
+    compile_with_doors(library, source)
+    return CDLL(str(library))
 
 
 def oscillator_seconds() -> float:
@@ -108,15 +109,21 @@ def in_turns(run: Callable[[], float], libraries: dict[str, CDLL], repetitions: 
     for turn in range(repetitions):
         seconds = {}
         for name in sorted(libraries, reverse=bool(turn % 2)):
-            structure._library.cache_clear()
+            forget_libraries()
             with (
-                patch.object(core, "core_library", lambda name=name: libraries[name]),
-                patch.object(structure, "core_library", lambda name=name: libraries[name]),
+                patch.object(oscillator, "core_library", lambda name=name: libraries[name]),
+                patch.object(structure, "library_with_doors", lambda name=name: libraries[name]),
             ):
                 seconds[name] = run()
         more.append(100.0 * (seconds["watched"] / seconds["unwatched"] - 1.0))
-    structure._library.cache_clear()
+    forget_libraries()
     return more
+
+
+def forget_libraries() -> None:
+    """Let the next call load its library anew."""
+    oscillator._library.cache_clear()
+    structure._library.cache_clear()
 
 
 def checksum_percent(points: int) -> float:

@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
+from support.structure import Modes, Structure
 from support.tolerance import ROUNDING
 
-from vibroimpact.fmus.structure import Modes, Structure
 from vibroimpact.orchestrator.run import Session
 from vibroimpact.orchestrator.scene import parse_scene
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from soak import bodies
+from support.structure import DONE, Modes, Stop, Structure
 from support.tolerance import ROUNDING
-
-from vibroimpact.fmus.structure import DONE, Modes, Stop, Structure
 
 
 def test_a_body_at_rest_on_a_stop_that_is_pulled_off_does_not_meet_it_again() -> None:

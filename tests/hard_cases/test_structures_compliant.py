@@ -8,9 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from soak.bodies import check
+from support.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 from support.tolerance import ROUNDING, SEQUENCE
-
-from vibroimpact.fmus.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 
 NATURAL, SHAPE = np.array([1.0, 2.7, 6.1, 11.0]), np.array([1.0, -0.7, 0.5, -0.3])
 FORCE, SPEED = np.array([1.0, 0.2, 0.1, 0.05]), np.array([1.0, 0.3, 0.2, 0.1])

@@ -8,10 +8,9 @@ from support.exact_motion import Oscillator, exact_flow, exact_next_contact
 from support.reference_bodies import Body, beam, chain, uniform_chain
 from support.reference_stops import Forcing
 from support.reference_stops import Stop as ReferenceStop
+from support.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 from support.structure_reference import Reference
 from support.tolerance import LONG_PHASE, SEQUENCE
-
-from vibroimpact.fmus.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 
 BODIES: dict[str, tuple[Body, np.ndarray]] = {
     "one mass": (uniform_chain(1, 0.0), uniform_chain(1).shapes[-1]),

@@ -9,9 +9,8 @@ import math
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
+from support.structure import DONE, Modes, Stop, Structure
 from support.tolerance import SEQUENCE
-
-from vibroimpact.fmus.structure import DONE, Modes, Stop, Structure
 
 MODES = [1, 2, 8]
 EXCESS = [10.0**-n for n in (2, 4, 6, 8, 10, 12)]

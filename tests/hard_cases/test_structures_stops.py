@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 from support.reference_bodies import beam, chain
+from support.structure import DONE, REFUSED, Modes, Stop, Structure
 from support.tolerance import ROUNDING, SEQUENCE
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.structure import DONE, REFUSED, Modes, Stop, Structure
 
 CHAIN = chain([1.0, 2.0, 0.5], [3.0, 1.0, 2.0], [0.0] * 3)
 MASS = CHAIN.shapes

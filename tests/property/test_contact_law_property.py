@@ -4,9 +4,8 @@ import math
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.structure import Modes, Stop, Structure
 from support.tolerance import ROUNDING
-
-from vibroimpact.fmus.structure import Modes, Stop, Structure
 
 FEW = settings(max_examples=100, deadline=None, derandomize=True)
 

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.intervals.correlation import correlation_sums
-from vibroimpact.fmus.correlation import near_pairs, radius_ladder
+from vibroimpact.fmus.core import near_pairs, radius_ladder
 
 Floats = NDArray[np.float64]
 

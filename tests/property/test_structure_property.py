@@ -20,9 +20,8 @@ from support.random_structures import (
     follow,
     scenes,
 )
+from support.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 from support.tolerance import ROUNDING
-
-from vibroimpact.fmus.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 
 FEW = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 

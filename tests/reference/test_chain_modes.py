@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from support.exact_modes import as_doubles
 from support.exact_modes import chain_modes as exact_modes
+from support.modes import ChainModes, chain_modes
 from support.tolerance import EPSILON, ROUNDING
-
-from vibroimpact.fmus.modes import ChainModes, chain_modes
 
 #: Frequencies and damping ratios of up to a dozen masses: a few roundings for each, of those some are the factor's
 #: entries sqrt(k/m) themselves.

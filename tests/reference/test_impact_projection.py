@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.modes import collocation as collocation_of
+from support.structure import Modes, Stop, Structure
 
-from vibroimpact.fmus.modes import beam_modes
-from vibroimpact.fmus.structure import Modes, Stop, Structure
+from vibroimpact.fmus.core import beam_modes
 
 IMPACTS = 200
 MODES = 4
@@ -18,7 +19,7 @@ def energy_after_impacts(*, collocation: bool) -> float:
     beam = beam_modes("clamped_free", MODES)
     tip = beam.shapes([1.0])[0]
     natural = (beam.eigenvalues / beam.eigenvalues[0]) ** 2
-    impulse = beam.collocation(grid, MODES - 1) * (tip @ tip) if collocation else None
+    impulse = collocation_of(beam, grid, MODES - 1) * (tip @ tip) if collocation else None
     stop = Stop(tip, 0.1, restitution=1.0, impulse=impulse)
     with Structure(Modes(natural), [stop], [0.02, 0.0, 0.0, 0.0], [0.2, 0.02, 0.01, 0.0]) as body:
         start = body.energy

@@ -11,6 +11,7 @@ import time
 from dataclasses import dataclass
 
 import numpy as np
+from support.modes import chain_modes
 from support.random_structures import (
     ALL_LAWS,
     COMPLIANT,
@@ -23,10 +24,10 @@ from support.random_structures import (
     depth_at,
     follow,
 )
+from support.structure import IMPACT_LIMIT, Modes, Stop, Structure
 
+from vibroimpact.fmus.core import beam_modes
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.fmus.modes import beam_modes, chain_modes
-from vibroimpact.fmus.structure import IMPACT_LIMIT, Modes, Stop, Structure
 
 #: Processor time that a run may take, s.
 LONGEST = 2.0

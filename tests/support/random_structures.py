@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
+from support.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-/* The functions that vibroimpact.fmus.core calls: the physics of the FMUs, one call at a time. */
+/* The functions that vibroimpact.fmus.core calls for an oscillator: the physics of the FMUs, one call at a time. */
 #ifndef VIBROIMPACT_DOOR_H
 #define VIBROIMPACT_DOOR_H
 

@@ -1,4 +1,4 @@
-/* The function that vibroimpact.analysis.intervals calls: correlation sums. */
+/* The functions that vibroimpact.fmus.core calls for correlation sums. */
 #ifndef VIBROIMPACT_DOOR_CORRELATION_H
 #define VIBROIMPACT_DOOR_CORRELATION_H
 

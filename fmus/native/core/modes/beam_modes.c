@@ -195,21 +195,6 @@ double vi_beam_participation(vi_beam_boundary boundary, int j)
     }
 }
 
-double vi_beam_static_stiffness(vi_beam_boundary boundary, double s)
-{
-    const double t = 1.0 - s;
-    switch (boundary) {
-    case VI_CLAMPED_FREE:
-        return 3.0 / (s * s * s);
-    case VI_CLAMPED_CLAMPED:
-        return 3.0 / (s * s * s * t * t * t);
-    case VI_CLAMPED_PINNED:
-        return 12.0 / (s * s * s * t * t * (4.0 - s));
-    default:
-        return 3.0 / (s * s * t * t);
-    }
-}
-
 double vi_beam_validity(vi_beam_boundary boundary, int j, double slenderness, double e_over_g, double shear_coefficient)
 {
     const double ratio = vi_beam_eigenvalue(boundary, j) * slenderness;

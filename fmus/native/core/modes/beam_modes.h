@@ -24,9 +24,6 @@ double vi_beam_shape(vi_beam_boundary boundary, int j, double s, int derivative)
 /* int_0^1 phi_j ds: participation of mode j in a uniform load or in an acceleration of the base. */
 double vi_beam_participation(vi_beam_boundary boundary, int j);
 
-/* Static stiffness at s times length^3 / (E I), in closed form for all four boundaries; infinite at a support. */
-double vi_beam_static_stiffness(vi_beam_boundary boundary, double s);
-
 /* Estimated relative error of a natural frequency by Euler-Bernoulli's theory: equations.md 6.7, Timoshenko's drop to
  * leading order (that of the pinned-pinned beam; of the others to about the same).
  * slenderness = radius of gyration / length; E / G and the shear coefficient (5/6 for a rectangle) as given there. */

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 from support.impact_records import CHAOTIC, THESIS, WORKED, channel_of, record_of
+from support.structure import Modes, Stop, Structure
 
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.estimation import Known, estimate_impacts, print_impacts
@@ -18,7 +19,6 @@ from vibroimpact.analysis.estimation.period_one import natural_frequency_of, sto
 from vibroimpact.analysis.estimation.physics import Forcing
 from vibroimpact.fmus.core import Oscillator, flow, motion, next_contact
 from vibroimpact.fmus.errors import EstimationError, UsageError
-from vibroimpact.fmus.structure import Modes, Stop, Structure
 
 
 def test_motion_at_many_instants_is_the_flow_one_at_a_time():

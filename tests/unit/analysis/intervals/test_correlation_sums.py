@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.intervals.correlation import correlation_sums, fitted_slopes
-from vibroimpact.fmus.correlation import MOST_RADII, near_pairs, radius_ladder
+from vibroimpact.fmus.core import MOST_RADII, near_pairs, radius_ladder
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
 Floats = NDArray[np.float64]

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from support.real_data import recording_folder
+from support.structure import Modes, Structure
 
 from vibroimpact.analysis.recording import Channel, Quality, TimeAxis
 from vibroimpact.analysis.replay import Comparison, compare, find_event, naive_variance, trust
-from vibroimpact.fmus.structure import Modes, Structure
 
 Floats = NDArray[np.float64]
 

@@ -56,6 +56,7 @@ def test_an_edit_of_the_c_makes_the_build_out_of_date(built_elsewhere: Path, sou
     assert fingerprint(sources) != fingerprint()
 
 
+@pytest.mark.slow
 def test_a_source_that_moves_makes_the_build_out_of_date(built_elsewhere: Path, sources: Path) -> None:
     header = sources / "core" / "motion" / "flow.h"
     header.rename(sources / "core" / "contact" / "flow.h")

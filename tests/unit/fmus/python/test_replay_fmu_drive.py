@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.replay_records import COUNT, INTERVAL, SIGNALS, base_values, gappy_values
+from support.structure import Modes, Stop, Structure
 
 from vibroimpact.analysis.dataset import read_flat
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.core import Oscillator, flow
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.packaging.replay_fmu import build_replay
-from vibroimpact.fmus.structure import Modes, Stop, Structure
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.importer.component import kind_of
 from vibroimpact.orchestrator.importer.master import Importer

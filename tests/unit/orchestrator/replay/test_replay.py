@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 from support.replay_scenes import BOARD, Floats, G, channel, pulse, written
+from support.structure import Modes, Structure
 from support.tolerance import PARTITION
 
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.recording import Quality, open_signals
+from vibroimpact.fmus.core import beam_modes
 from vibroimpact.fmus.errors import DatasetError, EstimationError, SceneError, UsageError
-from vibroimpact.fmus.modes import beam_modes
-from vibroimpact.fmus.structure import Modes, Structure
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.commands.cli import main
 from vibroimpact.orchestrator.replay import (

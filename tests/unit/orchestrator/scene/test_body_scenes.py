@@ -7,8 +7,8 @@ import pytest
 from support.scene_mistakes import BEAM, CHAIN, YIELDING
 
 from vibroimpact.analysis.dataset import Direction, Outcome, check
+from vibroimpact.fmus.core import beam_modes
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.fmus.modes import beam_modes
 from vibroimpact.orchestrator.campaign.chunks import carried_attributes, carried_state
 from vibroimpact.orchestrator.run import dataset_of_runs
 from vibroimpact.orchestrator.run.empty_record import empty_record

@@ -1,4 +1,4 @@
-"""The thin door to the C functions that the FMUs are made of: flow and next contact.
+"""A forced oscillator with a stop: flow, next contact and motion, by the C functions that its FMU is made of.
 
 Analyses fit and follow orbits with these, never with a second implementation of the physics.
 """
@@ -6,16 +6,14 @@ Analyses fit and follow orbits with these, never with a second implementation of
 from __future__ import annotations
 
 import ctypes
-import sys
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibroimpact.fmus.errors import ComponentError, UsageError
+from vibroimpact.fmus.core.library import core_library
+from vibroimpact.fmus.errors import UsageError
 
 SIDES = {"upper": 1, "lower": 2}
 Array = NDArray[np.float64]
@@ -60,23 +58,8 @@ class Contact:
 
 
 @lru_cache(maxsize=1)
-def core_library() -> ctypes.CDLL:
-    """Return the shared library of the core, loaded once.
-
-    Raises
-    ------
-    ComponentError
-        It is not built.
-    """
-    suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-    path = Path(str(files("vibroimpact.fmus"))) / "built" / f"libvibroimpact_core{suffix}"
-    try:
-        library = ctypes.CDLL(str(path))
-    except OSError as error:
-        raise ComponentError(
-            f"{path.name}: expected the built core library, got: {error}. "
-            "Run `python -m vibroimpact.fmus.packaging.build`."
-        ) from error
+def _library() -> ctypes.CDLL:
+    library = core_library()
     pair, number = ctypes.POINTER(ctypes.c_double), ctypes.c_double
     library.vi_door_flow.argtypes = [
         ctypes.POINTER(_Oscillator), number, pair, number, number, number, pair,
@@ -132,7 +115,7 @@ def flow(
     """
     end = _pair()
     body = oscillator._as_structure()
-    if core_library().vi_door_flow(body, phase, _pair(*state), held, held_rate, duration, end) != 0:
+    if _library().vi_door_flow(body, phase, _pair(*state), held, held_rate, duration, end) != 0:
         raise UsageError(
             "flow: expected finite arguments, mass > 0, and damping, stiffness, "
             f"angular_frequency, duration >= 0, got {oscillator}, state {state}, duration {duration}."
@@ -161,7 +144,7 @@ def next_contact(
     """
     found = _pair()
     body = oscillator._as_structure()
-    status = core_library().vi_door_next_contact(
+    status = _library().vi_door_next_contact(
         body, phase, _pair(*state), position, SIDES.get(side, 0), duration, found
     )
     if status < 0 or side not in SIDES:
@@ -216,7 +199,7 @@ def motion(
     times = np.ascontiguousarray(np.atleast_1d(np.asarray(instants, dtype=np.float64)))
     displacement, velocity = np.empty_like(times), np.empty_like(times)
     body = oscillator._as_structure()
-    hits = core_library().vi_door_motion(
+    hits = _library().vi_door_motion(
         body,
         phase,
         _pair(*state),

@@ -1,7 +1,4 @@
-"""Bodies of many modes, driven through the same C functions that the Chain and Beam FMUs are made of.
-
-For analyses that follow orbits or fit them, and for tests; campaigns use the FMUs.
-"""
+"""Bodies of many modes, driven through the same C functions that the Chain and Beam FMUs are made of."""
 
 from __future__ import annotations
 
@@ -15,7 +12,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibroimpact.fmus.core import SIDES, core_library
+from support.core_doors import library_with_doors
+from vibroimpact.fmus.core.oscillator import SIDES
 from vibroimpact.fmus.errors import ComponentError, UsageError
 
 Array = NDArray[np.float64]
@@ -119,7 +117,7 @@ class _Stop(ctypes.Structure):
 
 @lru_cache(maxsize=1)
 def _library() -> ctypes.CDLL:
-    library = core_library()
+    library = library_with_doors()
     numbers, integer, number = ctypes.POINTER(ctypes.c_double), ctypes.c_int, ctypes.c_double
     library.vi_door_structure_new.restype = ctypes.c_void_p
     library.vi_door_structure_new.argtypes = [

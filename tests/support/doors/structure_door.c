@@ -1,4 +1,4 @@
-#include "door/door_structure.h"
+#include "structure_door.h"
 
 #include <math.h>
 #include <stdlib.h>

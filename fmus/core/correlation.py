@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.core import core_library
+from vibroimpact.fmus.core.library import core_library
 from vibroimpact.fmus.errors import UsageError
 
 Array = NDArray[np.float64]

@@ -1,6 +1,6 @@
-/* A structure of any modes and stops, for Python: analyses fit and follow orbits with the physics of the FMUs. */
-#ifndef VIBROIMPACT_DOOR_STRUCTURE_H
-#define VIBROIMPACT_DOOR_STRUCTURE_H
+/* A structure of any modes and stops, for the tests in Python. */
+#ifndef VIBROIMPACT_STRUCTURE_DOOR_H
+#define VIBROIMPACT_STRUCTURE_DOOR_H
 
 #include "door/door.h"
 #include "sizes.h"
