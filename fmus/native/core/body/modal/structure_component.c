@@ -20,7 +20,8 @@ void vi_structure_component_defaults(vi_structure_component *c)
     }
 }
 
-vi_structure vi_structure_component_parts(vi_structure_component *c)
+/* The engine's view of the parts. */
+static vi_structure parts_of(vi_structure_component *c)
 {
     return (vi_structure){&c->model, &c->state, c->contacts, &c->record};
 }
@@ -144,7 +145,9 @@ static void check_pair(const vi_contact contacts[], int i, int j, char *message)
     }
 }
 
-void vi_structure_component_check_points(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH])
+/* Contacts i and j are at the same point of the body when their shapes are equal. Complain where such stops leave no
+ * room, or where a rigid one hides the one behind it. */
+static void check_points(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH])
 {
     for (int j = 1; j < c->model.contacts; ++j) {
         for (int i = 0; i < j; ++i) {
@@ -182,7 +185,7 @@ static bool start_clock(vi_structure_component *c, double start_time, vi_instant
 
 static bool starts_free(vi_structure_component *c, const char *start_name, char *message)
 {
-    const vi_structure parts = vi_structure_component_parts(c);
+    const vi_structure parts = parts_of(c);
     const int beyond = vi_structure_beyond(&parts);
     if (beyond == 0) {
         return true;
@@ -203,12 +206,12 @@ bool vi_structure_component_start(vi_structure_component *c, double start_time, 
     memset(c->state.status, 0, sizeof c->state.status); /* of a start with other start values */
     c->model.tolerance = c->contact_tolerance;
     vi_structure_prepare(&c->model);
-    vi_structure_component_check_points(c, message);
+    check_points(c, message);
     vi_instant now;
     if (!start_clock(c, start_time, &now, message) || !starts_free(c, start_name, message) || message[0] != '\0') {
         return false;
     }
-    const vi_structure parts = vi_structure_component_parts(c);
+    const vi_structure parts = parts_of(c);
     vi_structure_start(&parts, now);
     return true;
 }
@@ -216,7 +219,7 @@ bool vi_structure_component_start(vi_structure_component *c, double start_time, 
 void vi_structure_component_hold(vi_structure_component *c, const double held[VI_MODES],
                                  const double held_rate[VI_MODES])
 {
-    const vi_structure parts = vi_structure_component_parts(c);
+    const vi_structure parts = parts_of(c);
     vi_structure_hold(&parts, held, held_rate);
     c->inputs_changed = 0;
 }
@@ -272,7 +275,7 @@ static void update_energies(vi_structure_component *c)
 
 void vi_structure_component_outputs(vi_structure_component *c, double base_acceleration)
 {
-    const vi_structure parts = vi_structure_component_parts(c);
+    const vi_structure parts = parts_of(c);
     vi_structure_outputs(&parts, c->modal_acceleration);
     c->displacement = vi_structure_at(&c->model, c->model.observed, c->state.q);
     c->velocity = vi_structure_at(&c->model, c->model.observed, c->state.p);
@@ -340,7 +343,7 @@ bool vi_structure_component_resolve(vi_structure_component *c, char message[VI_M
     if (message[0] != '\0') {
         return false;
     }
-    const vi_structure parts = vi_structure_component_parts(c);
+    const vi_structure parts = parts_of(c);
     vi_structure_resolve(&parts);
     return true;
 }
@@ -348,7 +351,7 @@ bool vi_structure_component_resolve(vi_structure_component *c, char message[VI_M
 vi_step_result vi_structure_component_advance(vi_structure_component *c, vi_instant target,
                                               const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
-    const vi_structure parts = vi_structure_component_parts(c);
+    const vi_structure parts = parts_of(c);
     c->state.follow_energies = c->record_energies;
     const vi_step_result result = vi_structure_advance(&parts, target, request);
     if (result == VI_STEP_STANDSTILL) {

@@ -35,18 +35,11 @@ typedef struct {
 
 void vi_structure_component_defaults(vi_structure_component *c);
 
-/* The engine's view of the parts. */
-vi_structure vi_structure_component_parts(vi_structure_component *c);
-
 /* Parameters that all have: forcing's frequency and phase, the contacts' laws, tolerance, limit, shared inputs. */
 void vi_structure_component_check(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH]);
 
 /* Number of ports that have to be followed: up to the last one with a law. */
 int vi_structure_component_ports(const vi_structure_component *c);
-
-/* Contacts i and j are at the same point of the body when their shapes are equal. Complain where such stops leave no
- * room, or where a rigid one hides the one behind it. */
-void vi_structure_component_check_points(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH]);
 
 /* Modes, shapes, impulses, q, p are set: derive the rest, refuse a start beyond a stop (in the words `start_name`),
  * begin at `start_time`. */
