@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable
-from ctypes import c_char_p, c_double, c_int, c_size_t, c_void_p
+from ctypes import c_char_p, c_double, c_int, c_void_p
 from pathlib import Path
 
 from vibroimpact.fmus.packaging.archive import UnpackedFmu
@@ -158,22 +158,3 @@ class Instance2(Instance):
     def free_state(self, slot: c_void_p) -> None:
         """Give a saved state's memory back."""
         self.check(self._function("FreeFMUstate")(self._pointer, ctypes.byref(slot)), "FreeFMUstate")
-
-    def serialize(self, slot: c_void_p) -> bytes:
-        """Return a saved state as bytes, for another process."""
-        size = c_size_t()
-        found = self._function("SerializedFMUstateSize")(self._pointer, slot, ctypes.byref(size))
-        self.check(found, "SerializedFMUstateSize")
-        buffer = ctypes.create_string_buffer(size.value)
-        self.check(
-            self._function("SerializeFMUstate")(self._pointer, slot, buffer, size), "SerializeFMUstate"
-        )
-        return buffer.raw
-
-    def deserialize(self, data: bytes) -> c_void_p:
-        """Return a saved state made from bytes of `serialize`."""
-        slot = c_void_p()
-        read = self._function("DeSerializeFMUstate")
-        status = read(self._pointer, c_char_p(data), c_size_t(len(data)), ctypes.byref(slot))
-        self.check(status, "DeSerializeFMUstate")
-        return slot

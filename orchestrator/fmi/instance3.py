@@ -166,21 +166,3 @@ class Instance3(Instance):
     def free_state(self, slot: c_void_p) -> None:
         """Give a saved state's memory back."""
         self.check(self._function("FreeFMUState")(self._pointer, ctypes.byref(slot)), "FreeFMUState")
-
-    def serialize(self, slot: c_void_p) -> bytes:
-        """Return a saved state as bytes, for another process."""
-        size = c_size_t()
-        found = self._function("SerializedFMUStateSize")(self._pointer, slot, ctypes.byref(size))
-        self.check(found, "SerializedFMUStateSize")
-        buffer = ctypes.create_string_buffer(size.value)
-        written = self._function("SerializeFMUState")(self._pointer, slot, buffer, size)
-        self.check(written, "SerializeFMUState")
-        return buffer.raw
-
-    def deserialize(self, data: bytes) -> c_void_p:
-        """Return a saved state made from bytes of `serialize`."""
-        slot = c_void_p()
-        read = self._function("DeserializeFMUState")
-        status = read(self._pointer, c_char_p(data), c_size_t(len(data)), ctypes.byref(slot))
-        self.check(status, "DeserializeFMUState")
-        return slot

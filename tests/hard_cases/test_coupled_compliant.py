@@ -22,6 +22,7 @@ from support.compliant_parts import (
     yielding_stop,
 )
 from support.coupled_parts import VERSIONS, body, contact, events_of, external, link, part, stop
+from support.saved_states import deserialize, serialize
 
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Value
@@ -218,7 +219,7 @@ def test_a_state_saved_in_the_middle_of_a_contact_goes_on_bit_for_bit(law: str, 
     assert isinstance(instance, Instance3)
     instance.save(slot)
     ends = []
-    for state in (slot, slot, instance.deserialize(instance.serialize(slot))):
+    for state in (slot, slot, deserialize(instance, serialize(instance, slot))):
         instance.restore(state)
         for i in range(40):
             instance.step(1.004 + i * 1e-3, 1e-3)

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from support.coupled_parts import VERSIONS, body, contact, external, stop, values
 from support.places import TESTS
+from support.saved_states import deserialize, serialize
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Value
@@ -36,12 +37,13 @@ GO_ON = """
 import json, sys
 sys.path.insert(0, {tests!r})
 from support.coupled_parts import values
+from support.saved_states import deserialize
 from test_saved_states import OUTPUTS, coupled, fused
 kind, version, time, end, *files = json.loads(sys.argv[1])
 importer = {{"fused": fused, "coupled": coupled}}[kind](version)
 importer.begin(time)
 for component, file in zip(importer.components.values(), files, strict=True):
-    slot = component.instance.deserialize(open(file, "rb").read())
+    slot = deserialize(component.instance, open(file, "rb").read())
     component.instance.restore(slot)
     component.instance.free_state(slot)
 importer.advance(end)
@@ -66,7 +68,7 @@ def saved(importer: Importer) -> list[bytes]:
     for component in importer.components.values():
         slot = c_void_p()
         component.instance.save(slot)
-        states.append(component.instance.serialize(slot))
+        states.append(serialize(component.instance, slot))
         component.instance.free_state(slot)
     return states
 
@@ -111,7 +113,7 @@ def test_a_damaged_or_foreign_state_is_refused_and_the_instance_lives_on(version
     damaged[len(damaged) // 2] ^= 1
     for wrong in (bytes(damaged), state[:-1], state + b"x", other, b"", b"x" * len(state)):
         with pytest.raises(ComponentError, match="b: fmi"):
-            owner.deserialize(wrong)
+            deserialize(owner, wrong)
     importer.advance(40.0)
     importer.free()
 
