@@ -1,17 +1,21 @@
-"""Datasets in, datasets or figures out; importing this package adds `ds.vibroimpact` to xarray datasets."""
+"""Datasets in, datasets or figures out; what is imported from here adds `ds.vibroimpact` to xarray datasets."""
 
 from __future__ import annotations
 
-from vibroimpact.analysis.dataset import (
-    Direction,
-    Outcome,
-    RunRecord,
-    build_dataset,
-    check,
-    merge_datasets,
-    open_dataset,
-    write_dataset,
-)
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vibroimpact.analysis.dataset import (
+        Direction,
+        Outcome,
+        RunRecord,
+        build_dataset,
+        check,
+        merge_datasets,
+        open_dataset,
+        write_dataset,
+    )
 
 __all__ = [
     "Direction",
@@ -23,3 +27,10 @@ __all__ = [
     "open_dataset",
     "write_dataset",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # The options of commands come through this door, and xarray takes half a second to load.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.dataset"), name)

@@ -1,15 +1,7 @@
-"""The commands of this package; each module registers its own."""
+"""The commands of this package: `options` declares them, a module for each is what it does."""
 
 from __future__ import annotations
 
-import typer
-
-from vibroimpact.analysis.commands import estimate, plot, replay_fmu, spikes
+from vibroimpact.analysis.commands.options import register
 
 __all__ = ["register"]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands of this package to the command line."""
-    for module in (plot, estimate, spikes, replay_fmu):
-        module.register(app)

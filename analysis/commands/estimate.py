@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from vibroimpact.analysis.dataset.outputs import FORCE_HELP, refuse_outputs, refuse_overwriting, writing
+from vibroimpact.analysis.commands.shared_options import Force
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.terminal import Terminal
 
@@ -88,13 +88,14 @@ def estimate(
     ] = False,
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
-    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
+    force: Force = False,
 ) -> None:
     """Estimate damping, frequency, damping law, frequency response, or restitution from a signal.
 
     Example: vibroimpact estimate pendulum.nc --from 40 --to 80 -o estimates.nc --figure estimates.png
     """
     from vibroimpact.analysis.commands.estimate_scene import ImpactOptions, chosen_kind, refuse_far_options
+    from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
 
     if kind not in KINDS:
         raise UsageError(f'--kind: expected one of {", ".join(KINDS)}, got "{kind}".')
@@ -285,6 +286,7 @@ def _sourced(dataset: xr.Dataset, data: Path, recording: Recording) -> xr.Datase
 
 def _written(console: Terminal, dataset: xr.Dataset, output: Path | None, figure: Path | None) -> None:
     """Write what was asked for, and say so."""
+    from vibroimpact.analysis.dataset.outputs import writing
     from vibroimpact.analysis.dataset.results import write_results
 
     for path, what in ((output, "Estimates"), (figure, "Figure")):

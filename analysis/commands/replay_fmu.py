@@ -1,52 +1,28 @@
-"""The command `vibroimpact fmu replay`: an FMU that plays the channels of a recording."""
+"""What `vibroimpact fmu replay` does: write an FMU that plays the channels of a recording."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
-import typer
+import numpy as np
 
-from vibroimpact.fmus.commands import commands
+from vibroimpact.analysis.dataset.outputs import refuse_outputs
+from vibroimpact.analysis.recording import Channel, Quality, Recording, open_signals
+from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay
 from vibroimpact.fmus.terminal import say
-
-if TYPE_CHECKING:
-    from vibroimpact.analysis.recording import Channel, Recording
-    from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal
 
 #: A time axis that calls itself even is played as such where no instant is off by more than this part of the interval.
 EVEN = 0.01
 
 
-def register(app: typer.Typer) -> None:
-    """Add `replay` to the command `fmu`, which lives below this package: only here recordings can be read."""
-    commands.command("replay")(replay)
-
-
-def replay(
-    recording: Annotated[Path, typer.Argument(help="Recording (.nc), or a dataset with time series.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="FMU to write.")],
-    channel: Annotated[
-        list[str] | None, typer.Option(help="Channel to play; again for more; default: all.")
-    ] = None,
-    si: Annotated[
-        bool, typer.Option("--si", help="Play values in SI units: g becomes m/s2, mV becomes V.")
-    ] = False,
-    run: Annotated[int | None, typer.Option(help="run_index, of a dataset of several runs.", min=0)] = None,
-) -> None:
-    """Make an FMU that plays recorded channels in this or another tool: value, slope, validity.
-
-    Example: vibroimpact fmu replay a0.nc --channel base --si -o a0.fmu
-    """
-    from vibroimpact.analysis.dataset.outputs import refuse_outputs
-    from vibroimpact.analysis.recording import open_signals
-    from vibroimpact.fmus.packaging.replay_fmu import build_replay
-
+def build_player(recording: Path, output: Path, channel: Sequence[str], si: bool, run: int | None) -> None:
+    """Write the FMU that plays channels of a recording, all without a name, and say what it plays."""
     refuse_outputs([recording], output, ending=".fmu")
     source = open_signals(recording, run)
-    chosen = _chosen(source, channel or ())
+    chosen = _chosen(source, channel)
     build_replay({item.name: replay_signal(item, si=si) for item in chosen}, output)
     for item in chosen:
         say(_described(item, si))
@@ -71,10 +47,6 @@ def replay_signal(channel: Channel, *, si: bool = False) -> ReplaySignal:
     si : bool
         In the SI unit of its kind instead of its own.
     """
-    import numpy as np
-
-    from vibroimpact.analysis.recording.units import measured_unit
-    from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal
 
     unit = measured_unit(channel.unit)
     values, name = (channel.si(), unit.si) if si else (channel.values, unit.cf)
@@ -87,11 +59,6 @@ def replay_signal(channel: Channel, *, si: bool = False) -> ReplaySignal:
 
 
 def _described(channel: Channel, si: bool) -> str:
-    import numpy as np
-
-    from vibroimpact.analysis.recording import Quality
-    from vibroimpact.analysis.recording.units import measured_unit
-
     unit = measured_unit(channel.unit).si if si else channel.unit
     gaps = int(np.isnan(channel.values).sum())
     clipped = int(((channel.quality & int(Quality.clipped)) != 0).sum())

@@ -1,33 +1,31 @@
-"""The command `spikes`."""
+"""What `vibroimpact spikes` does: find spikes and look at the intervals between them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
-import typer
+import numpy as np
+import xarray as xr
 
-from vibroimpact.analysis.dataset.outputs import FORCE_HELP, refuse_outputs, refuse_overwriting, writing
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.intervals import interval_report, print_intervals, seams
+from vibroimpact.analysis.recording import EventTrain, Recording, open_signals
+from vibroimpact.analysis.recording.channels import Floats
+from vibroimpact.analysis.recording.rules import masked_spans
+from vibroimpact.analysis.spikes import Mechanics, SpikeReport, SpikeSettings, spike_report
+from vibroimpact.analysis.spikes.printing import print_spikes
+from vibroimpact.analysis.spikes.report import unobserved
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.terminal import Terminal
-
-if TYPE_CHECKING:
-    import xarray as xr
-
-    from vibroimpact.analysis.recording import EventTrain, Recording
-    from vibroimpact.analysis.recording.channels import Floats
-    from vibroimpact.analysis.spikes import Mechanics, SpikeReport, SpikeSettings
 
 #: Fewer spikes have no statistics of intervals.
 _FEWEST_FOR_INTERVALS = 3
 
-#: Of the correlation dimension: `intervals.dimension` has the same, and takes long to load.
-_EMBEDDING, _THEILER = 6, 1
-
 
 @dataclass(frozen=True, slots=True)
-class _IntervalOptions:
+class IntervalOptions:
     """What the command line says of the intervals between spikes; see `interval_report`."""
 
     forcing_period: float | None
@@ -37,91 +35,22 @@ class _IntervalOptions:
     theiler: int
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    app.command("spikes")(spikes)
-
-
-def spikes(
-    data: Annotated[Path, typer.Argument(help="Recording, or dataset of a run (.nc).")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
-    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
-    channel: Annotated[str | None, typer.Option(help="Channel to look for spikes in.")] = None,
-    events: Annotated[str | None, typer.Option(help="Event train: only its intervals are looked at.")] = None,
-    run: Annotated[int | None, typer.Option(help="run_index, in a dataset of several runs.", min=0)] = None,
-    method: Annotated[
-        str, typer.Option(help="auto, threshold, cycle_median (smooth shocks) or cycle_threshold.")
-    ] = "auto",
-    threshold: Annotated[
-        str | None,
-        typer.Option(help="SI unit of the channel, or 5% of the largest value; else from the noise."),
-    ] = None,
-    hysteresis: Annotated[float, typer.Option(help="A spike ends below this part of the threshold.")] = 0.5,
-    minimum_samples: Annotated[int, typer.Option(help="Fewer samples above the threshold are no spike.")] = 4,
-    merge: Annotated[
-        float | None, typer.Option(help="Excursions closer than this (s) are one spike with its ringing.")
-    ] = None,
-    polarity: Annotated[str, typer.Option(help="both, positive or negative.")] = "both",
-    noise: Annotated[
-        float | None, typer.Option(help="Standard deviation of normal noise, SI unit; else from the data.")
-    ] = None,
-    false_alarms: Annotated[float, typer.Option(help="Noise peaks above the threshold to expect.")] = 0.01,
-    baseline: Annotated[
-        float | None, typer.Option(help="Window of the baseline, s; else from the data.")
-    ] = None,
-    rms_window: Annotated[
-        float | None, typer.Option(help="Window for smooth shocks, s; else a tenth of a cycle.")
-    ] = None,
-    period: Annotated[
-        float | None, typer.Option(help="Period of the excitation, s; else from the data.")
-    ] = None,
-    mass: Annotated[float | None, typer.Option(help="Effective mass of the contact, kg.")] = None,
-    restitution: Annotated[float | None, typer.Option(help="Coefficient of restitution, 0 to 1.")] = None,
-    sensitivity: Annotated[float | None, typer.Option(help="Of the load cell, V/N.")] = None,
-    known_impulses: Annotated[
-        str | None, typer.Option(help="Impulses of the spikes, N s, with commas: the sensitivity is fitted.")
-    ] = None,
-    waveform: Annotated[str, typer.Option(help="auto, half_sine, haversine or bell.")] = "auto",
-    forcing_period: Annotated[float | None, typer.Option(help="By which intervals are folded, s.")] = None,
-    count_bin: Annotated[float | None, typer.Option(help="Bin of the Fano factor, s.")] = None,
-    seams: Annotated[float | None, typer.Option(help="Mask the intervals over multiples of this, s.")] = None,
-    embedding: Annotated[
-        int, typer.Option(help="Largest embedding of the correlation dimension.", min=2)
-    ] = _EMBEDDING,
-    theiler: Annotated[
-        int, typer.Option(help="Theiler window: vectors no further apart than this are no pair.", min=0)
-    ] = _THEILER,
-    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
+def find_spikes(
+    data: Path,
+    output: Path | None,
+    figure: Path | None,
+    channel: str | None,
+    events: str | None,
+    run: int | None,
+    settings: SpikeSettings,
+    mechanics: Mechanics,
+    intervals: IntervalOptions,
+    force: bool,
 ) -> None:
-    """Find impacts and shocks in a signal: instants, peaks, impulses, contact times, intervals.
-
-    Example: vibroimpact spikes smd05.nc --channel base -o spikes.nc --figure spikes.png
-    """
-    from vibroimpact.analysis.dataset.results import write_results
-    from vibroimpact.analysis.recording import open_signals
-    from vibroimpact.analysis.recording.rules import masked_spans
-    from vibroimpact.analysis.spikes import Mechanics, SpikeSettings
-
+    """Find the spikes of a channel, or look at the intervals of an event train; print, write and draw them."""
     refuse_outputs([data], output, figure)
     same = ("spikes", data.name)
     refuse_overwriting(output, force, lambda there: (there.get("results_kind"), there.get("source")) == same)
-    part = threshold is not None and threshold.strip().endswith("%")
-    settings = SpikeSettings(
-        method=method,
-        threshold=None if threshold is None or part else _number(threshold, "--threshold"),
-        threshold_part=_number(threshold.strip()[:-1], "--threshold") / 100.0 if threshold and part else None,
-        hysteresis=hysteresis,
-        minimum_samples=minimum_samples,
-        merge=merge,
-        polarity=polarity,
-        noise=noise,
-        false_alarms=false_alarms,
-        baseline_window=baseline,
-        rms_window=rms_window,
-        period=period,
-    )
-    intervals = _IntervalOptions(forcing_period, count_bin, seams, embedding, theiler)
-    mechanics = Mechanics(mass, restitution, sensitivity, _numbers(known_impulses), waveform=waveform)
     recording = open_signals(data, run)
     console = Terminal()
     for remark in recording.remarks_counted:
@@ -146,20 +75,25 @@ def spikes(
         console.print(f"Figure written to {figure}.")
 
 
-def _number(text: str, option: str) -> float:
+def number(text: str, option: str) -> float:
+    """Return the number that an option was given as text.
+
+    Raises
+    ------
+    UsageError
+        It is none.
+    """
     try:
         return float(text)
     except ValueError as problem:
         raise UsageError(f"{option}: expected a number, got {text!r}.") from problem
 
 
-def _numbers(text: str | None) -> Floats | None:
+def numbers(text: str | None) -> Floats | None:
     """Return numbers separated by commas as an array; None stays None."""
-    import numpy as np
-
     if text is None:
         return None
-    return np.array([_number(part, "--known-impulses") for part in text.split(",")])
+    return np.array([number(part, "--known-impulses") for part in text.split(",")])
 
 
 def _spikes(
@@ -168,16 +102,9 @@ def _spikes(
     channel: str | None,
     settings: SpikeSettings,
     mechanics: Mechanics,
-    intervals: _IntervalOptions,
+    intervals: IntervalOptions,
 ) -> tuple[SpikeReport, xr.Dataset]:
     """Find and print the spikes of a channel, and their intervals where there are enough."""
-    import xarray as xr
-
-    from vibroimpact.analysis.recording import EventTrain
-    from vibroimpact.analysis.spikes import spike_report
-    from vibroimpact.analysis.spikes.printing import print_spikes
-    from vibroimpact.analysis.spikes.report import unobserved
-
     report = spike_report(recording.channel(channel), settings, mechanics)
     print_spikes(console, report)
     dataset = report.dataset
@@ -194,12 +121,10 @@ def _spikes(
 def _trains(
     console: Terminal,
     train: EventTrain,
-    options: _IntervalOptions,
+    options: IntervalOptions,
     masked: tuple[tuple[float, float], ...] = (),
 ) -> xr.Dataset:
     """Print and return what the intervals of a train tell."""
-    from vibroimpact.analysis.intervals import interval_report, print_intervals, seams
-
     if options.seams is not None and len(train.times):
         masked += seams(options.seams, train.window or (float(train.times[0]), float(train.times[-1])))
     dataset = interval_report(
@@ -218,13 +143,9 @@ def _trains(
 
 def _draw(report: SpikeReport | None, dataset: xr.Dataset, path: Path) -> None:
     """Write the figure of the spikes, or that of the intervals where there are only these."""
+    # matplotlib takes half a second to import; spikes alone do not pay for it.
     from vibroimpact.analysis import figures
-
-    if report is None:
-        from vibroimpact.analysis.figures.intervals import draw_intervals
-
-        figures.save(draw_intervals(dataset), path)
-        return
+    from vibroimpact.analysis.figures.intervals import draw_intervals
     from vibroimpact.analysis.figures.spikes import draw_spikes
 
-    figures.save(draw_spikes(report), path)
+    figures.save(draw_intervals(dataset) if report is None else draw_spikes(report), path)

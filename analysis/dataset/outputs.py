@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from vibroimpact.analysis.dataset.results import file_attributes
 from vibroimpact.fmus.errors import UsageError
 
 FIGURE_ENDINGS = (".png", ".pdf", ".svg")
@@ -25,7 +26,6 @@ FILE_ENDINGS = (
     ".fmu",
 )
 """Endings that no folder is given on purpose."""
-FORCE_HELP = "Overwrite a file that holds something else; the same command may be repeated without."
 LONGEST_NAME = 200
 """Bytes: most file systems take 255, and what is half-written has a longer name."""
 
@@ -111,12 +111,7 @@ def refuse_overwriting(
     UsageError
         With the file and what to do.
     """
-    # NetCDF takes time to load, and most outputs are new.
-    if output is None or force or not output.exists():
-        return
-    from vibroimpact.analysis.dataset.results import file_attributes
-
-    if is_same(file_attributes(output)):
+    if output is None or force or not output.exists() or is_same(file_attributes(output)):
         return
     raise UsageError(
         f"{output}: expected a new file, or one that holds the same, got one that holds something else. "

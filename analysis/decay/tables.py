@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
 
 from vibroimpact.analysis.decay.estimate import Estimate
+from vibroimpact.analysis.decay.free_decay import FreeDecay
 from vibroimpact.analysis.decay.laws import spoken
 from vibroimpact.analysis.recording.units import unit_label
-
-if TYPE_CHECKING:
-    from rich.table import Table
-
-    from vibroimpact.analysis.decay.free_decay import FreeDecay
-    from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.fmus.terminal import Terminal
 
 _ROUNDING = 1e-9
 """Relative errors below this are not of the data, but of the arithmetic."""
@@ -50,9 +47,6 @@ def shown(value: float, error: float) -> tuple[str, str]:
 
 
 def _table(title: str, columns: Mapping[str, str]) -> Table:
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
     table = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
     for name, justify in columns.items():
         # rich wants literals, which values of a dict are not

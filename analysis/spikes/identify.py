@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from vibroimpact.analysis.recording import Channel, Quality
 from vibroimpact.analysis.recording.units import measured_unit
@@ -316,8 +317,6 @@ def _noise(
     tail = tail_threshold(statistic[~bad], settings.false_alarms, polarity)
     noise = settings.noise
     if noise is not None and method != "cycle_median":
-        from scipy.special import ndtri
-
         normal = -float(ndtri(settings.false_alarms / (2.0 * len(statistic))))
         return Tail(noise, 0.0, noise * normal, 0), noise
     if noise is not None:

@@ -1,14 +1,7 @@
-"""The commands of this package; each module registers its own."""
+"""The commands of this package: `options` declares them, `import_files` is what they do."""
 
 from __future__ import annotations
 
-import typer
-
-from vibroimpact.hardware.commands import import_recording
+from vibroimpact.hardware.commands.options import register
 
 __all__ = ["register"]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands of this package to the command line."""
-    import_recording.register(app)

@@ -1,15 +1,7 @@
-"""The command line; `cli` is what starts, each module registers its own commands."""
+"""The command line: `cli` is what starts, `options` declares the commands, a module for each is what it does."""
 
 from __future__ import annotations
 
-import typer
-
-from vibroimpact.orchestrator.commands import campaign, replay
+from vibroimpact.orchestrator.commands.options import register
 
 __all__ = ["register"]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands of this package to the command line."""
-    campaign.register(app)
-    replay.register(app)

@@ -5,21 +5,20 @@ from __future__ import annotations
 import time
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import typer
+import xarray as xr
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
+from vibroimpact.analysis import figures
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.landmarks import Reading, bifurcation_readings
 from vibroimpact.fmus.errors import CampaignError
-from vibroimpact.fmus.terminal import Terminal
-from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
+from vibroimpact.fmus.terminal import Terminal, say
+from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.scene import Scene, load_scene
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 SCENE = "demo_scene.toml"
 STEPS_ALLOWED = 2.0
@@ -38,14 +37,20 @@ def run_demo(output: Path) -> None:
     ------
     CampaignError
         When a reading is not within `STEPS_ALLOWED` of its exact value.
+    typer.Exit
+        The campaign was interrupted.
     """
     console = Terminal(soft_wrap=True)
     began = time.perf_counter()
     with resources.as_file(resources.files("vibroimpact.orchestrator.commands") / SCENE) as path:
         scene = load_scene(path)
     console.print(f"Scene: {scene.title}; {len(scene.sweep[0].values)} frequencies, up and down.")
-    with shown_progress() as progress:
-        report = run_campaign(scene, output, progress=progress)
+    try:
+        with shown_progress() as progress:
+            report = run_campaign(scene, output, progress=progress)
+    except CampaignInterrupted as interrupted:
+        say(str(interrupted), err=True)
+        raise typer.Exit(130) from None
     console.print(_told(report, scene))
     with open_dataset(report.dataset) as dataset:
         figure = _draw(dataset, output / "bifurcation.png")
@@ -69,8 +74,6 @@ def _told(report: CampaignReport, scene: Scene) -> str:
 
 
 def _draw(dataset: xr.Dataset, path: Path) -> Path:
-    from vibroimpact.analysis import figures
-
     figures.save(figures.draw(dataset, "bifurcation"), path)
     return path
 

@@ -1,19 +1,40 @@
-"""What the command line says of points that failed: how many, and the first of them with their messages."""
+"""What the command line says of points: how many failed, the first of them with their messages, and warnings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import Outcome
+from vibroimpact.analysis.dataset import Outcome, open_dataset
 
 FAILED = (Outcome.error, Outcome.crash, Outcome.timeout)
 """Outcomes of points without a result; the others are physics."""
 MOST_LISTED = 10
+MOST_WARNINGS = 3
+"""Different warnings that a command repeats."""
+MOST_RUNS_READ = 100_000
+"""Larger campaigns keep their warnings to the dataset."""
 LONGEST_MESSAGE = 400
+
+
+def outcome_lines(path: Path, runs: int) -> Iterator[str]:
+    """Yield what is to be said of the points of a dataset: those that failed, and warnings of those that went well.
+
+    Parameters
+    ----------
+    path : Path
+        Dataset that was written.
+    runs : int
+        Its number of points.
+    """
+    with open_dataset(path) as dataset:
+        yield from failure_lines(dataset)
+        if runs <= MOST_RUNS_READ:
+            yield from _warning_lines(dataset)
 
 
 def failure_lines(dataset: xr.Dataset) -> Iterator[str]:
@@ -49,3 +70,22 @@ def _where(dataset: xr.Dataset, place: NDArray[np.intp]) -> str:
         for name, index in zip(dataset.outcome.dims, place, strict=True)
     ]
     return f"{', '.join(values)}: " if values else ""
+
+
+def _warning_lines(dataset: xr.Dataset) -> Iterator[str]:
+    """Yield the messages of runs that went well: such runs have one only where their body warned."""
+    fine = dataset.outcome.isin([Outcome.ok, Outcome.stuck]).values
+    messages = sorted({str(text) for text in dataset.message.values[fine] if text})
+    for message in messages[:MOST_WARNINGS]:
+        yield f"warning: {message}"
+    if len(messages) > MOST_WARNINGS:
+        yield f"{len(messages) - MOST_WARNINGS} more warnings are in the dataset."
+
+
+def counted(count: int, what: str) -> str:
+    """Return a number with its noun.
+
+    >>> counted(1, "run"), counted(3, "run")
+    ('1 run', '3 runs')
+    """
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"

@@ -1,4 +1,4 @@
-"""The command `vibroimpact replay`."""
+"""What `vibroimpact replay` does."""
 
 from __future__ import annotations
 
@@ -6,75 +6,45 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
 
-import typer
+import xarray as xr
+from rich.table import Table
 
-from vibroimpact.analysis.dataset.outputs import FORCE_HELP
-from vibroimpact.fmus.terminal import Terminal, say
+from vibroimpact.analysis.dataset.outputs import refuse_folder, refuse_outputs, refuse_overwriting, writing
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.analysis.replay.table import print_comparison
+from vibroimpact.analysis.replay.trust import Verdict
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.orchestrator.campaign.manifest import holds_scene
+from vibroimpact.orchestrator.replay import ReplayFit
+from vibroimpact.orchestrator.replay.output import Replayed, fitted_scene_text
+from vibroimpact.orchestrator.replay.replaying import replay_scene, with_recordings
+from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 
-if TYPE_CHECKING:
-    from vibroimpact.analysis.replay.trust import Verdict
-    from vibroimpact.orchestrator.replay import ReplayFit
-    from vibroimpact.orchestrator.replay.output import Replayed
-    from vibroimpact.orchestrator.scene import Scene
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    app.command("replay")(replay)
-
-
-def replay(
-    scene: Annotated[Path, typer.Argument(help=r"Scene file (TOML) with a \[replay] table.")],
-    recordings: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Recordings to replay, and to fit to; left out, those that the scene names."),
-    ] = None,
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc); of a campaign its folder.")
-    ] = None,
-    fit: Annotated[
-        str | None, typer.Option(help="Numbers of the scene to fit: body.damping_ratio,sensor.gain")
-    ] = None,
-    score: Annotated[
-        list[Path] | None, typer.Option(help="Recording to score that was not fitted on; may be repeated.")
-    ] = None,
-    save_scene: Annotated[
-        Path | None,
-        typer.Option(
-            help="Scene to write with the numbers found (.toml); one that is there only with --force."
-        ),
-    ] = None,
-    figure: Annotated[Path | None, typer.Option(help="Figure to write: .png, .pdf or .svg.")] = None,
-    execution: Annotated[
-        str | None,
-        typer.Option(help="auto, fused, or coupled (a Replay FMU drives); else as the scene says."),
-    ] = None,
-    workers: Annotated[int | None, typer.Option(help="Worker processes of a campaign.", min=1)] = None,
-    scheduler: Annotated[str | None, typer.Option(help="Dask scheduler of a campaign.")] = None,
-    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
+def replay_recordings(
+    scene: Path,
+    recordings: Sequence[Path],
+    score: Sequence[Path],
+    output: Path | None,
+    fit: str | None,
+    save_scene: Path | None,
+    figure: Path | None,
+    execution: str | None,
+    workers: int | None,
+    scheduler: str | None,
+    force: bool,
 ) -> None:
-    """Drive a scene by recorded channels and compare its motion with what was measured.
-
-    One recording, or several with --fit and --score, make a dataset. A folder as output makes a campaign over all
-    recordings and the grid that the scene sweeps, on many workers; the same command resumes it.
-
-    Example: vibroimpact replay examples/recordings/board.toml a0.nc -o fit.nc --fit body.damping_ratio --score a1.nc
-    """
-    from vibroimpact.analysis.dataset.outputs import refuse_folder, refuse_outputs, refuse_overwriting
-    from vibroimpact.fmus.errors import UsageError
-    from vibroimpact.orchestrator.campaign.manifest import holds_scene
-    from vibroimpact.orchestrator.replay.replaying import with_recordings
-    from vibroimpact.orchestrator.scene import load_scene
-
+    """Replay recordings into a dataset, with scores and fits, or into the folder of a campaign."""
     loaded = load_scene(scene)
     if output is not None and output.suffix == ".nc":
-        refuse_outputs([scene, *(recordings or []), *(score or [])], output, figure)
-        named = with_recordings(loaded, recordings or [])
+        refuse_outputs([scene, *recordings, *score], output, figure)
+        named = with_recordings(loaded, recordings)
         refuse_overwriting(output, force, lambda there: holds_scene(there, named))
         if save_scene is not None:
-            refuse_outputs([scene, *(recordings or []), *(score or [])], save_scene, ending=".toml")
+            refuse_outputs([scene, *recordings, *score], save_scene, ending=".toml")
             _refuse_saving(save_scene, fit, force)
     if output is None:
         raise UsageError(
@@ -86,8 +56,8 @@ def replay(
         )
     if output.suffix != ".nc":
         refuse_folder(output)
-        _refuse_with_campaign(fit, score, save_scene, figure, execution)
-        _campaign(with_recordings(loaded, recordings or []), output, workers, scheduler)
+        _refuse_with_campaign(fit, score or None, save_scene, figure, execution)
+        _campaign(with_recordings(loaded, recordings), output, workers, scheduler)
         return
     if workers is not None or scheduler is not None:
         raise UsageError("--workers, --scheduler: expected the folder of a campaign as output, got a file.")
@@ -95,12 +65,10 @@ def replay(
         raise UsageError(
             f"--figure: expected a scene that compares something, got {scene} without. Add compare."
         )
-    _to_dataset(loaded, recordings or [], score or [], output, fit, save_scene, figure, execution)
+    _to_dataset(loaded, recordings, score, output, fit, save_scene, figure, execution)
 
 
 def _refuse_with_campaign(*others: object) -> None:
-    from vibroimpact.fmus.errors import UsageError
-
     if any(other is not None for other in others):
         raise UsageError(
             "--output: expected a dataset (.nc) beside --fit, --score, --save-scene, --figure or --execution, "
@@ -109,8 +77,6 @@ def _refuse_with_campaign(*others: object) -> None:
 
 
 def _refuse_saving(path: Path, fit: str | None, force: bool) -> None:
-    from vibroimpact.fmus.errors import UsageError
-
     if fit is None:
         raise UsageError(
             "--save-scene: expected --fit beside it, got nothing to save. Name numbers to be found."
@@ -122,22 +88,11 @@ def _refuse_saving(path: Path, fit: str | None, force: bool) -> None:
 
 
 def _campaign(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
-    from vibroimpact.fmus.errors import UsageError
-    from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign
-    from vibroimpact.orchestrator.campaign.progress import shown_progress
-    from vibroimpact.orchestrator.commands.campaign import tell
+    # Dask takes a tenth of a second to load, and a replay into a dataset does not need it.
+    from vibroimpact.orchestrator.commands.campaign import compute, refuse_two_kinds_of_workers
 
-    if workers is not None and scheduler is not None:
-        raise UsageError(
-            "--workers and --scheduler: expected one of them, got both. A scheduler has its own workers."
-        )
-    try:
-        with shown_progress() as progress:
-            report = run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)
-    except CampaignInterrupted as interrupted:
-        say(str(interrupted), err=True)
-        raise typer.Exit(130) from None
-    tell(report)
+    refuse_two_kinds_of_workers(workers, scheduler)
+    compute(scene, folder, workers, scheduler)
 
 
 def _to_dataset(
@@ -150,8 +105,6 @@ def _to_dataset(
     figure: Path | None,
     execution: str | None,
 ) -> None:
-    from vibroimpact.orchestrator.replay.replaying import replay_scene
-
     began = time.perf_counter()
     with _fitting(fit) as told:
         whole = replay_scene(scene, recordings, fit=fit, score=scored, execution=execution, told=told)
@@ -179,10 +132,6 @@ def _fitting(fit: str | None) -> Iterator[Callable[[int, float], None]]:
 def _print(
     console: Terminal, replays: Sequence[Replayed], fit: ReplayFit | None, verdict: Verdict | None
 ) -> None:
-    from rich.table import Table
-
-    from vibroimpact.analysis.replay.table import print_comparison
-
     if verdict is not None:
         console.print(verdict.words, soft_wrap=True, style="bold")
         for reason in verdict.beside:
@@ -203,33 +152,27 @@ def _print(
 
 
 def _save_scene(scene: Scene, fit: ReplayFit, recordings: Sequence[str], path: Path) -> None:
-    from vibroimpact.analysis.dataset.outputs import writing
-    from vibroimpact.analysis.files.atomic import write_atomically
-    from vibroimpact.orchestrator.replay.output import fitted_scene_text
-    from vibroimpact.orchestrator.scene import parse_scene
-
     text = fitted_scene_text(scene, fit, recordings, path.parent)
     parse_scene(text, str(path))  # a number found may break a rule between two keys
     with writing(path):
         write_atomically(path, text.encode())
 
 
-def _write(dataset: object, output: Path, figure: Path | None) -> None:
-    import xarray as xr
-
-    from vibroimpact.analysis.dataset.results import write_results
-    from vibroimpact.fmus.errors import UsageError
-
-    assert isinstance(dataset, xr.Dataset)
+def _write(dataset: xr.Dataset, output: Path, figure: Path | None) -> None:
     try:
         write_results(dataset, output, kind="replay")
         if figure is not None:
-            from vibroimpact.analysis import figures
-            from vibroimpact.analysis.figures.replay import draw_replay
-
-            figures.save(draw_replay(dataset), figure)
+            _draw(dataset, figure)
     except OSError as error:
         raise UsageError(
             f"{error.filename or output}: expected a place where a file can be written, got "
             f"{error.strerror or error}. Choose another."
         ) from error
+
+
+def _draw(dataset: xr.Dataset, path: Path) -> None:
+    # matplotlib takes half a second to import; a replay alone does not pay for it.
+    from vibroimpact.analysis import figures
+    from vibroimpact.analysis.figures.replay import draw_replay
+
+    figures.save(draw_replay(dataset), path)

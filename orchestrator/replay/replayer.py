@@ -22,6 +22,7 @@ from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.recording import Channel, Recording, open_signals
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError, UsageError
+from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.replay.covariance import drawn_noise, quiet_noise
 from vibroimpact.orchestrator.replay.drive import DriveSignal, drive_of, step_instants
@@ -158,8 +159,6 @@ class Replayer:
 
     def _component(self, path: Path) -> tuple[list[ComponentSpec], list[ConnectionSpec]]:
         """Make the Replay FMU of the drive, on the simulation's own clock."""
-        from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay  # pythonfmu is an extra
-
         assert self.drive is not None
         assert self._values is not None
         kind = str(self.replay.drive)

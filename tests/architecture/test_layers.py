@@ -68,6 +68,20 @@ def test_what_starts_light_loads_nothing_heavy(module: str, not_loaded: tuple[st
     assert result.stdout == "[]\n"
 
 
+@pytest.mark.parametrize(
+    "imported_first",
+    [
+        "from vibroimpact.analysis import open_dataset",
+        "from vibroimpact.analysis import figures",
+        "import vibroimpact.analysis.landmarks",
+    ],
+)
+def test_what_opens_or_takes_datasets_lets_them_know_their_runs(imported_first: str) -> None:
+    code = f"{imported_first}; import xarray; print(hasattr(xarray.Dataset, 'vibroimpact'))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout == "True\n"
+
+
 @pytest.mark.slow
 def test_every_benchmark_starts() -> None:
     """Nothing else of the tests runs them: a name that has moved would be found by the next person who measures."""

@@ -12,7 +12,7 @@ import xarray as xr
 from support.spike_signals import channel, pulses
 from typer.testing import CliRunner
 
-from vibroimpact.analysis.commands import spikes as spikes_command
+from vibroimpact.analysis.commands import options
 from vibroimpact.analysis.intervals import dimension
 from vibroimpact.analysis.recording import EventTrain, Recording, open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError, EstimationError, UsageError
@@ -36,7 +36,7 @@ def record(tmp_path: Path) -> Path:
 
 def spikes(*arguments: str | Path) -> str:
     app = typer.Typer()
-    spikes_command.register(app)
+    app.command("spikes")(options.spikes)
     done = CliRunner().invoke(app, [str(argument) for argument in arguments])
     if done.exception and not isinstance(done.exception, SystemExit):
         raise done.exception
@@ -189,7 +189,7 @@ def test_an_unknown_channel_is_answered_with_the_names_there_are(record: Path) -
 
 
 def test_the_defaults_of_the_dimension_are_those_of_the_report() -> None:
-    assert (spikes_command._EMBEDDING, spikes_command._THEILER) == (dimension.EMBEDDING, dimension.THEILER)
+    assert (options.EMBEDDING, options.THEILER) == (dimension.EMBEDDING, dimension.THEILER)
 
 
 def test_embedding_and_theiler_window_reach_the_dimension(record: Path, tmp_path: Path) -> None:

@@ -12,8 +12,7 @@ from support.dataset_examples import coupled_dataset, coupled_record, dataset_of
 from support.impact_sweep import SCENE, Oscillator
 from typer.testing import CliRunner
 
-from vibroimpact.analysis import figures, open_dataset, write_dataset
-from vibroimpact.analysis.commands import plot as commands
+from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.figures.scene_text import limits
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH

@@ -13,8 +13,7 @@ from support.dataset_examples import dataset_of, record, up_down
 from support.replay_signals import HIT, channel, clock, ring
 from typer.testing import CliRunner
 
-from vibroimpact.analysis import figures, open_dataset, write_dataset
-from vibroimpact.analysis.commands import plot as commands
+from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.figures.intervals import draw_intervals

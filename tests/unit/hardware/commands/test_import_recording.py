@@ -7,24 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 
 from vibroimpact.analysis.recording import open_recording
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.hardware.commands import import_recording as import_command
 from vibroimpact.hardware.recordings import read_settings
 from vibroimpact.hardware.recordings.settings import checked
 from vibroimpact.orchestrator.commands import cli
-
-
-@pytest.fixture(autouse=True)
-def only_this_command(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let the command line know this command alone: loading all of them for each test takes its time."""
-    alone = typer.Typer()
-    alone.callback()(lambda: None)
-    import_command.register(alone)
-    monkeypatch.setattr(cli, "app", alone)
-    monkeypatch.setattr(cli, "load_commands", lambda: None)
 
 
 def command(*arguments: str | Path) -> int:

@@ -1,12 +1,10 @@
-"""The command `vibroimpact fmu`: list, build, check and export the package's components."""
+"""What `vibroimpact fmu` does: list, build, check and export the package's components."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated
 
-import typer
 from rich.table import Table
 
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
@@ -20,20 +18,10 @@ from vibroimpact.fmus.terminal import Terminal, say
 
 VERSIONS = ("3.0", "2.0")
 USER_CONTACT_LAW = "user-contact-law"
-commands = typer.Typer(no_args_is_help=True, help="List, build, check and export the FMUs of the package.")
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command `fmu` to the command line."""
-    app.add_typer(commands, name="fmu")
-
-
-@commands.command("list")
-def list_components() -> None:
-    """Show every component, its FMUs and what they run on.
-
-    Example: vibroimpact fmu list
-    """
+def print_components() -> None:
+    """Show every component, its FMUs and what they run on."""
     table = Table("component", "FMI", "variables", "platforms", "file", title="Components")
     for component in read_components():
         for version in VERSIONS:
@@ -51,14 +39,9 @@ def _binaries(name: str, version: str) -> tuple[str, str]:
     return ", ".join(platforms(unpack(path))), str(path)
 
 
-@commands.command("build")
-def build_components(
-    output: Annotated[Path, typer.Option(help="Folder to fill.")] = BUILT,
-) -> None:
-    """Compile all components for this machine.
-
-    Example: vibroimpact fmu build
-    """
+def build_into(output: Path | None) -> None:
+    """Compile all components for this machine, into a folder or into the package."""
+    output = output or BUILT
     try:
         output.mkdir(parents=True, exist_ok=True)
     except OSError as problem:
@@ -70,14 +53,8 @@ def build_components(
         say(str(path))
 
 
-@commands.command("check")
-def check_files(
-    files: Annotated[list[Path] | None, typer.Argument(help="FMU files; all of the package if none.")] = None,
-) -> None:
-    """Check FMUs: description, binaries, functions, token. Runs their code.
-
-    Example: vibroimpact fmu check Oscillator.fmu
-    """
+def check_all(files: Sequence[Path]) -> None:
+    """Check FMUs, all of the package if none is named."""
     paths = files or [fmu_path(name, version) for name in components() for version in VERSIONS]
     problems = [f"{path}: {problem}" for path in paths for problem in check_fmu(path)]
     if problems:
@@ -94,24 +71,10 @@ def _export_user_law(law: Path | None, output: Path | None, counts: Mapping[str,
     return build_user_contact_law(law, output or law.with_suffix(".fmu"))
 
 
-@commands.command("export")
-def export_component(
-    component: Annotated[str, typer.Argument(help="Component, for example oscillator.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
-    contacts: Annotated[int | None, typer.Option(help="Contacts in its description; default: all.")] = None,
-    modes: Annotated[int | None, typer.Option(help="Beam: modes in its description; default: all.")] = None,
-    masses: Annotated[int | None, typer.Option(help="Chain: masses, likewise.")] = None,
-    sensors: Annotated[int | None, typer.Option(help="Beam: sensors, likewise.")] = None,
-    fmi: Annotated[str, typer.Option(help="FMI version, 3.0 or 2.0.")] = "3.0",
-    law: Annotated[Path | None, typer.Option(help="user-contact-law: the Python file of your law.")] = None,
+def export(
+    component: str, output: Path | None, counts: Mapping[str, int | None], fmi: str, law: Path | None
 ) -> None:
-    """Write an FMU for another tool, with as many contacts, modes, ... as wanted. Needs no compiler.
-
-    Example: vibroimpact fmu export beam --modes 8 --contacts 2 -o beam8.fmu
-
-    A contact law of your own in Python: vibroimpact fmu export user-contact-law --law my_law.py -o my_law.fmu
-    """
-    counts = {"contacts": contacts, "modes": modes, "masses": masses, "sensors": sensors}
+    """Write the FMU of a component, or of a contact law of the user's."""
     if component == USER_CONTACT_LAW:
         say(str(_export_user_law(law, output, counts)))
         return

@@ -1,11 +1,15 @@
-"""What `vibroimpact check` says of a scene without problems: what runs, and what it would cost."""
+"""What `vibroimpact check` does: it says what a scene without problems runs, and what it would cost."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import typer
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.campaign import SceneCost
+from vibroimpact.fmus.terminal import say
+from vibroimpact.orchestrator.campaign import SceneCost, cost_of
 from vibroimpact.orchestrator.campaign.check import (
     BYTES_BESIDE,
     COPIES_IN_CAMPAIGN,
@@ -14,8 +18,9 @@ from vibroimpact.orchestrator.campaign.check import (
     Trial,
 )
 from vibroimpact.orchestrator.campaign.cluster import processor_count
+from vibroimpact.orchestrator.commands.failures import FAILED
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
-from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.scene.summary import effects, engine, laws
 
 _WIDTH = 10
@@ -28,14 +33,25 @@ _DURATIONS = (
 )
 
 
-def engine_lines(scene: Scene) -> Iterator[str]:
-    """Yield the lines that say what runs, which need no trial."""
-    return _aligned(_what_runs(scene))
+def check_scene(path: Path, changes: Sequence[str]) -> None:
+    """Load a scene, compute one point of it, and print what would run and what it would cost.
 
-
-def cost_lines(scene: Scene, cost: SceneCost) -> Iterator[str]:
-    """Yield the lines that say what it costs."""
-    return _aligned(_what_it_costs(scene, cost))
+    Raises
+    ------
+    SceneError
+        The scene has problems.
+    typer.Exit
+        The point failed.
+    """
+    scene = load_scene(path, changes)
+    say(f"{path}: no problems")
+    for line in _aligned(_what_runs(scene)):
+        say(line)
+    cost = cost_of(scene)
+    for line in _aligned(_what_it_costs(scene, cost)):
+        say(line)
+    if cost.trial is not None and cost.trial.outcome in FAILED and not cost.trial.given_up:
+        raise typer.Exit(1)
 
 
 def _aligned(told: Iterator[tuple[str, str]]) -> Iterator[str]:

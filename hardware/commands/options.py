@@ -1,19 +1,16 @@
-"""The command `vibroimpact import`."""
+"""The options of the command `vibroimpact import`.
+
+What the command does is imported when it is called: `--help` loads nothing heavy.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from vibroimpact.analysis.dataset.outputs import FORCE_HELP, refuse_outputs, refuse_overwriting, writing
-from vibroimpact.fmus.errors import UsageError
-
-if TYPE_CHECKING:
-    from vibroimpact.analysis.recording import Recording
-
-# Reading files and drawing need numpy, netCDF4 and more: `vibroimpact --help` does not pay for them.
+from vibroimpact.analysis.commands.shared_options import Force
 
 
 def register(app: typer.Typer) -> None:
@@ -74,15 +71,13 @@ def import_files(
         typer.Option(help="The same as keys of a TOML file; without it, FILE.toml beside each file."),
     ] = None,
     figure: Annotated[Path | None, typer.Option(help="Figure of the channels (.png, .pdf, .svg).")] = None,
-    force: Annotated[bool, typer.Option("--force", help=FORCE_HELP)] = False,
+    force: Force = False,
 ) -> None:
     """Import measurements of one laboratory run into a recording, and say what is odd about them.
 
     Example: vibroimpact import base.txt board.txt --name base --name board --unit g -o a0.nc --figure a0.png
     """
-    from vibroimpact.hardware.commands.table import show_recording
-    from vibroimpact.hardware.recordings import import_recording, read_settings
-    from vibroimpact.hardware.recordings.settings import checked
+    from vibroimpact.hardware.commands.import_files import import_into, span
 
     written = {
         "name": name,
@@ -94,46 +89,9 @@ def import_files(
         "time_column": time_column,
         "columns": None if columns is None else [part.strip() for part in columns.split(",")],
         "events": events,
-        "window": None if window is None else _span(window, "window"),
-        "masked": [_span(text, "masked") for text in masked or ()],
+        "window": None if window is None else span(window, "window"),
+        "masked": [span(text, "masked") for text in masked or ()],
         "delimiter": delimiter,
         "decimal": decimal,
     }
-    given = checked({key: value for key, value in written.items() if value not in (None, [])}, "command line")
-    common = None if settings is None else read_settings(settings)
-    refuse_outputs(files, output, figure)
-    recording = import_recording(files, given, common)
-    sources = recording.attrs.get("source_sha256")
-    refuse_overwriting(output, force, lambda there: there.get("source_sha256", "") == sources)
-    _write(recording, output, figure)
-    show_recording(recording, output, figure)
-
-
-def _span(text: str, option: str) -> list[float]:
-    """Return start and end of a span of time, s."""
-    parts = text.split(":")
-    try:
-        begin, end = (float(part) for part in parts)
-    except ValueError:
-        raise UsageError(
-            f"--{option}: expected START:END in s, got {text[:60]!r}. For example 0:30."
-        ) from None
-    return [begin, end]
-
-
-def _write(recording: Recording, output: Path, figure: Path | None) -> None:
-    from vibroimpact.analysis.recording import write_recording
-
-    targets: dict[Path, Any] = {output: lambda: write_recording(recording, output)}
-    if figure is not None:
-        targets[figure] = lambda: _draw(recording, figure)
-    for target, write in targets.items():
-        with writing(target):
-            write()
-
-
-def _draw(recording: Recording, path: Path) -> None:
-    from vibroimpact.analysis import figures
-    from vibroimpact.analysis.figures.recordings import draw_recording
-
-    figures.save(draw_recording(recording), path)
+    import_into(output, files, written, settings, figure, force)

@@ -1,0 +1,163 @@
+"""The commands of this package and their options.
+
+What a command does is imported when it is called: `--help` loads nothing heavy.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from vibroimpact.analysis.commands.estimate import register as register_estimate
+from vibroimpact.analysis.commands.shared_options import DatasetFile, FigureFile, Force
+from vibroimpact.fmus.commands import commands as fmu_commands
+
+#: Of the correlation dimension: `intervals.dimension` has the same, and takes long to load.
+EMBEDDING, THEILER = 6, 1
+_KINDS_HELP = (
+    "auto; of a sweep bifurcation, map, impacts-per-period, strobe, shapes, scores; of a run run, portrait, strobe, "
+    "impact-map, return-map, spectrum, energies; of a recording or replay spectrum too; of a benchmark convergence, "
+    "work-precision."
+)
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this package to the command line; only here recordings can be read for `fmu replay`."""
+    app.command("plot")(plot)
+    register_estimate(app)
+    app.command("spikes")(spikes)
+    fmu_commands.command("replay")(replay_fmu)
+
+
+def plot(
+    file: Annotated[
+        Path, typer.Argument(help="Dataset, recording or results (.nc), or the folder of a campaign.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Figure to write: .png, .pdf or .svg.")],
+    kind: Annotated[str, typer.Option(help=_KINDS_HELP)] = "auto",
+    run: Annotated[
+        int | None, typer.Option(help="run_index of the run to draw; alone it implies --kind run.", min=0)
+    ] = None,
+    recording: Annotated[
+        str | None,
+        typer.Option(help="Recording of a replay, fitted or not: a1.nc, or the name of a comparison."),
+    ] = None,
+    start: Annotated[float | None, typer.Option("--from", help="Start of the window, s.")] = None,
+    stop: Annotated[float | None, typer.Option("--to", help="End of the window, s.")] = None,
+    periods: Annotated[
+        float | None,
+        typer.Option(help="Length of the window in forcing periods, after --from or before --to."),
+    ] = None,
+    title: Annotated[str | None, typer.Option(help='Title above the figure; "" for none.')] = None,
+    width: Annotated[float | None, typer.Option(help="Width of the figure, mm; else one column, 85.")] = None,
+    height: Annotated[float | None, typer.Option(help="Height of the figure, mm.")] = None,
+) -> None:
+    """Draw a dataset: a bifurcation diagram, maps over two parameters, one run, a recording, a replay, estimates.
+
+    Example: vibroimpact plot campaign/dataset.nc -o bifurcation.png
+    """
+    from vibroimpact.analysis.commands.plot import draw_file
+
+    options: dict[str, Any] = {"recording": recording, "start": start, "stop": stop, "periods": periods}
+    options |= {"title": title, "width": width, "height": height}
+    draw_file(file, output, kind, run, options)
+
+
+def spikes(
+    data: Annotated[Path, typer.Argument(help="Recording, or dataset of a run (.nc).")],
+    output: DatasetFile = None,
+    figure: FigureFile = None,
+    channel: Annotated[str | None, typer.Option(help="Channel to look for spikes in.")] = None,
+    events: Annotated[str | None, typer.Option(help="Event train: only its intervals are looked at.")] = None,
+    run: Annotated[int | None, typer.Option(help="run_index, in a dataset of several runs.", min=0)] = None,
+    method: Annotated[
+        str, typer.Option(help="auto, threshold, cycle_median (smooth shocks) or cycle_threshold.")
+    ] = "auto",
+    threshold: Annotated[
+        str | None,
+        typer.Option(help="SI unit of the channel, or 5% of the largest value; else from the noise."),
+    ] = None,
+    hysteresis: Annotated[float, typer.Option(help="A spike ends below this part of the threshold.")] = 0.5,
+    minimum_samples: Annotated[int, typer.Option(help="Fewer samples above the threshold are no spike.")] = 4,
+    merge: Annotated[
+        float | None, typer.Option(help="Excursions closer than this (s) are one spike with its ringing.")
+    ] = None,
+    polarity: Annotated[str, typer.Option(help="both, positive or negative.")] = "both",
+    noise: Annotated[
+        float | None, typer.Option(help="Standard deviation of normal noise, SI unit; else from the data.")
+    ] = None,
+    false_alarms: Annotated[float, typer.Option(help="Noise peaks above the threshold to expect.")] = 0.01,
+    baseline: Annotated[
+        float | None, typer.Option(help="Window of the baseline, s; else from the data.")
+    ] = None,
+    rms_window: Annotated[
+        float | None, typer.Option(help="Window for smooth shocks, s; else a tenth of a cycle.")
+    ] = None,
+    period: Annotated[
+        float | None, typer.Option(help="Period of the excitation, s; else from the data.")
+    ] = None,
+    mass: Annotated[float | None, typer.Option(help="Effective mass of the contact, kg.")] = None,
+    restitution: Annotated[float | None, typer.Option(help="Coefficient of restitution, 0 to 1.")] = None,
+    sensitivity: Annotated[float | None, typer.Option(help="Of the load cell, V/N.")] = None,
+    known_impulses: Annotated[
+        str | None, typer.Option(help="Impulses of the spikes, N s, with commas: the sensitivity is fitted.")
+    ] = None,
+    waveform: Annotated[str, typer.Option(help="auto, half_sine, haversine or bell.")] = "auto",
+    forcing_period: Annotated[float | None, typer.Option(help="By which intervals are folded, s.")] = None,
+    count_bin: Annotated[float | None, typer.Option(help="Bin of the Fano factor, s.")] = None,
+    seams: Annotated[float | None, typer.Option(help="Mask the intervals over multiples of this, s.")] = None,
+    embedding: Annotated[
+        int, typer.Option(help="Largest embedding of the correlation dimension.", min=2)
+    ] = EMBEDDING,
+    theiler: Annotated[
+        int, typer.Option(help="Theiler window: vectors no further apart than this are no pair.", min=0)
+    ] = THEILER,
+    force: Force = False,
+) -> None:
+    """Find impacts and shocks in a signal: instants, peaks, impulses, contact times, intervals.
+
+    Example: vibroimpact spikes smd05.nc --channel base -o spikes.nc --figure spikes.png
+    """
+    from vibroimpact.analysis.commands.spikes import IntervalOptions, find_spikes, number, numbers
+    from vibroimpact.analysis.spikes import Mechanics, SpikeSettings
+
+    part = threshold is not None and threshold.strip().endswith("%")
+    settings = SpikeSettings(
+        method=method,
+        threshold=None if threshold is None or part else number(threshold, "--threshold"),
+        threshold_part=number(threshold.strip()[:-1], "--threshold") / 100.0 if threshold and part else None,
+        hysteresis=hysteresis,
+        minimum_samples=minimum_samples,
+        merge=merge,
+        polarity=polarity,
+        noise=noise,
+        false_alarms=false_alarms,
+        baseline_window=baseline,
+        rms_window=rms_window,
+        period=period,
+    )
+    intervals = IntervalOptions(forcing_period, count_bin, seams, embedding, theiler)
+    mechanics = Mechanics(mass, restitution, sensitivity, numbers(known_impulses), waveform=waveform)
+    find_spikes(data, output, figure, channel, events, run, settings, mechanics, intervals, force)
+
+
+def replay_fmu(
+    recording: Annotated[Path, typer.Argument(help="Recording (.nc), or a dataset with time series.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="FMU to write.")],
+    channel: Annotated[
+        list[str] | None, typer.Option(help="Channel to play; again for more; default: all.")
+    ] = None,
+    si: Annotated[
+        bool, typer.Option("--si", help="Play values in SI units: g becomes m/s2, mV becomes V.")
+    ] = False,
+    run: Annotated[int | None, typer.Option(help="run_index, of a dataset of several runs.", min=0)] = None,
+) -> None:
+    """Make an FMU that plays recorded channels in this or another tool: value, slope, validity.
+
+    Example: vibroimpact fmu replay a0.nc --channel base --si -o a0.fmu
+    """
+    from vibroimpact.analysis.commands.replay_fmu import build_player
+
+    build_player(recording, output, channel or (), si, run)

@@ -1,0 +1,68 @@
+"""What `vibroimpact import` does: read files, write the recording and its figure, print what it holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
+from vibroimpact.analysis.recording import Recording, write_recording
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.hardware.commands.table import show_recording
+from vibroimpact.hardware.recordings import import_recording, read_settings
+from vibroimpact.hardware.recordings.settings import checked
+
+
+def import_into(
+    output: Path,
+    files: Sequence[Path],
+    options: Mapping[str, Any],
+    settings: Path | None,
+    figure: Path | None,
+    force: bool,
+) -> None:
+    """Import files as the options (keys of a settings file; None or empty: not given) and settings say."""
+    given = checked({key: value for key, value in options.items() if value not in (None, [])}, "command line")
+    common = None if settings is None else read_settings(settings)
+    refuse_outputs(files, output, figure)
+    recording = import_recording(files, given, common)
+    sources = recording.attrs.get("source_sha256")
+    refuse_overwriting(output, force, lambda there: there.get("source_sha256", "") == sources)
+    _write(recording, output, figure)
+    show_recording(recording, output, figure)
+
+
+def span(text: str, option: str) -> list[float]:
+    """Return start and end of a span of time, s.
+
+    Raises
+    ------
+    UsageError
+        The text is not START:END.
+    """
+    parts = text.split(":")
+    try:
+        begin, end = (float(part) for part in parts)
+    except ValueError:
+        raise UsageError(
+            f"--{option}: expected START:END in s, got {text[:60]!r}. For example 0:30."
+        ) from None
+    return [begin, end]
+
+
+def _write(recording: Recording, output: Path, figure: Path | None) -> None:
+    targets: dict[Path, Any] = {output: lambda: write_recording(recording, output)}
+    if figure is not None:
+        targets[figure] = lambda: _draw(recording, figure)
+    for target, write in targets.items():
+        with writing(target):
+            write()
+
+
+def _draw(recording: Recording, path: Path) -> None:
+    # matplotlib takes half a second to import; an import alone does not pay for it.
+    from vibroimpact.analysis import figures
+    from vibroimpact.analysis.figures.recordings import draw_recording
+
+    figures.save(draw_recording(recording), path)

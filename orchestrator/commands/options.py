@@ -1,0 +1,134 @@
+"""The commands of this package and their options.
+
+What a command does is imported when it is called: `--help` loads nothing heavy.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibroimpact.analysis.commands.shared_options import FigureFile, Force
+
+SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).")]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Change a key of the scene before it is checked, the key as messages write it; may be repeated.",
+    ),
+]
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this package to the command line."""
+    for command in (check, run, campaign, demo, replay):
+        app.command()(command)
+
+
+def check(scene: SceneFile, changes: Changes = None) -> None:
+    """Say what is wrong with a scene or, where nothing is, what would run and what it would cost.
+
+    One point of the scene is computed, the middle one of its sweep, for 20 s at most; times, memory and sizes are
+    those of this point, for all points. Nothing is written. Exit code 2: the scene has problems; 1: the point failed.
+
+    Example: vibroimpact check examples/bifurcation.toml
+    """
+    from vibroimpact.orchestrator.commands.check import check_scene
+
+    check_scene(scene, changes or ())
+
+
+def run(
+    scene: SceneFile,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Dataset to write (.nc).")],
+    changes: Changes = None,
+    force: Force = False,
+) -> None:
+    """Run a scene in this process, one point after the other, into one dataset.
+
+    Example: vibroimpact run examples/single_run.toml -o run.nc
+    """
+    from vibroimpact.orchestrator.commands.run import run_to_dataset
+
+    run_to_dataset(scene, output, changes or (), force)
+
+
+def campaign(
+    scene: Annotated[Path, typer.Argument(help="Scene file (TOML) that sweeps something.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the campaign.")],
+    changes: Changes = None,
+    workers: Annotated[
+        int | None, typer.Option(help="Worker processes; one for each processor by default.", min=1)
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(help="Use the workers of this Dask scheduler (tcp://host:8786) instead.")
+    ] = None,
+) -> None:
+    """Run all points of a scene's sweep with many workers; the same command resumes.
+
+    Example: vibroimpact campaign examples/bifurcation.toml -o bifurcation --workers 2
+    """
+    from vibroimpact.orchestrator.commands.campaign import run_to_folder
+
+    run_to_folder(scene, output, changes or (), workers, scheduler)
+
+
+def demo(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the results.")] = Path("demo"),
+) -> None:
+    """Run the bifurcation of the impact oscillator: campaign, dataset, figure, and what is read off it.
+
+    Example: vibroimpact demo -o demo
+    """
+    from vibroimpact.orchestrator.commands.demo import run_demo
+
+    run_demo(output)
+
+
+def replay(
+    scene: Annotated[Path, typer.Argument(help=r"Scene file (TOML) with a \[replay] table.")],
+    recordings: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Recordings to replay, and to fit to; left out, those that the scene names."),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc); of a campaign its folder.")
+    ] = None,
+    fit: Annotated[
+        str | None, typer.Option(help="Numbers of the scene to fit: body.damping_ratio,sensor.gain")
+    ] = None,
+    score: Annotated[
+        list[Path] | None, typer.Option(help="Recording to score that was not fitted on; may be repeated.")
+    ] = None,
+    save_scene: Annotated[
+        Path | None,
+        typer.Option(
+            help="Scene to write with the numbers found (.toml); one that is there only with --force."
+        ),
+    ] = None,
+    figure: FigureFile = None,
+    execution: Annotated[
+        str | None,
+        typer.Option(help="auto, fused, or coupled (a Replay FMU drives); else as the scene says."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Worker processes of a campaign.", min=1)] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Dask scheduler of a campaign.")] = None,
+    force: Force = False,
+) -> None:
+    """Drive a scene by recorded channels and compare its motion with what was measured.
+
+    One recording, or several with --fit and --score, make a dataset. A folder as output makes a campaign over all
+    recordings and the grid that the scene sweeps, on many workers; the same command resumes it.
+
+    Example: vibroimpact replay examples/recordings/board.toml a0.nc -o fit.nc --fit body.damping_ratio --score a1.nc
+    """
+    from vibroimpact.orchestrator.commands.replay import replay_recordings
+
+    replay_recordings(
+        *(scene, recordings or (), score or (), output, fit, save_scene, figure, execution),
+        *(workers, scheduler, force),
+    )

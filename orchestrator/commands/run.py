@@ -1,0 +1,41 @@
+"""What `vibroimpact run` does."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import typer
+
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
+from vibroimpact.fmus.terminal import say
+from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.campaign.manifest import holds_scene
+from vibroimpact.orchestrator.campaign.progress import shown_progress
+from vibroimpact.orchestrator.commands.failures import FAILED, counted, outcome_lines
+from vibroimpact.orchestrator.scene import load_scene
+from vibroimpact.orchestrator.scene.summary import in_one_line
+
+
+def run_to_dataset(scene: Path, output: Path, changes: Sequence[str], force: bool) -> None:
+    """Run a scene into a dataset and say what was run and what failed.
+
+    Raises
+    ------
+    typer.Exit
+        The only run failed.
+    """
+    began = time.perf_counter()
+    loaded = load_scene(scene, changes)
+    refuse_outputs([scene], output)
+    refuse_overwriting(output, force, lambda there: holds_scene(there, loaded))
+    with shown_progress() as progress:
+        outcomes = run_scene(loaded, output, progress=progress)
+    runs = sum(outcomes.values())
+    say(f"{counted(runs, 'run')} in {time.perf_counter() - began:.1f} s: {output}")
+    say(in_one_line(loaded))
+    for line in outcome_lines(output, runs):
+        say(line, err=True)
+    if runs == 1 and any(kind.name in outcomes for kind in FAILED):
+        raise typer.Exit(1)
