@@ -75,62 +75,27 @@ class ImpactOptions:
             if value == 0.0 and rule == _ABOVE_0:
                 raise UsageError(f"--{name.replace('_', '-')}: expected {rule}, got 0.")
 
-    def given(self) -> list[str]:
-        """Return the names of the options that were given."""
-        return [
-            "--" + item.name.replace("_", "-")
-            for item in fields(self)
-            if getattr(self, item.name) is not item.default
-        ]
 
-
-def chosen_kind(data: Path, kind: str, run: int | None, drive: str | None, options: ImpactOptions) -> str:
-    """Return the kind of estimation: the one named, or what the data are."""
-    if kind != "auto":
-        return kind
-    if drive is not None:
-        return "response"
-    if options.given():
-        return "impacts"
-    if is_recording(data):
-        return "decay"
-    flat = read_flat(data)
-    swept = {"angular_frequency", "frequency"} & set(swept_names(flat))
-    if run is None and flat.sizes["run"] > 1 and swept:
-        return "response"
-    rows = slice(None) if run is None else flat.run_index.values == run
-    return "impacts" if "impact_count" in flat and np.any(flat.impact_count.values[rows] > 0) else "decay"
-
-
-def refuse_far_options(
-    kind: str, impacts: ImpactOptions, response: Mapping[str, bool], decay: Mapping[str, bool]
-) -> None:
-    """Refuse options of another kind than the one that is estimated: they would do nothing.
+def kind_of(data: Path, *, one_run: bool) -> str:
+    """Return what `vibroimpact estimate` finds in data: decay, impacts or response.
 
     Parameters
     ----------
-    kind : str
-        That is estimated.
-    impacts : ImpactOptions
-    response, decay : mapping of str to bool
-        Options of these kinds, and whether each was given.
+    data : Path
+    one_run : bool
+        Whether one run is looked at: then a sweep of the frequency is no response.
 
     Raises
     ------
-    UsageError
-        With the names of these options.
+    DatasetError
+        The file is missing, damaged or foreign.
     """
-    far = []
-    if kind != "impacts":
-        far += impacts.given()
-    for other, options in (("response", response), ("decay", decay)):
-        if kind != other:
-            far += [name for name, given in options.items() if given]
-    if far:
-        raise UsageError(
-            f"--kind {kind}: expected none of the options of other kinds, got {', '.join(far)}. "
-            "Leave them out, or choose another --kind."
-        )
+    if is_recording(data):
+        return "decay"
+    flat = read_flat(data)
+    if not one_run and flat.sizes["run"] > 1 and {"angular_frequency", "frequency"} & set(swept_names(flat)):
+        return "response"
+    return "impacts" if "impact_count" in flat and np.any(flat.impact_count.values > 0) else "decay"
 
 
 def scene_of(attrs: Mapping[str, Any]) -> dict[str, Any]:
@@ -224,8 +189,8 @@ def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> floa
         if value is not None:
             return float(value) * factor
     raise UsageError(
-        "--kind impacts: expected the frequency of the force, got none. Give --forcing-frequency (Hz; 0 for bounces "
-        "without a force that oscillates) or --angular-frequency (rad/s)."
+        "--forcing-frequency: expected the frequency of the force, got none. Give it in Hz (0 for bounces without a "
+        "force that oscillates), or --angular-frequency (rad/s)."
     )
 
 

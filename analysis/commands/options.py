@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from vibroimpact.analysis.commands.estimate import register as register_estimate
+from vibroimpact.analysis.commands.estimate_options import estimate
 from vibroimpact.analysis.commands.shared_options import DatasetFile, FigureFile, Force
 from vibroimpact.fmus.commands import commands as fmu_commands
 
@@ -26,7 +26,7 @@ _KINDS_HELP = (
 def register(app: typer.Typer) -> None:
     """Add the commands of this package to the command line; only here recordings can be read for `fmu replay`."""
     app.command("plot")(plot)
-    register_estimate(app)
+    app.add_typer(estimate, name="estimate")
     app.command("spikes")(spikes)
     fmu_commands.command("replay")(replay_fmu)
 

@@ -154,7 +154,7 @@ def _turning_point(samples: DecaySamples, start: ExponentialDecay) -> tuple[floa
     if not np.isfinite(height):
         raise EstimationError(
             f"{samples.name}: expected a free decay, got motion that no decaying cosine is near to (decay rate "
-            f"{rate:.3g} 1/s). Narrow the window, or use --kind impacts for motion against a stop."
+            f"{rate:.3g} 1/s). Narrow the window, or write `estimate impacts` for motion against a stop."
         )
     return float(time), float(height), -1.0 if turns % 2 else 1.0
 

@@ -98,7 +98,7 @@ def test_a_half_done_campaign_goes_on_from_its_parts(old: Path) -> None:
 
 
 def test_a_recording_is_estimated_as_it_was(old: Path) -> None:
-    done = in_this_process("estimate", old / "recording.nc", "-o", old / "now.nc")
+    done = in_this_process("estimate", "decay", old / "recording.nc", "-o", old / "now.nc")
     assert done.returncode == 0, done.stderr
     with xr.open_dataset(old / "now.nc") as now, xr.open_dataset(old / "estimates.nc") as before:
         assert "angular_frequency" in before.quantity

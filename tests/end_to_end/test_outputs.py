@@ -49,7 +49,7 @@ def test_a_campaign_is_no_file(command: str, ending: str, scene: Path, tmp_path:
     misuse(done, f"expected the name of a folder, got that of a file ({ending})")
 
 
-@pytest.mark.parametrize("command", ["import", "spikes", "estimate", "plot", "fmu replay"])
+@pytest.mark.parametrize("command", ["import", "spikes", "estimate decay", "plot", "fmu replay"])
 def test_every_command_names_the_ending_that_it_writes_before_it_reads(command: str, tmp_path: Path) -> None:
     ending = {"plot": ".png", "fmu replay": ".fmu"}.get(command, ".nc")
     done = in_this_process(*command.split(), tmp_path / "absent.nc", "-o", tmp_path / "x.docx")
@@ -94,8 +94,8 @@ def test_imports_and_analyses_may_be_repeated_and_nothing_else_is_overwritten(tm
     misuse(in_this_process("import", tmp_path / "b.csv", "-o", recording), "--force")
     assert in_this_process("import", tmp_path / "b.csv", "-o", other).returncode == 0
     for _ in range(2):
-        assert in_this_process("estimate", recording, "--kind", "decay", "-o", found).returncode == 0
-    misuse(in_this_process("estimate", other, "--kind", "decay", "-o", found), "--force")
+        assert in_this_process("estimate", "decay", recording, "-o", found).returncode == 0
+    misuse(in_this_process("estimate", "decay", other, "-o", found), "--force")
     misuse(in_this_process("spikes", recording, "-o", found), "--force")
     assert in_this_process("spikes", recording, "-o", found, "--force").returncode == 0
     assert in_this_process("spikes", recording, "-o", found).returncode == 0

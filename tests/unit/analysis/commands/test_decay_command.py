@@ -42,7 +42,7 @@ def test_a_decay_is_printed_written_and_drawn(
     decay: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output, figure = tmp_path / "estimates.nc", tmp_path / "estimates.png"
-    assert estimate(decay, "--channel", "arm", "-o", output, "--figure", figure) == 0
+    assert estimate("decay", decay, "--channel", "arm", "-o", output, "--figure", figure) == 0
     printed = capsys.readouterr().out
     assert "viscous + Coulomb has the lowest AIC." in printed
     assert "95 % interval" in printed
@@ -64,41 +64,71 @@ def test_a_decay_is_printed_written_and_drawn(
 
 
 def test_one_law_or_none_can_be_asked_for(decay: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert estimate(decay, "--channel", "arm", "--law", "viscous", "--from", "0", "--to", "20") == 0
+    assert estimate("decay", decay, "--channel", "arm", "--law", "viscous", "--from", "0", "--to", "20") == 0
     assert "viscous was asked for." in capsys.readouterr().out
-    assert estimate(decay, "--channel", "arm", "--law", "none") == 0
+    assert estimate("decay", decay, "--channel", "arm", "--law", "none") == 0
     assert "Damping laws" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        ([], "expected one to be named, got 2: arm, force"),
-        (["--channel", "arm", "--kind", "decai"], "--kind: expected one of auto, decay, impacts, response"),
-        (["--channel", "arm", "--law", "dry"], "expected a sum of viscous, coulomb, quadratic"),
-        (["--channel", "arm", "--from", "70"], "the channel runs from 0 to 24.95 s"),
-        (["--channel", "arm", "--kind", "decay", "--stop", "1"], "options of other kinds, got --stop"),
-        (["--channel", "arm", "--kind", "impacts"], "expected the frequency of the force, got none"),
-        (["--channel", "arm", "--amplitude", "2", "--angular-frequency", "3"], "--amplitude: expected --mass"),
-        (["--drive", "force", "--window", "flat"], "--window: expected one of bartlett, hann, boxcar"),
-        (["--channel", "arm", "-o", "/nowhere/estimates.nc"], "expected a place where a file can be written"),
-        (["--kind", "impacts", "--damping-ratio", "-1"], "--damping-ratio: expected a number >= 0, got -1"),
-        (["--kind", "impacts", "--natural-frequency", "nan"], "--natural-frequency: expected a number > 0, got nan"),
-        (["--kind", "impacts", "--mass", "0"], "--mass: expected a number > 0, got 0"),
-        (["--kind", "impacts", "--offset", "inf"], "--offset: expected a finite number, got inf"),
-        (["--channel", "arm", "--run", "3"], "--run: expected none of a recording, got 3"),
-        (["--channel", "arm", "--figure", "estimates.bmp"], "expected a name ending in .png"),
+        ("decay", "expected one to be named, got 2: arm, force"),
+        ("decay --channel arm --law dry", "expected a sum of viscous, coulomb, quadratic"),
+        ("decay --channel arm --law none --from 70", "the channel runs from 0 to 24.95 s"),
+        ("decay --channel arm --stop 1", "No such option: --stop"),
+        ("impacts --channel arm", "--forcing-frequency: expected the frequency of the force, got none"),
+        ("impacts --channel arm --amplitude 2 --angular-frequency 3", "--amplitude: expected --mass"),
+        ("impacts --damping-ratio -1", "--damping-ratio: expected a number >= 0, got -1"),
+        ("impacts --natural-frequency nan", "--natural-frequency: expected a number > 0, got nan"),
+        ("impacts --mass 0", "--mass: expected a number > 0, got 0"),
+        ("impacts --offset inf", "--offset: expected a finite number, got inf"),
+        ("response", "--drive: expected the channel that drives, got none. Name it."),
+        ("response --drive force --window flat", "--window: expected one of bartlett, hann, boxcar"),
+        ("response --drive force --estimator h3", '--estimator: expected h1 or h2, got "h3".'),
+        ("decay --channel arm -o /nowhere/estimates.nc", "expected a place where a file can be written"),
+        ("decay --channel arm --run 3", "--run: expected none of a recording, got 3"),
+        ("decay --channel arm --figure estimates.bmp", "expected a name ending in .png"),
     ],
 )  # fmt: skip
 def test_misuse_leaves_with_2_and_says_what_to_do(
-    decay: Path, arguments: list[str], told: str, capsys: pytest.CaptureFixture[str]
+    decay: Path, arguments: str, told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    quick = (
-        [] if "--law" in arguments or "--kind" in arguments or "--drive" in arguments else ["--law", "none"]
-    )
-    quick = [] if "--angular-frequency" in arguments else quick
-    assert estimate(decay, *arguments, *quick) == 2
+    kind, *options = arguments.split()
+    assert estimate(kind, decay, *options) == 2
     assert told in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("{} --kind impacts --stop 0.4 -o a.nc", "impacts {} --stop 0.4 -o a.nc"),
+        ("--kind=response {} --drive force", "response {} --drive force"),
+        ("{} --drive force --band 1 2", "response {} --drive force --band 1 2"),
+        ("{} --forcing-frequency 10", "impacts {} --forcing-frequency 10"),
+        ("{} --channel arm --law none", "decay {} --channel arm --law none"),
+        # what the options leave open the data decide
+        ("{} --channel arm --from 3 -o a.nc", "decay {} --channel arm --from 3 -o a.nc"),
+        ("--from 3 {}", "decay --from 3 {}"),
+        (
+            "absent.nc --run 1",
+            "decay absent.nc --run 1, or vibroimpact estimate impacts absent.nc --run 1, "
+            "or vibroimpact estimate response absent.nc --run 1",
+        ),
+    ],
+)
+def test_the_old_form_is_refused_with_the_command_to_write(
+    decay: Path, old: str, new: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert estimate(*old.format(decay).split()) == 2
+    told = capsys.readouterr().err
+    assert told.endswith(f" Write: vibroimpact estimate {new.format(decay)}\n")
+    assert len(told.splitlines()) == 1
+
+
+def test_a_misspelt_kind_of_estimation_is_no_file_in_the_old_form(capsys: pytest.CaptureFixture[str]) -> None:
+    assert estimate("decai", "a.nc") == 2
+    assert "Did you mean 'decay'?" in capsys.readouterr().err
 
 
 def test_a_simulated_free_decay_and_a_swept_resonance_need_no_options(
@@ -106,9 +136,9 @@ def test_a_simulated_free_decay_and_a_swept_resonance_need_no_options(
 ) -> None:
     free, swept = tmp_path / "free.nc", tmp_path / "swept.nc"
     run_scene(parse_scene(BODY + FREE, "free.toml"), free)
-    assert estimate(free, "--law", "none", "-o", tmp_path / "one.nc") == 0
+    assert estimate("decay", free, "--law", "none", "-o", tmp_path / "one.nc") == 0
     run_scene(parse_scene(BODY + SWEPT, "swept.toml"), swept)
-    assert estimate(swept, "-o", tmp_path / "two.nc", "--figure", tmp_path / "two.png") == 0
+    assert estimate("response", swept, "-o", tmp_path / "two.nc", "--figure", tmp_path / "two.png") == 0
     # The scene: stiffness 800, mass 2, damping ratio .03.
     for name, method in (("one.nc", "exponential"), ("two.nc", "response")):
         with xr.open_dataset(tmp_path / name) as found:
@@ -124,7 +154,7 @@ def test_an_impacting_run_takes_forcing_and_stop_from_its_scene(
 ) -> None:
     run = tmp_path / "impacts.nc"
     run_scene(parse_scene(BODY + IMPACTING, "impacts.toml"), run)
-    assert estimate(run, "-o", tmp_path / "found.nc", "--figure", tmp_path / "found.png") == 0
+    assert estimate("impacts", run, "-o", tmp_path / "found.nc", "--figure", tmp_path / "found.png") == 0
     assert "restitution" in capsys.readouterr().out
     with xr.open_dataset(tmp_path / "found.nc") as found:
         best = found.estimate.sel(estimator="trajectory")
@@ -136,7 +166,7 @@ def test_an_impacting_run_takes_forcing_and_stop_from_its_scene(
 def test_each_run_of_a_sweep_of_the_stop_is_estimated_with_its_own_stop(tmp_path: Path) -> None:
     swept = tmp_path / "stops.nc"
     run_scene(parse_scene(BODY + IMPACTING + SWEPT_STOP, "stops.toml"), swept)
-    assert estimate(swept, "--run", "1", "-o", tmp_path / "found.nc") == 0
+    assert estimate("impacts", swept, "--run", "1", "-o", tmp_path / "found.nc") == 0
     with xr.open_dataset(tmp_path / "found.nc") as found:
         best = found.estimate.sel(estimator="trajectory")
         # Held at the stop that the scene has written, the trajectories would not follow the motion.
@@ -147,7 +177,7 @@ def test_an_accelerated_base_is_the_force_of_the_mass_turned_round(tmp_path: Pat
     # The load per mass of the scene above, 4 N on 2 kg: relative to the base the motion differs in its sign only.
     based = IMPACTING.replace("amplitude = 4.0", 'kind = "base_acceleration"\namplitude = 2.0')
     run_scene(parse_scene(BODY + based, "base.toml"), tmp_path / "base.nc")
-    assert estimate(tmp_path / "base.nc", "-o", tmp_path / "found.nc") == 0
+    assert estimate("impacts", tmp_path / "base.nc", "-o", tmp_path / "found.nc") == 0
     with xr.open_dataset(tmp_path / "found.nc") as found:
         best = found.estimate.sel(estimator="trajectory")
         assert float(best.sel(quantity="restitution")) == pytest.approx(0.8, abs=1e-4)
@@ -158,7 +188,12 @@ def test_a_clock_that_drifts_has_its_frequency_fitted_when_asked_for(tmp_path: P
     run = tmp_path / "impacts.nc"
     run_scene(parse_scene(BODY + IMPACTING, "impacts.toml"), run)
     # The scene says 35 rad/s; the generator of an experiment would say something else.
-    assert estimate(run, "--angular-frequency", "35.03", "--clock-drifts", "-o", tmp_path / "found.nc") == 0
+    assert (
+        estimate(
+            "impacts", run, "--angular-frequency", "35.03", "--clock-drifts", "-o", tmp_path / "found.nc"
+        )
+        == 0
+    )
     with xr.open_dataset(tmp_path / "found.nc") as found:
         best = found.estimate.sel(estimator="trajectory")
         assert float(best.sel(quantity="angular_frequency")) == pytest.approx(35.0, rel=1e-6)

@@ -98,7 +98,7 @@ def test_estimate_of_a_ball_under_its_weight_takes_the_flight_times(tmp_path):
     scene, data, figure = (tmp_path / name for name in ("ball.toml", "ball.nc", "ball.png"))
     scene.write_text(SCENE)
     assert in_this_process("run", scene, "-o", data).returncode == 0
-    done = in_this_process("estimate", data, "--figure", figure, "-o", tmp_path / "found.nc")
+    done = in_this_process("estimate", "impacts", data, "--figure", figure, "-o", tmp_path / "found.nc")
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("sure of flight times.")
     assert figure.stat().st_size > 10_000
