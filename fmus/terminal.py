@@ -20,6 +20,7 @@ from rich.console import Console
 from rich.text import Text
 
 _KEPT = "\n\t"
+_PIPE_WIDTH = 160
 # Control, format (such as U+202E, which turns what follows around), surrogate, line and paragraph separator.
 _ESCAPED = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
 _UNWRITTEN: set[str] = set()
@@ -95,3 +96,11 @@ class Terminal(Console):
     def _write_no_more(self, error: OSError) -> None:
         self.quiet = True
         _write_no_more(self.stderr, error)
+
+
+def wide_terminal() -> Terminal:
+    """Return a console whose tables are as wide as they need to be where they go to a pipe, which has no width."""
+    console = Terminal()
+    if not console.is_terminal:
+        console.width = _PIPE_WIDTH
+    return console

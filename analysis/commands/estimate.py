@@ -26,7 +26,7 @@ from vibroimpact.analysis.estimation.impacts import estimate_impacts
 from vibroimpact.analysis.estimation.report import print_impacts
 from vibroimpact.analysis.recording import Channel, Recording, is_recording, open_signals
 from vibroimpact.fmus.errors import EstimationError, UsageError
-from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +114,7 @@ def _estimating(asked: Estimation) -> Iterator[Terminal]:
         asked.output, asked.force, lambda there: (there.get("results_kind"), there.get("source_file")) == same
     )
     try:
-        # Piped, a table is as wide as it needs to be.
-        yield Terminal(soft_wrap=False, width=None if Terminal().is_terminal else 160)
+        yield wide_terminal()
     except EstimationError as problem:
         raise EstimationError(f"{asked.data}: {problem}") from problem
 

@@ -28,6 +28,7 @@ def register(app: typer.Typer) -> None:
     app.command("plot")(plot)
     app.add_typer(estimate, name="estimate")
     app.command("spikes")(spikes)
+    app.command("describe")(describe)
     fmu_commands.command("replay")(replay_fmu)
 
 
@@ -141,6 +142,20 @@ def spikes(
     intervals = IntervalOptions(forcing_period, count_bin, seams, embedding, theiler)
     mechanics = Mechanics(mass, restitution, sensitivity, numbers(known_impulses), waveform=waveform)
     find_spikes(data, output, figure, channel, events, run, settings, mechanics, intervals, force)
+
+
+def describe(
+    file: Annotated[
+        Path, typer.Argument(help="Dataset, recording or results (.nc), or the folder of a campaign.")
+    ],
+) -> None:
+    """Say what a file holds: what made it, its dimensions, each variable with its meaning, unit and values.
+
+    Example: vibroimpact describe run.nc
+    """
+    from vibroimpact.analysis.commands.describe import describe_file
+
+    describe_file(file)
 
 
 def replay_fmu(

@@ -7,6 +7,7 @@ import math
 from rich.table import Table
 
 from vibroimpact.analysis.estimation.estimates import QUANTITIES, SHOWN, ImpactEstimates, MethodEstimate
+from vibroimpact.fmus.printing import table, value_and_error
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.fmus.units import written_unit
 
@@ -32,17 +33,14 @@ def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
 def _estimates(estimates: ImpactEstimates) -> Table:
     """Return quantities by methods."""
     methods = [name for name in SHOWN if name in estimates.values]
-    table = Table(title=f"{estimates.channel}: estimates with {estimates.confidence:.0%} intervals")
-    table.add_column("quantity")
-    table.add_column("unit")
-    for method in methods:
-        table.add_column(method.replace("_", " "), justify="right")
+    title = f"{estimates.channel}: estimates with {estimates.confidence:.0%} intervals"
+    rows = table(title, "<quantity", "<unit", *(f">{method.replace('_', ' ')}" for method in methods))
     for quantity in QUANTITIES:
         cells = [estimates.values[method].get(quantity) for method in methods]
         if any(cells):
             words = quantity.replace("_", " ")
-            table.add_row(words, written_unit(estimates.unit_of(quantity)), *(_cell(cell) for cell in cells))
-    return table
+            rows.add_row(words, written_unit(estimates.unit_of(quantity)), *(_cell(cell) for cell in cells))
+    return rows
 
 
 def _cell(estimate: MethodEstimate | None) -> str:
@@ -51,19 +49,15 @@ def _cell(estimate: MethodEstimate | None) -> str:
         return ""
     if not math.isfinite(estimate.standard_error):
         return f"{estimate.value:.4g}"
-    if estimate.standard_error <= 0.0:
-        return f"{estimate.value:.6g}"
-    place = math.floor(math.log10(estimate.standard_error)) - 1
-    if not -12 <= place < 0:
-        return f"{estimate.value:.6g} [{estimate.low:.6g}, {estimate.high:.6g}]"
-    return f"{estimate.value:.{-place}f} [{estimate.low:.{-place}f}, {estimate.high:.{-place}f}]"
+    ends = (estimate.value, estimate.low, estimate.high)
+    value, low, high = (value_and_error(end, estimate.standard_error)[0] for end in ends)
+    return f"{value} [{low}, {high}]" if estimate.standard_error > 0.0 else value
 
 
 def _conditioning(estimates: ImpactEstimates) -> Table:
     """Return how errors move the estimates."""
-    table = Table(title="conditioning: change of the estimate per change of what it rests on")
-    table.add_column("sensitivity of the energy balance")
-    table.add_column("value", justify="right")
+    title = "conditioning: change of the estimate per change of what it rests on"
+    rows = table(title, "<sensitivity of the energy balance", ">value")
     for name, value in estimates.conditioning.items():
-        table.add_row(name.replace("_", " "), f"{value:.4g}")
-    return table
+        rows.add_row(name.replace("_", " "), f"{value:.4g}")
+    return rows

@@ -6,19 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
-from rich.table import Table
 
+from vibroimpact.fmus.printing import table, with_error
 from vibroimpact.fmus.terminal import Terminal
 
 
 def print_intervals(console: Terminal, report: xr.Dataset) -> None:
     """Print the report of `interval_report`: numbers with their doubt, verdicts with their reasons."""
-    table = Table(title="Intervals", title_justify="left")
-    for heading in ("quantity", "value", "how"):
-        table.add_column(heading, overflow="fold")
+    rows = table("Intervals", "<quantity", "<value", "<how")
     for row in (*_rows(report), *_lattice_rows(report)):
-        table.add_row(*row)
-    console.print(table)
+        rows.add_row(*row)
+    console.print(rows)
     console.print(f"Motion: {report.attrs['cycle']}.", soft_wrap=True)
     console.print(f"Lattice: {report.attrs['lattice']}.", soft_wrap=True)
     console.print(f"Gaps: {report.attrs['gaps']}.", soft_wrap=True)
@@ -40,7 +38,7 @@ def _rows(report: xr.Dataset) -> Iterator[tuple[str, str, str]]:
     )
     value = _number(report, "rate")
     per_minute = f"{60.0 * value:.2f} per minute; standard error from 20 long bins"
-    yield "rate", _with_error(value, _number(report, "rate_standard_error"), "Hz"), per_minute
+    yield "rate", with_error(value, _number(report, "rate_standard_error"), "Hz"), per_minute
     yield (
         "interval",
         f"{_number(report, 'mean_interval'):.5g} s",
@@ -53,7 +51,7 @@ def _rows(report: xr.Dataset) -> Iterator[tuple[str, str, str]]:
     )
     yield (
         "Fano factor",
-        f"{_number(report, 'fano_factor'):.4f} ± {_number(report, 'fano_standard_error'):.2g}",
+        with_error(_number(report, "fano_factor"), _number(report, "fano_standard_error")),
         f"ddof 1, bins of {_number(report, 'fano_bin'):.4g} s from the window's start; "
         f"{_number(report, 'fano_lowest'):.4f} to {_number(report, 'fano_highest'):.4f} with other offsets",
     )
@@ -76,7 +74,7 @@ def _lattice_rows(report: xr.Dataset) -> Iterator[tuple[str, str, str]]:
         f"true spikes scatter by {_number(report, 'lattice_jitter'):.2g} s about it",
     )
     for name, words in (("missed", "per true spike"), ("spurious", "per true interval")):
-        value = _with_error(_number(report, f"{name}_probability"), _number(report, f"{name}_standard_error"))
+        value = with_error(_number(report, f"{name}_probability"), _number(report, f"{name}_standard_error"))
         yield (
             f"{name} spikes",
             value,
@@ -93,13 +91,11 @@ def _lattice_rows(report: xr.Dataset) -> Iterator[tuple[str, str, str]]:
 def _print_gaps(console: Terminal, report: xr.Dataset) -> None:
     if not report.sizes["gap"]:
         return
-    table = Table(title="Gaps", title_justify="left")
-    for heading in ("after, s", "length, s", "beats missing"):
-        table.add_column(heading, justify="right")
+    rows = table("Gaps", ">after, s", ">length, s", ">beats missing")
     columns = (report[name].values for name in ("gap_start", "gap_length", "gap_missing"))
     for start, length, missing in list(zip(*columns, strict=True))[:_MOST_GAPS]:
-        table.add_row(f"{start:.4f}", f"{length:.4f}", str(missing))
-    console.print(table)
+        rows.add_row(f"{start:.4f}", f"{length:.4f}", str(missing))
+    console.print(rows)
     if report.sizes["gap"] > _MOST_GAPS:
         console.print(f"and {report.sizes['gap'] - _MOST_GAPS} more")
 
@@ -109,13 +105,11 @@ def _print_dimension(console: Terminal, report: xr.Dataset) -> None:
     low, high = report.attrs["slope_window"]
     if any(np.isfinite(report[f"slope_{scale}"].values).any() for scale in scales):
         console.print(f"Slope of the correlation sum, C from {low:g} to {high:g}")
-        table = Table()
-        for heading in ("m", "raw", "shuffled", "log", "shuffled"):
-            table.add_column(heading, justify="right")
+        rows = table("", ">m", ">raw", ">shuffled", ">log", ">shuffled")
         for m in report["embedding"].values:
             cells = (cell for scale in scales for cell in _slope_cells(report, scale, int(m)))
-            table.add_row(str(m), *cells)
-        console.print(table)
+            rows.add_row(str(m), *cells)
+        console.print(rows)
     for scale, kind in zip(scales, ("raw intervals", "log intervals"), strict=True):
         words = report.attrs[f"dimension_{scale}"]
         console.print(f"Dimension of {kind}: {words}.", soft_wrap=True)
@@ -135,13 +129,3 @@ def _slope_cells(report: xr.Dataset, scale: str, m: int) -> tuple[str, str]:
 
 def _number(report: xr.Dataset, name: str) -> float:
     return float(report[name])
-
-
-def _with_error(value: float, error: float, unit: str = "") -> str:
-    """Return a value with as many digits as its standard error allows."""
-    if not np.isfinite(value):
-        return "-"
-    if not np.isfinite(error) or error <= 0.0:
-        return f"{value:.4g} {unit}".strip()
-    digits = max(0, 1 - int(np.floor(np.log10(error))))
-    return f"{value:.{digits}f} ± {error:.{digits}f} {unit}".strip()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from vibroimpact.analysis.recording.units import measured_unit, unit_label
@@ -13,6 +12,7 @@ from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.held import MOST_ERROR, instant
 from vibroimpact.analysis.replay.replay_dataset import comparison_names
 from vibroimpact.analysis.replay.spectra import DominantFrequency
+from vibroimpact.fmus.printing import table, with_error
 from vibroimpact.fmus.terminal import Terminal
 
 _MOST_WINDOWS = 12
@@ -27,16 +27,13 @@ def print_comparison(console: Terminal, comparisons: Sequence[Comparison]) -> No
     comparisons : sequence of Comparison
     """
     names = comparison_names(comparisons)
-    table = Table(title="Simulated against measured", title_justify="left", box=SIMPLE_HEAD)
-    table.add_column("score")
-    for name in names:
-        table.add_column(name, justify="right")
+    rows = table("Simulated against measured", "<score", *(f">{name}" for name in names))
     for heading, said in _ROWS:
         cells = [said(comparison) for comparison in comparisons]
         if any(cells):
-            table.add_row(heading, *cells)
-    _add_windows(table, comparisons)
-    console.print(table)
+            rows.add_row(heading, *cells)
+    _add_windows(rows, comparisons)
+    console.print(rows)
     for name, comparison in zip(names, comparisons, strict=True):
         for remark in comparison.remarks:
             console.print(f"{name}: {remark}")
@@ -50,7 +47,7 @@ def _lag(comparison: Comparison) -> str:
     found = comparison.alignment
     if found.lag_error <= 0.0:
         return f"{1e3 * found.lag:.4f} ms (given)"
-    return f"{1e3 * found.lag:.4f} +- {1e3 * found.lag_error:.2g} ms"
+    return with_error(1e3 * found.lag, 1e3 * found.lag_error, "ms")
 
 
 def _margin(value: float) -> str:
@@ -58,8 +55,7 @@ def _margin(value: float) -> str:
 
 
 def _frequency(line: DominantFrequency) -> str:
-    doubt = f" +- {line.uncertainty:.2g}" if line.uncertainty > 0.0 else ""
-    return f"{line.frequency:.5g}{doubt} Hz"
+    return with_error(line.frequency, line.uncertainty, "Hz")
 
 
 def _offset(comparison: Comparison) -> str:
@@ -109,7 +105,7 @@ _ROWS: tuple[tuple[str, Callable[[Comparison], str]], ...] = (
 )
 
 
-def _add_windows(table: Table, comparisons: Sequence[Comparison]) -> None:
+def _add_windows(rows: Table, comparisons: Sequence[Comparison]) -> None:
     """Add a row for each window: those asked for, then the running ones, from the onset in ms."""
     for what in ("windows", "running"):
         spans = sorted({span for comparison in comparisons for span in getattr(comparison, what)})
@@ -125,4 +121,4 @@ def _add_windows(table: Table, comparisons: Sequence[Comparison]) -> None:
                     _percent(float(scores[mine.index((start, stop))])) if (start, stop) in mine else ""
                 )
             heading = "  window" if what == "windows" else "  running"
-            table.add_row(f"{heading} {instant(start)} to {instant(stop)}", *cells)
+            rows.add_row(f"{heading} {instant(start)} to {instant(stop)}", *cells)

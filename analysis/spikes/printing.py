@@ -8,13 +8,12 @@ from rich.table import Table
 
 from vibroimpact.analysis.spikes.contact import SHORT_CONTACT
 from vibroimpact.analysis.spikes.report import SpikeReport
+from vibroimpact.fmus.printing import table, with_error
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.fmus.units import written_unit
 
 #: A longer list of spikes is cut; all of them are in the dataset.
 _MOST_ROWS = 12
-#: From here on numbers are written with an exponent.
-_LARGE = 1e7
 
 
 def print_spikes(console: Terminal, report: SpikeReport) -> None:
@@ -67,23 +66,23 @@ def _settings(report: SpikeReport) -> Table:
     chosen = found.settings
     asked = chosen.threshold is not None or chosen.threshold_part is not None
     why = "asked for" if asked else f"noise passes it {chosen.false_alarms:g} times in such a record"
-    table = Table("how", "value", "why", title="Identification", title_justify="left")
-    table.add_row("method", found.method, found.reason)
+    rows = table("Identification", "<how", "<value", "<why")
+    rows.add_row("method", found.method, found.reason)
     if found.cycle.found:
         period = found.cycle.period * found.interval
         doubt = float(data.attrs["interval_uncertainty"])
         within = f" ± {doubt:.1%}" if doubt else ""
-        table.add_row("excitation", f"{1.0 / period:.6g} Hz{within}", f"{found.cycle.count} cycles")
-    table.add_row("threshold", f"{found.threshold:.4g}{shown}", why)
-    table.add_row("over at", f"{found.lower_threshold:.4g}{shown}", f"hysteresis {chosen.hysteresis:g}")
-    table.add_row("noise", f"{found.noise:.4g}{own}", f"tail shape {found.tail.shape:.2f} (0: normal)")
-    table.add_row(
+        rows.add_row("excitation", f"{1.0 / period:.6g} Hz{within}", f"{found.cycle.count} cycles")
+    rows.add_row("threshold", f"{found.threshold:.4g}{shown}", why)
+    rows.add_row("over at", f"{found.lower_threshold:.4g}{shown}", f"hysteresis {chosen.hysteresis:g}")
+    rows.add_row("noise", f"{found.noise:.4g}{own}", f"tail shape {found.tail.shape:.2f} (0: normal)")
+    rows.add_row(
         "baseline", f"{found.baseline_window * found.interval:.4g} s", "window of the running median"
     )
-    table.add_row("polarity", chosen.polarity, f"at least {chosen.minimum_samples} samples")
+    rows.add_row("polarity", chosen.polarity, f"at least {chosen.minimum_samples} samples")
     merge = f"{chosen.merge:g} s" if chosen.merge is not None else _automatic_merge(found.method)
-    table.add_row("ringing", merge, "excursions as close are one spike")
-    return table
+    rows.add_row("ringing", merge, "excursions as close are one spike")
+    return rows
 
 
 def _automatic_merge(method: str) -> str:
@@ -93,58 +92,42 @@ def _automatic_merge(method: str) -> str:
 def _spikes(data: xr.Dataset) -> Table:
     """Return one row for each spike."""
     peak, impulse = (written_unit(str(data[name].attrs["units"])) for name in ("spike_peak", "spike_impulse"))
-    heads = ["time (s)", f"peak ({peak})", f"impulse ({impulse})", "passes"]
+    heads = [">time (s)", f">peak ({peak})", f">impulse ({impulse})", ">passes"]
     columns = [("spike_peak", "spike_peak_error"), ("spike_impulse", "spike_impulse_error")]
     if "spike_velocity" in data:
-        heads.insert(3, "velocity (m/s)")
+        heads.insert(3, ">velocity (m/s)")
         columns.append(("spike_velocity", "spike_velocity_error"))
-    table = Table(*heads, title="Spikes", title_justify="left")
-    table.columns[0].no_wrap = True
+    rows = table("Spikes", *heads)
     for place in range(min(int(data.sizes["spike"]), _MOST_ROWS)):
         one = data.isel(spike=place)
         clipped = " clipped" if int(one["spike_clipped"]) else ""
-        table.add_row(
+        rows.add_row(
             f"{float(one['spike_time']):.6f}{clipped}",
-            *(_with_error(float(one[value]), float(one[error])) for value, error in columns),
+            *(with_error(float(one[value]), float(one[error])) for value, error in columns),
             f"{int(one['spike_excursions'])}",
         )
-    return table
+    return rows
 
 
 def _contacts(data: xr.Dataset) -> Table:
     """Return how long each spike lasts, and its sum above the threshold, which depends on the threshold."""
-    heads = ("time (s)", "foot to foot (ms)", "above (ms)")
-    sums = f"sum above ({written_unit(str(data['spike_impulse'].attrs['units']))})"
-    table = Table(*heads, sums, title="Contacts, and what is above the threshold", title_justify="left")
+    heads = (">time (s)", ">foot to foot (ms)", ">above (ms)")
+    sums = f">sum above ({written_unit(str(data['spike_impulse'].attrs['units']))})"
+    rows = table("Contacts, and what is above the threshold", *heads, sums)
     for place in range(min(int(data.sizes["spike"]), _MOST_ROWS)):
         one = data.isel(spike=place)
-        table.add_row(
+        rows.add_row(
             f"{float(one['spike_time']):.6f}",
             f"{1e3 * float(one['spike_length']):.4g}",
             f"{1e3 * float(one['spike_duration']):.4g}",
             f"{float(one['spike_impulse_above']):.4g}",
         )
-    return table
-
-
-def _with_error(value: float, error: float) -> str:
-    """Return a value to the second digit of its error.
-
-    >>> _with_error(0.87483, 0.0062), _with_error(43949.8, 23.8), _with_error(39357.0, 263.0)
-    ('0.8748 ± 0.0062', '43950 ± 24', '39360 ± 260')
-    """
-    if not 0.0 < error < np.inf or value == 0.0:
-        return f"{value:.5g} ± {error:.2g}"
-    place = int(np.floor(np.log10(error))) - 1
-    if place > 0 and abs(value) < _LARGE:
-        return f"{round(value, -place):.0f} ± {round(error, -place):.0f}"
-    digits = int(np.floor(np.log10(abs(value)))) - int(np.floor(np.log10(error))) + 2
-    return f"{value:.{min(max(digits, 1), 7)}g} ± {error:.2g}"
+    return rows
 
 
 def _waveforms(data: xr.Dataset) -> Table:
     """Return how well each curve fits."""
-    table = Table("curve", "goodness", "length (ms)", "chosen", title="Waveform", title_justify="left")
+    rows = table("Waveform", "<curve", ">goodness", ">length (ms)", "<chosen")
     for name in data["waveform"].values:
         fit = data.sel(waveform=name)
         goodness = fit["spike_fit_goodness"].values
@@ -153,20 +136,22 @@ def _waveforms(data: xr.Dataset) -> Table:
         length = 1e3 * float(np.nanmedian(fit["spike_fit_length"].values))
         words = f"{length:.4g}" + (" (standard deviation)" if name == "bell" else "")
         mark = "yes" if name == data.attrs["waveform"] else ""
-        table.add_row(str(name).replace("_", "-"), f"{float(np.nanmedian(goodness)):.4f}", words, mark)
-    return table
+        rows.add_row(str(name).replace("_", "-"), f"{float(np.nanmedian(goodness)):.4f}", words, mark)
+    return rows
 
 
 def _print_contact(console: Terminal, data: xr.Dataset) -> None:
     if "sensitivity" in data:
         value, error = float(data["sensitivity"]), float(data["sensitivity_error"])
-        console.print(f"Sensitivity of the load cell {value:.5g} ± {error:.2g} V/N, from the impulses given.")
+        console.print(
+            f"Sensitivity of the load cell {with_error(value, error, 'V/N')}, from the impulses given."
+        )
     if "contact_time_measure" not in data:
         return
     measure, error = float(data["contact_time_measure"]), float(data["contact_time_measure_error"])
     verdict = "below" if measure < SHORT_CONTACT else "not below"
     console.print(
-        f"Contact-time measure {measure:.4g} ± {error:.2g} above the threshold, "
+        f"Contact-time measure {with_error(measure, error)} above the threshold, "
         f"{float(data['contact_time_measure_feet']):.4g} from foot to foot: "
         f"{verdict} {SHORT_CONTACT:g}, under which rigid impacts are an adequate model."
     )

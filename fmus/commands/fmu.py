@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from rich.table import Table
-
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.archive import platforms, unpack
 from vibroimpact.fmus.packaging.build import BUILT, build, read_components, update_readmes
 from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.python_fmus import build_user_contact_law
+from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.shipped import component_name, components, fmu_path
-from vibroimpact.fmus.terminal import Terminal, say
+from vibroimpact.fmus.terminal import say, wide_terminal
 
 VERSIONS = ("3.0", "2.0")
 USER_CONTACT_LAW = "user-contact-law"
@@ -22,13 +21,12 @@ USER_CONTACT_LAW = "user-contact-law"
 
 def print_components() -> None:
     """Show every component, its FMUs and what they run on."""
-    table = Table("component", "FMI", "variables", "platforms", "file", title="Components")
+    rows = table("Components", "<component", "<FMI", ">variables", "<platforms", "<file")
     for component in read_components():
         for version in VERSIONS:
             count = len(component.variables_of(int(version[0])))
-            table.add_row(component.name, version, str(count), *_binaries(component.name, version))
-    # paths are for copying: never cut them
-    Terminal(soft_wrap=True).print(table)
+            rows.add_row(component.name, version, str(count), *_binaries(component.name, version))
+    wide_terminal().print(rows)
 
 
 def _binaries(name: str, version: str) -> tuple[str, str]:

@@ -8,8 +8,9 @@ from typing import Any
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.recording import Recording, write_recording
+from vibroimpact.analysis.recording.table import print_recording
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.hardware.commands.table import show_recording
+from vibroimpact.fmus.terminal import wide_terminal
 from vibroimpact.hardware.recordings import import_recording, read_settings
 from vibroimpact.hardware.recordings.settings import checked
 
@@ -30,7 +31,10 @@ def import_into(
     sources = recording.attrs.get("source_sha256")
     refuse_overwriting(output, force, lambda there: there.get("source_sha256", "") == sources)
     _write(recording, output, figure)
-    show_recording(recording, output, figure)
+    console = wide_terminal()
+    print_recording(console, recording)
+    drawn = f" Figure: {figure}." if figure else ""
+    console.print(f"Recording written to {output}.{drawn}", soft_wrap=True)
 
 
 def span(text: str, option: str) -> list[float]:

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import typer
 import xarray as xr
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from vibroimpact.analysis import figures
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.landmarks import Reading, bifurcation_readings
 from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.progress import shown_progress
@@ -79,14 +79,11 @@ def _draw(dataset: xr.Dataset, path: Path) -> Path:
 
 
 def _table(readings: list[Reading]) -> Table:
-    table = Table(title="Angular frequencies read off the dataset", title_justify="left", box=SIMPLE_HEAD)
-    table.add_column("what")
-    for heading in ("read", "exact", "grid steps apart"):
-        table.add_column(heading, justify="right")
+    rows = table("Angular frequencies read off the dataset", "<what", ">read", ">exact", ">grid steps apart")
     for reading in readings:
         steps = f"{abs(reading.steps):.2f}"
-        table.add_row(reading.name, f"{reading.value:.6f}", f"{reading.exact:.6f}", steps)
-    return table
+        rows.add_row(reading.name, f"{reading.value:.6f}", f"{reading.exact:.6f}", steps)
+    return rows
 
 
 def _refuse_far_readings(readings: list[Reading]) -> None:

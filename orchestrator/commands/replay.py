@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import xarray as xr
-from rich.table import Table
 
 from vibroimpact.analysis.dataset.outputs import refuse_folder, refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.dataset.results import write_results
@@ -16,6 +15,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.replay.table import print_comparison
 from vibroimpact.analysis.replay.trust import Verdict
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.printing import table, value_and_error
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.orchestrator.campaign.manifest import holds_scene
 from vibroimpact.orchestrator.replay import ReplayFit
@@ -137,10 +137,10 @@ def _print(
         for reason in verdict.beside:
             console.print(f"  also: {reason}", soft_wrap=True)
     if fit is not None:
-        table = Table("number", "found", "standard error", "began with", title="Fit", title_justify="left")
+        rows = table("Fit", "<number", ">found", ">standard error", ">began with")
         for key, value, error, start in zip(fit.keys, fit.values, fit.standard_error, fit.start, strict=True):
-            table.add_row(key, f"{value:.6g}", f"{error:.2g}", f"{start:.6g}")
-        console.print(table)
+            rows.add_row(key, *value_and_error(value, error), f"{start:.6g}")
+        console.print(rows)
         for line in fit.remarks:
             console.print(f"  {line}", soft_wrap=True)
     for replay in replays:

@@ -1,24 +1,18 @@
-"""The table that `vibroimpact import` prints: what was imported, and what was noticed."""
+"""A recording as a table for people: its channels, its events, what is odd about them."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 from rich.table import Table
 
-from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording
+from vibroimpact.analysis.recording.channels import Channel, EventTrain, Quality, Recording
+from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.fmus.units import written_unit
 
-_PIPE_WIDTH = 160
 
-
-def show_recording(recording: Recording, output: Path, figure: Path | None = None) -> None:
-    """Print a table of the channels and events of a recording, then its remarks, a line each."""
-    console = Terminal()
-    if not console.is_terminal:  # a pipe has no width to keep to
-        console.width = _PIPE_WIDTH
+def print_recording(console: Terminal, recording: Recording) -> None:
+    """Print tables of the channels and events of a recording, then its single values and remarks, a line each."""
     if recording.channels:
         console.print(_channel_table(recording))
     if recording.events:
@@ -28,19 +22,14 @@ def show_recording(recording: Recording, output: Path, figure: Path | None = Non
         console.print(f"{name} = {shown}")
     for line in recording.remarks:
         console.print(f"- {line}", soft_wrap=True)
-    console.print(
-        f"Recording written to {output}." + (f" Figure: {figure}." if figure else ""), soft_wrap=True
-    )
 
 
 def _channel_table(recording: Recording) -> Table:
-    table = Table(title=recording.title)
-    table.add_column("channel", overflow="fold")
-    for heading in ("samples", "rate (Hz)", "unit", "min", "max", "clipped", "missing", "overrange"):
-        table.add_column(heading, justify="right", overflow="fold")
+    heads = (">samples", ">rate (Hz)", ">unit", ">min", ">max", ">clipped", ">missing", ">overrange")
+    rows = table(recording.title, "<channel", *heads)
     for channel in recording.channels.values():
-        table.add_row(*_channel_row(channel))
-    return table
+        rows.add_row(*_channel_row(channel))
+    return rows
 
 
 def _channel_row(channel: Channel) -> tuple[str, ...]:
@@ -67,13 +56,11 @@ def _channel_row(channel: Channel) -> tuple[str, ...]:
 
 
 def _event_table(recording: Recording) -> Table:
-    table = Table(title="" if recording.channels else recording.title)
-    table.add_column("event train", overflow="fold")
-    for heading in ("events", "first (s)", "last (s)", "window (s)", "grid (s)", "per second"):
-        table.add_column(heading, justify="right", overflow="fold")
+    heads = (">events", ">first (s)", ">last (s)", ">window (s)", ">grid (s)", ">per second")
+    rows = table("" if recording.channels else recording.title, "<event train", *heads)
     for train in recording.events.values():
-        table.add_row(*_event_row(train))
-    return table
+        rows.add_row(*_event_row(train))
+    return rows
 
 
 def _event_row(train: EventTrain) -> tuple[str, ...]:

@@ -1,0 +1,54 @@
+"""Any file of ours, opened as what it is: a dataset of runs, a recording, what an analysis found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from pathlib import Path
+
+import xarray as xr
+
+from vibroimpact.analysis.dataset import open_dataset, open_measured
+from vibroimpact.analysis.dataset.results import file_attributes
+from vibroimpact.analysis.files.fingerprints import matches_recorded_hash
+from vibroimpact.analysis.files.opening import DAMAGE, unreadable
+from vibroimpact.analysis.recording import Recording, open_recording
+
+
+def dataset_of(path: Path) -> Path:
+    """Return the file that a name stands for: of the folder of a campaign its dataset, as for `open_dataset`."""
+    return path / "dataset.nc" if path.is_dir() else path
+
+
+@contextmanager
+def opened_file(file: Path) -> Iterator[xr.Dataset | Recording]:
+    """Open a file; values are read when first used, so that damage may show only then.
+
+    Raises
+    ------
+    DatasetError
+        The file is missing, damaged or foreign.
+    """
+    try:
+        with _opened(file) as data:
+            yield data
+    except DAMAGE as problem:
+        # What bears the hash of its writer holds what was written: there the fault is not the file's.
+        if isinstance(problem, OSError | RuntimeError) or not matches_recorded_hash(file):
+            raise unreadable(file, problem) from problem
+        raise
+
+
+def _opened(file: Path) -> AbstractContextManager[xr.Dataset | Recording]:
+    attributes = file_attributes(file)
+    if "recording_schema" in attributes:
+        return nullcontext(open_recording(file))
+    if "results_kind" in attributes:
+        return open_measured(file)
+    if "dataset_schema" not in attributes:
+        measured = open_measured(file)
+        # of a benchmark, which has no schema
+        if "error" in measured:
+            return measured
+        measured.close()
+    return open_dataset(file)
