@@ -13,9 +13,9 @@ from rich.table import Table
 from vibroimpact.analysis.commands.opened_file import dataset_of, opened_file
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.analysis.recording.table import print_recording
-from vibroimpact.analysis.recording.unit_symbols import written_unit
 from vibroimpact.fmus.printing import table, with_error
 from vibroimpact.fmus.terminal import Terminal, wide_terminal
+from vibroimpact.fmus.units import written_unit
 
 #: Texts of a variable that are shown; the rest is counted.
 _MOST_TEXTS = 6
