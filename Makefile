@@ -66,7 +66,7 @@ docs: $(VENV)/docs.stamp $(VENV)/fmus.stamp ## build the documentation site, its
 	@echo "The site begins at build/docs/html/index.html."
 
 clean: ## remove what make has made
-	rm -rf .venv .venv-* .editable build/docs fmus/built
+	rm -rf .venv .venv-* .editable build fmus/built
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "make: needs Python 3.11 or newer, found none on PATH. Install it, or say where it is: make PYTHON=/path/to/python3" >&2; exit 1; }

@@ -89,7 +89,7 @@ def kinds() -> dict[str, Picture]:
         "recording": _of("recording", "hit", hit),
         "replay": _of("replay", "fit", f"vibroimpact replay {board} hit.nc -o fit.nc {fit}"),
         "scores": _of("scores", "grid", "vibroimpact replay grid.toml hit.nc -o grid --workers 2"),
-        "estimates": _of("estimates", "found", "vibroimpact estimate single_run.nc -o found.nc"),
+        "estimates": _of("estimates", "found", "vibroimpact estimate impacts single_run.nc -o found.nc"),
         "intervals": _of("intervals", "trains", "vibroimpact spikes figure_2_11.nc -o trains.nc"),
         "convergence": _of("convergence", "ladder"),
         "work-precision": _of("work-precision", "ladder"),

@@ -11,6 +11,7 @@ from vibroimpact.orchestrator.scene.models import (
     OscillatorBody,
     RestitutionStop,
 )
+from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene.sampled_names import follow_energies
 from vibroimpact.orchestrator.scene.scene import Scene
 
@@ -83,7 +84,8 @@ def _samples(scene: Scene) -> bool:
 
 def _largest(scene: Scene) -> dict[str, float]:
     """Return the largest magnitude that each number of a scene has over its sweep, by key."""
-    swept = {axis.key: max(max(axis.values), -min(axis.values)) for axis in scene.sweep}
+    numbers = [axis for axis in scene.sweep if axis.key != RECORDING_KEY]
+    swept = {axis.key: max(max(axis.values), -min(axis.values)) for axis in numbers}
     return {key: abs(number) for key, number in scene.constants().items()} | swept
 
 

@@ -1,6 +1,6 @@
 """The C core with the doors that only tests go through (`doors/`): bodies of many modes.
 
-Compiled once for each state of the sources; what is built lies beside the FMUs, where `make clean` removes it.
+Compiled once for each state of the sources; what is built lies in `build/`, which `make clean` removes.
 """
 
 from __future__ import annotations
@@ -11,7 +11,8 @@ import os
 from functools import lru_cache
 from pathlib import Path
 
-from vibroimpact.fmus.packaging.build import BUILT, NATIVE, fingerprint
+from support.places import ROOT
+from vibroimpact.fmus.packaging.build import NATIVE, fingerprint
 from vibroimpact.fmus.packaging.compiler import compile_library
 from vibroimpact.fmus.packaging.platform_names import library_suffix
 
@@ -25,9 +26,9 @@ def library_with_doors() -> ctypes.CDLL:
     digest = hashlib.sha256(
         fingerprint().encode() + b"".join(path.read_bytes() for path in doors)
     ).hexdigest()
-    target = BUILT / "tests" / f"libvibroimpact_tests-{digest[:16]}{library_suffix()}"
+    target = ROOT / "build" / "tests" / f"libvibroimpact_tests-{digest[:16]}{library_suffix()}"
     if not target.is_file():
-        target.parent.mkdir(exist_ok=True)
+        target.parent.mkdir(parents=True, exist_ok=True)
         beside = target.with_name(f"{os.getpid()}-{target.name}")  # several workers may build it at once
         compile_with_doors(beside, NATIVE / "core")
         beside.replace(target)

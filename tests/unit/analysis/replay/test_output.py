@@ -18,6 +18,7 @@ from vibroimpact.analysis.figures.replay import draw_replay
 from vibroimpact.analysis.recording import TimeAxis
 from vibroimpact.analysis.replay import Comparison, compare, comparison_dataset, print_comparison
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.printing import with_error
 
 TIME = clock()
 MODEL = ring(TIME - HIT)
@@ -90,7 +91,7 @@ def test_table_says_score_lag_sign_and_what_was_left_out() -> None:
     said = text.getvalue()
     for expected in (
         f"{comparison.variance:.2f} %",
-        f"{1e3 * comparison.alignment.lag:.4f}",
+        with_error(1e3 * comparison.alignment.lag, 1e3 * comparison.alignment.lag_error, "ms"),
         f"{comparison.counts['clipped']} clipped",
         "1 matched, 1 missed, 0 extra",
         "not scored",

@@ -6,7 +6,10 @@ import io
 
 import pytest
 
-from vibroimpact.orchestrator.guard.pipe import LENGTH, Failure, Order, Point, receive, send
+from vibroimpact.orchestrator.guard.pipe import LENGTH, Failure, Order, PointTask, receive, send
+from vibroimpact.orchestrator.scene import parse_scene
+
+FREE = "[body]\nmass = 1\nstiffness = 1\n[record]\nrecorded_time = 5"
 
 
 def sent(*messages: object) -> bytes:
@@ -18,8 +21,8 @@ def sent(*messages: object) -> bytes:
 
 def test_messages_arrive_one_by_one_as_they_were_sent() -> None:
     messages = [
-        Order("[body]", "scene.toml", "fused", "notes", noting=True),
-        Point({"body.mass": 0.1 + 0.2}, (1.0, -0.0)),
+        Order(parse_scene(FREE, "scene.toml"), "fused", "notes", noting=True),
+        PointTask({"body.mass": 0.1 + 0.2}, (1.0, -0.0)),
         Failure("a: expected b, got c\n\N{GREEK SMALL LETTER OMEGA}", misuse=True),
     ]
     pipe = io.BytesIO(sent(*messages))
