@@ -76,7 +76,8 @@ class ImpactOscillator:
         """
         scene = parse_toml(text)
         stops = scene.get("stop", [])
-        if scene.get("body", {}).get("kind") != "oscillator" or len(stops) != 1 or "forcing" not in scene:
+        kind = scene["body"].get("kind", "oscillator") if "body" in scene else "none"
+        if kind != "oscillator" or len(stops) != 1 or "forcing" not in scene:
             raise DatasetError(
                 "scene: expected a forced oscillator with one stop, got another scene. "
                 "Exact landmarks are known for that one only."

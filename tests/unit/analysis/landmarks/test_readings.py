@@ -81,10 +81,15 @@ def test_a_scene_with_a_lower_stop_is_the_mirror_image() -> None:
     assert ImpactOscillator.from_scene(mirrored) == THESIS
 
 
+def test_a_body_without_a_kind_is_an_oscillator() -> None:
+    assert ImpactOscillator.from_scene(SCENE.replace('kind = "oscillator"\n', "")) == THESIS
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ('kind = "oscillator"', 'kind = "beam"', "expected a forced oscillator with one stop"),
+        ("[body]", "[bodies]", "expected a forced oscillator with one stop"),
         ("position = 1.0", "position = 0.0", "expected an impulsive stop at a positive distance"),
         ("damping_ratio = 0.05", "damping_ratio = 1.5", "expected damping_ratio < 1"),
     ],
