@@ -13,6 +13,9 @@ PACKAGES = ("fmus", "analysis", "orchestrator", "hardware")
 FOLDERS = sorted(page for package in PACKAGES for page in (ROOT / package).rglob("README.md"))
 SECTION = re.compile(r"^##+ (\d+(?:\.\d+)?)\b", re.MULTILINE)
 CITED = re.compile(r"equations\.md ((?:\d+(?:\.\d+)?(?:, | and | to )?)+)")
+FILE = re.compile(
+    r"(?<![\w/.])(?:fmus|analysis|orchestrator|hardware|door|tests)/[\w/]+\.(?:py|c|h|toml|md)\b"
+)
 LINK = re.compile(r"\]\(([^)\s#]+)(?:#[^)]*)?\)")
 
 
@@ -24,6 +27,12 @@ def links(page: Path) -> list[str]:
 @pytest.mark.parametrize("page", [*PAGES, *FOLDERS], ids=lambda page: str(page.relative_to(ROOT)))
 def test_no_link_of_a_page_leads_into_nowhere(page: Path) -> None:
     assert [link for link in links(page) if not (page.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("page", [*PAGES, *FOLDERS], ids=lambda page: str(page.relative_to(ROOT)))
+def test_the_files_of_the_project_that_a_page_names_are_there(page: Path) -> None:
+    named = FILE.findall(page.read_text(encoding="utf-8"))
+    assert [name for name in named if not (ROOT / name).exists()] == []
 
 
 def test_every_page_is_found_from_the_readme() -> None:
