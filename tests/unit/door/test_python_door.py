@@ -109,7 +109,7 @@ def test_a_run_in_memory_is_that_of_the_file(tmp_path):
     assert found.sizes["angular_frequency"] == 2
     assert found.encoding == {}
     # it saves and opens as any other
-    found.to_netcdf(tmp_path / "again.nc", engine="netcdf4")
+    found.to_netcdf(tmp_path / "again.nc")
     assert vi.open_dataset(tmp_path / "again.nc").outcome.values.tolist() == [0, 0]
 
 
