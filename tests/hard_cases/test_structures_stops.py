@@ -236,3 +236,15 @@ def test_of_two_stops_at_one_place_the_livelier_one_throws_the_body_off(order: i
         assert body.advance(0.5) == DONE
         assert body.displacement[0] == pytest.approx(-0.3 * math.sin(0.5), rel=ROUNDING)
         assert body.statuses == ("free", "free")
+
+
+def test_a_body_that_stops_hold_in_place_is_not_worked_on() -> None:
+    # two rigid stops whose shapes are nearly parallel: what they solve for is rounded forty times as coarsely
+    near = np.array([[0.12774186, 0.60210998], [0.27296587, 1.05226582]])
+    stops = [Stop(near[0], 0.0, side="lower", restitution=0.0), Stop(near[1], 0.0, restitution=0.5)]
+    modes = Modes([1.0, 6.26689303], 0.02, [2.60725225, -0.97574072], 0.3)
+    with Structure(modes, stops, 0.0, 0.0, energies=True) as body:
+        for _ in range(50):
+            assert body.advance(0.1) == DONE
+        assert np.all(body.forces > 0.0)
+        assert abs(body.forcing_work) <= ROUNDING

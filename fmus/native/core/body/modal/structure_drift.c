@@ -500,5 +500,8 @@ double vi_structure_drift(const vi_structure *s, double length, double room, vi_
     memcpy(q, state->q, sizeof q);
     vi_drift_at(&drift, u, q, state->p, state->q);
     finish(s, &drift, &now, u);
+    if (state->follow_energies) {
+        vi_energies_of_rounding(s, &drift, q, now.held, u);
+    }
     return u;
 }

@@ -178,3 +178,18 @@ void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const do
         }
     }
 }
+
+void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const double q[], const double held[],
+                             double u)
+{
+    const double cosine = cos(s->model->clock.angular_frequency * (s->state->now.rest + u)), zero[VI_MODES] = {0.0};
+    double moved[VI_MODES], p[VI_MODES], work = 0.0, way = 0.0, undone = 0.0;
+    vi_drift_at(drift, u, zero, p, moved);
+    for (int j = 0; j < s->model->modes; ++j) {
+        const double back = q[j] + moved[j] - s->state->q[j];
+        work += (s->model->mode[j].force * cosine + held[j] + s->state->held_rate[j] * u) * back;
+        way += fabs(moved[j]);
+        undone += fabs(back);
+    }
+    s->state->energies.forcing_work -= undone > 0.5 * way ? work : 0.0;
+}

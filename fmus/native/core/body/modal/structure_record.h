@@ -14,6 +14,10 @@ void vi_energies_of_flight(const vi_structure *s, const vi_flight *flight, const
 /* Contacts that are `still` do no work: what their series say of their motion is rounding. */
 void vi_energies_of_drift(const vi_structure *s, const vi_drift *drift, const double held[], const int still[],
                           double u);
+/* A drift from the displacements `q` that rounding and the stops that hold have undone, more than half of it, was no
+ * motion: the loads did no work over what is undone. */
+void vi_energies_of_rounding(const vi_structure *s, const vi_drift *drift, const double q[], const double held[],
+                             double u);
 
 /* ---- extremes of the observed point ---- */
 
