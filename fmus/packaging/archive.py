@@ -16,7 +16,6 @@ import tempfile
 import time
 import zipfile
 import zlib
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from io import BufferedReader
@@ -209,11 +208,15 @@ def _place(member: zipfile.ZipInfo) -> tuple[str, ...]:
 
 
 def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[str]:
-    """Yield what members would overwrite: equal places, and files where others need a folder."""
+    """Yield what members would overwrite: others at their place, and files where others need a folder."""
     places = [_place(member) for member in members]
-    twice = [place for place, count in Counter(places).items() if count > 1]
-    if twice:
-        yield f"two members have the same name, {_cut('/'.join(twice[0]))}"
+    contents: dict[tuple[str, ...], tuple[bool, int, int]] = {}
+    for member, place in zip(members, places, strict=True):
+        # the same member twice, as builds write it that list a folder twice; bytes are compared once unpacked
+        content = (_is_folder(member), member.file_size, member.CRC)
+        if contents.setdefault(place, content) != content:
+            yield f"two members have the same name, {_cut('/'.join(place))}"
+            break
     folders = {place[:end] for place in places for end in range(len(place))}
     blocking = [m for m, place in zip(members, places, strict=True) if place in folders and not _is_folder(m)]
     if blocking:

@@ -43,7 +43,7 @@ def check_fmu(path: Path) -> tuple[str, ...]:
     try:
         fmu = unpack(path)
     except ComponentFileError as error:
-        return (str(error),)
+        return (str(error).removeprefix(f"{path}: "),)
     return (
         *validate(path),
         *_spelling_problems(fmu),
@@ -90,7 +90,7 @@ def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
     try:
         binary = binary_path(fmu)
     except ComponentFileError as error:
-        return (str(error),)
+        return (str(error).removeprefix(f"{fmu.source}: "),)
     facts = {
         "binary": str(binary),
         "fmi_version": fmu.fmi_version,

@@ -5,6 +5,7 @@ import stat
 import subprocess
 import sys
 import zipfile
+import zlib
 from pathlib import Path
 
 import pytest
@@ -232,9 +233,28 @@ def test_a_symbolic_link_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_two_members_with_one_name_are_refused(tmp_path: Path) -> None:
-    path = written(tmp_path / "M.fmu", {"modelDescription.xml": DESCRIPTION})
+def test_two_different_members_with_one_name_are_refused(tmp_path: Path) -> None:
+    path = written(tmp_path / "M.fmu", {"modelDescription.xml": DESCRIPTION + " "})
     assert "the same name" in refusal(path)
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_members_that_are_listed_twice_are_unpacked(tmp_path: Path) -> None:
+    path = written(tmp_path / "M.fmu", {"extra/": b"", "extra/x/": b"", "extra/x/a": b"one"})
+    with zipfile.ZipFile(path, "a") as file:
+        for name in ("extra/", "extra/x/", "extra/x/a"):
+            file.writestr(name, b"" if name.endswith("/") else b"one")
+    assert (unpack(path).folder / "extra/x/a").read_bytes() == b"one"
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_members_of_one_name_and_one_checksum_are_refused_when_their_bytes_differ(tmp_path: Path) -> None:
+    one, other = b"plumless", b"buckeroo"  # CRC-32 of both: 4ddb0c25
+    assert zlib.crc32(one) == zlib.crc32(other)
+    path = written(tmp_path / "M.fmu", {"resources/x": one})
+    with zipfile.ZipFile(path, "a") as file:
+        file.writestr("resources/x", other)
+    assert "an unpacked copy equal to the archive" in refusal(path)
 
 
 @pytest.mark.parametrize("name", ["resources//x", "./resources/x", "resources/./x"])

@@ -95,7 +95,8 @@ def test_a_function_that_does_not_resolve_is_found(tmp_path: Path) -> None:
 def test_a_file_that_is_no_fmu_is_one_problem(tmp_path: Path) -> None:
     path = tmp_path / "O.fmu"
     path.write_bytes(b"nothing")
-    assert len(check_fmu(path)) == 1
+    (problem,) = check_fmu(path)
+    assert problem.startswith("expected an FMU (a zip archive), got")
 
 
 @pytest.mark.slow
