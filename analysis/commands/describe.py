@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 from rich.table import Table
 
-from vibroimpact.analysis.commands.opened_file import dataset_of, opened_file
+from vibroimpact.analysis.commands.opened_file import opened_file
+from vibroimpact.analysis.dataset import dataset_file
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.analysis.recording.table import print_recording
 from vibroimpact.fmus.printing import table, with_error
@@ -39,7 +40,7 @@ def describe_file(path: Path) -> None:
     DatasetError
         The file is missing, damaged or foreign.
     """
-    file = dataset_of(path)
+    file = dataset_file(path)
     console = wide_terminal()
     with opened_file(file) as data:
         console.print(f"{file}: {_kind(data)}", soft_wrap=True)

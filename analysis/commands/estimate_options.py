@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -65,7 +66,7 @@ class EstimateGroup(TyperGroup):
 
 def _has_old_form(first: str) -> bool:
     """Tell whether the first word is an option or a file; a kind of estimation that is misspelt is neither."""
-    return first.startswith("-") or bool(Path(first).suffix) or Path(first).exists()
+    return first.startswith("-") or bool(Path(first).suffix) or os.path.exists(first)
 
 
 def _without_kind(args: Sequence[str]) -> tuple[str, list[str]]:

@@ -15,11 +15,6 @@ from vibroimpact.analysis.files.opening import DAMAGE, unreadable
 from vibroimpact.analysis.recording import Recording, open_recording
 
 
-def dataset_of(path: Path) -> Path:
-    """Return the file that a name stands for: of the folder of a campaign its dataset, as for `open_dataset`."""
-    return path / "dataset.nc" if path.is_dir() else path
-
-
 @contextmanager
 def opened_file(file: Path) -> Iterator[xr.Dataset | Recording]:
     """Open a file; values are read when first used, so that damage may show only then.

@@ -9,7 +9,8 @@ from typing import Any
 import xarray as xr
 
 from vibroimpact.analysis import figures
-from vibroimpact.analysis.commands.opened_file import dataset_of, opened_file
+from vibroimpact.analysis.commands.opened_file import opened_file
+from vibroimpact.analysis.dataset import dataset_file
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, writing
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
@@ -18,7 +19,7 @@ from vibroimpact.fmus.terminal import say
 
 def draw_file(file: Path, output: Path, kind: str, run: int | None, options: Mapping[str, Any]) -> None:
     """Draw a file that this package wrote; the options are those of `figures.draw`."""
-    file = dataset_of(file)
+    file = dataset_file(file)
     refuse_outputs([file], None, output)
     with opened_file(file) as data:
         _refuse_few_spikes(file, data)

@@ -10,7 +10,14 @@ from __future__ import annotations
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor
 from vibroimpact.analysis.dataset.checking import check, marked
 from vibroimpact.analysis.dataset.merging import merge_datasets, refuse_unlike, take_runs
-from vibroimpact.analysis.dataset.reading import Part, open_dataset, open_measured, read_flat, read_part
+from vibroimpact.analysis.dataset.reading import (
+    Part,
+    dataset_file,
+    open_dataset,
+    open_measured,
+    read_flat,
+    read_part,
+)
 from vibroimpact.analysis.dataset.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,
@@ -50,6 +57,7 @@ __all__ = [
     "build_dataset",
     "check",
     "constant_names",
+    "dataset_file",
     "file_name_of",
     "file_names",
     "marked",

@@ -130,6 +130,12 @@ def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:
     }
 
 
+def dataset_file(path: str | os.PathLike[str]) -> Path:
+    """Return the file that a name stands for: of the folder of a campaign its dataset."""
+    # os.path: False for names that no file can have, where Path.is_dir raises
+    return Path(path) / "dataset.nc" if os.path.isdir(path) else Path(path)
+
+
 def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a dataset on the real dimensions of its sweep.
 
@@ -160,7 +166,7 @@ def open_dataset(path: str | os.PathLike[str]) -> xr.Dataset:
     >>> up.sel(angular_frequency=0.9, method="nearest")  # doctest: +SKIP
     >>> ds.vibroimpact.impacts(direction="up", angular_frequency=0.9)  # doctest: +SKIP
     """
-    file = Path(path) / "dataset.nc" if Path(path).is_dir() else Path(path)
+    file = dataset_file(path)
     flat = _open_flat(file)
     try:
         with one_error(file):

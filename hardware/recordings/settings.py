@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -163,7 +164,7 @@ def checked(values: Mapping[str, Any], source: str) -> ImportSettings:
 def settings_beside(path: Path) -> ImportSettings:
     """Return the settings in the file `NAME.toml` beside a recording; where there is none, none."""
     beside = path.with_name(path.name + ".toml")
-    return read_settings(beside) if beside.is_file() else ImportSettings()
+    return read_settings(beside) if os.path.isfile(beside) else ImportSettings()
 
 
 def read_settings(path: Path) -> ImportSettings:

@@ -56,6 +56,32 @@ def test_every_command_names_the_ending_that_it_writes_before_it_reads(command: 
     misuse(done, f"expected a name ending in {ending}")
 
 
+@pytest.mark.parametrize("length", [250, 256, 30_000])
+@pytest.mark.parametrize(
+    "command",
+    [
+        *(
+            "check NAME",
+            "run NAME -o a.nc",
+            "campaign NAME -o a",
+            "replay NAME NAME -o a.nc",
+            "plot NAME -o a.png",
+        ),
+        *("describe NAME", "estimate NAME", "estimate impacts NAME", "spikes NAME", "import NAME -o a.nc"),
+        "fmu check NAME",
+    ],
+)
+def test_a_name_too_long_for_a_file_is_one_line_from_every_command(
+    command: str, length: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    refused = in_this_process(*command.replace("NAME", "x" * length).split())
+    assert refused.returncode == 2
+    assert "x" * 50 in refused.stderr
+    assert "defect" not in refused.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_a_run_may_be_repeated_but_another_scene_needs_force(scene: Path, tmp_path: Path) -> None:
     output = tmp_path / "run.nc"
     command = ("run", scene, "-o", output)
