@@ -10,21 +10,47 @@ import errno
 import functools
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from importlib import metadata
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from vibroimpact.fmus.errors import VibroimpactError
-from vibroimpact.fmus.terminal import all_was_written, say
+from vibroimpact.fmus.terminal import all_was_written, printable, say
 
 COMMAND_GROUP = "vibroimpact.commands"
 DEBUG = "--debug"
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 
+
+@contextmanager
+def _printable_misuse() -> Iterator[None]:
+    """Show the words of a command that is misused as `say` would; typer repeats them as they are."""
+    try:
+        yield
+    except Exception as problem:
+        # misuse, whose class is typer's or click's with its version
+        if hasattr(problem, "format_message") and hasattr(problem, "message"):
+            problem.message = printable(problem.message)
+        raise
+
+
+class _Commands(TyperGroup):
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        with _printable_misuse():
+            return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        with _printable_misuse():
+            return super().invoke(ctx)
+
+
 app = typer.Typer(
     name="vibroimpact",
+    cls=_Commands,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,

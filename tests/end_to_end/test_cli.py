@@ -257,3 +257,22 @@ def test_a_bad_fmu_file_is_misuse_with_one_message(
 def test_a_build_into_a_file_is_misuse(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert_misuse(in_this_process("fmu", "build", "--output", tmp_path / "file"), "expected a folder to fill")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "WORD",
+        "--WORD",
+        "run a.toml WORD -o a.nc",
+        "run --WORD",
+        "estimate decay a.nc WORD",
+    ],
+)
+def test_a_word_that_turns_text_around_is_shown_as_its_escape_where_a_command_is_misused(
+    command: str,
+) -> None:
+    refused = in_this_process(*command.replace("WORD", "a\N{RIGHT-TO-LEFT OVERRIDE}b").split())
+    assert refused.returncode == 2
+    assert "\N{RIGHT-TO-LEFT OVERRIDE}" not in refused.stderr
+    assert "u202e" in refused.stderr
