@@ -4,10 +4,11 @@ import sys
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+import import_drawing
 import pytest
 from support.places import ROOT
 
-PACKAGES = ("fmus", "analysis", "orchestrator", "hardware")
+PACKAGES = import_drawing.LAYERS
 
 
 def test_each_layer_imports_only_those_below_it_and_each_heavy_dependency_has_one_door() -> None:
@@ -18,12 +19,7 @@ def test_each_layer_imports_only_those_below_it_and_each_heavy_dependency_has_on
 
 
 def test_no_module_imports_one_that_imports_it_not_even_for_its_types() -> None:
-    modules = {}
-    for package in PACKAGES:
-        for path in (ROOT / package).rglob("*.py"):
-            name = ".".join(("vibroimpact", *path.relative_to(ROOT).with_suffix("").parts))
-            modules[name.removesuffix(".__init__")] = path
-    graph = {name: imported(path) & set(modules) - {name} for name, path in modules.items()}
+    graph = import_drawing.imports()
     assert sum(map(len, graph.values())) > 1000
     try:
         TopologicalSorter(graph).prepare()
@@ -31,15 +27,10 @@ def test_no_module_imports_one_that_imports_it_not_even_for_its_types() -> None:
         raise AssertionError(" imports ".join(error.args[1])) from None
 
 
-def imported(path: Path) -> set[str]:
-    """Return the modules that a file imports, and what could be modules."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module:
-            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-        elif isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-    return found
+def test_the_drawing_of_the_rooms_is_that_of_their_imports() -> None:
+    assert import_drawing.DRAWING.read_text(encoding="utf-8") == import_drawing.drawing(), (
+        "run python docs/site/import_drawing.py"
+    )
 
 
 def test_the_build_of_the_fmus_starts_without_a_single_installed_package() -> None:
