@@ -75,12 +75,15 @@ def main() -> int:
             print(f"SKIPPED: the {missing} sanitizer, which {' '.join(compiler)} does not have here")
         options = options_for(sanitizers)
         core = compile_core(compiler, options, folder)
-        for test in sorted(HERE.glob("*.c")):
-            passed = core is not None and run(test, compiler, options, core, folder)
-            print(
-                f"{test.name} ({', '.join(sanitizers) or 'no sanitizer'}): {'passed' if passed else 'FAILED'}"
+        tests = sorted(HERE.glob("*.c"))
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            results = pool.map(
+                lambda test: core is not None and run(test, compiler, options, core, folder), tests
             )
-            failed += [] if passed else [test.name]
+            for test, passed in zip(tests, results, strict=True):
+                kinds, result = ", ".join(sanitizers) or "no sanitizer", "passed" if passed else "FAILED"
+                print(f"{test.name} ({kinds}): {result}")
+                failed += [] if passed else [test.name]
     return 1 if failed else 0
 
 
