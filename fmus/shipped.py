@@ -40,7 +40,7 @@ def fmu_path(name: str, fmi: str = "3.0") -> Path:
     """
     if fmi not in FOLDERS:
         raise ComponentFileError(f"{name}: expected FMI version {' or '.join(FOLDERS)}, got {fmi!r}.")
-    path = _package() / "built" / FOLDERS[fmi] / f"{component_name(name)}.fmu"
+    path = package_folder() / "built" / FOLDERS[fmi] / f"{component_name(name)}.fmu"
     if not path.is_file():
         raise ComponentFileError(
             f"{path}: expected a built FMU, got none. Run `python -m vibroimpact.fmus.packaging.build`."
@@ -65,7 +65,7 @@ def component_name(name: str) -> str:
 
 
 def _folders() -> dict[str, str]:
-    described = sorted((_package() / "native").glob("*/variables.toml"))
+    described = sorted((package_folder() / "native").glob("*/variables.toml"))
     return dict(_name_and_folder(path, path.stat().st_mtime_ns) for path in described)
 
 
@@ -76,5 +76,6 @@ def _name_and_folder(path: Path, changed: int) -> tuple[str, str]:
     return head["name"], head["folder"]
 
 
-def _package() -> Path:
+def package_folder() -> Path:
+    """Return the folder that the shipped FMUs are below."""
     return Path(str(files("vibroimpact.fmus")))

@@ -171,7 +171,11 @@ class _Campaign:
         hashed = self._manifest.scene_hash if self._manifest is not None else scene_hash(scene)
         self._kept_path = kept_path(self._parts_folder, hashed)
         self._work = Work(
-            scene.text, source, str(self._parts_folder), runner, hashed, kept=str(self._kept_path)
+            scene.model_copy(update={"source": source}),
+            str(self._parts_folder),
+            runner,
+            hashed,
+            kept=str(self._kept_path),
         )
 
     def _checked_manifest(self) -> Manifest | None:

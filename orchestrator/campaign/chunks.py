@@ -1,7 +1,7 @@
 """What a worker does with a chunk: run its points, write them as one part, say how that went.
 
-A chunk is a range of neighbouring runs. Everything here runs on a worker; the scene is parsed
-and the components are loaded once in each process and used for every chunk after that. What a point returns
+A chunk is a range of neighbouring runs. Everything here runs on a worker; the components
+of the scene are loaded once in each process and used for every chunk after that. What a point returns
 never depends on how the runs were cut into chunks.
 """
 
@@ -30,7 +30,7 @@ from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
 from vibroimpact.orchestrator.run import Runner, dataset_of_runs, named_runner
 from vibroimpact.orchestrator.run.empty_record import empty_record
-from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Point, expand
 
 DEFAULT_RUNNER = "vibroimpact.orchestrator.guard.guarded:make_runner"
@@ -62,8 +62,8 @@ class Work:
 
     Attributes
     ----------
-    scene_text, source : str
-        The scene; each worker parses it once.
+    scene : Scene
+        With an absolute path for its source: a worker may live in another folder.
     parts_folder : str
         Absolute path of the folder that the parts go to.
     runner : str
@@ -76,8 +76,7 @@ class Work:
         File with the runs of an earlier sweep that are left out of all chunks; it may be absent.
     """
 
-    scene_text: str
-    source: str
+    scene: Scene
     parts_folder: str
     runner: str = DEFAULT_RUNNER
     scene_hash: str = ""
@@ -138,15 +137,13 @@ class ChunkResult:
 class _Opened:
     """A scene with its components, ready to run in this process."""
 
-    scene: Scene
     branches: tuple[Branch, ...]
     runner: Runner
 
 
 @lru_cache(maxsize=1)
-def _opened(scene_text: str, source: str, runner: str) -> _Opened:
-    scene = parse_scene(scene_text, source)
-    return _Opened(scene, expand(scene), named_runner(scene, runner))
+def _opened(scene: Scene, runner: str) -> _Opened:
+    return _Opened(expand(scene), named_runner(scene, runner))
 
 
 def identity_of(runner: Runner) -> RunnerIdentity:
@@ -156,12 +153,12 @@ def identity_of(runner: Runner) -> RunnerIdentity:
 
 def get_ready(work: Work) -> RunnerIdentity:
     """Load all that a worker needs before its first chunk, and return which runner it has."""
-    opened = _opened(work.scene_text, work.source, work.runner)
+    opened = _opened(work.scene, work.runner)
     # The first dataset of a process takes long, because libraries load what they need when they need it.
     first_point = points_of(opened.branches[:1], Chunk(0, 0, 1))
-    record = empty_record(opened.scene, Outcome.error, "rehearsal", 0.0)
+    record = empty_record(work.scene, Outcome.error, "rehearsal", 0.0)
     with ScratchFolder("rehearsal") as folder:
-        write_dataset(dataset_of(opened.scene, first_point, [record], {}), Path(folder.name, "rehearsal.nc"))
+        write_dataset(dataset_of(work.scene, first_point, [record], {}), Path(folder.name, "rehearsal.nc"))
     return identity_of(opened.runner)
 
 
@@ -173,28 +170,27 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     CampaignError
         When this worker's runner is not the one the campaign began with, or the part cannot be written.
     """
-    opened = _opened(work.scene_text, work.source, work.runner)
+    opened = _opened(work.scene, work.runner)
     _refuse_other_runner(work, opened.runner)
     began = time.perf_counter()
     points = _points_left(work, opened.branches, chunk)
     if not points:
         return ChunkResult(chunk, chunk.start, {}, 0.0, 0.0)
     deadline = began + chunk.most_seconds
-    records, carried = run_points(opened.scene, opened.runner, points, chunk.start, deadline)
+    records, carried = run_points(work.scene, opened.runner, points, chunk.start, deadline)
     computed = time.perf_counter()
     left = points[len(records) :]
     done = replace(chunk, stop=left[0].point.index if left else chunk.stop)
-    outcomes = write_part(work, opened.scene, done, points[: len(records)], records, carried)
+    outcomes = write_part(work, done, points[: len(records)], records, carried)
     return ChunkResult(done, carried, outcomes, computed - began, time.perf_counter() - computed)
 
 
 def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     """Write the part of points that kill the process that runs them; nothing of the points is run."""
     began = time.perf_counter()
-    scene = parse_scene(work.scene_text, work.source)
-    points = _points_left(work, expand(scene), chunk)
-    records = [empty_record(scene, Outcome.crash, message, 0.0) for _ in points]
-    outcomes = write_part(work, scene, chunk, points, records, chunk.start)
+    points = _points_left(work, expand(work.scene), chunk)
+    records = [empty_record(work.scene, Outcome.crash, message, 0.0) for _ in points]
+    outcomes = write_part(work, chunk, points, records, chunk.start)
     return ChunkResult(chunk, chunk.start, outcomes, 0.0, time.perf_counter() - began)
 
 
@@ -326,7 +322,6 @@ def carried_state(attrs: Mapping[str, Any]) -> State | None:
 
 def write_part(
     work: Work,
-    scene: Scene,
     chunk: Chunk,
     points: Sequence[BranchPoint],
     records: Sequence[RunRecord],
@@ -338,7 +333,7 @@ def write_part(
         attrs |= carried_attributes(carried)
     path = Path(work.parts_folder, chunk.part_name)
     try:
-        dataset = dataset_of(scene, points, records, attrs)
+        dataset = dataset_of(work.scene, points, records, attrs)
         write_dataset(dataset, path)
     except OSError as error:
         raise CampaignError(

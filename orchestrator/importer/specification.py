@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
+
+from vibroimpact.fmus.shipped import package_folder
 
 Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
@@ -28,6 +30,17 @@ class ComponentSpec:
     name: str
     fmu: Path
     parameters: Mapping[str, float | int | bool | str] = field(default_factory=dict)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        package = package_folder()
+        if self.fmu.is_relative_to(package):
+            # Another machine may have the package elsewhere.
+            return _shipped, (self.name, self.fmu.relative_to(package), self.parameters)
+        return ComponentSpec, (self.name, self.fmu, self.parameters)
+
+
+def _shipped(name: str, place: Path, parameters: Mapping[str, float | int | bool | str]) -> ComponentSpec:
+    return ComponentSpec(name, package_folder() / place, parameters)
 
 
 @dataclass(frozen=True, slots=True)

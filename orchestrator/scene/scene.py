@@ -95,6 +95,9 @@ class Scene(BaseModel):
     general: GeneralScene | None = None
     replay: Replay | None = None
 
+    def __hash__(self) -> int:
+        return hash((self.source, self.text))
+
     @field_serializer("general")
     def _without_folders(self, general: GeneralScene | None) -> dict[str, Any] | None:
         """Leave the folders of FMU files out, so that a scene is the same wherever it lies."""

@@ -12,10 +12,13 @@ Run order (the `run` dimension of the dataset) is fixed by the scene alone:
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import product
 from math import prod
-from typing import Literal, Protocol, overload
+from typing import Any, Literal, Protocol, overload
+
+import numpy as np
 
 SweepPath = Literal["independent", "up", "down", "up-down"]
 SweepDirection = Literal["independent", "up", "down"]
@@ -40,16 +43,33 @@ class SweepAxis:
         Its values in the unit of the key; ascending on a continuation axis, else in the order of the scene.
     path : {"independent", "up", "down", "up-down"}
         Whether each point starts from the scene's start state, or from its predecessor's final state.
+    span : tuple or None
+        Start, stop and number of the values of a range: all of it that is sent to workers.
     """
 
     key: str
     values: tuple[float, ...]
     path: SweepPath = "independent"
+    span: tuple[float, float, int] | None = field(default=None, compare=False, repr=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        if self.span is not None:
+            return axis_of_range, (self.key, *self.span, self.path)
+        return SweepAxis, (self.key, self.values, self.path)
 
     @property
     def continuation(self) -> bool:
         """Whether the state is carried from point to point along this axis."""
         return self.path != "independent"
+
+
+@lru_cache(maxsize=8)
+def axis_of_range(key: str, start: float, stop: float, points: int, path: SweepPath) -> SweepAxis:
+    """Return an axis of evenly spaced values, both ends included."""
+    # Halved ends keep the span of the range finite for any two finite numbers; scaling by 2 is exact.
+    values = (2.0 * np.linspace(start / 2.0, stop / 2.0, points)).tolist()
+    ordered = values if path == "independent" else sorted(values)
+    return SweepAxis(key, tuple(ordered), path, (start, stop, points))
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from vibroimpact.orchestrator.scene.fields import field_of, is_array_only, known_keys, rule_of
@@ -22,7 +21,7 @@ from vibroimpact.orchestrator.scene.problems import (
     quoted,
     value_problem,
 )
-from vibroimpact.orchestrator.scene.sweep import SweepAxis
+from vibroimpact.orchestrator.scene.sweep import SweepAxis, axis_of_range
 
 _FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
 
@@ -162,12 +161,16 @@ def read_axis(key: str, entry: object) -> tuple[SweepAxis | None, list[Problem]]
     problem = _form_problem(key, table)
     if problem:
         return None, [problem]
-    values = table.values if table.values is not None else _range_values(table)
-    problem = _distinct_problem(key, values)
-    if problem:
-        return None, [problem]
-    ordered = values if table.path == "independent" else tuple(sorted(values))
-    return SweepAxis(key, ordered, table.path), []
+    if table.values is not None:
+        ordered = table.values if table.path == "independent" else tuple(sorted(table.values))
+        axis = SweepAxis(key, ordered, table.path)
+    else:
+        assert table.start is not None
+        assert table.stop is not None
+        assert table.points is not None
+        axis = axis_of_range(key, table.start, table.stop, table.points, table.path)
+    problem = _distinct_problem(key, table.values or axis.values)
+    return (None, [problem]) if problem else (axis, [])
 
 
 def _form_problem(key: str, table: AxisTable) -> Problem | None:
@@ -192,14 +195,6 @@ def _form_problem(key: str, table: AxisTable) -> Problem | None:
 
 def _and(words: list[str]) -> str:
     return " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
-
-
-def _range_values(table: AxisTable) -> tuple[float, ...]:
-    assert table.start is not None
-    assert table.stop is not None
-    assert table.points is not None
-    # Halved ends keep the span of the range finite for any two finite numbers; scaling by 2 is exact.
-    return tuple((2.0 * np.linspace(table.start / 2.0, table.stop / 2.0, table.points)).tolist())
 
 
 def _distinct_problem(key: str, values: tuple[float, ...]) -> Problem | None:

@@ -107,7 +107,7 @@ def one_repetition(scene: Scene, order: int) -> tuple[float, float, CampaignRepo
         report = run_campaign(scene, Path(folder, "campaign"), workers=WORKERS)
         parts = Path(folder, "parts")
         parts.mkdir()
-        work = Work(scene.text, scene.source, str(parts))
+        work = Work(scene, str(parts))
         kinds = (True, False) if order % 2 else (False, True)
         seconds = {write: bare_seconds(work, report.chunks, write=write) for write in kinds}
         return seconds[True], seconds[False], report

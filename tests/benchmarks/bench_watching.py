@@ -133,7 +133,7 @@ def checksum_percent(points: int) -> float:
         chunks = run_campaign(scene, Path(folder, "campaign"), workers=WORKERS).chunks
         parts = Path(folder, "parts")
         parts.mkdir()
-        work = Work(scene.text, scene.source, str(parts))
+        work = Work(scene, str(parts))
         get_ready(work)
         began = time.process_time()
         for chunk in chunks:

@@ -225,7 +225,7 @@ def test_a_continuation_of_a_chain_is_the_same_however_it_is_cut_into_chunks(tmp
     scene = parse_scene(text, "s.toml")
     folder = tmp_path / "parts"
     folder.mkdir()
-    work = Work(text, "s.toml", str(folder), scene_hash=scene_hash(scene))
+    work = Work(scene, str(folder), scene_hash=scene_hash(scene))
     carried = None
     for first, stop in ((0, 2), (2, 6)):
         carried = run_chunk(work, Chunk(0, first, stop, carried)).carried

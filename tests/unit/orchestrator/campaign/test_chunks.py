@@ -35,7 +35,7 @@ BUSY = "support.busy_runner:BusyRunner"
 
 def work_in(folder: Path, text: str, runner: str = BUSY) -> Work:
     folder.mkdir(exist_ok=True)
-    return Work(text, "test.toml", str(folder), runner, scene_hash(scene_of(text)))
+    return Work(scene_of(text), str(folder), runner, scene_hash(scene_of(text)))
 
 
 def run_all(work: Work, chunks: list[tuple[int, int]], branch_length: int) -> list[Path]:
@@ -90,7 +90,7 @@ def test_a_failed_run_hands_on_the_state_it_was_given() -> None:
 def test_a_chunk_of_failed_runs_merges_with_any_other(tmp_path: Path) -> None:
     work = work_in(tmp_path / "parts", amplitude_text(20, start=-0.9), "support.busy_runner:BrittleRunner")
     paths = run_all(work, [(0, 5), (5, 20)], 20)
-    compact(paths, tmp_path / "all.nc", scene_of(work.scene_text), {})
+    compact(paths, tmp_path / "all.nc", work.scene, {})
     outcome = read_flat(tmp_path / "all.nc")["outcome"].values
     assert (outcome[:10] == Outcome.error).all()
     assert (outcome[10:] == Outcome.ok).all()
@@ -114,13 +114,13 @@ def test_a_crashed_run_is_a_row_and_hands_on_the_state_it_was_given(tmp_path: Pa
 
 def test_a_worker_with_another_runner_than_the_campaign_refuses_its_chunk(tmp_path: Path) -> None:
     text = frequency_text(5)
-    work = Work(text, "test.toml", str(tmp_path), BUSY, "", RunnerIdentity("busy", "another", {}))
+    work = Work(scene_of(text), str(tmp_path), BUSY, "", RunnerIdentity("busy", "another", {}))
     with pytest.raises(CampaignError, match="expected the runner that the campaign began with"):
         run_chunk(work, Chunk(0, 0, 5))
 
 
 def test_a_part_that_cannot_be_written_is_one_clear_message(tmp_path: Path) -> None:
-    work = Work(frequency_text(5, milliseconds=0.01), "test.toml", str(tmp_path / "absent"), BUSY)
+    work = Work(scene_of(frequency_text(5, milliseconds=0.01)), str(tmp_path / "absent"), BUSY)
     with pytest.raises(CampaignError, match="the results of 5 points could not be written: No such file"):
         run_chunk(work, Chunk(0, 0, 5))
 

@@ -18,6 +18,7 @@ from support.places import ROOT
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.campaign.manifest import flat_scene, scene_hash
+from vibroimpact.orchestrator.importer import specification
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene.general.component_facts import component_facts
@@ -268,7 +269,22 @@ def test_a_description_is_read_once_for_files_of_the_same_contents(tmp_path: Pat
 
 def test_a_scene_travels_to_workers() -> None:
     scene = parse_scene(SWEPT, "s.toml")
-    assert pickle.loads(pickle.dumps(scene)) == scene
+    again = pickle.loads(pickle.dumps(scene))
+    assert again == scene
+    assert hash(again) == hash(scene)
+
+
+def test_a_worker_takes_shipped_fmus_from_its_own_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ours = ComponentSpec("a", fmu_path("Oscillator"))
+    theirs = ComponentSpec("ball", tmp_path / "ball.fmu")
+    message = pickle.dumps((ours, theirs))
+    monkeypatch.setattr(specification, "package_folder", lambda: Path("/elsewhere"))
+    assert pickle.loads(message) == (
+        ComponentSpec("a", Path("/elsewhere/built/fmi3/Oscillator.fmu")),
+        theirs,
+    )
 
 
 def test_a_scene_is_the_same_in_another_folder(tmp_path: Path) -> None:
@@ -407,7 +423,7 @@ def test_a_component_that_is_not_built_says_how_to_build_it(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     package = Path(shutil.copytree(ROOT / "fmus" / "native", tmp_path / "native")).parent
-    monkeypatch.setattr("vibroimpact.fmus.shipped._package", lambda: package)
+    monkeypatch.setattr("vibroimpact.fmus.shipped.package_folder", lambda: package)
     (problem,) = problems_of('[component.a]\nfmu = "Oscillator"\n[record]\nrecorded_time = 1')
     assert problem == (
         "component.a.fmu: expected Oscillator built for FMI 3.0, got no FMU. "

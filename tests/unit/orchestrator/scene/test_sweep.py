@@ -7,7 +7,14 @@ from dataclasses import dataclass
 
 import pytest
 
-from vibroimpact.orchestrator.scene.sweep import Branch, SweepAxis, expand, run_count
+from vibroimpact.orchestrator.scene.sweep import (
+    Branch,
+    SweepAxis,
+    SweepPath,
+    axis_of_range,
+    expand,
+    run_count,
+)
 
 FREQUENCY = "forcing.angular_frequency"
 POSITION = "stop[1].position"
@@ -96,3 +103,12 @@ def test_run_count_counts_both_ways_of_up_down() -> None:
 def test_branches_travel_to_workers() -> None:
     branches = expand(Swept((SweepAxis(FREQUENCY, (0.6, 0.7), "up-down"),)))
     assert pickle.loads(pickle.dumps(branches)) == branches
+
+
+@pytest.mark.parametrize("path", ["independent", "up"])
+def test_a_range_of_a_million_values_is_a_short_message_to_a_worker(path: SweepPath) -> None:
+    axis = axis_of_range("body.mass", 1.0, 2.0, 10**6, path)
+    message = pickle.dumps(axis)
+    assert len(message) < 200
+    axis_of_range.cache_clear()
+    assert pickle.loads(message) == axis
