@@ -11,9 +11,7 @@ from typing import Any
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.fmus.safe_toml import MOST_PARTS, parse_toml
 from vibroimpact.orchestrator.scene.keys import ALTERNATIVES
-from vibroimpact.orchestrator.scene.problems import CHANGES, Problem, key_path, quoted
-
-KeyPath = tuple[str | int, ...]
+from vibroimpact.orchestrator.scene.problems import CHANGES, KeyPath, Problem, key_path, quoted
 
 _PART = re.compile(
     r"""\s*(?P<name>[A-Za-z0-9_-]+|"(?:[^"\\\n]|\\.)*"|'[^'\n]*')\s*(?P<places>(?:\[[1-9][0-9]{0,8}\]\s*)*)"""

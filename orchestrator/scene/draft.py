@@ -1,38 +1,120 @@
-"""A scene on its way to being valid: what the rules between its tables look at."""
+"""A scene on its way to being valid: its document, those of its tables that are, and what is wrong with the others."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
+from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.keys import number_of, parse_key
-from vibroimpact.orchestrator.scene.models import Body, Forcing, Record, SceneHeader, Sensor, Stop
+from vibroimpact.orchestrator.scene.models import (
+    BODY_MODELS,
+    STOP_MODELS,
+    Body,
+    Execution,
+    Forcing,
+    Record,
+    SceneHeader,
+    Sensor,
+    Stop,
+)
+from vibroimpact.orchestrator.scene.problems import (
+    KeyPath,
+    Problem,
+    Table,
+    choice_problem,
+    key_path,
+    quoted,
+    read_table,
+)
 from vibroimpact.orchestrator.scene.replay_models import Replay
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 FREQUENCY_KEYS = frozenset({"angular_frequency", "frequency"})
 
 
-@dataclass(frozen=True, slots=True)
-class Draft:
-    """A scene on its way: the document, and those of its tables that are valid by themselves (else None)."""
+class DraftTables:
+    """The tables of a document, read one by one: a table that is not valid is None, and its problems are kept."""
 
-    document: Mapping[str, Any]
-    header: SceneHeader | None
-    body: Body | None
-    forcing: Forcing | None
-    stops: tuple[Stop | None, ...]
-    record: Record | None
-    axes: tuple[SweepAxis, ...]
-    sensor: Sensor | None = None
-    replay: Replay | None = None
+    def __init__(self, document: Mapping[str, Any]) -> None:
+        self.document = document
+        self.problems: list[Problem] = []
+        self.header = self.table(SceneHeader, "scene", {})
 
     def written(self, table: str) -> Mapping[str, Any]:
         """Return a table as written, or an empty one."""
         raw = self.document.get(table)
         return raw if isinstance(raw, dict) else {}
+
+    def table(self, model: type[Table], name: str, absent: object = None) -> Table | None:
+        """Return a table as its model; `absent` stands for one that is not written."""
+        raw = self.document.get(name, absent)
+        return None if raw is None else self.read(model, raw, (name,))
+
+    def read(self, model: type[Table], raw: object, path: KeyPath) -> Table | None:
+        """Return what the document has at a path as a model."""
+        return read_table(model, raw, path, self.problems)
+
+    def entries(self, name: str) -> list[tuple[object, KeyPath]]:
+        """Return what an array `[[name]]` holds, and where."""
+        raw = self.document.get(name, [])
+        if not isinstance(raw, list):
+            hint = f"Write [[{name}]], with two brackets, for each {name}."
+            self.problems.append(Problem(name, f"[[{name}]] tables", quoted(raw), hint))
+            return []
+        return [(table, (name, place)) for place, table in enumerate(raw)]
+
+
+class Draft(DraftTables):
+    """A scene of the short form on its way.
+
+    Parameters
+    ----------
+    document : mapping
+        A parsed TOML document; a swept key need not be written.
+    axes : tuple of SweepAxis
+        Its sweep.
+    """
+
+    def __init__(self, document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> None:
+        super().__init__(_with_swept_keys(document, axes))
+        self.axes = axes
+        self.body: Body | None = self._body()
+        self.forcing = self.table(Forcing, "forcing")
+        self.stops: tuple[Stop | None, ...] = tuple(
+            self._variant(STOP_MODELS, "law", "restitution", *entry) for entry in self.entries("stop")
+        )
+        self.record = self.table(Record, "record", {})
+        self.execution = self.table(Execution, "execution", {})
+        self.sensor = self.table(Sensor, "sensor")
+        self.replay = self.table(Replay, "replay")
+
+    def _body(self) -> Body | None:
+        if "body" not in self.document:
+            hint = "Add [body] with mass, stiffness and damping."
+            self.problems.append(Problem("body", "one [body] table", "nothing", hint))
+            return None
+        return self._variant(BODY_MODELS, "kind", "oscillator", self.document["body"], ("body",))
+
+    def _variant(
+        self, models: Mapping[str, type[Table]], tag: str, default: str, raw: object, path: KeyPath
+    ) -> Table | None:
+        """Read a table whose kind decides its keys; of an unknown kind nothing else is judged."""
+        kind = raw.get(tag, default) if isinstance(raw, dict) else default
+        if isinstance(kind, str) and kind in models:
+            there = len(self.problems)
+            table = self.read(models[kind], raw, path)
+            belongs = _keys_of_other_kinds(raw, models, tag, kind, path)
+            self.problems[there:] = [
+                replace(problem, hint=belongs.get(problem.key, problem.hint))
+                for problem in self.problems[there:]
+            ]
+            return table
+        model = models[default]
+        self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, models))
+        return None
 
     def worst(self, *tables: str) -> str:
         """Return a note for a number that may be the worst of a sweep over keys of these tables."""
@@ -60,3 +142,31 @@ class Draft:
             return self.span("forcing.angular_frequency")
         span = self.span("forcing.frequency")
         return span and (2.0 * math.pi * span[0], 2.0 * math.pi * span[1])
+
+
+def _with_swept_keys(document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> dict[str, Any]:
+    """Return the document with the first swept value wherever the swept key itself is not written."""
+    filled = dict(document)
+    for axis in axes:
+        key = parse_key(axis.key)
+        assert key is not None
+        table = filled[key.table]
+        owner = table if key.place is None else table[key.place]
+        if isinstance(owner, dict):
+            owner = {key.name: axis.values[0], **owner}
+            filled[key.table] = (
+                owner if key.place is None else [*table[: key.place], owner, *table[key.place + 1 :]]
+            )
+    return filled
+
+
+def _keys_of_other_kinds(
+    raw: object, models: Mapping[str, type[Table]], tag: str, kind: str, path: KeyPath
+) -> dict[str, str]:
+    """Return advice for each key, by its path, that a table of another kind has and one of this kind has not."""
+    advice = {}
+    for name in raw if isinstance(raw, dict) else ():
+        owners = [quoted(other) for other, model in models.items() if name in known_keys(model)]
+        if owners and name not in known_keys(models[kind]):
+            advice[key_path((*path, name))] = f"It belongs to {tag} = {listed(owners, 'or')}."
+    return advice

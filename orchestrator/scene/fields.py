@@ -135,7 +135,7 @@ def _expected(field: FieldInfo) -> str:
     """Return what the constraints of a field say."""
     forms, choices, bounds = forms_of(field.annotation), choices_of(field.annotation), bounds_of(field)
     if choices:
-        return _either([f'"{choice}"' for choice in choices])
+        return listed([f'"{choice}"' for choice in choices], "or")
     if forms == [bool]:
         return "true or false"
     if forms == [int]:
@@ -153,8 +153,13 @@ def _number(bounds: Bounds, noun: str = "number") -> str:
     return f"a {noun} {'>' if bounds.is_open else '>='} {bounds.low:g}"
 
 
-def _either(words: Sequence[str]) -> str:
-    return " or ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
+def listed(words: Sequence[str], last: str) -> str:
+    """Return words with commas between them and one word before the last.
+
+    >>> listed(["a", "b", "c"], "or"), listed(["a"], "or"), listed([], "or")
+    ('a, b or c', 'a', '')
+    """
+    return f" {last} ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
 
 
 @lru_cache(maxsize=256)

@@ -13,13 +13,16 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from vibroimpact.fmus.safe_toml import TooDeepError
 from vibroimpact.orchestrator.scene.fields import Rule, choices_of, field_of, forms_of, known_keys, rule_of
+
+Table = TypeVar("Table", bound=BaseModel)
+KeyPath = tuple[str | int, ...]
 
 NUMBER_TAG, ARRAY_TAG = "number alone", "array of numbers"
 """Which form of a field "a number, or an array of them" was read; part of pydantic's location, not of the key."""
@@ -169,9 +172,41 @@ def unknown_key(path: Sequence[str | int], known: Iterable[str]) -> Problem:
     )
 
 
-def problems_of(
-    error: ValidationError, model: type[BaseModel], table: tuple[str | int, ...]
-) -> list[Problem]:
+def read_table(model: type[Table], raw: object, path: KeyPath, problems: list[Problem]) -> Table | None:
+    """Return a table as its model; None, and its problems added to the list, when it is not valid.
+
+    Parameters
+    ----------
+    model : type of BaseModel
+        The model of the table; its fields carry a `Rule`.
+    raw : object
+        What the document has there.
+    path : tuple
+        Where the table is, for example ("stop", 0).
+    problems : list of Problem
+        Grows.
+    """
+    if not isinstance(raw, dict):
+        # of an array the whole is what to look at, because its brackets are what is wrong
+        where = key_path(path) if path[0] == "component" else str(path[0])
+        problems.append(Problem(where, "a table", quoted(raw), f"Write {_brackets(path)}."))
+        return None
+    try:
+        return model.model_validate(raw)
+    except ValidationError as error:
+        problems += problems_of(error, model, path)
+        return None
+
+
+def _brackets(path: KeyPath) -> str:
+    if path[0] == "component":
+        return f'[{key_path(path)}] and below it fmu = "FILE.fmu"'
+    if isinstance(path[-1], int):
+        return f"[[{path[0]}]], with two brackets"
+    return f"[{path[0]}], with single brackets, once"
+
+
+def problems_of(error: ValidationError, model: type[BaseModel], table: KeyPath) -> list[Problem]:
     """Translate what pydantic found in one table.
 
     Parameters
@@ -190,7 +225,7 @@ def problems_of(
     return [_problem_of(entry, model, table) for entry in entries if not _is_an_echo(entry, entries, model)]
 
 
-def _as_written(location: Sequence[str | int]) -> tuple[str | int, ...]:
+def _as_written(location: Sequence[str | int]) -> KeyPath:
     """Return a location without what only pydantic knows of."""
     return (*location[:1], *(part for part in location[1:] if part not in (NUMBER_TAG, ARRAY_TAG)))
 
@@ -211,7 +246,7 @@ def _is_an_echo(entry: Any, entries: Sequence[Any], model: type[BaseModel]) -> b
     return any(_nearest_word(word, known) == location[-1] for word in misspelt)
 
 
-def _problem_of(entry: Any, model: type[BaseModel], table: tuple[str | int, ...]) -> Problem:
+def _problem_of(entry: Any, model: type[BaseModel], table: KeyPath) -> Problem:
     path = (*table, *entry["loc"])
     owner, name = _owner(model, entry["loc"])
     if entry["type"] == "extra_forbidden":
@@ -262,7 +297,7 @@ def _value_hint(rule: Rule, field: FieldInfo, value: object) -> str:
     return rule.hint
 
 
-def _header(table: tuple[str | int, ...]) -> str:
+def _header(table: KeyPath) -> str:
     if len(table) > 1 and isinstance(table[1], int):
         return f"[[{table[0]}]]"
     return f"[{key_path(table)}]"

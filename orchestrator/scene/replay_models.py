@@ -9,6 +9,7 @@ from pydantic import Field
 
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.models import Finite, NotNegative, Positive, SceneTable
+from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 MOST_RECORDINGS = 10_000
 RECORDING_KEY = "replay.recording"
@@ -141,3 +142,10 @@ class Replay(SceneTable):
             default="none",
         ),
     ] = ()
+
+    @property
+    def axes(self) -> tuple[SweepAxis, ...]:
+        """The axis that goes through the recordings; none where there is one, or they are not named."""
+        if len(self.recordings) < 2:
+            return ()
+        return (SweepAxis(RECORDING_KEY, tuple(float(n) for n in range(1, len(self.recordings) + 1))),)

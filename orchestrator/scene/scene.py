@@ -85,9 +85,9 @@ class Scene(BaseModel):
     text: str = Field(repr=False)
     title: str
     units: Literal["SI", "nondimensional"]
-    body_given: Body | None = Field(alias="body")
-    forcing: Forcing | None
-    stops: tuple[Stop, ...]
+    body_given: Body | None = Field(None, alias="body")
+    forcing: Forcing | None = None
+    stops: tuple[Stop, ...] = ()
     sensor: Sensor | None = None
     record: Record
     sweep: tuple[SweepAxis, ...]
@@ -384,23 +384,9 @@ def parse_scene(text: str, source: str, changes: Sequence[str] = ()) -> Scene:
         With all problems of the text, each on one line.
     """
     document, changed = changed_document(parse_scene_toml(text, source), changes)
-    tables, problems = read_tables(document, Path(source).parent)
-    if tables is None:
+    fields, problems = read_tables(document, Path(source).parent)
+    if problems:
         raise SceneError(lines_of(problems, source, changed))
     if changed:
         text = tomli_w.dumps(document)
-    return Scene(
-        source=source,
-        text=text,
-        title=tables.header.title,
-        units=tables.header.units,
-        body=tables.body,
-        forcing=tables.forcing,
-        stops=tables.stops,
-        sensor=tables.sensor,
-        record=tables.record,
-        sweep=tables.sweep,
-        execution=tables.execution,
-        general=tables.general,
-        replay=tables.replay,
-    )
+    return Scene(source=source, text=text, **fields)

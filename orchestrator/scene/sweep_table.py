@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from vibroimpact.orchestrator.scene.fields import field_of, is_array_only, known_keys, rule_of
+from vibroimpact.orchestrator.scene.fields import field_of, is_array_only, known_keys, listed, rule_of
 from vibroimpact.orchestrator.scene.keys import SWEEPABLE, parse_key
 from vibroimpact.orchestrator.scene.models import BODY_MODELS, STOP_MODELS, AxisTable, Forcing, Sensor
 from vibroimpact.orchestrator.scene.problems import (
@@ -26,13 +26,21 @@ from vibroimpact.orchestrator.scene.sweep import SweepAxis, axis_of_range
 _FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
 
 
-def read_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
-    """Read the sweep of a scene file.
+def read_sweep(
+    document: Mapping[str, Any],
+    key_problems: Callable[[str, object], Iterable[Problem]],
+    axis_problems: Callable[[SweepAxis], Iterable[Problem]],
+) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
+    """Read the sweep of any form of scene.
 
     Parameters
     ----------
     document : mapping
         The parsed TOML document; its other tables need not be valid.
+    key_problems : callable
+        Yields what is wrong with a key and its entry.
+    axis_problems : callable
+        Yields what is wrong with the values of an axis.
 
     Returns
     -------
@@ -41,25 +49,30 @@ def read_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list
     problems : list of Problem
         Everything that is wrong with the others.
     """
-    entries, problems = sweep_entries(document)
+    table = document.get("sweep", {})
+    if not isinstance(table, dict):
+        hint = f"Write [sweep] and below it KEY = {_FORMS}."
+        return (), [Problem("sweep", "a table", quoted(table), hint)]
     axes: list[SweepAxis] = []
-    known = dict.fromkeys(_sweepable_keys(document))
-    for key, entry in entries.items():
-        found = list(_key_problems(key, entry, document, known))
+    problems: list[Problem] = []
+    for key, entry in table.items():
+        found = list(key_problems(key, entry))
         if not found:
-            axis, found = read_axis(key, entry)
-            found += _value_problems(axis, document) if axis else []
+            axis, found = _read_axis(key, entry)
+            found += axis_problems(axis) if axis else []
             axes += [axis] if axis and not found else []
         problems += found
     return tuple(axes), problems
 
 
-def sweep_entries(document: Mapping[str, Any]) -> tuple[Mapping[str, Any], list[Problem]]:
-    """Return the entries of the sweep of any form of scene, and what is wrong with the table itself."""
-    table = document.get("sweep", {})
-    if isinstance(table, dict):
-        return table, []
-    return {}, [Problem("sweep", "a table", quoted(table), f"Write [sweep] and below it KEY = {_FORMS}.")]
+def read_short_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
+    """Read the sweep of a scene of the short form."""
+    known = dict.fromkeys(_sweepable_keys(document))
+    return read_sweep(
+        document,
+        lambda key, entry: _key_problems(key, entry, document, known),
+        lambda axis: _value_problems(axis, document),
+    )
 
 
 def _key_problems(
@@ -149,7 +162,7 @@ def _element_hint(text: str, document: Mapping[str, Any], known: list[str]) -> s
     return ""
 
 
-def read_axis(key: str, entry: object) -> tuple[SweepAxis | None, list[Problem]]:
+def _read_axis(key: str, entry: object) -> tuple[SweepAxis | None, list[Problem]]:
     """Return the axis of one entry of a sweep, or what is wrong with its values and path."""
     path = ("sweep", key)
     if not isinstance(entry, dict):
@@ -181,20 +194,19 @@ def _form_problem(key: str, table: AxisTable) -> Problem | None:
     if table.values is not None:
         if given:
             return Problem(
-                where, "start, stop and points, or values", "both", f"Remove values or {_and(given)}."
+                where,
+                "start, stop and points, or values",
+                "both",
+                f"Remove values or {listed(given, 'and')}.",
             )
         return None
     if len(given) < len(ends):
         missing = [name for name in ends if name not in given]
-        return Problem(where, _FORMS, _and(given) or "neither", f"Add {_and(missing)}.")
+        return Problem(where, _FORMS, listed(given, "and") or "neither", f"Add {listed(missing, 'and')}.")
     if table.points == 1 and table.start != table.stop:
         hint = "One point cannot be at both ends; make stop equal to start, or give values."
         return Problem(key_path(("sweep", key, "points")), "a whole number >= 2", "1", hint)
     return None
-
-
-def _and(words: list[str]) -> str:
-    return " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
 
 
 def _distinct_problem(key: str, values: tuple[float, ...]) -> Problem | None:

@@ -19,8 +19,7 @@ from vibroimpact.orchestrator.scene.general.component_facts import (
 )
 from vibroimpact.orchestrator.scene.general.models import ComponentTable
 from vibroimpact.orchestrator.scene.general.start_values import Misfit, StartValue, typed_value
-from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
-from vibroimpact.orchestrator.scene.table_reader import read_table
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted, read_table
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 

@@ -7,8 +7,8 @@ said of the variables of an FMU that cannot be read.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.units import (
@@ -18,12 +18,13 @@ from vibroimpact.fmus.units import (
     parse_unit,
     product_agrees,
 )
+from vibroimpact.orchestrator.scene.draft import DraftTables
 from vibroimpact.orchestrator.scene.general.component_facts import (
     NUMERIC_KINDS,
     ComponentFacts,
     VariableFacts,
 )
-from vibroimpact.orchestrator.scene.general.components import DraftComponent
+from vibroimpact.orchestrator.scene.general.components import components_of
 from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN, Execution
@@ -35,16 +36,24 @@ ANSWERS = ("applied_restitution", "applied_force")
 SOURCES = ("output", "local", "parameter", "calculatedParameter")
 
 
-@dataclass(frozen=True, slots=True)
-class GeneralDraft:
-    """A general scene on its way: the document, and what of it is valid by itself (else None)."""
+class GeneralDraft(DraftTables):
+    """A general scene on its way.
 
-    document: Mapping[str, Any]
-    components: Mapping[str, DraftComponent]
-    connections: tuple[ConnectionTable | None, ...]
-    events: tuple[EventTable | None, ...]
-    record: GeneralRecord | None
-    execution: Execution | None
+    Parameters
+    ----------
+    document : mapping
+        A parsed TOML document.
+    folder : Path
+        The folder of the scene file, from which FMU paths count.
+    """
+
+    def __init__(self, document: Mapping[str, Any], folder: Path) -> None:
+        super().__init__(document)
+        self.components = components_of(document.get("component"), folder, self.problems)
+        self.connections = tuple(self.read(ConnectionTable, *entry) for entry in self.entries("connection"))
+        self.events = tuple(self.read(EventTable, *entry) for entry in self.entries("event"))
+        self.record = self.table(GeneralRecord, "record", {})
+        self.execution = self.table(Execution, "execution", {})
 
     def facts(self, reference: str) -> ComponentFacts | None:
         """Return the facts of the component that a reference names; None when they are not known."""

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
-from vibroimpact.orchestrator.scene.general.component_facts import VariableFacts
 from vibroimpact.orchestrator.scene.general.components import settable_names, start_problems
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, reference_problem, split
 from vibroimpact.orchestrator.scene.general.scene import gain_place
@@ -15,7 +14,7 @@ from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
-from vibroimpact.orchestrator.scene.sweep_table import read_axis, sweep_entries
+from vibroimpact.orchestrator.scene.sweep_table import read_sweep
 
 
 def read_general_sweep(draft: GeneralDraft) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
@@ -28,16 +27,12 @@ def read_general_sweep(draft: GeneralDraft) -> tuple[tuple[SweepAxis, ...], list
     problems : list of Problem
         Everything that is wrong with the others, and between them.
     """
-    entries, problems = sweep_entries(draft.document)
-    axes: list[SweepAxis] = []
-    for key, entry in entries.items():
-        found = list(_key_problems(key, entry, draft))
-        if not found:
-            axis, found = read_axis(key, entry)
-            found += _axis_problems(axis, draft) if axis else []
-            axes += [axis] if axis and not found else []
-        problems += found
-    return tuple(axes), problems + sweep_problems(axes) + list(_names_differ(axes))
+    axes, problems = read_sweep(
+        draft.document,
+        lambda key, entry: _key_problems(key, entry, draft),
+        lambda axis: _axis_problems(axis, draft),
+    )
+    return axes, problems + sweep_problems(axes) + list(_names_differ(axes))
 
 
 def _key_problems(key: str, entry: object, draft: GeneralDraft) -> Iterator[Problem]:
@@ -97,16 +92,15 @@ def _start_value_problems(key: str, where: str, draft: GeneralDraft) -> Iterator
             yield Problem(where, "a number", f"the {variable.type} {key}", "Run a scene for each value.")
 
 
-def _axis_problems(axis: SweepAxis, draft: GeneralDraft) -> list[Problem]:
+def _axis_problems(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:
     if axis.continuation:
         where = key_path(("sweep", axis.key, "path"))
         hint = "What a general scene carries from point to point is not known: every point starts anew."
-        return [Problem(where, '"independent" in a general scene', quoted(axis.path), hint)]
+        yield Problem(where, '"independent" in a general scene', quoted(axis.path), hint)
+        return
     variable = draft.variable(axis.key)
-    return list(_value_problems(axis, variable)) if variable else []
-
-
-def _value_problems(axis: SweepAxis, variable: VariableFacts) -> Iterator[Problem]:
+    if variable is None:
+        return
     for value in axis.values:
         fitted = swept_value(variable, value)
         if isinstance(fitted, Misfit):
@@ -114,7 +108,7 @@ def _value_problems(axis: SweepAxis, variable: VariableFacts) -> Iterator[Proble
             return
 
 
-def _names_differ(axes: list[SweepAxis]) -> Iterator[Problem]:
+def _names_differ(axes: tuple[SweepAxis, ...]) -> Iterator[Problem]:
     keys = [axis.key for axis in axes]
     named: dict[str, str] = {}
     for key in keys:

@@ -3,69 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
-from vibroimpact.orchestrator.scene.general.components import DraftComponent, components_of
+from vibroimpact.orchestrator.scene.general.components import DraftComponent
 from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems, split
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.general.start_values import Misfit, StartValue, swept_value
 from vibroimpact.orchestrator.scene.general.sweep import read_general_sweep, swept_units, unit_of_key
-from vibroimpact.orchestrator.scene.models import Execution, Record, SceneHeader
+from vibroimpact.orchestrator.scene.models import Execution, Record
 from vibroimpact.orchestrator.scene.problems import Problem
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
-from vibroimpact.orchestrator.scene.table_reader import read_array, read_table
 
 
-@dataclass(frozen=True, slots=True)
-class GeneralTables:
-    """All tables of a general scene, valid by themselves, together, and against the FMUs."""
-
-    header: SceneHeader
-    record: Record
-    sweep: tuple[SweepAxis, ...]
-    execution: Execution
-    general: GeneralScene
-
-
-def read_general(document: Mapping[str, Any], folder: Path) -> tuple[GeneralTables | None, list[Problem]]:
-    """Validate a document that has components.
-
-    Parameters
-    ----------
-    document : mapping
-        A parsed TOML document.
-    folder : Path
-        The folder of the scene file, from which FMU paths count.
-
-    Returns
-    -------
-    tables : GeneralTables or None
-        None when there is a problem.
-    problems : list of Problem
-        All of them, in the order of the tables.
-    """
-    problems: list[Problem] = []
-    header = read_table(SceneHeader, document.get("scene", {}), ("scene",), problems)
-    draft = GeneralDraft(
-        document,
-        components_of(document.get("component"), folder, problems),
-        read_array(ConnectionTable, document.get("connection", []), "connection", problems),
-        read_array(EventTable, document.get("event", []), "event", problems),
-        read_table(GeneralRecord, document.get("record", {}), ("record",), problems),
-        read_table(Execution, document.get("execution", {}), ("execution",), problems),
-    )
-    problems += general_problems(draft)
+def read_general(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[Problem]]:
+    """Validate a document that has components; as `read_tables`."""
+    draft = GeneralDraft(document, folder)
     axes, sweep_problems = read_general_sweep(draft)
-    problems += sweep_problems
-    if problems or header is None or draft.record is None or draft.execution is None:
-        return None, problems
+    problems = draft.problems + general_problems(draft) + sweep_problems
+    if problems:
+        return {}, problems
+    assert draft.header is not None
+    assert draft.record is not None
+    assert draft.execution is not None
     execution = _execution(draft, draft.execution)
-    general = _general(draft, draft.record, execution, axes)
-    return GeneralTables(header, _record(draft.record), axes, execution, general), []
+    return {
+        **dict(draft.header),
+        "record": _record(draft.record),
+        "sweep": axes,
+        "execution": execution,
+        "general": _general(draft, draft.record, execution, axes),
+    }, []
 
 
 def _record(record: GeneralRecord) -> Record:
@@ -81,7 +52,7 @@ def _record(record: GeneralRecord) -> Record:
 
 def _execution(draft: GeneralDraft, execution: Execution) -> Execution:
     """Return the execution with the guard that it has by default: on as soon as there is foreign code."""
-    if "guard" in draft.document.get("execution", {}):
+    if "guard" in execution.model_fields_set:
         return execution
     foreign = any(not component.shipped for component in draft.components.values())
     return execution.model_copy(update={"guard": foreign})

@@ -1,4 +1,4 @@
-"""Rules of `[replay]`: channels that are named, variables that the body has; recordings as an axis of the sweep."""
+"""Rules of `[replay]`: channels that are named, variables that the body has."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from difflib import get_close_matches
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.models import ChainBody
 from vibroimpact.orchestrator.scene.problems import Problem, nearest, quoted
-from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sampled_names import sampled_names
-from vibroimpact.orchestrator.scene.sweep import SweepAxis
 
 SENSOR = "sensor."
 _OWNERS = ("body.", "oscillator.", "chain.", "beam.")
@@ -28,13 +26,6 @@ def plain_variable(simulated: str) -> tuple[str, bool]:
         (simulated.removeprefix(owner) for owner in _OWNERS if simulated.startswith(owner)), simulated
     )
     return (name.removeprefix(SENSOR), True) if name.startswith(SENSOR) else (name, False)
-
-
-def recording_axis(replay: Replay | None) -> tuple[SweepAxis, ...]:
-    """Return the axis that goes through the recordings; none where there is one, or they are not named."""
-    if replay is None or len(replay.recordings) < 2:
-        return ()
-    return (SweepAxis(RECORDING_KEY, tuple(float(n) for n in range(1, len(replay.recordings) + 1))),)
 
 
 def replay_has_something_to_do(draft: Draft) -> Iterator[Problem]:

@@ -1,4 +1,4 @@
-"""The tables of keys in docs/scene.md, made of the fields: `python -m vibroimpact.orchestrator.scene.key_tables`."""
+"""The tables of keys in docs/scene.md, made of the fields: `python docs/site/key_tables.py`."""
 
 from __future__ import annotations
 
