@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
-from vibroimpact.orchestrator.scene.keys import number_of, parse_key
+from vibroimpact.orchestrator.scene.keys import number_of, numeric_key
 from vibroimpact.orchestrator.scene.models import (
     BODY_MODELS,
     STOP_MODELS,
@@ -126,8 +127,7 @@ class Draft(DraftTables):
         for axis in self.axes:
             if axis.key == text:
                 return min(axis.values), max(axis.values)
-        key = parse_key(text)
-        assert key is not None
+        key = numeric_key(text)
         owner = self.stops[key.place] if key.place is not None else getattr(self, key.table)
         number = number_of(owner, key)
         return None if number is None else (number, number)
@@ -148,15 +148,11 @@ def _with_swept_keys(document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -
     """Return the document with the first swept value wherever the swept key itself is not written."""
     filled = dict(document)
     for axis in axes:
-        key = parse_key(axis.key)
-        assert key is not None
-        table = filled[key.table]
-        owner = table if key.place is None else table[key.place]
+        key = numeric_key(axis.key)
+        filled[key.table] = deepcopy(filled[key.table])
+        owner = key.owner_in(filled)
         if isinstance(owner, dict):
-            owner = {key.name: axis.values[0], **owner}
-            filled[key.table] = (
-                owner if key.place is None else [*table[: key.place], owner, *table[key.place + 1 :]]
-            )
+            owner.setdefault(key.name, axis.values[0])
     return filled
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -41,6 +41,15 @@ class Key(NamedTuple):
     place: int | None
     name: str
     element: int | None = None
+
+    @property
+    def owner(self) -> str:
+        """The table as keys name it: `body`, or `stop[1]`."""
+        return self.table if self.place is None else f"{self.table}[{self.place + 1}]"
+
+    def owner_in(self, document: Mapping[str, Any]) -> Any:
+        """Return what a document has for its table."""
+        return document[self.table] if self.place is None else document[self.table][self.place]
 
 
 @lru_cache(maxsize=256)

@@ -271,7 +271,8 @@ def value_problem(path: Sequence[str | int], field: FieldInfo, value: object) ->
     """Return the problem of a value that breaks the rule of its field."""
     rule = rule_of(field)
     expected = rule.item if rule.item and isinstance(path[-1], int) else rule.expected
-    return Problem(key_path(path), expected, quoted(value), _value_hint(rule, field, value))
+    hint = _value_hint(rule, value, choices_of(field.annotation))
+    return Problem(key_path(path), expected, quoted(value), hint)
 
 
 def choice_problem(
@@ -279,15 +280,13 @@ def choice_problem(
 ) -> Problem:
     """Return the problem of a word that chooses a kind of table, and is none of these."""
     rule = rule_of(field)
-    near = _nearest_word(value, list(choices))
-    hint = f'Did you mean "{near}"?' if near else _value_hint(rule, field, value)
-    return Problem(key_path(path), rule.expected, quoted(value), hint)
+    return Problem(key_path(path), rule.expected, quoted(value), _value_hint(rule, value, choices))
 
 
-def _value_hint(rule: Rule, field: FieldInfo, value: object) -> str:
+def _value_hint(rule: Rule, value: object, words: Iterable[object]) -> str:
     if isinstance(value, str) and value in rule.unavailable:
         return f'"{value}" is not available in this version.'
-    choices = [choice for choice in choices_of(field.annotation) if isinstance(choice, str)]
+    choices = [word for word in words if isinstance(word, str)]
     if isinstance(value, str) and choices:
         near = _nearest_word(value, choices)
         return f'Did you mean "{near}"?' if near else rule.hint

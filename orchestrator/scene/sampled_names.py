@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from difflib import get_close_matches
 
 from vibroimpact.orchestrator.scene.models import BeamBody, Body, ChainBody, Forcing
+from vibroimpact.orchestrator.scene.problems import nearest
 
 CONSERVATIVE = ("energy.kinetic", "energy.potential")
 INTEGRATED = ("energy.forcing_work", "energy.damping_loss", "energy.contact_loss")
@@ -35,6 +37,12 @@ def sampled_names(body: Body, stops: int, forcing: Forcing | None) -> tuple[str,
     for name in _AT_CONTACT:
         names += _each(name, stops)
     return (*names, *_names_of(body))
+
+
+def variable_hint(name: str, known: Sequence[str]) -> str:
+    """Return a hint that names the nearest variable, or those that there are."""
+    near = get_close_matches(name, known, n=1)
+    return f'Did you mean "{near[0]}"?' if near else nearest(name, known)
 
 
 def _names_of(body: Body) -> Iterator[str]:

@@ -145,7 +145,7 @@ class Scene(BaseModel):
         if self.general is not None:
             return self.general.value(key)
         parts = numeric_key(key)
-        return self._number(key, parts, self._numbered_tables().get(_slot(parts)))
+        return self._number(key, parts, self._numbered_tables().get(parts.owner))
 
     def field(self, key: str) -> FieldInfo:
         """Return the field of the model that a numeric key of the short form names; `fields` reads it.
@@ -156,7 +156,7 @@ class Scene(BaseModel):
             When the scene has no such key.
         """
         parts = numeric_key(key)
-        owner = self._numbered_tables().get(_slot(parts))
+        owner = self._numbered_tables().get(parts.owner)
         if owner is None or parts.name not in known_keys(type(owner)):
             raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent one.")
         return field_of(type(owner), parts.name)
@@ -190,15 +190,18 @@ class Scene(BaseModel):
             if key == RECORDING_KEY:  # which recording is replayed: no number of any table
                 continue
             parts = numeric_key(key)
-            owner = tables.get(_slot(parts))
+            owner = tables.get(parts.owner)
             if owner is None:
                 raise UsageError(f"{self.source}: {key}: expected a key of this scene, got an absent table.")
             if parts.element is not None:
                 self._number(key, parts, owner)
-            tables[_slot(parts)] = owner.model_copy(update=replacement(owner, parts, value))
-        stops = tuple(tables[place] for place in range(len(self.stops)))
-        changed = {name: tables[name] for name in ("forcing", "sensor")}
-        return self.model_copy(update={"body_given": tables["body"], "stops": stops, **changed})
+            tables[parts.owner] = owner.model_copy(update=replacement(owner, parts, value))
+        others = {
+            "body_given": tables.pop("body"),
+            "forcing": tables.pop("forcing"),
+            "sensor": tables.pop("sensor"),
+        }
+        return self.model_copy(update={**others, "stops": tuple(tables.values())})
 
     @classmethod
     def from_file(cls, path: str | PathLike[str]) -> Scene:
@@ -322,10 +325,8 @@ class Scene(BaseModel):
         if self.general is not None:
             numbers = self.general.numbers()
         else:
-            tables = ((_table_name(slot), owner) for slot, owner in self._numbered_tables().items())
-            numbers = chain.from_iterable(
-                numbers_of(owner, name) for name, owner in tables if owner is not None
-            )
+            tables = self._numbered_tables().items()
+            numbers = chain.from_iterable(numbers_of(owner, name) for name, owner in tables if owner)
         swept = {axis.key for axis in self.sweep}
         return {key: value for key, value in numbers if key not in swept}
 
@@ -333,18 +334,10 @@ class Scene(BaseModel):
         """Return the name that a swept key has as a coordinate of the dataset."""
         return coordinate_name(key, [axis.key for axis in self.sweep])
 
-    def _numbered_tables(self) -> dict[str | int, BaseModel | None]:
-        """Return the tables that hold numbers; a stop has its 0-based place for a name."""
-        tables: dict[str | int, BaseModel | None] = dict(enumerate(self.stops))
-        return tables | {"body": self.body_given, "forcing": self.forcing, "sensor": self.sensor}
-
-
-def _slot(key: Key) -> str | int:
-    return key.table if key.place is None else key.place
-
-
-def _table_name(slot: str | int) -> str:
-    return f"stop[{slot + 1}]" if isinstance(slot, int) else slot
+    def _numbered_tables(self) -> dict[str, BaseModel | None]:
+        """Return the tables that hold numbers, as keys name them."""
+        stops = {f"stop[{number}]": stop for number, stop in enumerate(self.stops, start=1)}
+        return {**stops, "body": self.body_given, "forcing": self.forcing, "sensor": self.sensor}
 
 
 def load_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:

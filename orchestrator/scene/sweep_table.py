@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from vibroimpact.orchestrator.scene.fields import field_of, is_array_only, known_keys, listed, rule_of
-from vibroimpact.orchestrator.scene.keys import SWEEPABLE, parse_key
+from vibroimpact.orchestrator.scene.keys import SWEEPABLE, numeric_key, parse_key
 from vibroimpact.orchestrator.scene.models import BODY_MODELS, STOP_MODELS, AxisTable, Forcing, Sensor
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
@@ -224,10 +224,8 @@ def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Proble
 
     All rules of sweepable fields are intervals, so the lowest and the highest value speak for the rest.
     """
-    key = parse_key(axis.key)
-    assert key is not None
-    where = key.table if key.place is None else f"{key.table}[{key.place + 1}]"
-    model = next(_model_of(name, table) for name, table in _tables(document) if name == where)
+    key = numeric_key(axis.key)
+    model = _model_of(key.owner, key.owner_in(document))
     if model is None:
         return []
     field = field_of(model, key.name)

@@ -63,7 +63,7 @@ def _put_all(
 
 
 def _put(document: MutableMapping[str, Any], key: Key, value: float) -> None:
-    table = document[key.table] if key.place is None else document[key.table][key.place]
+    table = key.owner_in(document)
     table.pop(OVERRIDDEN_BY.get(key.name, ""), None)
     if key.element is not None:
         table[key.name][key.element] = value

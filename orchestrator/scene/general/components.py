@@ -14,11 +14,13 @@ from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.orchestrator.scene.general.component_facts import (
     ComponentFacts,
+    Misfit,
+    StartValue,
     VariableFacts,
     component_facts,
+    typed_value,
 )
 from vibroimpact.orchestrator.scene.general.models import ComponentTable
-from vibroimpact.orchestrator.scene.general.start_values import Misfit, StartValue, typed_value
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted, read_table
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
@@ -202,6 +204,5 @@ def settable_names(facts: ComponentFacts) -> list[str]:
 
 
 def _described(variable: VariableFacts) -> str:
-    shape = variable.type if variable.scalar else f"array of {variable.type}"
     constant = "constant " if variable.variability == "constant" else ""
-    return f"the {constant}{variable.causality} {variable.name} ({shape})"
+    return f"the {constant}{variable.causality} {variable.name} ({variable.shape})"

@@ -27,8 +27,9 @@ from vibroimpact.orchestrator.scene.general.component_facts import (
 from vibroimpact.orchestrator.scene.general.components import components_of
 from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
 from vibroimpact.orchestrator.scene.keys import dataset_name
-from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN, Execution
+from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+from vibroimpact.orchestrator.scene.rules.scene import sample_problems
 
 MOST_STEPS_PER_RUN = 10**10
 #: Inputs of a body's contact port by which another component answers its contact.
@@ -141,8 +142,7 @@ def _end_problem(draft: GeneralDraft, place: int, end: str, reference: str) -> P
         hint = "Connect the output that feeds it." if is_input else ""
         return Problem(where, "an output, a local variable or a parameter", got, hint)
     if variable.kind not in NUMERIC_KINDS or not variable.scalar:
-        shape = variable.type if variable.scalar else f"array of {variable.type}"
-        return Problem(where, "a number, or true or false", f"the {shape} {reference}")
+        return Problem(where, "a number, or true or false", f"the {variable.shape} {reference}")
     return None
 
 
@@ -255,8 +255,7 @@ def _records_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
             hint = f"It would be a second {dataset_name(reference)} in the dataset."
             yield Problem(where, "each variable once", quoted(reference), hint)
         elif variable and (variable.kind not in NUMERIC_KINDS or not variable.scalar):
-            shape = variable.type if variable.scalar else f"array of {variable.type}"
-            yield Problem(where, "a variable that is one number", f"the {shape} {reference}")
+            yield Problem(where, "a variable that is one number", f"the {variable.shape} {reference}")
     if record.variables and record.rate is None:
         hint = "Add rate = ... to [record]: samples per unit of time."
         yield Problem("record.rate", "a number > 0 beside variables", "nothing", hint)
@@ -267,11 +266,7 @@ def _records_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
 
 def _samples_fit(draft: GeneralDraft) -> Iterator[Problem]:
     if draft.record and draft.record.rate is not None:
-        samples = draft.record.rate * draft.record.recorded_time
-        if samples > MOST_SAMPLES_PER_RUN:
-            hint = "Lower the rate or the recorded time."
-            expected = f"at most {MOST_SAMPLES_PER_RUN} samples per run"
-            yield Problem("record.rate", expected, f"{samples:.3g}", hint)
+        yield from sample_problems("record.rate", draft.record.rate * draft.record.recorded_time, "time")
 
 
 def _runs_coupled(draft: GeneralDraft) -> Iterator[Problem]:

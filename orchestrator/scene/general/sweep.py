@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
+from vibroimpact.orchestrator.scene.general.component_facts import Misfit, swept_value
 from vibroimpact.orchestrator.scene.general.components import settable_names, start_problems
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, reference_problem, split
 from vibroimpact.orchestrator.scene.general.scene import gain_place
-from vibroimpact.orchestrator.scene.general.start_values import Misfit, swept_value
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
@@ -32,7 +32,7 @@ def read_general_sweep(draft: GeneralDraft) -> tuple[tuple[SweepAxis, ...], list
         lambda key, entry: _key_problems(key, entry, draft),
         lambda axis: _axis_problems(axis, draft),
     )
-    return axes, problems + sweep_problems(axes) + list(_names_differ(axes))
+    return axes, [*problems, *sweep_problems(axes), *_names_differ(axes)]
 
 
 def _key_problems(key: str, entry: object, draft: GeneralDraft) -> Iterator[Problem]:

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
+from vibroimpact.orchestrator.scene.general.component_facts import Misfit, StartValue, swept_value
 from vibroimpact.orchestrator.scene.general.components import DraftComponent
 from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems, split
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
-from vibroimpact.orchestrator.scene.general.start_values import Misfit, StartValue, swept_value
 from vibroimpact.orchestrator.scene.general.sweep import read_general_sweep, swept_units, unit_of_key
 from vibroimpact.orchestrator.scene.models import Execution, Record
 from vibroimpact.orchestrator.scene.problems import Problem

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from difflib import get_close_matches
 
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.fields import field_of, fmu_variables_of, is_array_only
 from vibroimpact.orchestrator.scene.models import BeamBody, Body, ChainBody, Forcing, OscillatorBody
 from vibroimpact.orchestrator.scene.places import moves
-from vibroimpact.orchestrator.scene.problems import Problem, nearest, quoted
-from vibroimpact.orchestrator.scene.sampled_names import sampled_names
+from vibroimpact.orchestrator.scene.problems import Problem, quoted
+from vibroimpact.orchestrator.scene.sampled_names import sampled_names, variable_hint
 
 SECTION_KEYS = ("width", "thickness", "youngs_modulus", "density")
 RIGIDITY_KEYS = ("flexural_rigidity", "mass_per_length")
@@ -157,8 +156,7 @@ def sampled_variables_are_known(draft: Draft) -> Iterator[Problem]:
     known = sampled_names(draft.body, len(draft.stops), draft.forcing)
     for place, name in enumerate(series.variables, start=1):
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            hint = f'Did you mean "{near[0]}"?' if near else nearest(name, known)
+            hint = variable_hint(name, known)
             yield Problem(f"record.time_series.variables[{place}]", "a variable name", quoted(name), hint)
     for name, times in Counter(series.variables).items():
         if times > 1:

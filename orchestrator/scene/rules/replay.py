@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from difflib import get_close_matches
 
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.models import ChainBody
-from vibroimpact.orchestrator.scene.problems import Problem, nearest, quoted
-from vibroimpact.orchestrator.scene.sampled_names import sampled_names
+from vibroimpact.orchestrator.scene.problems import Problem, quoted
+from vibroimpact.orchestrator.scene.sampled_names import sampled_names, variable_hint
 
 SENSOR = "sensor."
 _OWNERS = ("body.", "oscillator.", "chain.", "beam.")
@@ -65,8 +64,7 @@ def compared_variables_are_known(draft: Draft) -> Iterator[Problem]:
         variable, is_reading = plain_variable(compared.simulated)
         where = f"replay.compare[{place}].simulated"
         if variable not in known:
-            near = get_close_matches(variable, known, n=1)
-            hint = f'Did you mean "{near[0]}"?' if near else nearest(variable, known)
+            hint = variable_hint(variable, known)
             yield Problem(where, "a variable of the body", quoted(compared.simulated), hint)
         elif is_reading and draft.sensor is None and "sensor" not in draft.document:
             hint = "Add [sensor], or leave `sensor.` out of the name."

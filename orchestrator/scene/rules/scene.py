@@ -39,7 +39,7 @@ def rule_problems(draft: Draft) -> list[Problem]:
         _samples_fit,
         _coupling_is_asked_for,
     )
-    return [problem for rule in rules for problem in rule(draft)] + sweep_problems(draft.axes)
+    return [problem for rule in rules for problem in rule(draft)] + list(sweep_problems(draft.axes))
 
 
 def _coupling_is_asked_for(draft: Draft) -> Iterator[Problem]:
@@ -141,22 +141,18 @@ def _samples_fit(draft: Draft) -> Iterator[Problem]:
         draft.record.recorded_periods * 2.0 * math.pi / span[0] if forced else draft.record.recorded_time
     )
     samples = draft.record.time_series.rate * duration
+    yield from sample_problems("record.time_series.rate", samples, "periods" if forced else "time")
+
+
+def sample_problems(key: str, samples: float, recorded: str) -> Iterator[Problem]:
+    """Yield the problem of a run with too many samples, of any form of scene."""
     if samples > MOST_SAMPLES_PER_RUN:
-        hint = f"Lower the rate or the recorded {'periods' if forced else 'time'}."
-        yield Problem(
-            "record.time_series.rate",
-            f"at most {MOST_SAMPLES_PER_RUN} samples per run",
-            f"{samples:.3g}",
-            hint,
-        )
+        expected = f"at most {MOST_SAMPLES_PER_RUN} samples per run"
+        yield Problem(key, expected, f"{samples:.3g}", f"Lower the rate or the recorded {recorded}.")
 
 
-def sweep_problems(axes: Sequence[SweepAxis]) -> list[Problem]:
-    """Return what is wrong between the axes of a sweep, of any form of scene."""
-    return list(_sweep_fits(axes))
-
-
-def _sweep_fits(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
+def sweep_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
+    """Yield what is wrong between the axes of a sweep, of any form of scene."""
     count = run_count(axes)
     if count > MOST_POINTS:
         yield Problem("sweep", f"at most {MOST_POINTS} points in all", str(count), "Lower points of an axis.")
