@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, field_serializer
+from pydantic import BaseModel, Field, field_serializer
 from pydantic.fields import FieldInfo
 
 from vibroimpact.fmus.errors import SceneError, UsageError
@@ -36,7 +36,7 @@ from vibroimpact.orchestrator.scene.keys import (
     numeric_key,
     replacement,
 )
-from vibroimpact.orchestrator.scene.models import Body, Execution, Forcing, Record, Sensor, Stop
+from vibroimpact.orchestrator.scene.models import Body, Execution, Forcing, Record, SceneTable, Sensor, Stop
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
@@ -45,7 +45,7 @@ from vibroimpact.orchestrator.scene.tables import read_tables
 __all__ = ["Scene", "load_scene", "parse_scene"]
 
 
-class Scene(BaseModel):
+class Scene(SceneTable):
     """A validated scene; it never changes, `with_values` and `with_sweep` make another.
 
     Attributes
@@ -78,8 +78,6 @@ class Scene(BaseModel):
     execution : Execution
         How the points run.
     """
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
     source: str
     text: str = Field(repr=False)

@@ -26,6 +26,7 @@ from vibroimpact.orchestrator.scene.general.component_facts import (
 )
 from vibroimpact.orchestrator.scene.general.components import components_of
 from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
+from vibroimpact.orchestrator.scene.general.scene import gain_place
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
@@ -65,6 +66,12 @@ class GeneralDraft(DraftTables):
         """Return the variable that `COMPONENT.VARIABLE` names; None when it is not known."""
         facts = self.facts(reference)
         return facts.variables.get(split(reference)[1]) if facts else None
+
+    def unit(self, key: str) -> str:
+        """Return the unit of a variable or gain as its description or connection writes it; `1` where it has none."""
+        variable, place = self.variable(key), gain_place(key)
+        connection = self.connections[place] if place is not None and variable is None else None
+        return (variable.unit_name if variable else connection and connection.gain_unit) or "1"
 
 
 def split(reference: str) -> tuple[str, str]:

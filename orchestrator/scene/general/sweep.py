@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -117,18 +117,3 @@ def _names_differ(axes: tuple[SweepAxis, ...]) -> Iterator[Problem]:
         if other != key:
             hint = f"Both would be the coordinate {name} of the dataset: rename a component."
             yield Problem(key_path(("sweep", key)), f"a name of its own beside {other}", quoted(key), hint)
-
-
-def swept_units(axes: tuple[SweepAxis, ...], draft: GeneralDraft) -> Mapping[str, str]:
-    """Return the unit of each swept key as its description or connection writes it; `1` where it has none."""
-    return {axis.key: unit_of_key(axis.key, draft) for axis in axes}
-
-
-def unit_of_key(key: str, draft: GeneralDraft) -> str:
-    """Return the unit of a start value or gain as its description or connection writes it; `1` where it has none."""
-    variable = draft.variable(key)
-    if variable:
-        return variable.unit_name or "1"
-    place = gain_place(key)
-    connection = draft.connections[place] if place is not None else None
-    return (connection.gain_unit if connection else None) or "1"

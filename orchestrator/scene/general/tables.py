@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.scene.general.components import DraftComponent
 from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems, split
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
-from vibroimpact.orchestrator.scene.general.sweep import read_general_sweep, swept_units, unit_of_key
+from vibroimpact.orchestrator.scene.general.sweep import read_general_sweep
 from vibroimpact.orchestrator.scene.models import Execution, Record
 from vibroimpact.orchestrator.scene.problems import Problem
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
@@ -61,8 +61,6 @@ def _execution(draft: GeneralDraft, execution: Execution) -> Execution:
 def _general(
     draft: GeneralDraft, record: GeneralRecord, execution: Execution, axes: tuple[SweepAxis, ...]
 ) -> GeneralScene:
-    recorded = ((name, draft.variable(name)) for name in record.variables)
-    units = {name: (variable.unit_name or "1") if variable else "1" for name, variable in recorded}
     general = GeneralScene(
         components=tuple(_component(component, axes) for component in draft.components.values()),
         connections=tuple(_connection(table) for table in draft.connections if table),
@@ -72,9 +70,9 @@ def _general(
         macro_step=execution.macro_step or record.transient_time + record.recorded_time,
         exchange=execution.exchange,
         guard=execution.guard,
-        units={**units, **swept_units(axes, draft)},
+        units={key: draft.unit(key) for key in (*record.variables, *(axis.key for axis in axes))},
     )
-    return replace(general, start_units={key: unit_of_key(key, draft) for key, _ in general.numbers()})
+    return replace(general, start_units={key: draft.unit(key) for key, _ in general.numbers()})
 
 
 def _component(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> ComponentSpec:
