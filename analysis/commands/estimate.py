@@ -21,9 +21,9 @@ from vibroimpact.analysis.decay.response_estimates import ResponseEstimates
 from vibroimpact.analysis.decay.samples import decay_samples
 from vibroimpact.analysis.decay.swept_response import swept_response
 from vibroimpact.analysis.decay.tables import print_decay, print_estimates, print_remarks
-from vibroimpact.analysis.estimation.bounces import estimate_bounces
+from vibroimpact.analysis.estimation.estimates import print_impacts
+from vibroimpact.analysis.estimation.flight_times import estimate_bounces
 from vibroimpact.analysis.estimation.impacts import estimate_impacts
-from vibroimpact.analysis.estimation.report import print_impacts
 from vibroimpact.analysis.recording import Channel, Recording, is_recording, open_signals
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.terminal import Terminal, wide_terminal
