@@ -294,7 +294,7 @@ def unknowns_by_speed(
     p : Parameters
         Values of what is known.
     unknown : sequence of str
-        Of damping_ratio, static_deflection, and phase (with static_deflection: as cos and sin parts).
+        Of damping_ratio, static_deflection, and phase, in this order; a phase only with a static_deflection.
     drawn : mapping or None
         Values that differ between draws, by name, shape (draw,).
     squares : ndarray, shape (half,), or None
@@ -311,7 +311,7 @@ def unknowns_by_speed(
     Raises
     ------
     EstimationError
-        The columns are as good as dependent, as for P(1,1) with more than two unknowns.
+        The columns are nearly dependent, as for P(1,1) with more than two unknowns.
     """
     value = _values(p, drawn)
     square, drag = value["natural_frequency"] ** 2, -4.0 * value["natural_frequency"] * halves.drag
@@ -339,18 +339,11 @@ def unknowns_by_speed(
             "Give one of them, or take motion of several impact velocities."
         )
     solution = np.einsum("dij,dj->di", np.linalg.pinv(matrix), target)
-    return _named(solution, unknown), condition
-
-
-def _named(solution: Floats, unknown: Sequence[str]) -> Floats:
-    """Return amplitude and phase in place of their cos and sin parts, in the order asked for."""
-    if "phase" not in unknown:
-        return solution
-    cosine, sine = solution[:, -2], solution[:, -1]
-    values = {"static_deflection": np.hypot(cosine, sine), "phase": np.arctan2(sine, cosine)}
-    if "damping_ratio" in unknown:
-        values["damping_ratio"] = solution[:, 0]
-    return np.stack([values[name] for name in unknown], axis=1)
+    if "phase" in unknown:
+        cosine, sine = solution[:, -2], solution[:, -1]
+        amplitude, phase = np.hypot(cosine, sine), np.arctan2(sine, cosine)
+        solution = np.column_stack([solution[:, :-2], amplitude, phase])
+    return solution, condition
 
 
 def sensitivities(

@@ -90,8 +90,7 @@ def estimate_impacts(
         raise UsageError(
             f"forcing, known: expected a Forcing and a Known, got {got}. Write Forcing(angular_frequency)."
         )
-    _check(methods, draws, confidence)
-    _check_known(held)
+    _check(methods, draws, confidence, held)
     record = prepare(channel, forcing, held, window)
     values, refusals, resampled = _attempted(record, methods, draws, confidence, seed)
     doubts = doubts_of(record, values, confidence)
@@ -173,7 +172,7 @@ def _check_answer(method: str, found: Estimates, record: Prepared) -> None:
             )
 
 
-def _check(methods: Sequence[str], draws: int, confidence: float) -> None:
+def _check(methods: Sequence[str], draws: int, confidence: float, held: Known) -> None:
     for method in methods:
         if method not in METHODS:
             raise EstimationError(f'methods: expected some of {", ".join(METHODS)}, got "{method}".')
@@ -181,9 +180,6 @@ def _check(methods: Sequence[str], draws: int, confidence: float) -> None:
         raise EstimationError(
             f"estimate: expected at least 10 draws and 0 < confidence < 1, got {draws} and {confidence}."
         )
-
-
-def _check_known(held: Known) -> None:
     if held.damping_ratio is not None and not held.damping_ratio >= 0.0:
         raise EstimationError(f"damping_ratio: expected >= 0, got {held.damping_ratio}.")
     if held.natural_frequency is not None and not held.natural_frequency > 0.0:

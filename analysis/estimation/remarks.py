@@ -123,7 +123,7 @@ def remarks_of(record: Prepared, values: Values) -> Iterator[str]:
 def doubts_of(record: Prepared, values: Values, confidence: float) -> tuple[Doubt, ...]:
     """Return what makes the estimates of a record, with intervals of a confidence, doubtful: the gravest first."""
     clocks = "" if record.forcing.clock_drifts else ", or clocks that differ (--clock-drifts)"
-    # without noise there is no chance to judge by: what is left is rounding
+    # without noise the residual is rounding, and standard errors of it say nothing
     noisy = record.fit.noise > _ROUNDING * record.signal.range
     return (
         *_of_stops(record),

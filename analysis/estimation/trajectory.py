@@ -342,17 +342,14 @@ class PathProblem:
         place, speed = (self.origin + self.scale * x)[first : first + 2]
         return replace(self.pieces[k], state=(float(place) - parameters.offset, float(speed)))
 
-    def residual_of(self, x: Floats, k: int, parameters: Parameters) -> Floats:
-        """Return samples minus trajectory of one piece."""
-        return residual_of(self.signal, self.piece(x, k, parameters), parameters)
-
     def residual(self, x: Floats) -> Floats:
         """Return samples minus trajectories of all pieces."""
         parameters = self.parameters(x)
         if parameters is None:
             # so bad a trial makes the search take a shorter step
             return np.full(self.rows[-1], _FAR * float(np.ptp(self.signal.values)))
-        return np.concatenate([self.residual_of(x, k, parameters) for k in range(len(self.pieces))])
+        pieces = [self.piece(x, k, parameters) for k in range(len(self.pieces))]
+        return np.concatenate([residual_of(self.signal, piece, parameters) for piece in pieces])
 
     def distance(self) -> float:
         """Return the root mean square of the residual at the start."""
@@ -372,7 +369,8 @@ class PathProblem:
             shared = j < len(self.names)
             for k in range(len(self.pieces)) if shared else [(j - len(self.names)) // 2]:
                 rows = slice(self.rows[k], self.rows[k + 1])
-                jacobian[rows, j] = (self.residual_of(moved, k, parameters) - base[rows]) / _STEP
+                there = residual_of(self.signal, self.piece(moved, k, parameters), parameters)
+                jacobian[rows, j] = (there - base[rows]) / _STEP
         return jacobian
 
     def solve(self, noise: float) -> Trajectory:
