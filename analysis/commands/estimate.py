@@ -13,17 +13,16 @@ from vibroimpact.analysis.commands.estimate_scene import ImpactOptions, cut, for
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.results import write_results
-from vibroimpact.analysis.decay.free_decay import estimate_decay
+from vibroimpact.analysis.decay.estimate import print_estimates, print_remarks
+from vibroimpact.analysis.decay.free_decay import estimate_decay, print_decay
 from vibroimpact.analysis.decay.frequency_response import frequency_response
 from vibroimpact.analysis.decay.laws import ALL_LAWS, damping_law
-from vibroimpact.analysis.decay.resonance import curve_of, fit_resonance, resolution_remark
-from vibroimpact.analysis.decay.response_estimates import ResponseEstimates
+from vibroimpact.analysis.decay.resonance import ResponseEstimates, curve_of, fit_resonance, resolution_remark
 from vibroimpact.analysis.decay.samples import decay_samples
 from vibroimpact.analysis.decay.swept_response import swept_response
-from vibroimpact.analysis.decay.tables import print_decay, print_estimates, print_remarks
-from vibroimpact.analysis.estimation.bounces import estimate_bounces
+from vibroimpact.analysis.estimation.estimates import print_impacts
+from vibroimpact.analysis.estimation.flight_times import estimate_bounces
 from vibroimpact.analysis.estimation.impacts import estimate_impacts
-from vibroimpact.analysis.estimation.report import print_impacts
 from vibroimpact.analysis.recording import Channel, Recording, is_recording, open_signals
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.terminal import Terminal, wide_terminal

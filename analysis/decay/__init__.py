@@ -18,14 +18,13 @@ Examples
 from vibroimpact.analysis.decay.decrement import logarithmic_decrement
 from vibroimpact.analysis.decay.estimate import Estimate
 from vibroimpact.analysis.decay.exponential import fit_exponential
-from vibroimpact.analysis.decay.free_decay import FreeDecay, estimate_decay
+from vibroimpact.analysis.decay.free_decay import FreeDecay, estimate_decay, print_decay
 from vibroimpact.analysis.decay.frequency_response import FrequencyResponse, frequency_response
-from vibroimpact.analysis.decay.law_choice import LawChoice, choose_law
+from vibroimpact.analysis.decay.law_fit import LawChoice, choose_law
 from vibroimpact.analysis.decay.laws import ALL_LAWS, DampingLaw, damping_law
 from vibroimpact.analysis.decay.resonance import Resonance, curve_of, fit_resonance
 from vibroimpact.analysis.decay.samples import DecaySamples, decay_samples
 from vibroimpact.analysis.decay.swept_response import swept_response
-from vibroimpact.analysis.decay.tables import print_decay
 
 __all__ = [
     "ALL_LAWS",

@@ -7,19 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponential
-from vibroimpact.analysis.decay.samples import FEWEST_SAMPLES, DecaySamples
-from vibroimpact.analysis.decay.windows import FirstGuess, first_guess
+from vibroimpact.analysis.decay.exponential import ExponentialDecay, FirstGuess, first_guess, fit_exponential
+from vibroimpact.analysis.decay.samples import FEWEST_SAMPLES, DecaySamples, Floats, stretches
 from vibroimpact.analysis.recording.units import unit_label
 from vibroimpact.fmus.errors import EstimationError
-
-Floats = NDArray[np.float64]
 
 _FEWEST_PERIODS = 4.0
 _MOST_WINDOWS = 16
 _TENTH = 0.1
 _SMALLEST = 3.0
-"""Standard errors that the amplitude of a window must stand out by; it must exceed the rms of the residual, too."""
+"""Amplitude of a window, in standard errors, below which it is noise; so it is below the rms of the residual."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,11 +94,8 @@ def backbone(samples: DecaySamples, periods: float | None = None) -> Backbone:
     total = float(samples.time[-1] - samples.time[0]) / length
     periods = max(_FEWEST_PERIODS, total / _MOST_WINDOWS) if periods is None else periods
     number = np.floor((samples.time - samples.time[0]) / (periods * length)).astype(int)
-    found = []
-    for part in np.split(np.arange(len(number)), np.flatnonzero(np.diff(number)) + 1):
-        fit = _window(samples, part, guess, 0.7 * periods * length)
-        if fit is not None:
-            found.append(fit)
+    fits = (_window(samples, part, guess, 0.7 * periods * length) for part in stretches(number))
+    found = [fit for fit in fits if fit is not None]
     if len(found) < 2:
         raise EstimationError(
             f"{samples.name}: expected two windows of {periods:.3g} periods with an oscillation above the noise, got "

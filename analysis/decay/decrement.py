@@ -5,24 +5,20 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vibroimpact.analysis.decay.covariance import coloured_covariance
 from vibroimpact.analysis.decay.estimate import Estimate
-from vibroimpact.analysis.decay.residuals import residual_test
-from vibroimpact.analysis.decay.samples import DecaySamples
-from vibroimpact.analysis.decay.windows import Envelope, first_guess
+from vibroimpact.analysis.decay.exponential import Envelope, first_guess
+from vibroimpact.analysis.decay.residuals import coloured_covariance, residual_test
+from vibroimpact.analysis.decay.samples import DecaySamples, Floats, stretches
 from vibroimpact.fmus.errors import EstimationError
-
-Floats = NDArray[np.float64]
 
 _FEWEST_PEAKS = 4
 _SMALLEST = 3.0
-"""Standard errors that a peak must stand out by: the logarithm of less is biased."""
+"""Height of a peak, in standard errors, below which its logarithm is biased: such peaks are left out."""
 _LAGS_TURN = 1.25
-"""rad: makes the residual test look over ten peaks."""
+"""Phase per peak, rad, with which the residual test looks over ten peaks."""
 _BENT = 3.0
-"""Standard errors by which ln(peak) must bend over n before it is called bent."""
+"""Curvature of ln(peak) over n, in standard errors, above which it is called bent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +148,7 @@ def find_peaks(samples: DecaySamples, envelope: Envelope) -> Peaks:
     half = np.round(phase / np.pi).astype(int)
     found: list[tuple[float, ...]] = []
     squares, spare = 0.0, 0
-    for part in np.split(np.arange(len(half)), np.flatnonzero(np.diff(half)) + 1):
+    for part in stretches(half):
         turn = phase[part] - np.pi * half[part[0]]
         if len(part) < 4 or np.ptp(turn) < 0.7 * np.pi:
             continue

@@ -1,4 +1,4 @@
-"""A number with its doubt, and such numbers as a dataset."""
+"""A number with its standard error, and such numbers as a dataset and as a table that people read."""
 
 from __future__ import annotations
 
@@ -9,8 +9,18 @@ import xarray as xr
 from scipy.stats import t as student
 
 from vibroimpact.analysis.files.estimate_table import estimate_table
+from vibroimpact.analysis.recording.units import unit_label
+from vibroimpact.fmus.printing import table, value_and_error
+from vibroimpact.fmus.terminal import Terminal
 
 CONFIDENCE = 0.95
+METHOD_WORDS = {
+    "decrement": "logarithmic decrement",
+    "exponential": "decaying cosine",
+    "law": "best damping law",
+    "response": "frequency response",
+    "half_power": "half-power bandwidth",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +56,40 @@ class Estimate:
 
 def table_of(estimates: Mapping[str, Mapping[str, Estimate]]) -> xr.Dataset:
     """Return estimates by method, then quantity, on these dimensions; see `estimate_table`."""
-    units: dict[str, str] = {}
-    for found in estimates.values():
-        for name, item in found.items():
-            units.setdefault(name, item.unit)
+    units = {name: item.unit for found in estimates.values() for name, item in found.items()}
     cells = {
         method: {name: (item.value, item.standard_error, *item.interval) for name, item in found.items()}
         for method, found in estimates.items()
     }
     return estimate_table(cells, units, CONFIDENCE)
+
+
+def print_estimates(
+    console: Terminal,
+    title: str,
+    estimates: Mapping[str, Mapping[str, Estimate]],
+    names: Mapping[str, str] = METHOD_WORDS,
+) -> None:
+    """Print all methods side by side: one row for each quantity and method, with the name of the method."""
+    rows = table(title, "<quantity", "<method", ">value", ">std. error", ">95 % interval", "<unit")
+    quantities = list(dict.fromkeys(name for found in estimates.values() for name in found))
+    for quantity in quantities:
+        for method, found in estimates.items():
+            if quantity in found:
+                estimate = found[quantity]
+                value, error = value_and_error(estimate.value, estimate.standard_error)
+                interval = "-"
+                if error != "-":
+                    low, high = (
+                        value_and_error(end, estimate.standard_error)[0] for end in estimate.interval
+                    )
+                    interval = f"{low} .. {high}"
+                row = quantity.replace("_", " "), names.get(method, method), value, error, interval
+                rows.add_row(*row, unit_label(estimate.unit))
+    console.print(rows)
+
+
+def print_remarks(console: Terminal, remarks: tuple[str, ...]) -> None:
+    """Print remarks, one line each."""
+    for remark in remarks:
+        console.print(f"- {remark}", soft_wrap=True)

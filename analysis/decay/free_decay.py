@@ -1,4 +1,4 @@
-"""All that is estimated from one free decay, and the dataset of it."""
+"""All that is estimated from one free decay, as a dataset and as tables that people read."""
 
 from __future__ import annotations
 
@@ -11,14 +11,23 @@ import xarray as xr
 
 from vibroimpact.analysis.decay.backbone import Backbone, backbone
 from vibroimpact.analysis.decay.decrement import Decrement, logarithmic_decrement
-from vibroimpact.analysis.decay.estimate import Estimate, table_of
+from vibroimpact.analysis.decay.estimate import (
+    METHOD_WORDS,
+    Estimate,
+    print_estimates,
+    print_remarks,
+    table_of,
+)
 from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponential
-from vibroimpact.analysis.decay.law_choice import LawChoice, choose_law
-from vibroimpact.analysis.decay.law_fit import CUBIC, LawFit
+from vibroimpact.analysis.decay.law_fit import CUBIC, LawChoice, LawFit, choose_law
 from vibroimpact.analysis.decay.laws import ALL_LAWS, COULOMB, QUADRATIC, VISCOUS, DampingLaw, spoken
 from vibroimpact.analysis.decay.samples import DecaySamples, decay_samples
+from vibroimpact.analysis.files.estimate_table import described
 from vibroimpact.analysis.recording import Channel
+from vibroimpact.analysis.recording.units import unit_label
 from vibroimpact.fmus.errors import EstimationError
+from vibroimpact.fmus.printing import table, value_and_error, with_error
+from vibroimpact.fmus.terminal import Terminal
 
 T = TypeVar("T")
 
@@ -54,16 +63,11 @@ class FreeDecay:
                 "damping_ratio": self.decrement.damping_ratio,
                 "angular_frequency": self.decrement.angular_frequency,
             }
-        fit = self.exponential
-        found["exponential"] = {
-            "amplitude": fit.amplitude,
-            "angular_frequency": fit.angular_frequency,
-            "decay_rate": fit.decay_rate,
-            "phase": fit.phase,
-            "offset": fit.offset,
-            "natural_angular_frequency": fit.natural_angular_frequency,
-            "damping_ratio": fit.damping_ratio,
-        }
+        quantities = (
+            *("amplitude", "angular_frequency", "decay_rate", "phase", "offset"),
+            *("natural_angular_frequency", "damping_ratio"),
+        )
+        found["exponential"] = {name: getattr(self.exponential, name) for name in quantities}
         if self.choice is not None:
             found["law"] = law_estimates(self.choice.best)
         return found
@@ -169,31 +173,27 @@ def law_estimates(fit: LawFit) -> dict[str, Estimate]:
     return found
 
 
-def _described(words: str, unit: str = "1") -> dict[str, str]:
-    return {"units": unit, "long_name": words}
-
-
 def _motion(decay: FreeDecay) -> xr.Dataset:
     samples, unit = decay.samples, decay.samples.unit
     data = {
-        "measured": ("time", samples.value, _described(f"measured {samples.name}", unit)),
-        "exponential_fit": ("time", decay.exponential.fitted, _described("fitted decaying cosine", unit)),
+        "measured": ("time", samples.value, described(f"measured {samples.name}", unit)),
+        "exponential_fit": ("time", decay.exponential.fitted, described("fitted decaying cosine", unit)),
     }
     if decay.choice is not None:
         words = f"motion under the fitted law: {spoken(decay.choice.best.law)}"
-        data["law_fit"] = ("time", decay.choice.best.fitted, _described(words, unit))
-    return xr.Dataset(data, {"time": ("time", samples.time, _described("time", "s"))})
+        data["law_fit"] = ("time", decay.choice.best.fitted, described(words, unit))
+    return xr.Dataset(data, {"time": ("time", samples.time, described("time", "s"))})
 
 
 def _peaks(found: Decrement, unit: str) -> xr.Dataset:
     peaks = found.peaks
     return xr.Dataset(
         {
-            "peak_height": ("peak", peaks.height, _described("turning points from the equilibrium", unit)),
-            "peak_height_error": ("peak", peaks.error, _described("standard error of the height", unit)),
-            "peak_number": ("peak", peaks.number, _described("half periods from the first phase")),
+            "peak_height": ("peak", peaks.height, described("turning points from the equilibrium", unit)),
+            "peak_height_error": ("peak", peaks.error, described("standard error of the height", unit)),
+            "peak_number": ("peak", peaks.number, described("half periods from the first phase")),
         },
-        {"peak_time": ("peak", peaks.time, _described("instants of the turning points", "s"))},
+        {"peak_time": ("peak", peaks.time, described("instants of the turning points", "s"))},
     )
 
 
@@ -203,7 +203,7 @@ def _laws(choice: LawChoice, unit: str) -> xr.Dataset:
     def column(
         words: str, values: Sequence[float | bool], of: str = "1"
     ) -> tuple[str, object, dict[str, str]]:
-        return "law", np.array(values, dtype=np.float64), _described(words, of)
+        return "law", np.array(values, dtype=np.float64), described(words, of)
 
     data = {
         "aic": column("Akaike's criterion, for white residuals", [fit.aic for fit in fits]),
@@ -229,9 +229,9 @@ def _laws(choice: LawChoice, unit: str) -> xr.Dataset:
             errors = [np.nan if item is None else item.standard_error for item in known]
             data[f"law_{term}"] = column(f"{term} coefficient", values, of)
             data[f"law_{term}_error"] = column(f"standard error of the {term} coefficient", errors, of)
-    names = ("law", [fit.law.name for fit in fits], _described("damping law"))
+    names = ("law", [fit.law.name for fit in fits], described("damping law"))
     return xr.Dataset(
-        data, {"law": names, "effective_samples": ((), samples, _described("independent samples"))}
+        data, {"law": names, "effective_samples": ((), samples, described("independent samples"))}
     )
 
 
@@ -245,5 +245,61 @@ def _windows(found: Backbone, unit: str) -> xr.Dataset:
         "window_damping_error": (found.damping_ratio_error, "standard error of it", "1"),
     }
     return xr.Dataset(
-        {name: ("window", values, _described(words, of)) for name, (values, words, of) in columns.items()}
+        {name: ("window", values, described(words, of)) for name, (values, words, of) in columns.items()}
     )
+
+
+def print_decay(console: Terminal, decay: FreeDecay) -> None:
+    """Print the estimates of a free decay, its damping laws, its backbone, and the remarks."""
+    unit = "" if decay.samples.unit == "1" else f" ({unit_label(decay.samples.unit)})"
+    title = (
+        f"Free decay of {decay.samples.name}{unit}, amplitude and phase at {decay.samples.reference_time:g} s"
+    )
+    law = {} if decay.choice is None else {"law": spoken(decay.choice.best.law)}
+    print_estimates(console, title, decay.estimates(), METHOD_WORDS | law)
+    if decay.choice is not None:
+        _print_laws(console, decay.choice, len(decay.samples.time))
+    if decay.backbone is not None:
+        _print_backbone(console, decay.backbone)
+    print_remarks(console, decay.words())
+
+
+def _print_laws(console: Terminal, choice: LawChoice, samples: int) -> None:
+    rows = table(
+        f"Damping laws, best first (x'' + w0^2 x = -2 viscous x' - coulomb sign x' - quadratic x' |x'|); "
+        f"effective samples {choice.effective_samples:.0f} of {samples}",
+        *("<law", ">AIC", ">effective", ">weight", ">rms", "<residual", "<coefficients"),
+    )
+    lowest = choice.best.aic
+    lowest_effective = choice.best.effective_aic(choice.effective_samples)
+    for fit, weight in zip(choice.fits, choice.weights(), strict=True):
+        parts = []
+        for term in (*fit.law.terms, "cubic"):
+            if term in fit.coefficients:
+                known = fit.coefficients[term]
+                parts.append(f"{term} {with_error(known.value, known.standard_error)}")
+        verdict = "noise" if fit.test.adequate else "not noise"
+        rows.add_row(
+            spoken(fit.law),
+            f"{fit.aic - lowest:+.1f}" if fit is not choice.best else f"{lowest:.1f}",
+            f"{fit.effective_aic(choice.effective_samples) - lowest_effective:+.1f}",
+            f"{weight:.3f}",
+            f"{fit.test.rms:.4g}",
+            verdict if fit.physical else "negative term",
+            ", ".join(parts),
+        )
+    console.print(rows)
+
+
+def _print_backbone(console: Terminal, found: Backbone) -> None:
+    rows = table(
+        f"Frequency and damping against amplitude, in windows of {found.periods:.3g} periods",
+        *(">time (s)", ">amplitude", ">frequency (Hz)", ">+-", ">damping ratio", ">+-"),
+    )
+    for place in range(len(found.time)):
+        frequency = value_and_error(
+            found.angular_frequency[place] / (2 * np.pi), found.angular_frequency_error[place] / (2 * np.pi)
+        )
+        damping = value_and_error(found.damping_ratio[place], found.damping_ratio_error[place])
+        rows.add_row(f"{found.time[place]:.6g}", f"{found.amplitude[place]:.4g}", *frequency, *damping)
+    console.print(rows)

@@ -9,12 +9,11 @@ import xarray as xr
 from numpy.typing import NDArray
 from scipy.signal import csd, get_window, welch
 
-from vibroimpact.analysis.decay.samples import clock_remark
+from vibroimpact.analysis.decay.samples import Floats, clock_remark
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import UsageError
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 WINDOWS = ("bartlett", "hann", "boxcar")

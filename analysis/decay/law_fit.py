@@ -1,26 +1,20 @@
-"""One damping law fitted to the whole motion of a free decay."""
+"""Damping laws fitted to the whole motion of a free decay, and which of them it follows, if any."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares, nnls
 
-from vibroimpact.analysis.decay.covariance import coloured_covariance
 from vibroimpact.analysis.decay.estimate import Estimate
-from vibroimpact.analysis.decay.exponential import ExponentialDecay
-from vibroimpact.analysis.decay.half_swing import Coefficients
-from vibroimpact.analysis.decay.laws import COULOMB, QUADRATIC, VISCOUS, DampingLaw
-from vibroimpact.analysis.decay.motion import decaying_motion
-from vibroimpact.analysis.decay.residuals import ResidualTest, residual_test
-from vibroimpact.analysis.decay.samples import DecaySamples
-from vibroimpact.analysis.decay.windows import Envelope
+from vibroimpact.analysis.decay.exponential import Envelope, ExponentialDecay, first_guess, fit_exponential
+from vibroimpact.analysis.decay.laws import ALL_LAWS, COULOMB, QUADRATIC, VISCOUS, DampingLaw, spoken
+from vibroimpact.analysis.decay.motion import Coefficients, decaying_motion
+from vibroimpact.analysis.decay.residuals import ResidualTest, coloured_covariance, residual_test
+from vibroimpact.analysis.decay.samples import DecaySamples, Floats
 from vibroimpact.fmus.errors import EstimationError
-
-Floats = NDArray[np.float64]
 
 CUBIC = "cubic"
 _STEP = 1e-6
@@ -99,17 +93,15 @@ class _Problem:
             CUBIC: (self.size**-2, "1" if unit == "1" else f"{length}-2"),
         }
 
-    def origin(self) -> dict[str, float]:
-        """Return the values that scaled parameters of 0 stand for."""
-        return {
+    def physical(self, parameters: Floats) -> dict[str, Floats]:
+        """Return the physical values of scaled parameters, shape (parameter, column)."""
+        scales = self.scales()
+        # what scaled parameters of 0 stand for
+        origin = {
             "turning_time": self.turning,
             "offset": self.offset,
             "natural_angular_frequency": self.omega,
         }
-
-    def physical(self, parameters: Floats) -> dict[str, Floats]:
-        """Return the physical values of scaled parameters, shape (parameter, column)."""
-        scales, origin = self.scales(), self.origin()
         return {
             name: origin.get(name, 0.0) + scales[name][0] * row
             for name, row in zip(self.names, parameters, strict=True)
@@ -231,7 +223,7 @@ def _first_values(problem: _Problem, law: DampingLaw, envelope: Envelope) -> Flo
         share, power = losses[term]
         areas = np.concatenate([[power[0] * time[0]], 0.5 * (power[1:] + power[:-1]) * np.diff(time)])
         columns.append(-omega * share * np.cumsum(areas))
-    # The slow equation ends where friction holds the body: what is left there is noise.
+    # The slow equation ends where friction holds the body: from there on the envelope is noise.
     moving = slice(0, max(3, int(np.argmax(np.append(size < 0.02 * size[0], True)))))
     solved, _ = nnls(np.column_stack(columns)[moving], size[moving])
     values = [0.0, float(solved[0]) or 1.0, 0.0, 0.0, *solved[1:]]
@@ -259,3 +251,128 @@ def _described(
     aic = count * float(np.log(max(total / count, 1e-300))) + 2.0 * numbers
     aicc = aic + 2.0 * numbers * (numbers + 1.0) / max(count - numbers - 1.0, 1.0)
     return LawFit(law, coefficients, aic, aicc, total, numbers, fitted, test, settled)
+
+
+@dataclass(frozen=True, slots=True)
+class LawChoice:
+    """Damping laws fitted to one decay, ranked.
+
+    Attributes
+    ----------
+    fits : tuple of LawFit
+        Best first by AIC; laws with a negative coefficient come after all others.
+    effective_samples : float
+        Independent samples by the residual of the best law; the same number for all laws.
+    lost : tuple of DampingLaw
+        Laws whose fit ended in damping beyond any swing.
+    """
+
+    fits: tuple[LawFit, ...]
+    effective_samples: float
+    lost: tuple[DampingLaw, ...] = ()
+
+    @property
+    def best(self) -> LawFit:
+        """The law of the lowest AIC among those that take energy out only."""
+        return self.fits[0]
+
+    @property
+    def best_by_effective_samples(self) -> LawFit:
+        """The law of the lowest AIC when correlated samples are counted as the fewer that they are worth."""
+        eligible = [fit for fit in self.fits if fit.physical] or list(self.fits)
+        return min(eligible, key=lambda fit: fit.effective_aic(self.effective_samples))
+
+    def weights(self) -> tuple[float, ...]:
+        """Return Akaike weights of the fits, by the effective number of samples; 0 where a law is no damping."""
+        scores = np.array(
+            [fit.effective_aic(self.effective_samples) if fit.physical else np.inf for fit in self.fits]
+        )
+        if not np.any(np.isfinite(scores)):
+            return (0.0,) * len(self.fits)
+        share = np.exp(-0.5 * (scores - np.min(scores)))
+        return tuple((share / np.sum(share)).tolist())
+
+    def words(self) -> tuple[str, ...]:
+        """Return what was found, in sentences."""
+        best, other = self.best, self.best_by_effective_samples
+        said = [f"{spoken(best.law)} {'has the lowest AIC' if len(self.fits) > 1 else 'was asked for'}."]
+        if not best.physical:
+            said.append(
+                "a coefficient of it is negative: it feeds energy in; no law here is a damping of this motion."
+            )
+        said.append(f"{spoken(best.law)} is {best.test.words()}.")
+        if len(self.fits) > 1 and not best.test.adequate:
+            good = [fit for fit in self.fits if fit.test.adequate and fit.physical]
+            said.append(
+                "none of the laws is adequate: coefficients and errors describe the best of the wrong models."
+                if not good
+                else f"adequate by its residual: {', '.join(spoken(fit.law) for fit in good)}."
+            )
+        count = len(best.fitted)
+        if len(self.fits) > 1 and self.effective_samples < 0.8 * count:
+            said.append(
+                f"AIC assumes white residuals; these are correlated, and {count} samples are worth "
+                f"{self.effective_samples:.0f}: with that number "
+                + (
+                    f"{spoken(other.law)} wins."
+                    if other is not best
+                    else f"{spoken(best.law)} stays the first."
+                )
+            )
+        odd = [spoken(fit.law) for fit in self.fits if not fit.physical]
+        if odd and best.physical:
+            said.append(f"left out for a negative coefficient: {', '.join(odd)}.")
+        if self.lost:
+            said.append(f"could not be fitted: {', '.join(spoken(law) for law in self.lost)}.")
+        unsettled = [spoken(fit.law) for fit in self.fits if not fit.settled]
+        if unsettled:
+            said.append(f"not settled within the limit of steps: {', '.join(unsettled)}.")
+        return tuple(said)
+
+
+def choose_law(
+    samples: DecaySamples,
+    laws: Sequence[DampingLaw] = ALL_LAWS,
+    *,
+    cubic: bool = False,
+    start: ExponentialDecay | None = None,
+) -> LawChoice:
+    """Fit damping laws to a free decay and rank them by Akaike's criterion.
+
+    Parameters
+    ----------
+    samples : DecaySamples
+    laws : sequence of DampingLaw
+        All seven, unless named.
+    cubic : bool
+        Fit a cubic stiffness with every law.
+    start : ExponentialDecay, optional
+        The decaying cosine of the same samples, where it is known already.
+
+    Raises
+    ------
+    EstimationError
+        Nothing oscillates, or no law can be fitted.
+
+    Examples
+    --------
+    >>> time = np.arange(0.0, 40.0, 0.05)
+    >>> noise = 0.02 * np.random.default_rng(2).normal(size=time.size)
+    >>> choice = choose_law(DecaySamples(time, 3.0 * np.exp(-0.05 * time) * np.cos(4.0 * time) + noise))
+    >>> choice.best.law.name, choice.best.test.adequate
+    ('viscous', True)
+    """
+    envelope = first_guess(samples).envelope
+    start = fit_exponential(samples) if start is None else start
+    found, lost = [], []
+    for law in laws:
+        try:
+            found.append(fit_law(samples, law, start, envelope, cubic=cubic))
+        except EstimationError:
+            lost.append(law)
+    if not found:
+        raise EstimationError(
+            f"{samples.name}: expected a decay that some law fits, got none. Narrow the window."
+        )
+    ranked = sorted(found, key=lambda fit: (not fit.physical, fit.aic))
+    return LawChoice(tuple(ranked), ranked[0].test.effective_samples, tuple(lost))

@@ -1,30 +1,28 @@
-"""Natural frequency, damping ratio and modal constant of a resonance, fitted to a frequency response."""
+"""Natural frequency, damping ratio and modal constant of a resonance, fitted to a frequency response; its dataset."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+import xarray as xr
 from scipy.optimize import least_squares
 
-from vibroimpact.analysis.decay.covariance import coloured_covariance
-from vibroimpact.analysis.decay.estimate import Estimate
-from vibroimpact.analysis.decay.frequency_response import FrequencyResponse
+from vibroimpact.analysis.decay.estimate import Estimate, table_of
+from vibroimpact.analysis.decay.frequency_response import Complexes, FrequencyResponse
+from vibroimpact.analysis.decay.residuals import coloured_covariance
+from vibroimpact.analysis.decay.samples import Floats
+from vibroimpact.analysis.files.estimate_table import described
 from vibroimpact.fmus.errors import EstimationError, UsageError
-
-Floats = NDArray[np.float64]
-Complexes = NDArray[np.complex128]
 
 FORMS = ("displacement", "velocity", "acceleration", "transmissibility")
 """What responds to what: the first three to a force, the last an absolute acceleration to that of the base."""
 
 _FEWEST_LINES = 8
 _DRIVEN = 1e-3
-"""Part of the largest drive that a line must have to be looked at for a peak."""
+"""Drive of a line, relative to the largest, below which it is not looked at for a peak."""
 _STANDS_OUT = 3.0
-"""Standard errors of its modal constant; what is less may be a ripple of the noise."""
+"""Modal constant, in standard errors, below which a peak may be a ripple of the noise."""
 _BAND = 8.0
 """Half-power bandwidths on either side of a peak that are fitted, unless a band is given."""
 
@@ -51,7 +49,6 @@ class Resonance:
         What was fitted: rad/s, `|H|` measured and fitted.
     error : ndarray of float, shape (line,)
         Standard error of the magnitude; zeros where not known.
-    remarks : tuple of str
     """
 
     natural_angular_frequency: Estimate
@@ -64,7 +61,6 @@ class Resonance:
     magnitude: Floats
     fitted: Floats
     error: Floats
-    remarks: tuple[str, ...] = field(default=())
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +125,9 @@ def curve_of(
     if band is None:
         # Where hardly anything was driven, the quotient is noise over noise, and may be the highest of all.
         driven = np.abs(response) * (found.drive_power > _DRIVEN)
-        lines &= _around_peak(omega, driven, 2.0 * np.pi * found.resolution)
+        peak, width = _peak(omega, driven)
+        finest = max(2.0 * np.pi * found.resolution, 2.0 * float(omega[1] - omega[0]))
+        lines &= np.abs(omega - peak) <= _BAND * max(width, finest)
     if np.count_nonzero(lines) < _FEWEST_LINES:
         raise UsageError(
             f"--band: expected {_FEWEST_LINES} lines or more, got {np.count_nonzero(lines)}; they are "
@@ -151,16 +149,9 @@ def _form_of(units: tuple[str, str]) -> str:
 def _constant_unit(form: str, units: tuple[str, str]) -> str:
     if form == "transmissibility" or units == ("1", "1"):
         return "1"
-    return (
-        "kg-1" if units[0] == "N" and units[1] in ("m", "m s-1", "m s-2") else f"({units[1]}) ({units[0]})-1"
-    )
-
-
-def _around_peak(omega: Floats, magnitude: Floats, resolution: float) -> NDArray[np.bool_]:
-    peak, width = _peak(omega, magnitude)
-    reach = _BAND * max(width, resolution, 2.0 * float(omega[1] - omega[0]))
-    chosen: NDArray[np.bool_] = np.abs(omega - peak) <= reach
-    return chosen
+    drive, response = units
+    mechanical = drive == "N" and response in ("m", "m s-1", "m s-2")
+    return "kg-1" if mechanical else f"({response}) ({drive})-1"
 
 
 def _peak(omega: Floats, magnitude: Floats) -> tuple[float, float]:
@@ -237,7 +228,12 @@ def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
     peak, width = _peak(omega, magnitude)
     known = bool(np.all(curve.error > 0.0))
     weight = 1.0 / curve.error if known else np.full(len(omega), 1.0 / float(np.max(magnitude)))
-    model = _complex_model(curve) if curve.complex else _magnitude_model(curve)
+
+    def model(p: Floats) -> Floats | Complexes:
+        shape = _shape(omega, p[0], p[1], curve.form)
+        if curve.complex:
+            return np.asarray((p[2] + 1j * p[3]) * shape + p[4] + 1j * p[5])
+        return np.asarray(np.abs(p[2] * shape + p[3]))
 
     def residual(p: Floats) -> Floats:
         difference = (model(p) - curve.response) * weight
@@ -279,23 +275,8 @@ def _start(curve: Curve, peak: float, width: float) -> Floats:
     if not curve.complex:
         return np.array([peak, damping, float(np.max(curve.response) / np.max(np.abs(shape))), 0.0])
     columns = np.column_stack([shape, np.ones_like(shape)])
-    constant, rest = np.linalg.lstsq(columns, curve.response, rcond=None)[0]
-    return np.array([peak, damping, constant.real, constant.imag, rest.real, rest.imag])
-
-
-def _complex_model(curve: Curve) -> Callable[[Floats], Complexes]:
-    def model(p: Floats) -> Complexes:
-        shape = _shape(curve.angular_frequency, p[0], p[1], curve.form)
-        return np.asarray((p[2] + 1j * p[3]) * shape + p[4] + 1j * p[5])
-
-    return model
-
-
-def _magnitude_model(curve: Curve) -> Callable[[Floats], Floats]:
-    def model(p: Floats) -> Floats:
-        return np.asarray(np.abs(p[2] * _shape(curve.angular_frequency, p[0], p[1], curve.form) + p[3]))
-
-    return model
+    constant, others = np.linalg.lstsq(columns, curve.response, rcond=None)[0]
+    return np.array([peak, damping, constant.real, constant.imag, others.real, others.imag])
 
 
 def _described(curve: Curve, found: Floats, covariance: Floats, fitted: Floats) -> Resonance:
@@ -310,7 +291,6 @@ def _described(curve: Curve, found: Floats, covariance: Floats, fitted: Floats) 
         constant = abs(turned) * (1.0 if turned.real >= 0.0 else -1.0)
         constant_error = float(np.sqrt(along @ block @ along))
         phase = Estimate(float(np.angle(turned)), float(np.sqrt(across @ block @ across)), "rad", freedom)
-    curve = curve_of(curve) if isinstance(curve, FrequencyResponse) else curve
     omega, magnitude = curve.angular_frequency, np.abs(curve.response)
     return Resonance(
         Estimate(float(found[0]), float(error[0]), "rad s-1", freedom),
@@ -335,3 +315,85 @@ def resolution_remark(found: FrequencyResponse, resonance: Resonance) -> tuple[s
         f"a line is {found.resolution:.3g} Hz wide and the resonance {width:.3g} Hz: the damping ratio may be too "
         "large by leakage. Take longer segments (--segment), or fit the decay.",
     )
+
+
+@dataclass(frozen=True, slots=True)
+class ResponseEstimates:
+    """A fitted resonance and where it is from.
+
+    Attributes
+    ----------
+    resonance : Resonance
+    response : FrequencyResponse or None
+        None where the curve is that of a simulated sweep.
+    title : str
+    unit : str
+        CF unit of the response.
+    remarks : tuple of str
+    """
+
+    resonance: Resonance
+    response: FrequencyResponse | None
+    title: str
+    unit: str = "1"
+    remarks: tuple[str, ...] = ()
+
+    def estimates(self) -> dict[str, dict[str, Estimate]]:
+        """Return the estimates by method, then quantity."""
+        fit = self.resonance
+        found = {
+            "natural_angular_frequency": fit.natural_angular_frequency,
+            "damping_ratio": fit.damping_ratio,
+            "modal_constant": fit.modal_constant,
+        }
+        if fit.phase is not None:
+            found["modal_phase"] = fit.phase
+        rough = Estimate(fit.half_power_damping_ratio, float("nan"))
+        return {"response": found, "half_power": {"damping_ratio": rough}}
+
+    def words(self) -> tuple[str, ...]:
+        """Return what a reader must know, in sentences."""
+        said = list(self.remarks)
+        fit = self.resonance
+        ratio = fit.half_power_damping_ratio / fit.damping_ratio.value
+        if not np.isfinite(ratio):
+            said.append("the band does not hold both half-power points: there is no cross-check.")
+        elif abs(ratio - 1.0) > 0.2:
+            said.append(
+                f"the half-power bandwidth gives {ratio:.2g} times the fitted damping ratio: another mode, noise, or "
+                "lines too far apart."
+            )
+        return tuple(said)
+
+    def dataset(self) -> xr.Dataset:
+        """Return estimates (method, quantity), the fitted lines, and all lines of a measured response."""
+        fit, found, unit = self.resonance, self.response, self.unit
+        lines = {
+            "response": (fit.magnitude, "magnitude of the response"),
+            "response_error": (fit.error, "standard error of the magnitude"),
+            "fitted_response": (fit.fitted, "magnitude of the fitted response"),
+        }
+        parts = [
+            table_of(self.estimates()),
+            xr.Dataset(
+                {name: ("line", values, described(words, unit)) for name, (values, words) in lines.items()},
+                {"angular_frequency": ("line", fit.angular_frequency, described("frequency", "rad s-1"))},
+            ),
+        ]
+        if found is not None:
+            measured = {
+                "h1_magnitude": (np.abs(found.h1), "|H1|", unit),
+                "h1_phase": (np.angle(found.h1), "phase of H1", "rad"),
+                "h2_magnitude": (np.abs(found.h2), "|H2|", unit),
+                "coherence": (found.coherence, "coherence", "1"),
+            }
+            parts.append(
+                xr.Dataset(
+                    {name: ("frequency", row, described(*words)) for name, (row, *words) in measured.items()},
+                    {"frequency": ("frequency", found.frequency, described("frequency", "Hz"))},
+                )
+            )
+        merged = xr.merge(parts, combine_attrs="override")
+        return merged.assign_attrs(
+            estimates="response", title=self.title, form=fit.form, remarks="\n".join(self.words())
+        )

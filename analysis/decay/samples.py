@@ -14,7 +14,7 @@ from vibroimpact.fmus.errors import UsageError
 Floats = NDArray[np.float64]
 
 FEWEST_SAMPLES = 16
-"""Below this the five unknowns of a decaying cosine are not fitted."""
+"""Number of samples below which the five unknowns of a decaying cosine are not fitted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +88,11 @@ def decay_samples(
     return DecaySamples(
         time[chosen], channel.values[chosen], channel.unit, channel.name, float(start), tuple(remarks)
     )
+
+
+def stretches(number: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Return the places of neighbours that have the same number, one array for each stretch of them."""
+    return np.split(np.arange(len(number)), np.flatnonzero(np.diff(number)) + 1)
 
 
 def clock_remark(channel: Channel) -> list[str]:

@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.schema import Outcome, swept_names
 from vibroimpact.analysis.decay.resonance import Curve
+from vibroimpact.analysis.decay.samples import Floats
 from vibroimpact.fmus.errors import DatasetError
-
-Floats = NDArray[np.float64]
 
 _FEWEST_RUNS = 8
 
@@ -71,13 +69,9 @@ def swept_response(
     amplitude = np.mean(half[free], axis=1) / drive_amplitude
     order = np.argsort(omega, kind="stable")
     remarks = _remarks(int(np.count_nonzero(~free)), others, half[free])
-    unit = (
-        "1"
-        if flat.attrs.get("units_system") == "nondimensional"
-        else "kg-1"
-        if drive_unit == "N"
-        else "m s-2"
-    )
+    unit = "kg-1" if drive_unit == "N" else "m s-2"
+    if flat.attrs.get("units_system") == "nondimensional":
+        unit = "1"
     curve = Curve(omega[order], amplitude[order], np.zeros(len(order)), "displacement", unit)
     return curve, remarks
 

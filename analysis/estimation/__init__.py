@@ -19,7 +19,6 @@ Examples
 0.8
 """
 
-from vibroimpact.analysis.estimation.bounces import estimate_bounces
 from vibroimpact.analysis.estimation.estimates import (
     METHODS,
     QUANTITIES,
@@ -27,7 +26,9 @@ from vibroimpact.analysis.estimation.estimates import (
     ImpactEstimates,
     MethodEstimate,
     Refusal,
+    print_impacts,
 )
+from vibroimpact.analysis.estimation.flight_times import estimate_bounces
 from vibroimpact.analysis.estimation.impacts import estimate_impacts
 from vibroimpact.analysis.estimation.modal import (
     ModalEstimates,
@@ -36,7 +37,6 @@ from vibroimpact.analysis.estimation.modal import (
     restitution_from_energy,
 )
 from vibroimpact.analysis.estimation.physics import Forcing, Known
-from vibroimpact.analysis.estimation.report import print_impacts
 
 __all__ = [
     "METHODS",

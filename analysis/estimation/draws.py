@@ -15,21 +15,20 @@ from scipy.stats import t as student
 
 from vibroimpact.analysis.estimation.energy import Drawn, EnergyBalance, HalfEnergies, unknowns_by_speed
 from vibroimpact.analysis.estimation.estimates import MethodEstimate
-from vibroimpact.analysis.estimation.flight_fit import FittedFlight, flights_to_level
-from vibroimpact.analysis.estimation.noise import Floats
-from vibroimpact.analysis.estimation.physics import Parameters
-from vibroimpact.analysis.estimation.segments import Signal
+from vibroimpact.analysis.estimation.flight_fit import flights_to_level
+from vibroimpact.analysis.estimation.physics import Floats, Parameters
+from vibroimpact.analysis.estimation.prepared import Prepared
 from vibroimpact.analysis.estimation.smoothing import choose_window
 from vibroimpact.fmus.errors import EstimationError
 
-# Parts of a period of the fastest motion to which the noiseless motion is smoothed: exact for what is asked.
+# Window of the noiseless motion, in periods of the fastest motion: short enough to smooth nothing away.
 _FINE = 0.15
 _SAMPLES_PER_SPAN = 6
 _MOST_FAILED = 0.1
-# Of these the noiseless motion has known values.
+# Quantities whose true value is known for the noiseless motion.
 _FITTED = ("restitution", "damping_ratio", "static_deflection")
 
-Estimator = Callable[[EnergyBalance, HalfEnergies, Parameters, Drawn], Mapping[str, Floats]]
+Estimator = Callable[["Resampled", HalfEnergies, Drawn], Mapping[str, Floats]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,108 +37,84 @@ class Resampled:
 
     Attributes
     ----------
-    balance, fine : EnergyBalance
-        With the window that suits the noise, and with one for the noiseless motion.
+    balance : EnergyBalance
+        With the window that suits the noise.
     parameters : Parameters
         What the methods take as known.
-    measured, exact, drawn : tuple
-        HalfEnergies, and the values that differ between draws.
+    measured, exact, drawn : HalfEnergies
+    varied : mapping of str to ndarray, shape (draw,)
+        Parameters from the weak form, which vary with the noise of the draws.
     window : float
         Of the smoothing, s.
     """
 
     balance: EnergyBalance
-    fine: EnergyBalance
     parameters: Parameters
-    measured: tuple[HalfEnergies, Drawn]
-    exact: tuple[HalfEnergies, Drawn]
-    drawn: tuple[HalfEnergies, Drawn]
+    measured: HalfEnergies
+    exact: HalfEnergies
+    drawn: HalfEnergies
+    varied: Drawn
     window: float
 
 
-def resample(
-    signal: Signal,
-    fitted: Sequence[FittedFlight],
-    parameters: Parameters,
-    stop_position: float | None,
-    noise: float,
-    names: Sequence[str],
-    influence: Sequence[Floats],
-    draws: int,
-    seed: int,
-) -> Resampled:
-    """Return the energies of a record and of `draws` draws of noise about its fitted motion.
-
-    Parameters
-    ----------
-    signal : Signal
-    fitted : sequence of FittedFlight
-        The exact flow on each flight: samples minus rests are the noiseless motion.
-    parameters : Parameters
-        With what is known, or came from the weak form.
-    stop_position : float or None
-        None: where the flights meet.
-    noise : float
-        Standard deviation.
-    names, influence : sequence
-        What came from the weak form, and how it changes with the samples of each flight.
-    draws, seed : int
-    """
-    level = (parameters.stop_position if stop_position is None else stop_position) - parameters.offset
+def resample(record: Prepared, draws: int, seed: int) -> Resampled:
+    """Return the energies of a record and of `draws` draws of noise about its fitted motion."""
+    signal, fitted, parameters = record.signal, record.fit.fitted, record.parameters
+    level = (parameters.stop_position if record.stop is None else record.stop) - parameters.offset
     flights = flights_to_level(signal, fitted, level, parameters)
     fastest = max(parameters.angular_frequency, parameters.natural_frequency)
+    # samples less residuals of the exact flow are the motion without noise
     motion = signal.values.copy()
     for one in fitted:
-        motion[one.flight.index] -= one.rests
+        motion[one.flight.index] -= one.residual
     rounding = 1e-12 * float(np.ptp(motion[signal.good]))
     noiseless = replace(signal, values=motion, noise=rounding)
-    shortest = _SAMPLES_PER_SPAN * signal.interval
-    fine_window = max(_FINE * 2.0 * np.pi / fastest, shortest)
-    window = choose_window(noiseless, flights, fine_window, fastest, noise)
+    fine_window = max(_FINE * 2.0 * np.pi / fastest, _SAMPLES_PER_SPAN * signal.interval)
+    window = choose_window(noiseless, flights, fine_window, fastest, record.fit.noise)
     balance = EnergyBalance(signal, flights, parameters.angular_frequency, window)
     fine = EnergyBalance(noiseless, flights, parameters.angular_frequency, fine_window)
-    errors = noise * np.random.default_rng(seed).standard_normal((draws, len(motion)))
+    errors = record.fit.noise * np.random.default_rng(seed).standard_normal((draws, len(motion)))
     shifts = sum(
-        (errors[:, one.flight.index] @ part.T for one, part in zip(fitted, influence, strict=False)),
-        np.zeros((draws, len(names))),
+        (
+            errors[:, one.flight.index] @ part.T
+            for one, part in zip(fitted, record.search.influence, strict=False)
+        ),
+        np.zeros((draws, len(record.names))),
     )
-    varied = {name: getattr(parameters, name) + shifts[:, k] for k, name in enumerate(names)}
-    drawn = balance.energies(motion + errors, parameters, stop_position)
     return Resampled(
         balance,
-        fine,
         parameters,
-        (balance.energies(signal.values[None], parameters, stop_position), {}),
-        (fine.energies(motion[None], parameters, stop_position), {}),
-        (drawn, varied),
+        balance.energies(signal.values[None], parameters, record.stop),
+        fine.energies(motion[None], parameters, record.stop),
+        balance.energies(motion + errors, parameters, record.stop),
+        {name: getattr(parameters, name) + shifts[:, k] for k, name in enumerate(record.names)},
         window,
     )
 
 
 def with_intervals(
-    resampled: Resampled, estimator: Estimator, confidence: float, inflation: float
+    resampled: Resampled, confidence: float, inflation: float, estimator: Estimator
 ) -> dict[str, MethodEstimate]:
     """Return an energy estimator's values less their systematic part, with standard errors and intervals.
 
     Parameters
     ----------
     resampled : Resampled
-    estimator : callable
-        From balance, energies, parameters and drawn values to values by name, shape (draw,).
     confidence : float
         Of the intervals.
     inflation : float
         Factor of the standard errors, for noise that is not white.
+    estimator : callable
+        From resampled record, energies and drawn values to values by name, shape (draw,).
 
     Raises
     ------
     EstimationError
         As the estimator's, or it fails on more than a tenth of the draws.
     """
-    p = resampled.parameters
-    measured = estimator(resampled.balance, resampled.measured[0], p, resampled.measured[1])
-    exact = estimator(resampled.fine, resampled.exact[0], p, resampled.exact[1])
-    drawn = estimator(resampled.balance, resampled.drawn[0], p, resampled.drawn[1])
+    measured = estimator(resampled, resampled.measured, {})
+    exact = estimator(resampled, resampled.exact, {})
+    drawn = estimator(resampled, resampled.drawn, resampled.varied)
     found = {}
     for name, value in measured.items():
         change = drawn[name] - exact[name][0]
@@ -153,59 +128,40 @@ def with_intervals(
             )
         error = inflation * float(np.std(known, ddof=1))
         if name in _FITTED:
-            # what smoothing and first-order ends make of the noiseless motion: all there is without noise
-            error = math.hypot(error, float(exact[name][0]) - getattr(p, name))
+            # error of smoothing and first-order ends, seen on the noiseless motion: without noise the only one
+            error = math.hypot(error, float(exact[name][0]) - getattr(resampled.parameters, name))
         centre = float(value[0] - np.mean(known))
         reach = float(student.ppf(0.5 + confidence / 2.0, len(known) - 1)) * error
         reach *= math.sqrt(1.0 + 1.0 / len(known))
-        found[name] = MethodEstimate(centre, error, centre - reach, centre + reach)
+        found[name] = MethodEstimate.within(centre, error, reach)
     return found
 
 
-def known_damping(
-    balance: EnergyBalance, halves: HalfEnergies, p: Parameters, drawn: Drawn
-) -> dict[str, Floats]:
+def known_damping(record: Resampled, halves: HalfEnergies, drawn: Drawn) -> dict[str, Floats]:
     """Estimate the restitution with the damping known."""
-    energy = halves.energy(p, drawn)
-    return {"restitution": balance.restitution(energy), "impact_velocity": _speed(balance, energy)}
+    energy = halves.energy(record.parameters, drawn)
+    balance = record.balance
+    return {"restitution": balance.restitution(energy), "impact_velocity": balance.speed(energy)}
 
 
-def all_loss_at_impact(
-    balance: EnergyBalance, halves: HalfEnergies, p: Parameters, drawn: Drawn
-) -> dict[str, Floats]:
+def all_loss_at_impact(record: Resampled, halves: HalfEnergies, drawn: Drawn) -> dict[str, Floats]:
     """Estimate the energy-loss factor: the restitution if nothing else took energy out."""
-    lossless = dict(drawn) | {"damping_ratio": np.zeros(1)}
-    return {"energy_loss_factor": balance.restitution(halves.energy(p, lossless))}
+    energy = halves.energy(record.parameters, {**drawn, "damping_ratio": np.zeros(1)})
+    return {"energy_loss_factor": record.balance.restitution(energy)}
 
 
-def by_speeds(unknown: Sequence[str], squares: Floats) -> Estimator:
-    """Return the estimator of restitution together with damping or forcing, from the speeds at the impacts.
+def by_speeds(unknown: Sequence[str]) -> Estimator:
+    """Return the estimator of restitution together with damping or forcing (`unknowns_by_speed`), from the speeds."""
 
-    Parameters
-    ----------
-    unknown : sequence of str
-        As of `unknowns_by_speed`.
-    squares : ndarray, shape (half,)
-        Squares of the speeds of the noiseless motion.
-    """
-
-    def estimate(
-        balance: EnergyBalance, halves: HalfEnergies, p: Parameters, drawn: Drawn
-    ) -> dict[str, Floats]:
+    def estimate(record: Resampled, halves: HalfEnergies, drawn: Drawn) -> dict[str, Floats]:
+        p, squares = record.parameters, record.exact.speed_squared[0]
         values, _ = unknowns_by_speed(halves, p, unknown, drawn, squares)
         found = {name: values[:, k] for k, name in enumerate(unknown)}
-        energy = halves.energy(p, dict(drawn) | found)
+        energies = known_damping(record, halves, {**drawn, **found})
         return {
-            "restitution": balance.restitution(energy),
+            "restitution": energies["restitution"],
             **found,
-            "impact_velocity": _speed(balance, energy),
+            "impact_velocity": energies["impact_velocity"],
         }
 
     return estimate
-
-
-def _speed(balance: EnergyBalance, energy: Floats) -> Floats:
-    """Return the root mean square of the speeds of approach."""
-    squares = np.mean([energy[:, 2 * one + 1] for one, _ in balance.pairs], axis=0)
-    found: Floats = np.sqrt(np.where(squares > 0.0, squares, np.nan))
-    return found

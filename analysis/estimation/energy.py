@@ -20,19 +20,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibroimpact.analysis.estimation.flight_fit import pairs_of
-from vibroimpact.analysis.estimation.noise import Floats
-from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.estimation.physics import Floats, Parameters
 from vibroimpact.analysis.estimation.segments import Flight, Signal
 from vibroimpact.analysis.estimation.smoothing import Smoother, smoother
 from vibroimpact.fmus.errors import EstimationError
 
 Drawn = Mapping[str, Floats]
 
-# A refinement of the deepest point ends after so many Newton steps.
+# Newton steps to the deepest point of a flight.
 _NEWTON_STEPS = 4
-# Unknowns whose columns are more alike than this cannot be told apart.
+# Condition number above which the unknowns cannot be told apart.
 _DEPENDENT = 1e3
-# Speeds squared below this part of the largest have the weight that it would have.
+# Floor of the squared speeds in the weights, relative to the largest.
 _SLOW = 0.04
 
 
@@ -100,9 +99,14 @@ class HalfEnergies:
         """
         value = _values(p, drawn)
         square = value["natural_frequency"] ** 2
-        work = np.cos(value["phase"]) * self.work_cos + np.sin(value["phase"]) * self.work_sin
-        found: Floats = square * (self.elastic + 2.0 * value["static_deflection"] * work)
+        work = value["static_deflection"] * self.work(value["phase"])
+        found: Floats = square * (self.elastic + 2.0 * work)
         return found - 4.0 * value["damping_ratio"] * value["natural_frequency"] * self.drag
+
+    def work(self, phase: Floats) -> Floats:
+        """Return the work of the force of a phase, over its amplitude per unit mass."""
+        found: Floats = np.cos(phase) * self.work_cos + np.sin(phase) * self.work_sin
+        return found
 
 
 def _values(p: Parameters, drawn: Drawn | None) -> dict[str, Floats]:
@@ -141,8 +145,8 @@ class EnergyBalance:
         for one in self.smoothers:
             index = one.flight.index
             samples = self.signal.values[index]
-            rests = samples - one.row(self.signal.time[index]) @ samples
-            squares += float(rests @ rests)
+            residual = samples - one.row(self.signal.time[index]) @ samples
+            squares += float(residual @ residual)
             freedom += len(index) - one.gain.shape[0]
         return math.sqrt(squares / max(freedom, 1.0))
 
@@ -161,15 +165,21 @@ class EnergyBalance:
         parts = [
             samples[:, half_flight.index] - parameters.offset for half_flight in self.flights for _ in (0, 1)
         ]
-        value = np.stack([y @ h.edge_value for y, h in zip(parts, self.halves, strict=True)], 1)
-        slope = np.stack([y @ h.edge_slope for y, h in zip(parts, self.halves, strict=True)], 1)
-        deepest = np.stack([y @ h.deepest for y, h in zip(parts, self.halves, strict=True)], 1)
-        waves = np.stack([y @ h.waves.T for y, h in zip(parts, self.halves, strict=True)], 1)
+
+        def mapped(name: str) -> Floats:
+            """Return what one of the maps makes of the samples of all halves, shape (draw, half, ...)."""
+            return np.stack([y @ getattr(h, name).T for y, h in zip(parts, self.halves, strict=True)], 1)
+
+        value, slope, deepest, waves = map(mapped, ("edge_value", "edge_slope", "deepest", "waves"))
         drag = np.stack(
             [np.sum((y @ h.speeds.T) ** 2, axis=1) for y, h in zip(parts, self.halves, strict=True)], 1
         )
         sign = np.array([half.sign for half in self.halves])
-        stop = self._stop(value, slope) if stop_position is None else np.full(len(samples), stop_position)
+        stop = (
+            self._stop(value, slope, parameters)
+            if stop_position is None
+            else np.full(len(samples), stop_position)
+        )
         stop = stop - (0.0 if stop_position is None else parameters.offset)
         # the flight was cut at about the impact: what is missing to the stop, to first order
         missing = stop[:, None] - value
@@ -179,42 +189,33 @@ class EnergyBalance:
         bounds_cos = stop[:, None] * np.cos(edge) - deepest * np.cos(turn)
         bounds_sin = -stop[:, None] * np.sin(edge) + deepest * np.sin(turn)
         variance = self.noise**2
-        square_noise = np.array([float(half.deepest @ half.deepest) for half in self.halves]) * variance
+
+        def variances(one: str, other: str) -> Floats:
+            """Return the covariance of the noise in two maps of each half."""
+            return variance * np.array([float(getattr(h, one) @ getattr(h, other)) for h in self.halves])
+
         drag_noise = np.array([float(np.sum(half.speeds**2)) for half in self.halves]) * variance
-        slope_noise = np.array([float(half.edge_slope @ half.edge_slope) for half in self.halves]) * variance
-        # value and slope at an end have their noise in common
-        edge_noise = np.array([float(half.edge_value @ half.edge_slope) for half in self.halves]) * variance
-        pull = self._acceleration(parameters, stop[:, None], slope, edge)
+        pull = parameters.acceleration(stop[:, None], slope, edge)
         return HalfEnergies(
-            deepest**2 - square_noise - stop[:, None] ** 2,
+            deepest**2 - variances("deepest", "deepest") - stop[:, None] ** 2,
             bounds_cos + sign * waves[:, :, 0],
             bounds_sin + sign * waves[:, :, 1],
-            sign * (drag - drag_noise + sign * (slope * missing + edge_noise)),
-            slope**2 - slope_noise + 2.0 * pull * missing,
+            # value and slope at an end have their noise in common
+            sign * (drag - drag_noise + sign * (slope * missing + variances("edge_value", "edge_slope"))),
+            slope**2 - variances("edge_slope", "edge_slope") + 2.0 * pull * missing,
         )
 
-    def _acceleration(self, p: Parameters, y: Floats, v: Floats, angle: Floats) -> Floats:
-        square = p.natural_frequency**2
-        load = square * p.static_deflection * np.cos(angle + p.phase)
-        found: Floats = load - 2.0 * p.damping_ratio * p.natural_frequency * v - square * y
-        return found
-
-    def _stop(self, value: Floats, slope: Floats) -> Floats:
+    def _stop(self, value: Floats, slope: Floats, p: Parameters) -> Floats:
         """Return the mean level where flights meet, from the offset; shape (draw,)."""
         levels = []
         for one, other in self.pairs:
             end, start = 2 * one + 1, 2 * other
-            late = 0.0 if one != other else self._short_by(self.flights[one])
+            late = 0.0 if one != other else p.short_of_periods(self.flights[one].duration)
             shift = (value[:, end] + late * slope[:, end] - value[:, start]) / (
                 slope[:, start] - slope[:, end]
             )
             levels.append(value[:, end] + (late + shift) * slope[:, end])
         return np.asarray(np.mean(levels, axis=0), dtype=np.float64)
-
-    def _short_by(self, flight: Flight) -> float:
-        """Return what a flight that meets itself, P(1,q), is short of whole periods, s."""
-        period = 2.0 * math.pi / self.angular_frequency
-        return max(1, round(flight.duration / period)) * period - flight.duration
 
     def restitution(self, energy: Floats) -> Floats:
         """Return r from the energies of the halves, over all impacts between flights; shape (draw,).
@@ -234,6 +235,12 @@ class EnergyBalance:
                 "Damping, forcing or mass at the contact are not what the motion shows."
             )
         found: Floats = np.sqrt(np.where(ratio >= 0.0, ratio, np.nan))
+        return found
+
+    def speed(self, energy: Floats) -> Floats:
+        """Return the root mean square of the speeds of approach from the energies of the halves; shape (draw,)."""
+        squares = np.mean([energy[:, 2 * one + 1] for one, _ in self.pairs], axis=0)
+        found: Floats = np.sqrt(np.where(squares > 0.0, squares, np.nan))
         return found
 
 
@@ -287,7 +294,7 @@ def unknowns_by_speed(
     p : Parameters
         Values of what is known.
     unknown : sequence of str
-        Of damping_ratio, static_deflection, and phase (with static_deflection: as cos and sin parts).
+        Of damping_ratio, static_deflection, and phase, in this order; a phase only with a static_deflection.
     drawn : mapping or None
         Values that differ between draws, by name, shape (draw,).
     squares : ndarray, shape (half,), or None
@@ -304,46 +311,39 @@ def unknowns_by_speed(
     Raises
     ------
     EstimationError
-        The columns are as good as dependent, as for P(1,1) with more than two unknowns.
+        The columns are nearly dependent, as for P(1,1) with more than two unknowns.
     """
     value = _values(p, drawn)
     square, drag = value["natural_frequency"] ** 2, -4.0 * value["natural_frequency"] * halves.drag
-    work = np.cos(value["phase"]) * halves.work_cos + np.sin(value["phase"]) * halves.work_sin
-    columns, rest = [], halves.speed_squared - square * halves.elastic
+    work = halves.work(value["phase"])
+    columns, target = [], halves.speed_squared - square * halves.elastic
     if "damping_ratio" in unknown:
         columns.append(drag)
     else:
-        rest = rest - value["damping_ratio"] * drag
+        target = target - value["damping_ratio"] * drag
     if "phase" in unknown:
         columns.extend([2.0 * square * halves.work_cos, 2.0 * square * halves.work_sin])
     elif "static_deflection" in unknown:
         columns.append(2.0 * square * work)
     else:
-        rest = rest - 2.0 * square * value["static_deflection"] * work
+        target = target - 2.0 * square * value["static_deflection"] * work
     matrix = np.stack(columns, axis=2)
     # the square of a slope is the less certain the larger it is
     speeds = np.abs(halves.speed_squared[0] if squares is None else squares)
     weight = 1.0 / np.sqrt(np.maximum(speeds, _SLOW * np.max(speeds)))
-    matrix, rest = matrix * weight[:, None], rest * weight
+    matrix, target = matrix * weight[:, None], target * weight
     condition = float(np.linalg.cond(matrix[0] / np.linalg.norm(matrix[0], axis=0)))
     if matrix.shape[1] < matrix.shape[2] or not condition < _DEPENDENT:
         raise EstimationError(
             f"energy balance: expected half orbits that separate {', '.join(unknown)}, got condition {condition:.3g}. "
             "Give one of them, or take motion of several impact velocities."
         )
-    solution = np.einsum("dij,dj->di", np.linalg.pinv(matrix), rest)
-    return _named(solution, unknown), condition
-
-
-def _named(solution: Floats, unknown: Sequence[str]) -> Floats:
-    """Return amplitude and phase in place of their cos and sin parts, in the order asked for."""
-    if "phase" not in unknown:
-        return solution
-    cosine, sine = solution[:, -2], solution[:, -1]
-    values = {"static_deflection": np.hypot(cosine, sine), "phase": np.arctan2(sine, cosine)}
-    if "damping_ratio" in unknown:
-        values["damping_ratio"] = solution[:, 0]
-    return np.stack([values[name] for name in unknown], axis=1)
+    solution = np.einsum("dij,dj->di", np.linalg.pinv(matrix), target)
+    if "phase" in unknown:
+        cosine, sine = solution[:, -2], solution[:, -1]
+        amplitude, phase = np.hypot(cosine, sine), np.arctan2(sine, cosine)
+        solution = np.column_stack([solution[:, :-2], amplitude, phase])
+    return solution, condition
 
 
 def sensitivities(

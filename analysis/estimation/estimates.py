@@ -1,17 +1,20 @@
-"""What an estimation from impacting motion returns: one row for each method and quantity, as a table or a dataset."""
+"""What an estimation from impacting motion returns: one row for each method and quantity, printed or as a dataset."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+from rich.table import Table
 
-from vibroimpact.analysis.files.estimate_table import estimate_table
-
-Floats = NDArray[np.float64]
+from vibroimpact.analysis.estimation.physics import Floats
+from vibroimpact.analysis.files.estimate_table import described, estimate_table
+from vibroimpact.fmus.printing import table, value_and_error
+from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.fmus.units import written_unit
 
 METHODS = (
     "energy_known_damping",
@@ -23,11 +26,11 @@ METHODS = (
 )
 """In the order in which they are shown; `period_one` gives start values only, without an interval."""
 
-ANSWERING = (*METHODS[:-1], "flight_times")
-"""Those that give intervals; `flight_times` is that of bounces without a force."""
-
 SHOWN = (*METHODS, "flight_times")
-"""In the order of tables."""
+"""In the order of tables; `flight_times` is the method of bounces without a force."""
+
+ANSWERING = tuple(name for name in SHOWN if name != "period_one")
+"""Those that give intervals."""
 
 QUANTITIES: Mapping[str, tuple[str, str]] = {
     "restitution": ("1", "coefficient of restitution"),
@@ -62,6 +65,11 @@ class MethodEstimate:
     standard_error: float = np.nan
     low: float = np.nan
     high: float = np.nan
+
+    @classmethod
+    def within(cls, value: float, error: float, reach: float) -> MethodEstimate:
+        """Return an estimate whose interval ends as far below the value as above it."""
+        return cls(value, error, value - reach, value + reach)
 
     def covers(self, truth: float) -> bool:
         """Tell whether the interval holds a value."""
@@ -186,14 +194,17 @@ class ImpactEstimates:
         cells = {
             method: {name: astuple(one) for name, one in self.values[method].items()} for method in methods
         }
-        table = estimate_table(cells, {name: self.unit_of(name) for name in quantities}, self.confidence)
-        attrs = {"units": "s", "long_name": "instants of impact"}
-        table = table.assign_coords(impact_time=("impact", self.impact_times, attrs))
-        if self.motion is not None:
-            table = table.assign(_drawn(self.motion, self.unit)).assign_coords(
-                time=("time", self.motion.time, {"units": "s", "long_name": "time"})
-            )
-        return table.assign_attrs(self._attributes())
+        units = {name: self.unit_of(name) for name in quantities}
+        instants = ("impact", self.impact_times, described("instants of impact", "s"))
+        found = estimate_table(cells, units, self.confidence).assign_coords(impact_time=instants)
+        motion = self.motion
+        if motion is not None:
+            fitted = described(f"displacement fitted by {motion.method}", self.unit)
+            found = found.assign(
+                measured=("time", motion.measured, described("measured displacement", self.unit)),
+                fitted=("time", motion.fitted, fitted),
+            ).assign_coords(time=("time", motion.time, described("time", "s")))
+        return found.assign_attrs(self._attributes())
 
     def _attributes(self) -> dict[str, str | float]:
         """Return what belongs to the whole table."""
@@ -211,15 +222,6 @@ class ImpactEstimates:
         }
 
 
-def _drawn(motion: FittedMotion, unit: str) -> dict[str, tuple[str, Floats, dict[str, str]]]:
-    """Return the variables of the motion."""
-    said = {"measured": "measured displacement", "fitted": f"displacement fitted by {motion.method}"}
-    return {
-        name: ("time", getattr(motion, name), {"units": unit, "long_name": words})
-        for name, words in said.items()
-    }
-
-
 def _listed(reasons: Sequence[str]) -> str:
     """Return the gravest reasons in one line."""
     different = list(dict.fromkeys(reasons))
@@ -229,3 +231,54 @@ def _listed(reasons: Sequence[str]) -> str:
 
 def _named(methods: Sequence[str]) -> str:
     return ", ".join(name.replace("_", " ") for name in methods)
+
+
+def print_impacts(console: Terminal, estimates: ImpactEstimates) -> None:
+    """Print the verdict, all methods side by side, how far errors move the estimates, refusals and remarks."""
+    console.print(estimates.verdict)
+    console.print(_estimates(estimates))
+    if estimates.conditioning:
+        console.print(_conditioning(estimates))
+    for name, value in estimates.facts.items():
+        shown = value if isinstance(value, str) else f"{value:.6g}"
+        console.print(f"{name.replace('_', ' ')}: {shown}")
+    for doubt in estimates.doubts:
+        of = f" of {', '.join(doubt.methods)}" if doubt.methods else ""
+        console.print(f"doubt{of}: {doubt.reason}")
+    for refusal in estimates.refusals:
+        console.print(f"refused: {refusal.reason}")
+    for remark in estimates.remarks:
+        console.print(f"note: {remark}")
+
+
+def _estimates(estimates: ImpactEstimates) -> Table:
+    """Return quantities by methods."""
+    methods = [name for name in SHOWN if name in estimates.values]
+    title = f"{estimates.channel}: estimates with {estimates.confidence:.0%} intervals"
+    rows = table(title, "<quantity", "<unit", *(f">{method.replace('_', ' ')}" for method in methods))
+    for quantity in QUANTITIES:
+        cells = [estimates.values[method].get(quantity) for method in methods]
+        if any(cells):
+            words = quantity.replace("_", " ")
+            rows.add_row(words, written_unit(estimates.unit_of(quantity)), *(_cell(cell) for cell in cells))
+    return rows
+
+
+def _cell(estimate: MethodEstimate | None) -> str:
+    """Return value and interval with the digits that the doubt leaves."""
+    if estimate is None:
+        return ""
+    if not math.isfinite(estimate.standard_error):
+        return f"{estimate.value:.4g}"
+    ends = (estimate.value, estimate.low, estimate.high)
+    value, low, high = (value_and_error(end, estimate.standard_error)[0] for end in ends)
+    return f"{value} [{low}, {high}]" if estimate.standard_error > 0.0 else value
+
+
+def _conditioning(estimates: ImpactEstimates) -> Table:
+    """Return how errors move the estimates."""
+    title = "conditioning: change of the estimate per change of what it rests on"
+    rows = table(title, "<sensitivity of the energy balance", ">value")
+    for name, value in estimates.conditioning.items():
+        rows.add_row(name.replace("_", " "), f"{value:.4g}")
+    return rows

@@ -13,26 +13,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vibroimpact.analysis.estimation.coordinates import Coordinates
-from vibroimpact.analysis.estimation.noise import Floats
-from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Parameters, central_differences
 from vibroimpact.analysis.estimation.segments import Flight, Signal
 from vibroimpact.fmus.core import motion
 from vibroimpact.fmus.errors import EstimationError
 
-# Steps of the numerical derivatives, relative to the size of what is varied.
+# Step of the numerical derivatives, relative to the argument.
 _STEP = 1e-5
-# Steps of the search over flights are counted in this part of a coordinate; its derivatives are differences over so
-# much of that.
+# Unit of the search over flights, relative to a coordinate, and the step of its derivatives in that unit.
 _STEP_OF_SEARCH, _DIFFERENCE = 0.1, 1e-4
 _MOST_STEPS, _MOST_HALVINGS = 10, 12
-# It ends where a step promises to lessen chi squared by no more than this.
+# Decrease of chi squared that a step promises, below which the search ends.
 _SETTLED = 1e-3
-# A trial that is no oscillator fits this many times the range of the signal badly.
+# Residual of a trial that is no oscillator, in ranges of the signal.
 _FAR = 1e3
-# Instants on motion of constant acceleration are found in so many Newton steps.
+# Newton steps to an instant on motion of constant acceleration.
 _NEWTON_STEPS = 4
-# An end of a flight is moved by this part of it at most.
+# Part of its duration by which an end of a flight may be moved.
 _REACH = 0.1
 
 
@@ -49,7 +46,7 @@ class FittedFlight:
         The state's least-squares weights of the samples.
     to_end : ndarray, shape (2, 3)
         End state = to_end[:, :2] @ state + to_end[:, 2].
-    rests : ndarray, shape (sample,)
+    residual : ndarray, shape (sample,)
         Samples minus fit.
     """
 
@@ -57,7 +54,7 @@ class FittedFlight:
     state: Floats
     gain: Floats
     to_end: Floats
-    rests: Floats
+    residual: Floats
 
     @property
     def end_state(self) -> Floats:
@@ -83,12 +80,15 @@ class FlightSearch:
     Attributes
     ----------
     parameters : Parameters
+    names : tuple of str
+        Those that were free.
     covariance : ndarray, shape (name, name)
     influence : list of ndarray, shape (name, sample)
         Change of the parameters for a change of the samples of each flight, to first order.
     """
 
     parameters: Parameters
+    names: tuple[str, ...]
     covariance: Floats
     influence: list[Floats]
 
@@ -108,31 +108,30 @@ def search_flights(
     coordinates = Coordinates(tuple(names), start)
     origin = coordinates.of(start)
     scale = _STEP_OF_SEARCH * (np.abs(origin) + 1e-3 * float(np.max(np.abs(origin))) + 1e-300)
-    size = float(np.ptp(signal.values[signal.good]))
     counts = [len(flight.index) for flight in flights]
 
-    def rests(x: Floats) -> Floats:
+    def residual(x: Floats) -> Floats:
         trial = coordinates.parameters(origin + scale * x)
         if trial is None or trial.damping_ratio < 0.0:
             # no oscillator; so bad a trial makes the search take a shorter step
-            return np.full(sum(counts), _FAR * size)
-        return np.concatenate([fit_flight(signal, flight, trial).rests for flight in flights])
+            return np.full(sum(counts), _FAR * signal.range)
+        return np.concatenate([fit_flight(signal, flight, trial).residual for flight in flights])
 
     freedom = max(sum(counts) - 2 * len(flights) - len(names), 1)
-    x, left, columns = _gauss_newton(rests, len(names), freedom)
+    x, left, columns = _gauss_newton(residual, len(names), freedom)
     best = coordinates.parameters(origin + scale * x)
     if best is None:
         raise EstimationError("weak form: expected an oscillator that fits the flights, got none.")
     noise = math.sqrt(float(left @ left) / freedom)
     gain = np.linalg.inv(coordinates.derivative(best)) @ np.linalg.pinv(columns / scale)
     parts = np.split(-gain, np.cumsum(counts)[:-1], axis=1)
-    return FlightSearch(best, noise**2 * gain @ gain.T, parts)
+    return FlightSearch(best, tuple(names), noise**2 * gain @ gain.T, parts)
 
 
 def _gauss_newton(
     function: Callable[[Floats], Floats], count: int, freedom: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the unknowns from 0 on at which the squares are least, the rests there, and their derivatives."""
+    """Return the unknowns from 0 on at which the squares are least, the residual there, and their derivatives."""
     x = np.zeros(count)
     left = function(x)
     columns = np.empty((len(left), count))
@@ -204,7 +203,7 @@ def read_impacts(
     parameters: Parameters,
     stop_position: float | None,
     interval: float,
-    speed_noise: Floats | None = None,
+    speed_noise: Floats,
 ) -> ImpactReading:
     """Return restitution, speed and stop from the states at both ends of the flights.
 
@@ -216,34 +215,31 @@ def read_impacts(
         None: where the flights meet.
     interval : float
         An impact is within this time of where the flights were cut, s.
-    speed_noise : ndarray or None, shape (flight,)
+    speed_noise : ndarray, shape (flight,)
         Variance of the speed at the end of each flight: the squares of speeds have it in them, products do not.
     """
     pairs = pairs_of(flights)
     periodic = pairs[0][0] == pairs[0][1]
     one, other = np.array(pairs).T
-    cut = np.array([flight.end for flight in flights])[one]
-    begin = np.array([flight.start for flight in flights])[other]
-    earlier = with_acceleration(ends[one], cut, parameters)
-    later = with_acceleration(states[other], begin, parameters)
+    earlier = with_acceleration(ends[one], [flights[k].end for k in one], parameters)
+    later = with_acceleration(states[other], [flights[k].start for k in other], parameters)
     stop = stop_position
     if stop is None:
-        late = np.array([_short_by(flights[k], parameters) for k in one]) if periodic else np.zeros(len(one))
-        stop = float(np.mean(_meeting_levels(earlier, later, late))) + parameters.offset
-    before, after = (_speeds_at(side, stop - parameters.offset, interval) for side in (earlier, later))
+        late = [parameters.short_of_periods(flights[k].duration) if periodic else 0.0 for k in one]
+        stop = float(np.mean(_meeting_levels(earlier, later, np.array(late)))) + parameters.offset
+    level = stop - parameters.offset
+    before, after = (_after(side, _shifts_to(side, level, interval))[1] for side in (earlier, later))
     square = float(before @ before)
-    excess = 0.0 if speed_noise is None else float(np.sum(speed_noise[one]))
+    excess = float(np.sum(speed_noise[one]))
     # noise that is as large as the speeds leaves nothing to correct by
     square -= excess if excess < 0.5 * square else 0.0
     return ImpactReading(-float(before @ after) / square, math.sqrt(square / len(before)), stop, periodic)
 
 
-def with_acceleration(states: Floats, times: Floats, p: Parameters) -> Floats:
+def with_acceleration(states: Floats, times: Sequence[float] | Floats, p: Parameters) -> Floats:
     """Return displacement, velocity and acceleration of states at times, shape (state, 3)."""
-    square = p.natural_frequency**2
-    load = square * p.static_deflection * np.cos(p.angular_frequency * times + p.phase)
-    drag = 2.0 * p.damping_ratio * p.natural_frequency
-    return np.column_stack([states, load - drag * states[:, 1] - square * states[:, 0]])
+    push = p.acceleration(states[:, 0], states[:, 1], p.angular_frequency * np.asarray(times))
+    return np.column_stack([states, push])
 
 
 def _after(side: Floats, shift: Floats) -> tuple[Floats, Floats]:
@@ -259,17 +255,6 @@ def _meeting_levels(earlier: Floats, later: Floats, late: Floats) -> Floats:
         (place, speed), (other, other_speed) = _after(earlier, late + shift), _after(later, shift)
         shift = shift + (place - other) / (other_speed - speed)
     return _after(earlier, late + shift)[0]
-
-
-def _short_by(flight: Flight, p: Parameters) -> float:
-    """Return what a P(1,q) flight that meets its own start is short of whole periods, s."""
-    period = 2.0 * math.pi / p.angular_frequency
-    return max(1, round(flight.duration / period)) * period - flight.duration
-
-
-def _speeds_at(side: Floats, level: float, reach: float) -> Floats:
-    """Return the velocities where motion meets a level."""
-    return _after(side, _shifts_to(side, level, reach))[1]
 
 
 def _shifts_to(side: Floats, level: float, reach: Floats | float) -> Floats:
@@ -299,13 +284,9 @@ def flights_to_level(
     first = _shifts_to(with_acceleration(np.array([one.state for one in fitted]), starts, p), level, reach)
     last = _shifts_to(with_acceleration(np.array([one.end_state for one in fitted]), ends, p), level, reach)
     found = []
-    for one, start, end in zip(fitted, starts + first, ends + last, strict=True):
+    for one, start, end in zip(fitted, (starts + first).tolist(), (ends + last).tolist(), strict=True):
         times = signal.time[one.flight.index]
-        found.append(
-            replace(
-                one.flight, start=min(float(start), float(times[0])), end=max(float(end), float(times[-1]))
-            )
-        )
+        found.append(replace(one.flight, start=min(start, float(times[0])), end=max(end, float(times[-1]))))
     return found
 
 
@@ -332,7 +313,7 @@ class FlightFit:
         Of restitution, impact_velocity and stop_position, with the doubt of the parameters in them.
     fitted : list of FittedFlight
     noise : float
-        Standard deviation of the noise that the rests show.
+        Standard deviation of the noise that the residuals show.
     """
 
     reading: ImpactReading
@@ -365,8 +346,8 @@ def fit_flights(
     states = np.array([one.state for one in fitted])
     maps = np.array([one.to_end for one in fitted])
 
-    freedom = sum(len(one.rests) - 2 for one in fitted) - len(names)
-    noise = math.sqrt(sum(float(one.rests @ one.rests) for one in fitted) / freedom)
+    freedom = sum(len(one.residual) - 2 for one in fitted) - len(names)
+    noise = math.sqrt(sum(float(one.residual @ one.residual) for one in fitted) / freedom)
     speed_noise = _speed_noise(fitted, parameters, noise)
 
     def reading_of(states: Floats, maps: Floats, parameters: Parameters) -> ImpactReading:
@@ -378,32 +359,21 @@ def fit_flights(
         reading = reading_of(states, maps, parameters)
         return np.array([getattr(reading, name) for name in _READ])
 
-    by_state = _derivative(lambda x: read(x.reshape(states.shape), maps, parameters), states.ravel())
-
     def of_parameters(values: Floats) -> Floats:
-        changed = replace(parameters, **dict(zip(names, (float(x) for x in values), strict=True)))
+        changed = parameters.with_values(names, values)
         again = [fit_flight(signal, flight, changed) for flight in flights]
         return read(np.array([one.state for one in again]), np.array([one.to_end for one in again]), changed)
 
-    by_name = _derivative(of_parameters, np.array([getattr(parameters, name) for name in names]))
+    def derivative(function: Callable[[Floats], Floats], at: Floats) -> Floats:
+        return central_differences(function, at, _STEP, float(np.max(np.abs(at))) or 1.0)
+
+    by_state = derivative(lambda x: read(x.reshape(states.shape), maps, parameters), states.ravel())
+    by_name = derivative(of_parameters, parameters.values_of(names)) if names else None
     variance = np.zeros(len(_READ))
     for j, one in enumerate(fitted):
         weights = by_state[:, 2 * j : 2 * j + 2] @ one.gain
-        if names:
+        if by_name is not None:
             weights = weights + by_name @ influence[j]
         variance += np.sum(weights**2, axis=1)
     errors = dict(zip(_READ, (noise * np.sqrt(variance)).tolist(), strict=True))
     return FlightFit(reading_of(states, maps, parameters), errors, fitted, noise)
-
-
-def _derivative(function: Callable[[Floats], Floats], at: Floats) -> Floats:
-    """Return central differences, shape (value, argument)."""
-    if len(at) == 0:
-        return np.zeros((len(_READ), 0))
-    columns = []
-    largest = float(np.max(np.abs(at), initial=0.0))
-    for k in range(len(at)):
-        step = np.zeros(len(at))
-        step[k] = _STEP * (abs(at[k]) or largest or 1.0)
-        columns.append((function(at + step) - function(at - step)) / (2.0 * step[k]))
-    return np.array(columns).T

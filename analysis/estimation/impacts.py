@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 
 import numpy as np
 import xarray as xr
 from scipy.stats import norm
 
-from vibroimpact.analysis.estimation.checks import check_displacement
-from vibroimpact.analysis.estimation.coordinates import Coordinates
-from vibroimpact.analysis.estimation.doubts import doubts_of
 from vibroimpact.analysis.estimation.draws import (
     Resampled,
     all_loss_at_impact,
@@ -22,23 +20,23 @@ from vibroimpact.analysis.estimation.draws import (
     with_intervals,
 )
 from vibroimpact.analysis.estimation.estimates import METHODS, ImpactEstimates, MethodEstimate, Refusal
-from vibroimpact.analysis.estimation.noise import Floats
-from vibroimpact.analysis.estimation.period_one import period_one
-from vibroimpact.analysis.estimation.physics import Forcing, Known, Parameters
+from vibroimpact.analysis.estimation.flight_times import period_one
+from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Forcing, Known, Parameters
 from vibroimpact.analysis.estimation.prepared import Prepared, fitted_motion, prepare
-from vibroimpact.analysis.estimation.remarks import conditioning_of, facts_of, remarks_of
+from vibroimpact.analysis.estimation.remarks import conditioning_of, doubts_of, facts_of, remarks_of
 from vibroimpact.analysis.estimation.trajectory import fit_trajectory
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
-# A damping ratio of fewer standard errors is not told from restitution or, with more unknowns, from the force.
+Estimates = dict[str, MethodEstimate]
+
+# Standard errors from which a damping ratio is told from the restitution and, with more unknowns, from the force.
 _CLEAR = {"energy_joint": 0.5, "energy_amplitude": 3.0}
-# A standard error of the restitution below this part of what noise and samples allow is none.
+# Standard error of the restitution, relative to what noise and samples allow, below which the interval has no width.
 _NO_WIDTH = 1e-3
-# What a method's numbers may end with on motion that its model is far from; one method's failure leaves the others.
+# Errors of a method's numbers on motion far from its model; one method's failure leaves the others.
 _FAILURES = (EstimationError, UsageError, ArithmeticError, ValueError)
-# Speeds read off at impacts whose instants are less certain than this (rad of the fastest motion) are those of another
-# instant, by more than their stated error.
+# Uncertainty of the instants (rad of the fastest motion) above which speeds at impacts are off by more than they state.
 _INSTANT_DOUBT = 0.1
 
 
@@ -92,13 +90,11 @@ def estimate_impacts(
         raise UsageError(
             f"forcing, known: expected a Forcing and a Known, got {got}. Write Forcing(angular_frequency)."
         )
-    _check(methods, draws, confidence)
-    _check_known(held)
-    check_displacement(channel)
+    _check(methods, draws, confidence, held)
     record = prepare(channel, forcing, held, window)
-    values, refusals, resampled = _attempted(record, forcing, held, methods, draws, confidence, seed)
-    doubts = doubts_of(record, forcing, values, confidence)
-    sign = record.segmentation.signal.sign
+    values, refusals, resampled = _attempted(record, methods, draws, confidence, seed)
+    doubts = doubts_of(record, values, confidence)
+    sign = record.signal.sign
     return ImpactEstimates(
         channel.name,
         channel.unit,
@@ -107,7 +103,7 @@ def estimate_impacts(
         facts_of(record, resampled),
         tuple(refusals),
         doubts,
-        remarks_of(record, held, values),
+        tuple(remarks_of(record, values)),
         confidence,
         np.array([impact.time for impact in record.segmentation.impacts]),
         fitted_motion(channel, record),
@@ -115,32 +111,26 @@ def estimate_impacts(
 
 
 def _attempted(
-    record: Prepared,
-    forcing: Forcing,
-    held: Known,
-    methods: Sequence[str],
-    draws: int,
-    confidence: float,
-    seed: int,
-) -> tuple[dict[str, dict[str, MethodEstimate]], list[Refusal], Resampled | None]:
+    record: Prepared, methods: Sequence[str], draws: int, confidence: float, seed: int
+) -> tuple[dict[str, Estimates], list[Refusal], Resampled | None]:
     """Return what each method says, why others refuse, and the draws of the energy balance."""
     natural, offset = record.parameters.natural_frequency, record.parameters.offset
-    ways: dict[str, Callable[[], dict[str, MethodEstimate]]] = {
-        "weak_form": lambda: _weak_values(record, held, confidence),
-        "trajectory": lambda: _trajectory_values(record, held, confidence),
+    ways: dict[str, Callable[[], Estimates]] = {
+        "weak_form": lambda: _weak_values(record, confidence),
+        "trajectory": lambda: _trajectory_values(record, confidence),
         "period_one": lambda: period_one(record.segmentation, natural, offset),
     }
     refusals: list[Refusal] = []
     energies = [name for name in methods if name.startswith("energy")]
     resampled: Resampled | None = None
     try:
-        resampled = _resampled(record, draws, seed) if energies else None
+        resampled = resample(record, draws, seed) if energies else None
     except _FAILURES as problem:
         refusals = [Refusal(name, _reason(name, problem)) for name in energies]
     if resampled is not None:
         for name in energies:
-            ways[name] = partial(_energy_values, name, record, resampled, forcing, held, confidence)
-    values: dict[str, dict[str, MethodEstimate]] = {}
+            ways[name] = partial(_energy_values, name, record, resampled, confidence)
+    values: dict[str, Estimates] = {}
     for name, run in ways.items():
         if name not in methods:
             continue
@@ -164,10 +154,9 @@ def _reason(method: str, problem: Exception) -> str:
     )
 
 
-def _check_answer(method: str, found: dict[str, MethodEstimate], record: Prepared) -> None:
+def _check_answer(method: str, found: Estimates, record: Prepared) -> None:
     """Refuse an answer that cannot be: its interval has no width though there is noise, or nothing physical in it."""
-    signal = record.segmentation.signal
-    size = float(np.ptp(signal.values[signal.good])) * math.sqrt(len(signal.time))
+    size = record.signal.range * math.sqrt(len(record.signal.time))
     restitution = found.get("restitution")
     if restitution is not None and restitution.standard_error < _NO_WIDTH * record.fit.noise / size:
         raise EstimationError(
@@ -183,7 +172,7 @@ def _check_answer(method: str, found: dict[str, MethodEstimate], record: Prepare
             )
 
 
-def _check(methods: Sequence[str], draws: int, confidence: float) -> None:
+def _check(methods: Sequence[str], draws: int, confidence: float, held: Known) -> None:
     for method in methods:
         if method not in METHODS:
             raise EstimationError(f'methods: expected some of {", ".join(METHODS)}, got "{method}".')
@@ -191,9 +180,6 @@ def _check(methods: Sequence[str], draws: int, confidence: float) -> None:
         raise EstimationError(
             f"estimate: expected at least 10 draws and 0 < confidence < 1, got {draws} and {confidence}."
         )
-
-
-def _check_known(held: Known) -> None:
     if held.damping_ratio is not None and not held.damping_ratio >= 0.0:
         raise EstimationError(f"damping_ratio: expected >= 0, got {held.damping_ratio}.")
     if held.natural_frequency is not None and not held.natural_frequency > 0.0:
@@ -202,14 +188,9 @@ def _check_known(held: Known) -> None:
         raise EstimationError(f'side: expected upper or lower, got "{held.side}".')
 
 
-def _with_normal(value: float, error: float, confidence: float) -> MethodEstimate:
-    z = float(norm.ppf(0.5 + confidence / 2.0))
-    return MethodEstimate(value, error, value - z * error, value + z * error)
-
-
 def _with_coordinates(
     found: Parameters, names: tuple[str, ...], covariance: Floats, confidence: float
-) -> dict[str, MethodEstimate]:
+) -> Estimates:
     """Return estimates whose intervals are those of the coordinates in which the equation is linear."""
     intervals = Coordinates(names, found).intervals(found, covariance, confidence)
     return {
@@ -219,24 +200,25 @@ def _with_coordinates(
     }
 
 
-def _weak_values(record: Prepared, held: Known, confidence: float) -> dict[str, MethodEstimate]:
+def _weak_values(record: Prepared, confidence: float) -> Estimates:
     """Return what weak form and flights say."""
-    read = ["restitution", "impact_velocity"] + ["stop_position"] * (held.stop_position is None)
-    found = {
-        name: _with_normal(
-            getattr(record.fit.reading, name), record.inflation * record.fit.standard_errors[name], confidence
-        )
-        for name in read
-    }
-    if record.weak is not None:
-        covariance = record.inflation**2 * record.weak.covariance
-        found |= _with_coordinates(record.weak.parameters, record.weak.names, covariance, confidence)
+    quantile = float(norm.ppf(0.5 + confidence / 2.0))
+    found: Estimates = {}
+    for name, error in record.fit.standard_errors.items():
+        if name != "stop_position" or record.stop is None:
+            widened = record.inflation * error
+            found[name] = MethodEstimate.within(
+                getattr(record.fit.reading, name), widened, quantile * widened
+            )
+    if record.names:
+        covariance = record.inflation**2 * record.search.covariance
+        found |= _with_coordinates(record.search.parameters, record.names, covariance, confidence)
     return found
 
 
-def _trajectory_values(record: Prepared, held: Known, confidence: float) -> dict[str, MethodEstimate]:
+def _trajectory_values(record: Prepared, confidence: float) -> Estimates:
     """Return what the fit of whole trajectories says."""
-    free = ("restitution", *record.free, *(("stop_position",) if held.stop_position is None else ()))
+    free = ("restitution", *record.names, *(("stop_position",) if record.stop is None else ()))
     found = fit_trajectory(record.segmentation, record.fit.fitted, record.parameters, free, record.fit.noise)
     record.trajectory = found
     return _with_coordinates(found.parameters, free, record.inflation**2 * found.covariance, confidence)
@@ -253,38 +235,23 @@ def _check_instants(method: str, record: Prepared) -> None:
         )
 
 
-def _resampled(record: Prepared, draws: int, seed: int) -> Resampled:
-    return resample(
-        record.segmentation.signal,
-        record.fit.fitted,
-        record.parameters,
-        record.stop,
-        record.fit.noise,
-        record.names,
-        record.influence,
-        draws,
-        seed,
-    )
-
-
-def _energy_values(
-    method: str,
-    record: Prepared,
-    resampled: Resampled,
-    forcing: Forcing,
-    held: Known,
-    confidence: float,
-) -> dict[str, MethodEstimate]:
+def _energy_values(method: str, record: Prepared, resampled: Resampled, confidence: float) -> Estimates:
     """Return what one of the energy balances says."""
+    held, intervals = record.held, partial(with_intervals, resampled, confidence, record.inflation)
     if method == "energy_known_damping":
-        return _energy_with_known_damping(resampled, held, confidence, record.inflation)
+        if held.damping_ratio is None:
+            return intervals(all_loss_at_impact)
+        found = intervals(known_damping)
+        # strong damping takes more than an impact could: it has no energy-loss factor
+        with suppress(EstimationError):
+            found = intervals(all_loss_at_impact) | found
+        return found
     _check_instants(method, record)
     unknown = ["damping_ratio"]
     if method == "energy_amplitude":
         unknown = [] if held.damping_ratio is not None else ["damping_ratio"]
-        unknown += ["static_deflection"] + (["phase"] if forcing.phase is None else [])
-    estimator = by_speeds(unknown, resampled.exact[0].speed_squared[0])
-    found = with_intervals(resampled, estimator, confidence, record.inflation)
+        unknown += ["static_deflection"] + (["phase"] if record.forcing.phase is None else [])
+    found = intervals(by_speeds(unknown))
     damping = found.get("damping_ratio")
     # judged by the size that the weak form gives: judged by its own, only chance excesses would pass
     if (
@@ -299,20 +266,7 @@ def _energy_values(
     return found
 
 
-def _energy_with_known_damping(
-    resampled: Resampled, held: Known, confidence: float, inflation: float
-) -> dict[str, MethodEstimate]:
-    """Return restitution and energy-loss factor; strong damping takes more than an impact could: it has no factor."""
-    if held.damping_ratio is None:
-        return with_intervals(resampled, all_loss_at_impact, confidence, inflation)
-    found = with_intervals(resampled, known_damping, confidence, inflation)
-    try:
-        return with_intervals(resampled, all_loss_at_impact, confidence, inflation) | found
-    except EstimationError:
-        return found
-
-
-def _as_measured(values: dict[str, MethodEstimate], sign: float) -> dict[str, MethodEstimate]:
+def _as_measured(values: Estimates, sign: float) -> Estimates:
     """Return estimates in the coordinate of the channel: a lower stop was mirrored."""
     found = dict(values)
     for name in ("stop_position", "offset"):

@@ -18,9 +18,9 @@ from scipy.stats import t as student
 
 from vibroimpact.analysis.estimation.estimates import MethodEstimate
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight, pairs_of
-from vibroimpact.analysis.estimation.noise import Floats, noise_level
-from vibroimpact.analysis.estimation.physics import Forcing, Parameters
-from vibroimpact.analysis.estimation.segments import Flight, Segmentation, Signal, segment
+from vibroimpact.analysis.estimation.noise import noise_level
+from vibroimpact.analysis.estimation.physics import Floats, Forcing, Parameters
+from vibroimpact.analysis.estimation.segments import Flight, Signal, segment
 from vibroimpact.analysis.estimation.weak_form import (
     linear_estimate,
     robust_weak_form,
@@ -30,7 +30,7 @@ from vibroimpact.analysis.estimation.weak_form import (
 from vibroimpact.fmus.errors import EstimationError
 
 _WORST_PROJECTION = 1e6
-# Energies that contradict each other by fewer standard errors than this do so by noise: a nearly elastic stop.
+# Standard errors by which noise may put the restitution of a nearly elastic stop above 1.
 _BEYOND_NOISE = 3.0
 
 
@@ -159,20 +159,25 @@ def estimate_modes(
     good = np.isfinite(contact)
     cut = segment(time, contact, good, fastest=fastest, side=side, stop_position=stop_position)
     flights = [flight for flight in cut.flights if flight.usable]
-    noise = [noise_level(row, good) for row in coordinates]
-    flights = _followed(cut, coordinates, flights, forcing, fastest, noise)
-    modes, fitted = _all_modes(cut, coordinates, flights, forcing, fastest, noise)
+    signals = [
+        Signal(time, row, good, cut.signal.interval, 1.0, noise_level(row, good)) for row in coordinates
+    ]
+    free = ["damping_ratio", "natural_frequency", "static_deflection"]
+    free += ["phase"] if forcing.phase is None else []
+    start = Parameters(1.0, 0.0, fastest, forcing.angular_frequency, 1.0, forcing.phase or 0.0, 0.0)
+    flights = _followed(signals, flights, start, free)
+    modes, fitted = _all_modes(signals, flights, start, free)
     found = _numbers(modes, fitted, contact_shape, flights)
     drawn = [
-        _numbers(*_all_modes(cut, draw, flights, forcing, fastest, noise), contact_shape, flights)
-        for draw in _draws(coordinates, fitted, noise, draws, seed)
+        _numbers(*_all_modes(draw, flights, start, free), contact_shape, flights)
+        for draw in _draws(signals, fitted, draws, seed)
     ]
     errors = np.std(drawn, axis=0, ddof=1)
     if not found[-1] - _BEYOND_NOISE * errors[-1] <= 1.0:
         restitution_from_energy(*_energies(fitted, contact_shape, flights))  # which refuses
     reach = errors * float(student.ppf(0.5 + confidence / 2.0, draws - 1))
-    rows = np.column_stack([found, errors, found - reach, found + reach]).tolist()
-    estimates = [MethodEstimate(*row) for row in rows]
+    rows = np.column_stack([found, errors, reach]).tolist()
+    estimates = [MethodEstimate.within(*row) for row in rows]
     count = len(modes)
     return ModalEstimates(
         tuple(estimates[:count]),
@@ -186,49 +191,30 @@ def estimate_modes(
 
 
 def _draws(
-    coordinates: Floats,
-    fitted: Sequence[Sequence[FittedFlight]],
-    noise: Sequence[float],
-    draws: int,
-    seed: int,
-) -> Iterator[Floats]:
+    signals: Sequence[Signal], fitted: Sequence[Sequence[FittedFlight]], draws: int, seed: int
+) -> Iterator[list[Signal]]:
     """Yield the fitted motion with other draws of the noise."""
-    motion = coordinates.copy()
+    motion = np.array([signal.values for signal in signals])
     for row, fits in zip(motion, fitted, strict=True):
         for one in fits:
-            row[one.flight.index] -= one.rests
+            row[one.flight.index] -= one.residual
+    noise = np.array([signal.noise for signal in signals])
     generator = np.random.default_rng(seed)
     for _ in range(draws):
-        yield motion + np.array(noise)[:, None] * generator.standard_normal(coordinates.shape)
-
-
-def _of_mode(cut: Segmentation, row: Floats, noise: float) -> Signal:
-    return Signal(cut.signal.time, row, cut.signal.good, cut.signal.interval, 1.0, noise)
-
-
-def _asked(forcing: Forcing, fastest: float) -> tuple[Parameters, list[str]]:
-    """Return start values, and what is estimated of each mode."""
-    free = ["damping_ratio", "natural_frequency", "static_deflection"]
-    free += ["phase"] if forcing.phase is None else []
-    return Parameters(1.0, 0.0, fastest, forcing.angular_frequency, 1.0, forcing.phase or 0.0, 0.0), free
+        drawn = motion + noise[:, None] * generator.standard_normal(motion.shape)
+        yield [replace(signal, values=row) for signal, row in zip(signals, drawn, strict=True)]
 
 
 def _followed(
-    cut: Segmentation,
-    coordinates: Floats,
-    flights: list[Flight],
-    forcing: Forcing,
-    fastest: float,
-    noise: Sequence[float],
+    signals: Sequence[Signal], flights: list[Flight], start: Parameters, free: Sequence[str]
 ) -> list[Flight]:
     """Return the flights that every mode follows: in the others an impact was not seen."""
-    start, free = _asked(forcing, fastest)
     if not flights:
         raise EstimationError("modes: expected flights of at least 10 samples between impacts, got none.")
     kept = set(range(len(flights)))
-    for row, level in zip(coordinates, noise, strict=True):
-        tested = weighted_flights(_of_mode(cut, row, level), flights, fastest)
-        kept &= set(robust_weak_form(tested, start, free, level)[1])
+    for signal in signals:
+        tested = weighted_flights(signal, flights, start.natural_frequency)
+        kept &= set(robust_weak_form(tested, start, free, signal.noise)[1])
     if not kept:
         raise EstimationError(
             "modes: expected flights that every mode follows, got none. Modes are lacking, or impacts were not seen."
@@ -237,21 +223,13 @@ def _followed(
 
 
 def _all_modes(
-    cut: Segmentation,
-    coordinates: Floats,
-    flights: Sequence[Flight],
-    forcing: Forcing,
-    fastest: float,
-    noise: Sequence[float],
+    signals: Sequence[Signal], flights: Sequence[Flight], start: Parameters, free: Sequence[str]
 ) -> tuple[list[Parameters], list[list[FittedFlight]]]:
     """Return the weak form's parameters of each mode, and its flights on the exact flow."""
     modes, fitted = [], []
-    start, free = _asked(forcing, fastest)
-    for row, level in zip(coordinates, noise, strict=True):
-        signal = _of_mode(cut, row, level)
-        tested = weighted_flights(signal, flights, fastest)
-        first = linear_estimate(tested, forcing.angular_frequency, start, free)
-        found = weak_form(tested, first, free).parameters
+    for signal in signals:
+        tested = weighted_flights(signal, flights, start.natural_frequency)
+        found, _ = weak_form(tested, linear_estimate(tested, start, free), free)
         found = replace(found, damping_ratio=max(found.damping_ratio, 0.0))
         modes.append(found)
         fitted.append([fit_flight(signal, flight, found) for flight in flights])

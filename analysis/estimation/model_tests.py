@@ -1,7 +1,7 @@
 """What speaks against one oscillator, one stop and one restitution: each alternative tried as one more unknown.
 
-The rests of a fit are regressed on what the alternative would add to them, beside all that is estimated: its size comes
-with a standard error, however alike it is to damping or to a force.
+The residual of a fit is regressed on what the alternative would add to it, beside all that is estimated: the size of
+the alternative comes with a standard error, however alike it is to damping or to a force.
 """
 
 from __future__ import annotations
@@ -12,16 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight, flow_of
-from vibroimpact.analysis.estimation.noise import Floats
-from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.estimation.physics import Floats, Parameters, central_differences
 from vibroimpact.analysis.estimation.prepared import Prepared
-from vibroimpact.analysis.estimation.trajectory import PathProblem, Piece, deepest, follow
+from vibroimpact.analysis.estimation.trajectory import PathProblem, Piece, deepest, follow, residual_of
 from vibroimpact.fmus.core import motion
 
 _STEP = 1e-5
 _SLOPE_STEP = 1e-6
-# A flight is followed when its rests are no more than this many times the noise, or this part of the motion's size:
-# through impacts that are not seen, parameters that are not exact lead astray.
+# Residual up to which a flight follows motion from before it, in units of the noise, or relative to the motion's size:
+# parameters that are not exact lead astray through impacts that are not seen.
 _FOLLOWED, _OF_SIZE = 1.5, 0.05
 _POINTS = 200
 
@@ -38,11 +37,11 @@ def excess_of_trajectories(record: Prepared) -> float:
     found = record.trajectory
     if found is None or not record.fit.noise > 0.0:
         return math.nan
-    signal = record.segmentation.signal
-    rests = np.full(len(signal.values), np.nan)
+    signal = record.signal
+    residual = np.full(len(signal.values), np.nan)
     for piece in found.pieces:
-        rests[piece.index] = signal.values[piece.index] - follow(signal, piece, found.parameters)
-    both = [(rests[one.flight.index], one.rests) for one in record.fit.fitted]
+        residual[piece.index] = residual_of(signal, piece, found.parameters)
+    both = [(residual[one.flight.index], one.residual) for one in record.fit.fitted]
     both = [pair for pair in both if np.all(np.isfinite(pair[0]))]
     freedom = 2 * (len(both) - len(found.pieces)) - sum(
         name in found.names for name in ("restitution", "stop_position")
@@ -58,7 +57,7 @@ def slope_of_restitution(record: Prepared) -> Sized:
     found = record.trajectory
     if found is None:
         return math.nan, math.nan
-    signal, typical = record.segmentation.signal, record.fit.reading.impact_velocity
+    signal, typical = record.signal, record.fit.reading.impact_velocity
     problem = PathProblem(signal, list(found.pieces), found.parameters, found.names, 1.0)
     origin = np.zeros(len(problem.origin))
     column = np.concatenate(
@@ -68,43 +67,38 @@ def slope_of_restitution(record: Prepared) -> Sized:
             for piece in found.pieces
         ]
     )
-    return _size_of(column / _SLOPE_STEP, problem.jacobian(origin), problem.rests(origin))
+    return _size_of(column / _SLOPE_STEP, problem.jacobian(origin), problem.residual(origin))
 
 
 def dry_friction(record: Prepared) -> Sized:
     """Return the dry friction over the stiffness that the single flights show, with its standard error."""
-    p, fitted, signal = record.parameters, record.fit.fitted, record.segmentation.signal
-    columns = []
-    for name in record.names:
-        value = getattr(p, name)
-        step = _STEP * (abs(value) or 1.0)
-        sides = [
-            np.concatenate(
-                [
-                    fit_flight(signal, one.flight, replace(p, **{name: value + sign * step})).rests
-                    for one in fitted
-                ]
-            )
-            for sign in (1.0, -1.0)
-        ]
-        columns.append((sides[0] - sides[1]) / (2.0 * step))
-    rests = np.concatenate([one.rests for one in fitted])
+    p, fitted, signal = record.parameters, record.fit.fitted, record.signal
+
+    def residual_with(values: Floats) -> Floats:
+        changed = p.with_values(record.names, values)
+        return np.concatenate([fit_flight(signal, one.flight, changed).residual for one in fitted])
+
+    residual = np.concatenate([one.residual for one in fitted])
     column = np.concatenate([_friction_column(signal.time, one, p) for one in fitted])
-    return _size_of(column, np.column_stack(columns) if columns else np.empty((len(rests), 0)), rests)
+    columns = np.empty((len(residual), 0))
+    if record.names:
+        found = central_differences(residual_with, p.values_of(record.names), _STEP)
+        columns = np.ascontiguousarray(found)
+    return _size_of(column, columns, residual)
 
 
-def _size_of(column: Floats, others: Floats, rests: Floats) -> Sized:
-    """Return the size of a column in the rests beside others, and its standard error; NaN where it is not seen."""
+def _size_of(column: Floats, others: Floats, residual: Floats) -> Sized:
+    """Return the size of a column in the residual beside others, and its standard error; NaN where it is not seen."""
     scale = np.linalg.norm(others, axis=0)
     basis = np.linalg.qr(others[:, scale > 0.0] / scale[scale > 0.0])[0]
-    own, left = (values - basis @ (basis.T @ values) for values in (column, rests))
+    own, residual = (values - basis @ (basis.T @ values) for values in (column, residual))
     square = float(own @ own)
     if not square > 1e-12 * float(column @ column):
         return math.nan, math.nan
-    size = float(own @ left) / square
-    left = left - size * own
-    freedom = max(len(left) - basis.shape[1] - 1, 1)
-    return size, math.sqrt(float(left @ left) / freedom / square)
+    size = float(own @ residual) / square
+    residual = residual - size * own
+    freedom = max(len(residual) - basis.shape[1] - 1, 1)
+    return size, math.sqrt(float(residual @ residual) / freedom / square)
 
 
 def _friction_column(time: Floats, one: FittedFlight, p: Parameters) -> Floats:
@@ -126,8 +120,8 @@ def _friction_column(time: Floats, one: FittedFlight, p: Parameters) -> Floats:
             # answer to a force that begins: static, less free motion from there
             column[reached] += step * (1.0 - motion(free, (1.0, 0.0), later[reached] - begin)[0])
     basis = flow_of(time[flight.index], flight, p)[0]
-    rest: Floats = column - basis @ (one.gain @ column)
-    return rest
+    residual: Floats = column - basis @ (one.gain @ column)
+    return residual
 
 
 def unexplained_flights(record: Prepared) -> int:
@@ -136,9 +130,9 @@ def unexplained_flights(record: Prepared) -> int:
     Between weak impacts that were not seen, as of chatter, the fitted motion follows from the flight before.
     """
     p = record.parameters if record.trajectory is None else record.trajectory.parameters
-    signal, cut = record.segmentation.signal, record.segmentation
+    signal, cut = record.signal, record.segmentation
     used = {one.flight.first: one for one in record.fit.fitted}
-    limit = max(_FOLLOWED * record.fit.noise, 0.5 * _OF_SIZE * float(np.ptp(signal.values[signal.good])))
+    limit = max(_FOLLOWED * record.fit.noise, 0.5 * _OF_SIZE * signal.range)
     missed, before = 0, None
     for flight in cut.flights:
         if flight.first in used:
@@ -152,10 +146,10 @@ def unexplained_flights(record: Prepared) -> int:
 
 def _distance(record: Prepared, before: FittedFlight, last: int, index: np.ndarray, p: Parameters) -> float:
     """Return the root mean square distance of a flight from the motion that goes on from one before it."""
-    signal = record.segmentation.signal
+    signal = record.signal
     again = fit_flight(signal, before.flight, p)
     place, state = deepest(signal, again, p)
     good = np.flatnonzero(signal.good)
     piece = Piece(good[(good >= place) & (good <= last)], state, 0)
-    rests = signal.values[piece.index] - follow(signal, piece, p)
-    return float(np.sqrt(np.mean(rests[np.isin(piece.index, index)] ** 2)))
+    residual = residual_of(signal, piece, p)
+    return float(np.sqrt(np.mean(residual[np.isin(piece.index, index)] ** 2)))

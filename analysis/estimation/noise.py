@@ -7,20 +7,20 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.estimation.physics import Floats
 from vibroimpact.analysis.robust import robust_sigma
 from vibroimpact.fmus.errors import EstimationError
 
-Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-# Differences of these orders are tried: with each, a smooth signal falls by its radians per sample, noise does not.
+# Orders of the differences that are tried: each one shrinks a smooth signal by its radians per sample, but not noise.
 _ORDERS = range(2, 9)
-# Noise below this part of the peak is rounding.
+# Smallest noise, relative to the range of the signal: below it is rounding.
 _ROUNDING = 1e-13
 _FEWEST_SAMPLES = 20
 _FEWEST_IN_WINDOW = 6
-# Of a one-sided cubic least-squares fit of m samples at interval h, at its end: standard error of the slope is
-# sqrt(1200 / m^3) sigma / h; the slope of the part of y'''' that it leaves out is y'''' (m h)^3 / 84.
+# Slope at the end of a one-sided cubic through m samples at interval h: standard error sqrt(1200 / m^3) sigma / h; bias
+# by the fourth derivative, which a cubic has not, y'''' (m h)^3 / 84.
 _SLOPE_NOISE = math.sqrt(1200.0)
 _SLOPE_BIAS = 1.0 / 84.0
 

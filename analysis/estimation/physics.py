@@ -1,15 +1,34 @@
-"""What is known and what is asked of an oscillator that hits a stop.
+"""What is known and what is asked of an oscillator that hits a stop, and the coordinates in which it is linear.
 
 Per unit mass, in the unit of the displacement: y'' + 2 zeta wn y' + wn^2 (y - y0) = wn^2 y_st cos(Omega t + psi)
 for y below the stop y_s; at the stop the velocity V becomes -r V. zeta damping ratio, wn natural angular frequency, y0
 offset (where the channel reads at rest), y_st static deflection, Omega and psi of the force, r restitution.
+
+Stiffness wn^2, drag 2 zeta wn, force wn^2 y_st (cos psi, sin psi) and rest force wn^2 y0 enter the equation linearly.
+Motion that hardly determines the stiffness leaves a valley, straight in these coordinates and bent in those that a
+person asks for: searches go along it, and intervals follow it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm, qmc
 
 from vibroimpact.fmus.core import Oscillator
+
+Floats = NDArray[np.float64]
+
+_STEP = 1e-6
+_WITHOUT_STIFFNESS = ("restitution", "stop_position", "angular_frequency")
+_DRAWS = 12
+"""Draws of an interval, as a power of 2."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,3 +111,147 @@ class Parameters:
     def phase_at(self, time: float) -> float:
         """Return the phase of the force at a time, rad."""
         return self.angular_frequency * time + self.phase
+
+    def short_of_periods(self, duration: float) -> float:
+        """Return what a flight of P(1,q), which meets its own start, is short of whole periods, s."""
+        period = 2.0 * math.pi / self.angular_frequency
+        return max(1, round(duration / period)) * period - duration
+
+    def acceleration(self, y: Floats, v: Floats, angle: Floats) -> Floats:
+        """Return the acceleration at displacements from the offset and velocities; angle: Omega t, rad."""
+        square = self.natural_frequency**2
+        load = square * self.static_deflection * np.cos(angle + self.phase)
+        found: Floats = load - 2.0 * self.damping_ratio * self.natural_frequency * v - square * y
+        return found
+
+    def values_of(self, names: Sequence[str]) -> Floats:
+        """Return the numbers of some names, shape (name,)."""
+        return np.array([getattr(self, name) for name in names])
+
+    def with_values(self, names: Sequence[str], values: Sequence[float] | Floats) -> Parameters:
+        """Return the same but for the numbers of some names."""
+        changes: dict[str, Any] = {name: float(value) for name, value in zip(names, values, strict=True)}
+        return replace(self, **changes)
+
+
+def central_differences(
+    function: Callable[[Floats], Floats], at: Floats, relative: float, size_of_zero: float = 1.0
+) -> Floats:
+    """Return the derivatives of a function by its arguments, shape (value, argument).
+
+    Parameters
+    ----------
+    function : callable
+    at : ndarray, shape (argument,)
+    relative, size_of_zero : float
+        The step is this part of an argument; an argument of 0 has this size.
+    """
+    columns = []
+    for k, value in enumerate(at):
+        step = np.zeros(len(at))
+        step[k] = relative * (abs(value) or size_of_zero)
+        columns.append((function(at + step) - function(at - step)) / (2.0 * step[k]))
+    return np.array(columns).T
+
+
+@dataclass(frozen=True, slots=True)
+class Coordinates:
+    """The linear coordinates of some of the parameters; the others are held.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of `Parameters`: what is free.
+    held : Parameters
+        Values of the others.
+    """
+
+    names: tuple[str, ...]
+    held: Parameters
+
+    @property
+    def both(self) -> bool:
+        """Amplitude and phase of the force are both free."""
+        return "static_deflection" in self.names and "phase" in self.names
+
+    def of(self, p: Parameters) -> Floats:
+        """Return the coordinates of parameters, in the order of the names."""
+        square = p.natural_frequency**2
+        force = square * p.static_deflection
+        values = {
+            "natural_frequency": square,
+            "damping_ratio": 2.0 * p.damping_ratio * p.natural_frequency,
+            "static_deflection": force * math.cos(p.phase) if self.both else force,
+            "phase": force * math.sin(p.phase) if self.both else p.phase,
+            "offset": square * p.offset,
+        }
+        return np.array([values.get(name, getattr(p, name)) for name in self.names])
+
+    def parameters(self, values: Sequence[float] | Floats) -> Parameters | None:
+        """Return the parameters of coordinates; None where the stiffness is not positive."""
+        given: dict[str, Any] = {name: float(value) for name, value in zip(self.names, values, strict=True)}
+        square = given.get("natural_frequency", self.held.natural_frequency**2)
+        if not square > 0.0:
+            return None
+        natural = math.sqrt(square)
+        divisors = {"damping_ratio": 2.0 * natural, "static_deflection": square, "offset": square}
+        changes = {name: value / divisors.get(name, 1.0) for name, value in given.items()}
+        if "natural_frequency" in given:
+            changes["natural_frequency"] = natural
+        if self.both:
+            cosine, sine = given["static_deflection"], given["phase"]
+            changes |= {
+                "static_deflection": math.hypot(cosine, sine) / square,
+                "phase": math.atan2(sine, cosine),
+            }
+        return replace(self.held, **changes)
+
+    def derivative(self, p: Parameters) -> Floats:
+        """Return d coordinates / d parameters, shape (name, name)."""
+        at = p.values_of(self.names)
+        return central_differences(lambda values: self.of(p.with_values(self.names, values)), at, _STEP)
+
+    def intervals(
+        self, p: Parameters, covariance: Floats, confidence: float
+    ) -> Mapping[str, tuple[float, float]]:
+        """Return intervals of parameters whose coordinates are normal: parts of draws, the same draws every time.
+
+        Parameters
+        ----------
+        p : Parameters
+            The estimate.
+        covariance : ndarray, shape (name, name)
+            Of the parameters, to first order.
+        confidence : float
+
+        Returns
+        -------
+        mapping of str to (float, float)
+            Lower and upper end; none of what the stiffness is in, where the data do not exclude a stiffness of 0.
+        """
+        slope = self.derivative(p)
+        values, vectors = np.linalg.eigh(slope @ covariance @ slope.T)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        drawn = [self.parameters(self.of(p) + root @ one) for one in _normal_draws(len(self.names))]
+        tail = 50.0 * (1.0 - confidence)
+        open_ended = sum(one is None for one in drawn) > 0.01 * tail * len(drawn)
+        found = {}
+        for name in self.names:
+            if open_ended and name not in _WITHOUT_STIFFNESS:
+                continue
+            middle = getattr(p, name)
+            cloud = np.array([getattr(one, name) for one in drawn if one is not None])
+            if name == "phase":
+                cloud = middle + np.angle(np.exp(1j * (cloud - middle)))
+            low, high = np.percentile(cloud, [tail, 100.0 - tail])
+            found[name] = (float(low), float(high))
+        return found
+
+
+@lru_cache(maxsize=8)
+def _normal_draws(count: int) -> Floats:
+    """Return evenly spread normal numbers, shape (draw, count), symmetric about 0."""
+    even = qmc.Sobol(count, scramble=False).random_base2(_DRAWS)[1:]
+    half = norm.ppf(np.clip(even, 1e-9, 1.0 - 1e-9))
+    found: Floats = np.concatenate([half, -half])
+    return found

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vibroimpact.analysis.estimation.estimates import FittedMotion
-from vibroimpact.analysis.estimation.flight_fit import FlightFit, fit_flights, search_flights
-from vibroimpact.analysis.estimation.noise import Floats
-from vibroimpact.analysis.estimation.physics import Forcing, Known, Parameters
-from vibroimpact.analysis.estimation.segments import Flight, Segmentation, segment
+from vibroimpact.analysis.estimation.flight_fit import FlightFit, FlightSearch, fit_flights, search_flights
+from vibroimpact.analysis.estimation.physics import Floats, Forcing, Known, Parameters
+from vibroimpact.analysis.estimation.segments import Flight, Segmentation, Signal, segment_channel
 from vibroimpact.analysis.estimation.trajectory import Trajectory, follow
 from vibroimpact.analysis.estimation.weak_form import (
-    WeakForm,
     robust_weak_form,
     weak_form,
     weighted_flights,
@@ -23,12 +22,13 @@ from vibroimpact.analysis.estimation.weak_form import (
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.fmus.errors import EstimationError
 
-# Correlation of neighbouring rests beyond so many standard errors widens the intervals.
+# Correlation of neighbouring residuals, in standard errors, from which it widens the intervals.
 _CORRELATED = 3.0
 _LEAST_DAMPING = 1e-6
-# Rests of a flight larger or more alike than those of noise by so many standard errors show that it has an impact.
+# Standard errors of chance beyond which the residuals of a flight are so large or so correlated that it has an impact.
 _BEYOND_CHANCE = 4.5
-# A natural frequency over that for which a record was cut by such a factor is cut for; beyond, it is no oscillator's.
+# A record is cut again if its natural frequency exceeds that for which it was cut by more than the first factor; beyond
+# the second it is that of no oscillator.
 _FASTER, _MUCH_FASTER = 1.05, 4.0
 
 
@@ -38,47 +38,50 @@ class Prepared:
 
     Attributes
     ----------
+    forcing : Forcing
+    held : Known
     segmentation : Segmentation
     flights : list of Flight
         Those that follow the model.
-    weak : WeakForm or None
-        None: nothing was left to estimate.
+    search : FlightSearch
+        What weak form and exact flow say of what is not held.
     fit : FlightFit
     parameters : Parameters
-        What is held, and what weak form and flights say of the rest.
-    stop : float or None
-        The known stop, mirrored where it is a lower one.
-    free : tuple of str
-        What the weak form estimates.
+        What is held, and what search and flights say of the rest.
     left_out : int
         Flights that do not follow the model.
     correlation, inflation : float
-        Of neighbouring rests, and the factor by which it widens standard errors.
+        Of neighbouring residuals, and the factor by which it widens standard errors.
     trajectory : Trajectory or None
         Set when it was fitted.
     """
 
+    forcing: Forcing
+    held: Known
     segmentation: Segmentation
     flights: list[Flight]
-    weak: WeakForm | None
+    search: FlightSearch
     fit: FlightFit
     parameters: Parameters
-    stop: float | None
-    free: tuple[str, ...]
     left_out: int
     correlation: float
     inflation: float
     trajectory: Trajectory | None = None
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """What the weak form estimated."""
-        return self.weak.names if self.weak else ()
+    def signal(self) -> Signal:
+        """The displacement, mirrored where its stop is a lower one."""
+        return self.segmentation.signal
 
     @property
-    def influence(self) -> list[Floats]:
-        """How that changes with the samples of each flight."""
-        return self.weak.influence if self.weak else []
+    def names(self) -> tuple[str, ...]:
+        """What weak form and search estimated."""
+        return self.search.names
+
+    @property
+    def stop(self) -> float | None:
+        """The known stop, mirrored where it is a lower one."""
+        return None if self.held.stop_position is None else self.signal.sign * self.held.stop_position
 
 
 def prepare(channel: Channel, forcing: Forcing, held: Known, window: float | None) -> Prepared:
@@ -107,83 +110,34 @@ def _prepared(
     channel: Channel, forcing: Forcing, held: Known, window: float | None, fastest: float
 ) -> Prepared:
     """Return a record cut for motion of this fastest angular frequency, rad/s."""
-    segmentation = segment(
-        channel.time,
-        np.where(channel.good, channel.values, 0.0),
-        channel.good,
-        fastest=fastest,
-        side=held.side,
-        stop_position=held.stop_position,
-        window=window,
-    )
-    sign = segmentation.signal.sign
-    stop = None if held.stop_position is None else sign * held.stop_position
-    start, free = _start(forcing, held, segmentation, sign)
-    flights = [flight for flight in segmentation.flights if flight.usable]
-    if not flights:
+    cut = segment_channel(channel, fastest, held, window)
+    signal = cut.signal
+    stop = None if held.stop_position is None else signal.sign * held.stop_position
+    start, free = _start(forcing, held, cut)
+    usable = [flight for flight in cut.flights if flight.usable]
+    if not usable:
         raise EstimationError(
             f"estimate: expected flights of at least 10 samples between impacts, got none between "
-            f"{len(segmentation.impacts)} impacts. Use a higher sampling rate."
+            f"{len(cut.impacts)} impacts. Use a higher sampling rate."
         )
-    weak, flights = _weak(segmentation, flights, start, free, fastest)
-    weak, parameters, fit = _fitted(segmentation, flights, start, weak, stop)
+    start, flights = _followed_by_weak_form(signal, usable, start, free, fastest)
+    search, parameters, fit = _searched(signal, flights, start, free, stop)
     followed = _followed(fit)
-    if weak is not None and len(followed) < len(flights):
-        # rests of all samples show a weak impact that the few integrals of the weak form do not
+    if free and len(followed) < len(flights):
+        # residuals of all samples show a weak impact that the few integrals of the weak form do not
         flights = [flights[k] for k in followed]
-        whole = weighted_flights(segmentation.signal, flights, fastest)
-        weak = weak_form(whole, weak.parameters, free)
-        weak, parameters, fit = _fitted(segmentation, flights, start, weak, stop)
+        start, _ = weak_form(weighted_flights(signal, flights, fastest), search.parameters, free)
+        search, parameters, fit = _searched(signal, flights, start, free, stop)
     parameters = replace(
         parameters,
         restitution=min(max(fit.reading.restitution, 0.0), 1.0),
         stop_position=fit.reading.stop_position,
     )
-    correlation, inflation = _coloured(fit)
-    left_out = sum(flight.usable for flight in segmentation.flights) - len(flights)
-    return Prepared(
-        segmentation, flights, weak, fit, parameters, stop, free, left_out, correlation, inflation
-    )
+    left_out = len(usable) - len(flights)
+    return Prepared(forcing, held, cut, flights, search, fit, parameters, left_out, *_coloured(fit))
 
 
-def _fitted(
-    segmentation: Segmentation,
-    flights: list[Flight],
-    start: Parameters,
-    weak: WeakForm | None,
-    stop: float | None,
-) -> tuple[WeakForm | None, Parameters, FlightFit]:
-    """Return the weak form, the parameters that it found or were held, and the exact flow with them on each flight."""
-    signal = segmentation.signal
-    if weak is None:
-        return None, start, fit_flights(signal, flights, start, stop)
-    found = search_flights(signal, flights, _damped(weak.parameters), weak.names)
-    weak = replace(weak, parameters=found.parameters, covariance=found.covariance, influence=found.influence)
-    parameters = _damped(weak.parameters)
-    return weak, parameters, fit_flights(signal, flights, parameters, stop, weak.names, weak.influence)
-
-
-def _damped(parameters: Parameters) -> Parameters:
-    """Return parameters of a flow: noise may put weak damping below zero, where there is none."""
-    return replace(parameters, damping_ratio=max(parameters.damping_ratio, _LEAST_DAMPING))
-
-
-def _followed(fit: FlightFit) -> list[int]:
-    """Return the flights whose rests are no larger and no more alike than noise; all where most are not."""
-    found = []
-    for k, one in enumerate(fit.fitted):
-        count = len(one.rests)
-        square = float(one.rests @ one.rests)
-        excess = (square / fit.noise**2 - count) / math.sqrt(2.0 * count) if fit.noise > 0.0 else 0.0
-        alike = float(one.rests[1:] @ one.rests[:-1]) / square * math.sqrt(count) if square > 0.0 else 0.0
-        if max(excess, alike) < _BEYOND_CHANCE:
-            found.append(k)
-    return found if len(found) > 0.5 * len(fit.fitted) else list(range(len(fit.fitted)))
-
-
-def _start(
-    forcing: Forcing, held: Known, segmentation: Segmentation, sign: float
-) -> tuple[Parameters, tuple[str, ...]]:
+def _start(forcing: Forcing, held: Known, cut: Segmentation) -> tuple[Parameters, tuple[str, ...]]:
     """Return the held values (start values for the others), and the names of what is estimated."""
     unknown = {
         "damping_ratio": held.damping_ratio is None,
@@ -193,55 +147,83 @@ def _start(
         "angular_frequency": forcing.clock_drifts,
         "offset": held.offset is None,
     }
-    # mirrored for a lower stop: the force then has the opposite sign
-    phase = (forcing.phase or 0.0) + (0.0 if sign > 0.0 else math.pi)
+    sign = cut.signal.sign
     parameters = Parameters(
-        1.0,
-        0.0 if held.damping_ratio is None else held.damping_ratio,
-        held.natural_frequency or forcing.angular_frequency,
-        forcing.angular_frequency,
-        1.0 if forcing.static_deflection is None else forcing.static_deflection,
-        phase,
-        segmentation.stop_position,
-        sign * (held.offset or 0.0),
+        restitution=1.0,
+        damping_ratio=0.0 if held.damping_ratio is None else held.damping_ratio,
+        natural_frequency=held.natural_frequency or forcing.angular_frequency,
+        angular_frequency=forcing.angular_frequency,
+        static_deflection=1.0 if forcing.static_deflection is None else forcing.static_deflection,
+        # mirrored for a lower stop: the force then has the opposite sign
+        phase=(forcing.phase or 0.0) + (0.0 if sign > 0.0 else math.pi),
+        stop_position=cut.stop_position,
+        offset=sign * (held.offset or 0.0),
     )
     return parameters, tuple(name for name, is_free in unknown.items() if is_free)
 
 
-def _weak(
-    segmentation: Segmentation,
-    flights: list[Flight],
-    start: Parameters,
-    free: tuple[str, ...],
-    fastest: float,
-) -> tuple[WeakForm | None, list[Flight]]:
+def _followed_by_weak_form(
+    signal: Signal, flights: list[Flight], start: Parameters, free: tuple[str, ...], fastest: float
+) -> tuple[Parameters, list[Flight]]:
     """Return the weak form over the flights that follow the model, and those flights."""
     if not free:
-        return None, flights
-    whole = weighted_flights(segmentation.signal, flights, fastest)
+        return start, flights
+    whole = weighted_flights(signal, flights, fastest)
     if "angular_frequency" in free:
         start = with_own_clock(whole, start, [name for name in free if name != "angular_frequency"])
-    found, kept = robust_weak_form(whole, start, free, segmentation.signal.noise)
+    found, kept = robust_weak_form(whole, start, free, signal.noise)
     return found, [flights[k] for k in kept]
 
 
+def _searched(
+    signal: Signal, flights: list[Flight], start: Parameters, free: tuple[str, ...], stop: float | None
+) -> tuple[FlightSearch, Parameters, FlightFit]:
+    """Return what is free as found near a start, all parameters of the flow, and the exact flow on each flight."""
+    if not free:
+        nothing = FlightSearch(start, (), np.empty((0, 0)), [])
+        return nothing, start, fit_flights(signal, flights, start, stop)
+    search = search_flights(signal, flights, _damped(start), free)
+    parameters = _damped(search.parameters)
+    return search, parameters, fit_flights(signal, flights, parameters, stop, free, search.influence)
+
+
+def _damped(parameters: Parameters) -> Parameters:
+    """Return parameters of a flow: noise may put weak damping below zero, where there is none."""
+    return replace(parameters, damping_ratio=max(parameters.damping_ratio, _LEAST_DAMPING))
+
+
+def _followed(fit: FlightFit) -> list[int]:
+    """Return the flights whose residuals are no larger and no more correlated than noise; all where most are not."""
+    found = []
+    for k, one in enumerate(fit.fitted):
+        correlation, square, count = _correlation([one.residual])
+        excess = (square / fit.noise**2 - count) / math.sqrt(2.0 * count) if fit.noise > 0.0 else 0.0
+        if max(excess, correlation * math.sqrt(count)) < _BEYOND_CHANCE:
+            found.append(k)
+    return found if len(found) > 0.5 * len(fit.fitted) else list(range(len(fit.fitted)))
+
+
 def _coloured(fit: FlightFit) -> tuple[float, float]:
-    """Return the correlation of neighbouring rests, and the factor by which it widens standard errors."""
-    product = sum(float(one.rests[1:] @ one.rests[:-1]) for one in fit.fitted)
-    square = sum(float(one.rests @ one.rests) for one in fit.fitted)
-    count = sum(len(one.rests) for one in fit.fitted)
-    correlation = product / square if square > 0.0 else 0.0
+    """Return the correlation of neighbouring residuals, and the factor by which it widens standard errors."""
+    correlation, _, count = _correlation([one.residual for one in fit.fitted])
     if correlation * math.sqrt(count) < _CORRELATED:
         return correlation, 1.0
     return correlation, math.sqrt((1.0 + correlation) / (1.0 - min(correlation, 0.99)))
 
 
+def _correlation(residuals: Sequence[Floats]) -> tuple[float, float, int]:
+    """Return the correlation of neighbours in residuals, the sum of squares, and the number of samples."""
+    product = sum(float(one[1:] @ one[:-1]) for one in residuals)
+    square = sum(float(one @ one) for one in residuals)
+    return product / square if square > 0.0 else 0.0, square, sum(len(one) for one in residuals)
+
+
 def fitted_motion(channel: Channel, record: Prepared) -> FittedMotion:
     """Return the motion of the trajectories, or of the single flights where there are none."""
-    signal, found = record.segmentation.signal, record.trajectory
+    signal, found = record.signal, record.trajectory
     fitted = np.full(len(signal.values), np.nan)
     for one in record.fit.fitted:
-        fitted[one.flight.index] = signal.values[one.flight.index] - one.rests
+        fitted[one.flight.index] = signal.values[one.flight.index] - one.residual
     if found is not None:
         for piece in found.pieces:
             fitted[piece.index] = follow(signal, piece, found.parameters)

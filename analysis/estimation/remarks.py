@@ -1,4 +1,4 @@
-"""What is said beside the estimates: conditioning, facts of the record, and remarks."""
+"""What is said beside the estimates: conditioning, facts of the record, remarks, and doubts: each in one sentence."""
 
 from __future__ import annotations
 
@@ -6,20 +6,45 @@ import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from scipy.stats import norm
 
 from vibroimpact.analysis.estimation.draws import Resampled
 from vibroimpact.analysis.estimation.energy import sensitivities
-from vibroimpact.analysis.estimation.estimates import MethodEstimate
-from vibroimpact.analysis.estimation.physics import Known
+from vibroimpact.analysis.estimation.estimates import ANSWERING, Doubt, MethodEstimate
+from vibroimpact.analysis.estimation.flight_fit import pairs_of
+from vibroimpact.analysis.estimation.model_tests import (
+    dry_friction,
+    excess_of_trajectories,
+    slope_of_restitution,
+    unexplained_flights,
+)
 from vibroimpact.analysis.estimation.prepared import Prepared
 from vibroimpact.analysis.estimation.trajectory import MOST_IMPACTS
+
+# Standard errors from which evidence against the model counts: chance gets there once in a thousand times.
+_CLEAR = 3.3
+# Kinks the other way are those of a second stop from this number, and from this part of the impacts, on.
+_FEWEST_OPPOSITE, _PART_OPPOSITE = 3, 0.1
+# Largest part of kinks that are not at the stop, and of flights that nothing explains, without a doubt.
+_PART_STRAY = 0.15
+_PART_UNEXPLAINED = 0.15
+# Noise, relative to the motion's range, below which it is the rounding of a simulation.
+_ROUNDING = 1e-6
+_FEWEST_IMPACTS = 5
+_FEWEST_SAMPLES = 12
+# Standard errors of both together from which two methods contradict each other.
+_APART = 3.0
+# Relative standard error of a natural frequency from which it is hardly determined.
+_DETERMINED = 0.1
+
+Values = Mapping[str, Mapping[str, MethodEstimate]]
 
 
 def conditioning_of(record: Prepared, resampled: Resampled | None) -> dict[str, float]:
     """Return the sensitivities of the energy balance at the estimates."""
     if resampled is None:
         return {}
-    drag = np.abs(resampled.exact[0].drag[0])
+    drag = np.abs(resampled.exact.drag[0])
     reading = record.fit.reading
     flight, half = float(np.mean(drag[0::2] + drag[1::2])), float(np.mean(drag[1::2]))
     if not (reading.restitution > 0.0 and half > 0.0):
@@ -30,8 +55,8 @@ def conditioning_of(record: Prepared, resampled: Resampled | None) -> dict[str, 
 
 def facts_of(record: Prepared, resampled: Resampled | None) -> dict[str, float | str]:
     """Return what the record is like."""
-    cut = record.segmentation
-    peak = float(np.max(np.abs(cut.signal.values[cut.signal.good] - record.parameters.offset)))
+    cut, signal = record.segmentation, record.signal
+    peak = float(np.max(np.abs(signal.values[signal.good] - record.parameters.offset)))
     facts: dict[str, float | str] = {
         "impacts": float(len(cut.impacts)),
         "flights_used": float(len(record.flights)),
@@ -40,7 +65,7 @@ def facts_of(record: Prepared, resampled: Resampled | None) -> dict[str, float |
         "noise_over_peak": record.fit.noise / peak,
         "noise_correlation": record.correlation,
         "window": cut.window,
-        "side": "upper" if cut.signal.sign > 0.0 else "lower",
+        "side": signal.side,
         "restitution_scatter": _scatter(record),
     }
     if resampled is not None:
@@ -61,15 +86,8 @@ def _scatter(record: Prepared) -> float:
     return float(np.std(ratios, ddof=1)) if len(ratios) > 1 else math.nan
 
 
-def remarks_of(
-    record: Prepared, held: Known, values: Mapping[str, Mapping[str, MethodEstimate]]
-) -> tuple[str, ...]:
-    """Return what a reader must know."""
-    return (*_of_flights(record), *_of_methods(record, held, values))
-
-
-def _of_flights(record: Prepared) -> Iterator[str]:
-    """Yield what became of the flights."""
+def remarks_of(record: Prepared, values: Values) -> Iterator[str]:
+    """Yield what a reader must know."""
     if record.fit.reading.periodic:
         yield "No impact has a usable flight on both sides: P(1,1) was assumed."
     if record.left_out:
@@ -84,19 +102,13 @@ def _of_flights(record: Prepared) -> Iterator[str]:
         )
     if record.trajectory is not None and len(record.flights) > MOST_IMPACTS:
         yield f"The trajectories are those of about {MOST_IMPACTS} impacts, the first."
-
-
-def _of_methods(
-    record: Prepared, held: Known, values: Mapping[str, Mapping[str, MethodEstimate]]
-) -> Iterator[str]:
-    """Yield what the methods rest on."""
     energy = any(name.startswith("energy") for name in values)
     if energy and record.names:
         yield (
             f"The energy balance took {', '.join(record.names)} from the weak form where it does not estimate them; "
             "their doubt is in its intervals."
         )
-    if energy and held.damping_ratio is None:
+    if energy and record.held.damping_ratio is None:
         yield (
             "No damping ratio was given: the energy balance with known damping gives the energy-loss factor, "
             "which counts all damping as loss at the impact."
@@ -106,3 +118,142 @@ def _of_methods(
             "period_one assumes undamped free motion between impacts: a start value without an interval, "
             "off by several percent for driven, damped motion."
         )
+
+
+def doubts_of(record: Prepared, values: Values, confidence: float) -> tuple[Doubt, ...]:
+    """Return what makes the estimates of a record, with intervals of a confidence, doubtful: the gravest first."""
+    clocks = "" if record.forcing.clock_drifts else ", or clocks that differ (--clock-drifts)"
+    # without noise the residual is rounding, and standard errors of it say nothing
+    noisy = record.fit.noise > _ROUNDING * record.signal.range
+    return (
+        *_of_stops(record),
+        *_of_flights(record, clocks),
+        *(_of_model(record, clocks) if noisy else ()),
+        *_of_constancy(record, clocks),
+        *(_of_contradictions(values, confidence) if noisy else ()),
+        *_of_precision(record, values),
+    )
+
+
+def _of_stops(record: Prepared) -> Iterator[Doubt]:
+    """Yield what kinks say that are not those of one stop."""
+    cut = record.segmentation
+    if cut.opposite >= max(_FEWEST_OPPOSITE, _PART_OPPOSITE * len(cut.impacts)):
+        yield Doubt(f"{cut.opposite} impacts turn the motion the other way: there is a second stop")
+    if cut.stray > _PART_STRAY * (cut.stray + len(cut.impacts)):
+        yield Doubt(
+            f"{cut.stray} of {cut.stray + len(cut.impacts)} jumps of the velocity are not where the others are: "
+            "the stop is not one place, or the channel is not the displacement of the contact"
+        )
+
+
+def _of_flights(record: Prepared, clocks: str) -> Iterator[Doubt]:
+    """Yield what the flights show: how many, and how well they are followed."""
+    missed, used = unexplained_flights(record), len(record.flights)
+    pairs = sum(one != other for one, other in pairs_of(record.flights))
+    if pairs < _FEWEST_IMPACTS:
+        yield Doubt(f"only {pairs} impacts have a usable flight on both sides: record more of them")
+    if missed > max(1.0, _PART_UNEXPLAINED * (missed + used)):
+        yield Doubt(
+            f"{missed} of {missed + record.left_out - missed + used} flights do not follow one oscillator with this "
+            f"force: a second mode, another force{clocks}"
+        )
+    samples = float(np.median([len(flight.index) for flight in record.flights]))
+    if samples < _FEWEST_SAMPLES:
+        yield Doubt(f"flights have {samples:.0f} samples: {_FEWEST_SAMPLES} are needed, sample faster")
+
+
+def _of_model(record: Prepared, clocks: str) -> Iterator[Doubt]:
+    """Yield what speaks against one linear oscillator with white noise and one restitution."""
+    if record.inflation > 1.0:
+        yield Doubt(
+            f"what the motion leaves is no white noise (correlation {record.correlation:.2f} from sample to sample): "
+            "a sensor that filters, or motion that the model lacks"
+        )
+    slope, error = slope_of_restitution(record)
+    if abs(slope) > _CLEAR * error:
+        yield Doubt(
+            f"the restitution changes with the speed of impact ({slope:+.2g} +- {error:.1g} at double the typical "
+            "speed), or friction does"
+        )
+    friction, error = dry_friction(record)
+    if abs(friction) > _CLEAR * error:
+        yield Doubt(
+            f"the flights show dry friction ({abs(friction):.2g} +- {error:.1g} over the stiffness), or other damping "
+            "that is not viscous"
+        )
+    excess = excess_of_trajectories(record)
+    if excess > _CLEAR:
+        yield Doubt(
+            f"trajectories through the impacts leave more than the flights between them, by {excess:.0f} standard "
+            f"errors: the restitution or the stop is not the same at all impacts{clocks}"
+        )
+    if excess < -_CLEAR:
+        yield Doubt(
+            f"the trajectories follow the flights better than the weak form does, by {-excess:.0f} standard errors",
+            tuple(name for name in ANSWERING if name != "trajectory"),
+        )
+
+
+def _of_constancy(record: Prepared, clocks: str) -> Iterator[Doubt]:
+    """Yield trajectories that do not follow at all what single flights do."""
+    if record.trajectory is not None and not record.trajectory.adequate:
+        yield Doubt(
+            f"the fitted trajectories leave {record.trajectory.noise:.3g}, the single flights {record.fit.noise:.3g}: "
+            f"restitution or forcing is not constant{clocks}"
+        )
+
+
+def _of_contradictions(values: Values, confidence: float) -> Iterator[Doubt]:
+    """Yield methods that differ by more than chance explains.
+
+    Intervals of 95 % beside much narrower ones have no point in common with them once in twenty times.
+    """
+    best = next((name for name in ("trajectory", "weak_form") if name in values), None)
+    for method in ANSWERING:
+        if best is None or method not in values or method == best:
+            continue
+        apart = [
+            name
+            for name, one in values[method].items()
+            if name in values[best] and _apart(name, one, values[best][name], confidence)
+        ]
+        if apart:
+            said = " and ".join(name.replace("_", " ") for name in apart)
+            yield Doubt(
+                f"{method} and {best} contradict each other about {said}",
+                () if method == "weak_form" else (method,),
+            )
+
+
+def _apart(name: str, one: MethodEstimate, other: MethodEstimate, confidence: float) -> bool:
+    """Tell whether two intervals have nothing in common, and by more than chance explains."""
+    turn = 2.0 * math.pi * round((other.value - one.value) / (2.0 * math.pi)) if name == "phase" else 0.0
+    gap = one.value + turn - other.value
+    between = one.value - one.low, other.high - other.value
+    if gap <= 0.0:
+        between = one.high - one.value, other.value - other.low
+    reach = _APART / float(norm.ppf(0.5 + 0.5 * confidence)) * math.hypot(*between)
+    return abs(gap) > max(sum(between), reach)
+
+
+def _of_precision(record: Prepared, values: Values) -> Iterator[Doubt]:
+    """Yield methods that the data hardly determine."""
+    for method in ANSWERING:
+        found = values.get(method, {})
+        natural = found.get("natural_frequency")
+        free = "natural_frequency" in record.names
+        if method in ("weak_form", "trajectory") and method in values and free and natural is None:
+            yield Doubt("the motion does not determine the natural frequency: give it", (method,))
+        elif natural is not None and natural.standard_error > _DETERMINED * natural.value:
+            yield Doubt(
+                f"the motion hardly determines the natural frequency ({natural.value:.3g} +- "
+                f"{natural.standard_error:.1g} rad/s): give it",
+                (method,),
+            )
+        restitution = found.get("restitution")
+        if restitution is not None and not 0.0 <= restitution.value <= 1.0:
+            yield Doubt(f"a restitution of {restitution.value:.3g} is not between 0 and 1", (method,))
+        damping = found.get("damping_ratio")
+        if damping is not None and damping.value < 0.0:
+            yield Doubt(f"a damping ratio of {damping.value:.2g} is below 0", (method,))

@@ -12,40 +12,45 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import NDArray
 from scipy.signal import find_peaks, oaconvolve
 
-from vibroimpact.analysis.estimation.noise import Floats, Mask, noise_level, one_sided_window
+from vibroimpact.analysis.estimation.noise import Mask, noise_level, one_sided_window
+from vibroimpact.analysis.estimation.physics import Floats, Known
+from vibroimpact.analysis.recording import Channel
+from vibroimpact.analysis.recording.units import measured_unit, unit_label
 from vibroimpact.analysis.robust import robust_sigma
 from vibroimpact.fmus.errors import EstimationError
 
-# A jump of the velocity counts from this many standard errors on ...
+# A jump of the velocity is a kink from this many standard errors on ...
 _JUMPS_BEYOND = 5.0
-# ... and from this many times what motion of the largest size and the fastest rate makes of it.
+# ... and from this multiple of the jump that smooth motion of the largest size and the fastest rate seems to have.
 _BIAS_BEYOND = 1.5
 _FEWEST_IN_FLIGHT = 10
-# A sampling step off the median by this part is a gap or a repeated sample: no kink is looked for across it.
+# Relative deviation of a sampling step from the median beyond which it is a gap or a repeated sample, without a kink.
 _UNEVEN = 0.5
 _REFINEMENTS = 4
-# A kink that meets its neighbours' level worse than this many standard errors is not at the stop.
+# A kink is not at the stop if its level is more than this many standard errors from the median level ...
 _LEVEL_BEYOND = 8.0
-# ... and by more than this part of the motion's size.
+# ... and more than this part of the motion's size.
 _LEVEL_OF_SIZE = 0.02
-# Each shorter window is this part of the one before it, down to as many samples ...
+# Each trial window is this part of the one before, down to the fewest samples ...
 _SHORTER = 0.6
 _FEWEST_IN_WINDOW = 6
-# ... and is taken where it shows more than so many times as many impacts ...
+# ... and is taken if it shows more impacts than the longer one, by more than this factor.
 _MORE = 1.1
-# ... which is not tried where impacts lie so many windows apart.
+# No shorter window is tried if all impacts are further apart than this many windows.
 _APART = 2.5
-# A window has no other kink in it where the next one is this many of its halves away.
+# A kink the other way counts if it is further from all kinks at the stop than this many windows ...
 _CLEAR_OF = 1.1
-# Jumps the other way count from this part of the largest one on: smooth motion makes small ones.
+# ... and larger than this part of the largest of them: smooth motion makes small ones.
 _PART_OF_LARGEST = 0.1
-# A known stop is wrong that is this part of the motion's size off the impacts; told from so many of them on.
+# A known stop is refused if it is this part of the motion's size off the impacts; checked from this many impacts on.
 _STOP_OF_SIZE, _FEWEST_TO_CHECK = 0.1, 5
-# Samples within so many standard errors of an impact's instant are in no flight.
+# Samples within this many standard errors of the instant of an impact belong to no flight.
 _DOUBTFUL = 2.5
+_OTHER_UNITS = {"m s-1": "a velocity", "m s-2": "an acceleration", "N": "a force"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +77,16 @@ class Signal:
     interval: float
     sign: float
     noise: float
+
+    @property
+    def side(self) -> str:
+        """Where the stop is: `upper` or `lower`."""
+        return "upper" if self.sign > 0.0 else "lower"
+
+    @property
+    def range(self) -> float:
+        """Largest less smallest good sample."""
+        return float(np.ptp(self.values[self.good]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +170,32 @@ class Segmentation:
         return float(np.average([impact.level for impact in self.impacts], weights=weight))
 
 
+def segment_channel(channel: Channel, fastest: float, known: Known, window: float | None) -> Segmentation:
+    """Cut a channel at its impacts; see `segment`.
+
+    Raises
+    ------
+    EstimationError
+        As of `segment`; or the channel is no displacement: velocities jump at impacts, accelerations and forces have
+        spikes.
+    """
+    si = measured_unit(channel.unit).si
+    if si in _OTHER_UNITS:
+        raise EstimationError(
+            f"{channel.name}: expected a displacement, got {_OTHER_UNITS[si]} ({unit_label(channel.unit)}). "
+            "Measure the displacement, or integrate before the import."
+        )
+    return segment(
+        channel.time,
+        np.where(channel.good, channel.values, 0.0),
+        channel.good,
+        fastest=fastest,
+        side=known.side,
+        stop_position=known.stop_position,
+        window=window,
+    )
+
+
 def segment(
     time: Floats,
     values: Floats,
@@ -187,18 +228,16 @@ def segment(
     """
     noise = noise_level(values, good)
     interval = float(np.median(np.diff(time)))
-    size = 0.5 * float(np.ptp(values[good]))
+    signal = Signal(time, values, good, interval, 1.0, noise)
     if window is None:
         longest = 0.25 * 2.0 * math.pi / fastest
-        window = one_sided_window(noise, interval, size, fastest, longest)
+        window = one_sided_window(noise, interval, 0.5 * signal.range, fastest, longest)
         counts = _counts(window / interval)
     else:
         counts = [max(_FEWEST_IN_WINDOW, round(window / interval))]
-    scales = _Scales(noise, interval, size, fastest)
-    signal = Signal(time, values, good, interval, 1.0, noise)
     found: Segmentation | None = None
     for count in counts:
-        trial = _cut(signal, scales, count, side, stop_position)
+        trial = _cut(signal, fastest, count, side, stop_position)
         if found is None or len(trial.impacts) > _MORE * len(found.impacts):
             found = trial
         if _uncrowded(trial, count):
@@ -210,17 +249,7 @@ def segment(
             "motion, or one with less noise or more samples between impacts."
         )
     shorter = [count for count in counts if count * interval <= found.window]
-    return replace(found, opposite=max(_opposite(found.signal, scales, count) for count in shorter))
-
-
-@dataclass(frozen=True, slots=True)
-class _Scales:
-    """Noise, sampling interval (s), amplitude and fastest smooth rate (rad/s) of a signal."""
-
-    noise: float
-    interval: float
-    size: float
-    fastest: float
+    return replace(found, opposite=max(_opposite(found.signal, fastest, count) for count in shorter))
 
 
 def _counts(most: float) -> list[int]:
@@ -238,38 +267,40 @@ def _uncrowded(cut: Segmentation, count: int) -> bool:
 
 
 def _cut(
-    raw: Signal, scales: _Scales, count: int, side: str | None, stop_position: float | None
+    raw: Signal, fastest: float, count: int, side: str | None, stop_position: float | None
 ) -> Segmentation:
     """Return a signal cut at the impacts that windows of `count` samples on each side show."""
-    noise, interval, size = scales.noise, scales.interval, scales.size
-    jump, least = _jumps_and_least(raw, scales, count)
+    jump, least = _jumps_and_least(raw, fastest, count)
     sign = _side_sign(jump, side)
     signal = replace(raw, values=sign * raw.values, sign=sign)
     places = _kinks(-sign * jump, least, count)
     stop = None if stop_position is None else sign * stop_position
     located = _located(signal, places, count, stop)
     if stop is not None and len(located) < 0.5 * len(places):
-        _check_stop(_consistent(_located(signal, places, count, None), noise, count, size), stop, size, sign)
-    impacts = _consistent(located, noise, count, size)
+        _check_stop(_consistent(_located(signal, places, count, None), signal, count), signal, stop)
+    impacts = _consistent(located, signal, count)
     stray = len(located) - len(impacts)
-    return Segmentation(signal, tuple(impacts), _flights(signal, impacts), count * interval, stray)
+    return Segmentation(signal, tuple(impacts), _flights(signal, impacts), count * signal.interval, stray)
 
 
-def _opposite(signal: Signal, scales: _Scales, count: int) -> int:
+def _opposite(signal: Signal, fastest: float, count: int) -> int:
     """Return how many kinks the other way windows of `count` samples show, away from those of the stop."""
-    jump, least = _jumps_and_least(signal, scales, count)
+    jump, least = _jumps_and_least(signal, fastest, count)
     ours = _kinks(-jump, least, count)
     largest = float(np.max(-jump[ours])) if ours else 0.0
     others = _kinks(jump, max(least, _PART_OF_LARGEST * largest), count)
     return sum(all(abs(place - one) > _CLEAR_OF * count for one in ours) for place in others)
 
 
-def _jumps_and_least(signal: Signal, scales: _Scales, count: int) -> tuple[Floats, float]:
-    """Return the jumps of the velocity, and what the least is that counts."""
-    even = np.abs(np.diff(signal.time) - scales.interval) < _UNEVEN * scales.interval
-    error, bias = _hinge_errors(scales, count)
-    jump = _jumps(signal.values, signal.good, even, count, scales.interval)
-    return jump, max(_JUMPS_BEYOND * error, _BIAS_BEYOND * bias)
+def _jumps_and_least(signal: Signal, fastest: float, count: int) -> tuple[Floats, float]:
+    """Return the jumps of the velocity, and the smallest that is more than noise and smooth motion seem to have."""
+    even = np.abs(np.diff(signal.time) - signal.interval) < _UNEVEN * signal.interval
+    weights = _hinge(count)
+    jump = _jumps(signal.values, signal.good, even, weights) / signal.interval
+    error = signal.noise * float(np.linalg.norm(weights)) / signal.interval
+    fourth = (np.arange(2 * count) - (count - 0.5)) ** 4 / 24.0
+    bend = 0.5 * signal.range * fastest**4 * signal.interval**3
+    return jump, max(_JUMPS_BEYOND * error, _BIAS_BEYOND * (bend * abs(float(weights @ fourth))))
 
 
 def _hinge(count: int) -> Floats:
@@ -280,19 +311,19 @@ def _hinge(count: int) -> Floats:
     abscissa = np.arange(2 * count) - (count - 0.5)
     cubic = np.vander(abscissa / count, 4)
     hinge = np.maximum(0.0, abscissa)
-    rest = hinge - cubic @ np.linalg.lstsq(cubic, hinge, rcond=None)[0]
-    weights: Floats = rest / (rest @ rest)
+    residual = hinge - cubic @ np.linalg.lstsq(cubic, hinge, rcond=None)[0]
+    weights: Floats = residual / (residual @ residual)
     return weights
 
 
-def _jumps(values: Floats, good: Mask, even: Mask, count: int, interval: float) -> Floats:
-    """Return the jump of the velocity in the middle of each sampling interval; NaN where it is not known."""
+def _jumps(values: Floats, good: Mask, even: Mask, weights: Floats) -> Floats:
+    """Return the jump of the velocity in each sampling interval, times its length; NaN where it is not known."""
+    count = len(weights) // 2
     jump = np.full(len(values) - 1, np.nan)
-    if len(values) < 2 * count:
-        return jump
-    kinks = oaconvolve(np.where(good, values - np.mean(values), 0.0), _hinge(count)[::-1], mode="valid")
-    whole = _all_of(good, 2 * count) & _all_of(even, 2 * count - 1)
-    jump[count - 1 : len(values) - count] = np.where(whole, kinks, np.nan) / interval
+    if len(values) >= 2 * count:
+        kinks = oaconvolve(np.where(good, values - np.mean(values), 0.0), weights[::-1], mode="valid")
+        whole = _all_of(good, 2 * count) & _all_of(even, 2 * count - 1)
+        jump[count - 1 : len(values) - count] = np.where(whole, kinks, np.nan)
     return jump
 
 
@@ -309,15 +340,6 @@ def _side_sign(jump: Floats, side: str | None) -> float:
         return 1.0 if side == "upper" else -1.0
     known = jump[np.isfinite(jump)]
     return 1.0 if known.size == 0 or -np.min(known) >= np.max(known) else -1.0
-
-
-def _hinge_errors(scales: _Scales, count: int) -> tuple[float, float]:
-    """Return what noise, and what the fourth derivative of smooth motion, make of a jump where there is none."""
-    weights = _hinge(count)
-    fourth = (np.arange(2 * count) - (count - 0.5)) ** 4 / 24.0
-    error = scales.noise * float(np.linalg.norm(weights)) / scales.interval
-    bend = scales.size * scales.fastest**4 * scales.interval**3
-    return error, bend * abs(float(weights @ fourth))
 
 
 def _kinks(drop: Floats, least: float, count: int) -> list[int]:
@@ -361,11 +383,8 @@ def _meeting(
         # of the end of a cubic of m samples: 4 sigma / sqrt(m); two sides
         error = 4.0 * signal.noise * math.sqrt(1.0 / len(before) + 1.0 / len(after))
         s = shift / reach
-        level = 0.5 * (np.polynomial.polynomial.polyval(s, one) + np.polynomial.polynomial.polyval(s, other))
-        slopes = [
-            np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(side)) / reach
-            for side in (one, other)
-        ]
+        level = 0.5 * (polyval(s, one) + polyval(s, other))
+        slopes = [polyval(s, polyder(side)) / reach for side in (one, other)]
         jump = float(slopes[0] - slopes[1])
         if jump <= 0.0:
             return impact
@@ -398,10 +417,10 @@ def _crossing(one: Floats, other: Floats, reach: float) -> float:
     difference = one - other
     s = 0.0
     for _ in range(6):
-        slope = np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(difference))
+        slope = polyval(s, polyder(difference))
         if slope == 0.0:
             return math.inf
-        s -= float(np.polynomial.polynomial.polyval(s, difference) / slope)
+        s -= float(polyval(s, difference) / slope)
         if not abs(s) < 1.0:
             return math.inf
     return s * reach
@@ -409,40 +428,41 @@ def _crossing(one: Floats, other: Floats, reach: float) -> float:
 
 def _at_stop(one: Floats, other: Floats, stop: float, reach: float) -> float:
     """Return the time to where each cubic meets the stop, weighted by their speeds squared, s."""
-    shifts, weights = [], []
-    for side in (one, other):
-        level = np.array([stop, 0.0, 0.0, 0.0])
-        shifts.append(_crossing(side, level, reach))
-        weights.append(float(side[1]) ** 2)
-    known = [k for k in (0, 1) if math.isfinite(shifts[k])]
-    if not known or sum(weights[k] for k in known) == 0.0:
-        return math.inf
-    return sum(weights[k] * shifts[k] for k in known) / sum(weights[k] for k in known)
+    level = np.array([stop, 0.0, 0.0, 0.0])
+    found = [(_crossing(side, level, reach), float(side[1]) ** 2) for side in (one, other)]
+    known = [(shift, weight) for shift, weight in found if math.isfinite(shift)]
+    total = sum(weight for _, weight in known)
+    return sum(weight * shift for shift, weight in known) / total if total > 0.0 else math.inf
 
 
-def _check_stop(impacts: list[Impact], stop: float, size: float, sign: float) -> None:
+def _check_stop(impacts: list[Impact], signal: Signal, stop: float) -> None:
     """Refuse a known stop that is not where the impacts are."""
     if len(impacts) < _FEWEST_TO_CHECK:
         return
-    levels = np.array([impact.level for impact in impacts])
-    middle = float(np.median(levels))
-    error = robust_sigma(levels - middle) / math.sqrt(len(levels))
-    if abs(middle - stop) > max(_LEVEL_BEYOND * error, _STOP_OF_SIZE * size):
+    middle, scatter, _ = _levels(impacts)
+    error = scatter / math.sqrt(len(impacts))
+    if abs(middle - stop) > max(_LEVEL_BEYOND * error, _STOP_OF_SIZE * (0.5 * signal.range)):
         raise EstimationError(
-            f"stop: expected the place where the impacts are, {sign * middle:.4g} +- {error:.1g}, got "
-            f"{sign * stop:.4g}. Correct it, or leave it out: it is estimated then."
+            f"stop: expected the place where the impacts are, {signal.sign * middle:.4g} +- {error:.1g}, got "
+            f"{signal.sign * stop:.4g}. Correct it, or leave it out: it is estimated then."
         )
 
 
-def _consistent(impacts: list[Impact], noise: float, count: int, size: float) -> list[Impact]:
+def _consistent(impacts: list[Impact], signal: Signal, count: int) -> list[Impact]:
     """Leave out kinks that are not where the others are: they are not at the stop."""
     if len(impacts) < 4:
         return impacts
+    _, scatter, off = _levels(impacts)
+    least = _LEVEL_OF_SIZE * (0.5 * signal.range)
+    limit = max(_LEVEL_BEYOND * max(scatter, 4.0 * signal.noise / math.sqrt(count)), least)
+    return [impact for impact, distance in zip(impacts, np.abs(off), strict=True) if distance <= limit]
+
+
+def _levels(impacts: list[Impact]) -> tuple[float, float, Floats]:
+    """Return the median level of impacts, the scatter about it, and how far each is off it."""
     levels = np.array([impact.level for impact in impacts])
     middle = float(np.median(levels))
-    scatter = robust_sigma(levels - middle)
-    limit = max(_LEVEL_BEYOND * max(scatter, 4.0 * noise / math.sqrt(count)), _LEVEL_OF_SIZE * size)
-    return [impact for impact in impacts if abs(impact.level - middle) <= limit]
+    return middle, robust_sigma(levels - middle), levels - middle
 
 
 def _flights(signal: Signal, impacts: list[Impact]) -> tuple[Flight, ...]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import BSpline
 
-from vibroimpact.analysis.estimation.noise import Floats
+from vibroimpact.analysis.estimation.physics import Floats
 from vibroimpact.analysis.estimation.segments import Flight, Signal
 from vibroimpact.fmus.errors import EstimationError
 

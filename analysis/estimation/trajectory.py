@@ -16,31 +16,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from vibroimpact.analysis.estimation.coordinates import Coordinates
 from vibroimpact.analysis.estimation.flight_fit import FittedFlight, fit_flight
-from vibroimpact.analysis.estimation.noise import Floats
-from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Parameters
 from vibroimpact.analysis.estimation.segments import Flight, Segmentation, Signal
 from vibroimpact.fmus.core import motion, next_contact
 from vibroimpact.fmus.errors import EstimationError
 
-#: Impacts in a piece: the first of these with which the samples are followed within their noise.
+#: Impacts in a piece: the first of these that follows the samples within their noise.
 SPANS = (12, 6, 3, 1)
-#: More impacts than these are not fitted at once.
+#: Most impacts that are fitted at once.
 MOST_IMPACTS = 60
-# Rests may be so many times the noise of the single flights before a fit is called not adequate.
+# Residual, over the noise of the single flights, above which a fit is not adequate, and above which it is refused.
 _ADEQUATE = 1.5
 _HOPELESS = 4.0
-# A fit is tried only where its start is not further off than this part of the motion's size.
+# Distance of the start from the samples, relative to the motion's size, above which no fit is tried.
 _NEAR = 0.1
 _STEP = 1e-7
-# Contacts closer than this over the natural period are chatter, which is left to the body itself.
+# Time between contacts, relative to the natural period, below which it is chatter, left to the body itself.
 _CHATTER = 1e-5
 _FEWEST_IN_HEAD = 5
 _MOST_TRIALS = 20
-# A trial that is no oscillator fits this many times the range of the signal badly.
+# Residual of a trial that is no oscillator, in ranges of the signal.
 _FAR = 1e3
-# Pieces whose rests are larger than typical by more than so many standard errors are left out, up to this part.
+# Pieces with a residual above the typical one by more than this many standard errors are left out, up to this part.
 _BEYOND_CHANCE = 5.0
 _MOST_ODD = 0.34
 
@@ -75,13 +73,11 @@ class Trajectory:
         Estimated, in the order of `covariance`.
     covariance : ndarray, shape (name, name)
     noise : float
-        Standard deviation of the rests.
+        Standard deviation of the residual.
     adequate : bool
-        The rests are not much larger than the noise of the single flights.
+        The residual is not much larger than the noise of the single flights.
     pieces : tuple of Piece
         With their fitted start states.
-    span : int
-        Impacts in a piece at most.
     """
 
     parameters: Parameters
@@ -90,12 +86,6 @@ class Trajectory:
     noise: float
     adequate: bool
     pieces: tuple[Piece, ...]
-    span: int
-
-    def standard_error(self, name: str) -> float:
-        """Return the standard error of one parameter."""
-        k = self.names.index(name)
-        return math.sqrt(float(self.covariance[k, k]))
 
 
 def follow(
@@ -139,6 +129,12 @@ def follow(
     return found + parameters.offset
 
 
+def residual_of(signal: Signal, piece: Piece, parameters: Parameters) -> Floats:
+    """Return the samples of a piece minus the exact flow."""
+    residual: Floats = signal.values[piece.index] - follow(signal, piece, parameters)
+    return residual
+
+
 def pieces_of(
     segmentation: Segmentation, fitted: Sequence[FittedFlight], parameters: Parameters, span: int
 ) -> list[Piece]:
@@ -170,7 +166,7 @@ def _cut(
     """Return the pieces of one run, with the motion before its first and after its last impact where there is any."""
     signal, impacts = segmentation.signal, segmentation.impacts
     head = _head(signal, impacts[0].time, parameters) if run[0].flight.first == 0 else None
-    cuts = [head or _first(signal, run[0], parameters)]
+    cuts = [head or _state_at(signal, run[0], parameters, int(run[0].flight.index[0]))]
     counts = [run[0].flight.first + (0 if head else 1)]
     for one in run:
         if one.flight.first + 1 - counts[-1] >= span:
@@ -194,11 +190,6 @@ def _cut(
     ]
 
 
-def _first(signal: Signal, one: FittedFlight, parameters: Parameters) -> tuple[int, tuple[float, float]]:
-    """Return the first sample of a flight, and the fitted state there."""
-    return _state_at(signal, one, parameters, int(one.flight.index[0]))
-
-
 def _state_at(
     signal: Signal, one: FittedFlight, parameters: Parameters, place: int
 ) -> tuple[int, tuple[float, float]]:
@@ -215,7 +206,7 @@ def _state_at(
 def deepest(signal: Signal, one: FittedFlight, parameters: Parameters) -> tuple[int, tuple[float, float]]:
     """Return the sample where a flight is furthest from its stop, and the fitted state there."""
     index = one.flight.index
-    return _state_at(signal, one, parameters, int(index[np.argmin(signal.values[index] - one.rests)]))
+    return _state_at(signal, one, parameters, int(index[np.argmin(signal.values[index] - one.residual)]))
 
 
 def _head(
@@ -240,7 +231,6 @@ def fit_trajectory(
     start: Parameters,
     free: Sequence[str],
     noise: float,
-    spans: Sequence[int] = SPANS,
 ) -> Trajectory:
     """Fit parameters and start states to all samples.
 
@@ -255,56 +245,55 @@ def fit_trajectory(
         Names of the parameters that are estimated.
     noise : float
         Of the single flights' fits, to judge by.
-    spans : sequence of int
-        Impacts in a piece, tried in turn.
 
     Raises
     ------
     EstimationError
         The model does not follow the samples with pieces of any length.
     """
-    size = 0.5 * float(np.ptp(segmentation.signal.values[segmentation.signal.good]))
+    signal = segmentation.signal
+    size = 0.5 * signal.range
     best: Trajectory | None = None
     tried: set[int] = set()
-    for span in spans:
+    for span in SPANS:
         pieces = pieces_of(segmentation, fitted, start, span)
         if len(pieces) in tried:
             continue
         tried.add(len(pieces))
-        problem = PathProblem(segmentation.signal, pieces, start, tuple(free), size)
-        if span > spans[-1] and problem.distance() > _NEAR * size:
+        problem = PathProblem(signal, pieces, start, tuple(free), size)
+        if span > SPANS[-1] and problem.distance() > _NEAR * size:
             continue
-        trial = problem.solve(noise, span)
-        odd = problem.misfits(trial)
+        trial = problem.solve(noise)
+        odd = _misfits(signal, trial)
         if odd and len(odd) <= _MOST_ODD * len(pieces):
             kept = [piece for k, piece in enumerate(trial.pieces) if k not in odd]
-            again = PathProblem(segmentation.signal, kept, trial.parameters, tuple(free), size)
-            trial = again.solve(noise, span)
+            trial = PathProblem(signal, kept, trial.parameters, tuple(free), size).solve(noise)
         if best is None or trial.noise < best.noise:
             best = trial
         if trial.adequate:
             return trial
     if best is None or best.noise > _HOPELESS * noise + 1e-9 * size:
-        rest = math.inf if best is None else best.noise
+        residual = math.inf if best is None else best.noise
         raise EstimationError(
-            f"trajectory: expected rests of the size of the noise ({noise:.3g}), got {rest:.3g}. The model of one "
+            f"trajectory: expected rests of the size of the noise ({noise:.3g}), got {residual:.3g}. The model of one "
             "oscillator with a constant restitution does not follow these impacts."
         )
     return best
 
 
-def _size(parameters: Parameters, name: str, size: float, both: bool) -> float:
-    """Return the size of changes of a linear coordinate; both: amplitude and phase of the force are free."""
-    square = parameters.natural_frequency**2
+def _scales(coordinates: Coordinates, size: float) -> list[float]:
+    """Return the sizes of changes of linear coordinates, for motion of a size."""
+    start = coordinates.held
+    square = start.natural_frequency**2
     sizes = {
         "restitution": 0.1,
-        "damping_ratio": 0.2 * parameters.natural_frequency,
+        "damping_ratio": 0.2 * start.natural_frequency,
         "natural_frequency": 0.2 * square,
-        "angular_frequency": 1e-3 * parameters.angular_frequency,
-        "phase": 0.1 * square * size if both else 0.1,
+        "angular_frequency": 1e-3 * start.angular_frequency,
+        "phase": 0.1 * square * size if coordinates.both else 0.1,
         "stop_position": 0.1 * size,
     }
-    return sizes.get(name, 0.1 * square * size)
+    return [sizes.get(name, 0.1 * square * size) for name in coordinates.names]
 
 
 class PathProblem:
@@ -333,10 +322,10 @@ class PathProblem:
     ) -> None:
         self.signal, self.pieces, self.names = signal, pieces, names
         self.coordinates = Coordinates(names, start)
-        both = "static_deflection" in names and "phase" in names
-        scale = [_size(start, name, size, both) for name in names]
         speed = size * max(start.angular_frequency, start.natural_frequency)
-        self.scale = np.concatenate([scale, np.tile([0.1 * size, 0.1 * speed], len(pieces))])
+        self.scale = np.concatenate(
+            [_scales(self.coordinates, size), np.tile([0.1 * size, 0.1 * speed], len(pieces))]
+        )
         states = [x for p in pieces for x in (p.state[0] + start.offset, p.state[1])]
         self.origin = np.concatenate([self.coordinates.of(start), states])
         self.rows = np.cumsum([0, *(len(piece.index) for piece in pieces)])
@@ -353,28 +342,23 @@ class PathProblem:
         place, speed = (self.origin + self.scale * x)[first : first + 2]
         return replace(self.pieces[k], state=(float(place) - parameters.offset, float(speed)))
 
-    def rests_of(self, x: Floats, k: int, parameters: Parameters) -> Floats:
-        """Return samples minus trajectory of one piece."""
-        piece = self.piece(x, k, parameters)
-        rests: Floats = self.signal.values[piece.index] - follow(self.signal, piece, parameters)
-        return rests
-
-    def rests(self, x: Floats) -> Floats:
+    def residual(self, x: Floats) -> Floats:
         """Return samples minus trajectories of all pieces."""
         parameters = self.parameters(x)
         if parameters is None:
-            # a trial that fits so badly makes the search take a shorter step
+            # so bad a trial makes the search take a shorter step
             return np.full(self.rows[-1], _FAR * float(np.ptp(self.signal.values)))
-        return np.concatenate([self.rests_of(x, k, parameters) for k in range(len(self.pieces))])
+        pieces = [self.piece(x, k, parameters) for k in range(len(self.pieces))]
+        return np.concatenate([residual_of(self.signal, piece, parameters) for piece in pieces])
 
     def distance(self) -> float:
-        """Return the root mean square of the rests at the start."""
-        return float(np.sqrt(np.mean(self.rests(np.zeros(len(self.origin))) ** 2)))
+        """Return the root mean square of the residual at the start."""
+        return float(np.sqrt(np.mean(self.residual(np.zeros(len(self.origin))) ** 2)))
 
     def jacobian(self, x: Floats) -> Floats:
         """Return differences; a piece's start state moves that piece only."""
         jacobian = np.zeros((self.rows[-1], len(x)))
-        base = self.rests(x)
+        base = self.residual(x)
         for j in range(len(x)):
             moved = x.copy()
             moved[j] += _STEP
@@ -385,14 +369,15 @@ class PathProblem:
             shared = j < len(self.names)
             for k in range(len(self.pieces)) if shared else [(j - len(self.names)) // 2]:
                 rows = slice(self.rows[k], self.rows[k + 1])
-                jacobian[rows, j] = (self.rests_of(moved, k, parameters) - base[rows]) / _STEP
+                there = residual_of(self.signal, self.piece(moved, k, parameters), parameters)
+                jacobian[rows, j] = (there - base[rows]) / _STEP
         return jacobian
 
-    def solve(self, noise: float, span: int) -> Trajectory:
+    def solve(self, noise: float) -> Trajectory:
         """Return the least squares from the start on."""
         unit = max(noise, 1e-300)
         found: Any = least_squares(
-            lambda x: self.rests(x) / unit,
+            lambda x: self.residual(x) / unit,
             np.zeros(len(self.origin)),
             jac=lambda x: self.jacobian(x) / unit,
             method="lm",
@@ -402,7 +387,7 @@ class PathProblem:
             max_nfev=_MOST_TRIALS,
         )
         freedom = max(self.rows[-1] - len(self.origin), 1)
-        sigma = math.sqrt(float(np.sum(self.rests(found.x) ** 2)) / freedom)
+        sigma = math.sqrt(float(np.sum(self.residual(found.x) ** 2)) / freedom)
         best = self.parameters(found.x)
         if best is None:
             raise EstimationError("trajectory: expected an oscillator that fits the impacts, got none.")
@@ -419,16 +404,13 @@ class PathProblem:
             sigma,
             sigma <= _ADEQUATE * noise + 1e-5 * size,
             tuple(self.piece(found.x, k, best) for k in range(len(self.pieces))),
-            span,
         )
 
-    def misfits(self, trajectory: Trajectory) -> list[int]:
-        """Return the pieces whose rests are larger than those of the typical piece, beyond chance."""
-        rests = [
-            self.signal.values[piece.index] - follow(self.signal, piece, trajectory.parameters)
-            for piece in trajectory.pieces
-        ]
-        squares = np.array([float(np.mean(one**2)) for one in rests])
-        counts = np.array([len(one) for one in rests])
-        limit = float(np.median(squares)) * (1.0 + _BEYOND_CHANCE * np.sqrt(2.0 / counts))
-        return np.flatnonzero(squares > limit).tolist()
+
+def _misfits(signal: Signal, trajectory: Trajectory) -> list[int]:
+    """Return the pieces whose residuals are larger than those of the typical piece, beyond chance."""
+    residuals = [residual_of(signal, piece, trajectory.parameters) for piece in trajectory.pieces]
+    squares = np.array([float(np.mean(one**2)) for one in residuals])
+    counts = np.array([len(one) for one in residuals])
+    limit = float(np.median(squares)) * (1.0 + _BEYOND_CHANCE * np.sqrt(2.0 / counts))
+    return np.flatnonzero(squares > limit).tolist()

@@ -20,35 +20,37 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import legder, legval
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
-from vibroimpact.analysis.estimation.noise import Floats
-from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.estimation.physics import Coordinates, Floats, Parameters
 from vibroimpact.analysis.estimation.segments import Flight, Signal
 from vibroimpact.fmus.errors import EstimationError
 
-#: Power of s (1 - s) in the test functions: ends smooth enough for sums of samples to be integrals.
+#: Power of s (1 - s) in the test functions: high enough for sums of samples to be integrals.
 POWER = 5
-# Test functions on each flight: so many, and so many more for each radian of the fastest motion ...
+# Test functions on each flight: the fewest, more for each radian of the fastest motion ...
 _FEWEST_FUNCTIONS, _FUNCTIONS_PER_RADIAN = 3, 1.0
-# ... but a function for so many samples at most.
+# ... and at most one for this many samples.
 _SAMPLES_PER_FUNCTION = 4
-# Eigenvalues of G below this part of the largest are left out: those functions are the sum of others.
+# Eigenvalue of G, relative to the largest, below which a test function is a sum of the others.
 _DEPENDENT = 1e-8
-# A flight follows the model while the sum of squares of its whitened rests is one that noise exceeds so seldom ...
+# Singular value of the Jacobian, relative to the largest, below which the parameters cannot be told apart.
+_SINGULAR = 1e-9
+# Probability of a larger misfit by noise alone, below which a flight does not follow the model.
 _SELDOM = 1e-4
-# ... where the size of the noise is known to so much.
+# Relative uncertainty of the noise variance, by which the limit of the misfit is raised.
 _NOISE_DOUBT = 1.2
-# While some do not, this part of the flights, the worst, is left out at a time.
+# Each round drops the worst flights, this part of them, until all follow the model or only so few are left.
 _LEFT_OUT = 0.25
 _FEWEST_KEPT = 0.2
 _FUNCTIONS_OF_START = 3
-# Natural frequencies over that of the force from which the search starts.
+# Parameters whose coordinates are the unknowns of the linear system, in its order.
+_LINEAR = ("damping_ratio", "natural_frequency", "static_deflection", "phase", "offset")
+# Natural frequencies, over that of the force, from which the search starts.
 _RATIOS_OF_START = tuple(np.geomspace(0.1, 2.5, 24).tolist())
 _MOST_CLOCKS = 500
-# Sums of samples are integrals to about this part of the motion's size.
+# Relative error of the sums of samples as integrals.
 _EXACT = 1e-4
 
 
@@ -66,39 +68,6 @@ class WeightedFlight:
     time: Floats
     values: Floats
     weights: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class WeakForm:
-    """What the weak form found.
-
-    Attributes
-    ----------
-    parameters : Parameters
-        With the held values filled in; restitution and stop are those given.
-    names : tuple of str
-        Estimated, in the order of `covariance`.
-    covariance : ndarray, shape (name, name)
-    influence : list of ndarray, shape (name, sample)
-        Change of the estimates for a change of the samples of each flight, to first order.
-    noise : float
-        Standard deviation of the noise that the rests show.
-    misfit : ndarray, shape (flight,)
-        Mean square of the whitened rests of each flight: the noise squared for good ones.
-    """
-
-    parameters: Parameters
-    names: tuple[str, ...]
-    covariance: Floats
-    influence: list[Floats]
-    noise: float
-    misfit: Floats
-
-
-def functions_for(duration: float, samples: int, fastest: float) -> int:
-    """Return how many test functions a flight takes."""
-    wanted = _FEWEST_FUNCTIONS + math.ceil(_FUNCTIONS_PER_RADIAN * fastest * duration)
-    return max(2, min(wanted, samples // _SAMPLES_PER_FUNCTION))
 
 
 def weighted(time: Floats, values: Floats, functions: int, power: int = POWER) -> WeightedFlight:
@@ -148,34 +117,28 @@ def _functions(s: Floats, functions: int, power: int) -> Floats:
 
 
 def weighted_flights(signal: Signal, flights: Sequence[Flight], fastest: float) -> list[WeightedFlight]:
-    """Return the usable flights with their test functions."""
-    return [
-        weighted(
-            signal.time[flight.index],
-            signal.values[flight.index],
-            functions_for(flight.duration, len(flight.index), fastest),
-        )
-        for flight in flights
-        if flight.usable
-    ]
+    """Return the usable flights with their test functions: more of them on flights that are long and well sampled."""
+    found = []
+    for flight in flights:
+        if flight.usable:
+            wanted = _FEWEST_FUNCTIONS + math.ceil(_FUNCTIONS_PER_RADIAN * fastest * flight.duration)
+            functions = max(2, min(wanted, len(flight.index) // _SAMPLES_PER_FUNCTION))
+            found.append(weighted(signal.time[flight.index], signal.values[flight.index], functions))
+    return found
 
 
-def linear_estimate(
-    flights: Sequence[WeightedFlight], angular_frequency: float, known: Parameters, free: Sequence[str]
-) -> Parameters:
+def linear_estimate(flights: Sequence[WeightedFlight], known: Parameters, free: Sequence[str]) -> Parameters:
     """Return the plain linear least squares of the weak form: the start of `weak_form`.
 
     Parameters
     ----------
     flights : sequence of WeightedFlight
-    angular_frequency : float
-        Of the force, rad/s.
     known : Parameters
         Values of all that is not free.
     free : sequence of str
         Of damping_ratio, natural_frequency, static_deflection, phase, offset.
     """
-    columns, target = _linear_system(flights, angular_frequency, known, free)
+    columns, target = _linear_system(flights, known, free)
     scale = np.linalg.norm(columns, axis=0)
     if not np.all(scale > 0.0):
         raise EstimationError("weak form: expected motion that depends on all free parameters, got none.")
@@ -184,75 +147,63 @@ def linear_estimate(
 
 
 def _linear_system(
-    flights: Sequence[WeightedFlight], angular_frequency: float, known: Parameters, free: Sequence[str]
+    flights: Sequence[WeightedFlight], known: Parameters, free: Sequence[str]
 ) -> tuple[Floats, Floats]:
     """Return columns for (2 zeta wn, wn^2, wn^2 y_st (cos psi, sin psi), wn^2 y0) as far as free, and their target."""
     stiffness = known.natural_frequency**2
     drag = 2.0 * known.damping_ratio * known.natural_frequency
-    force = known.static_deflection
+    wave_free = "static_deflection" in free or "phase" in free
     blocks, targets = [], []
     for whole in flights:
         # the lowest functions only: unweighted, the highest would count most
         flight = WeightedFlight(whole.time, whole.values, whole.weights[:, : _FUNCTIONS_OF_START + len(free)])
         plain, first, second = flight.weights @ flight.values
-        angle = angular_frequency * flight.time
+        angle = known.angular_frequency * flight.time
         waves = [flight.weights[0] @ np.cos(angle), -flight.weights[0] @ np.sin(angle)]
+        wave = math.cos(known.phase) * waves[0] + math.sin(known.phase) * waves[1]
         one = flight.weights[0].sum(axis=1)
-        loads = [force * (math.cos(known.phase) * waves[0] + math.sin(known.phase) * waves[1])]
         elastic = plain - (0.0 if "offset" in free else known.offset * one)
-        wave_free = "static_deflection" in free or "phase" in free
         if not wave_free:
-            elastic = elastic - loads[0]
-        columns, rest = [], -second
+            elastic = elastic - known.static_deflection * wave
+        columns, target = [], -second
         if "damping_ratio" in free:
             columns.append(-first)
-        elif "natural_frequency" not in free:
-            rest = rest + drag * first
-        if "natural_frequency" in free:
-            damped = 0.0 if "damping_ratio" in free else 2.0 * known.damping_ratio * known.natural_frequency
-            columns.append(elastic)
-            rest = rest + damped * first
         else:
-            rest = rest - stiffness * elastic
+            target = target + drag * first
+        if "natural_frequency" in free:
+            columns.append(elastic)
+        else:
+            target = target - stiffness * elastic
         if "phase" in free:
             columns.extend(-wave for wave in waves)
         elif wave_free:
-            columns.append(-math.cos(known.phase) * waves[0] - math.sin(known.phase) * waves[1])
+            columns.append(-wave)
         if "offset" in free:
             columns.append(-one)
-        blocks.append(np.column_stack(columns) if columns else np.empty((len(rest), 0)))
-        targets.append(rest)
+        blocks.append(np.column_stack(columns) if columns else np.empty((len(target), 0)))
+        targets.append(target)
     return np.concatenate(blocks), np.concatenate(targets)
 
 
 def _from_linear(solution: Floats, known: Parameters, free: Sequence[str]) -> Parameters:
-    """Return parameters from the solution of the linear system."""
-    values = list(solution)
-    drag = values.pop(0) if "damping_ratio" in free else None
-    square = values.pop(0) if "natural_frequency" in free else known.natural_frequency**2
-    if not square > 0.0:
+    """Return parameters from the solution of the linear system, whose unknowns are their coordinates."""
+    # a free phase has two columns, those of amplitude and phase
+    asked = {*free, "static_deflection"} if "phase" in free else set(free)
+    names = [name for name in _LINEAR if name in asked]
+    found = Coordinates(tuple(names), known).parameters(solution)
+    if found is None:
+        square = dict(zip(names, solution, strict=True)).get("natural_frequency", known.natural_frequency**2)
         raise EstimationError(
             f"weak form: expected a positive stiffness, got a natural frequency squared of {square:.4g} (rad/s)^2. "
             "The flights do not follow a spring: give the natural frequency, or look at the signal."
         )
-    natural = math.sqrt(square)
-    found = replace(known, natural_frequency=natural)
-    if drag is not None:
-        found = replace(found, damping_ratio=float(drag) / (2.0 * natural))
-    if "phase" in free:
-        cosine, sine = float(values.pop(0)), float(values.pop(0))
-        found = replace(found, phase=math.atan2(sine, cosine))
-        if "static_deflection" in free:
-            found = replace(found, static_deflection=math.hypot(cosine, sine) / square)
-    elif "static_deflection" in free:
-        found = replace(found, static_deflection=float(values.pop(0)) / square)
-    if "offset" in free:
-        found = replace(found, offset=float(values.pop(0)) / square)
-    return found
+    return found if "static_deflection" in free else replace(found, static_deflection=known.static_deflection)
 
 
-def weak_form(flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str]) -> WeakForm:
-    """Return the G-weighted least squares of the weak form.
+def weak_form(
+    flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str]
+) -> tuple[Parameters, Floats]:
+    """Return the G-weighted least squares of the weak form, and the mean square of each flight's whitened residuals.
 
     Parameters
     ----------
@@ -274,36 +225,32 @@ def weak_form(flights: Sequence[WeightedFlight], start: Parameters, free: Sequen
             "Give a longer recording."
         )
     scale = _scales(start, free)
-    origin = np.array([getattr(start, name) for name in free])
+    origin = start.values_of(free)
 
-    def rests(x: Floats) -> Floats:
-        return stacked.whitened(_with(start, free, origin + scale * x)).ravel()
+    def residual(x: Floats) -> Floats:
+        return stacked.whitened(start.with_values(free, origin + scale * x)).ravel()
 
-    noise = max(float(np.linalg.norm(rests(np.zeros(len(free))))) / math.sqrt(stacked.rows), 1e-300)
+    noise = max(float(np.linalg.norm(residual(np.zeros(len(free))))) / math.sqrt(stacked.rows), 1e-300)
     found: Any = least_squares(
-        lambda x: rests(x) / noise, np.zeros(len(free)), method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13
+        lambda x: residual(x) / noise, np.zeros(len(free)), method="lm", xtol=1e-13, ftol=1e-13, gtol=1e-13
     )
-    best = _with(start, free, origin + scale * found.x)
-    whitened = stacked.whitened(best)
-    sigma = float(np.linalg.norm(whitened)) / math.sqrt(stacked.rows - len(free))
-    jacobian = found.jac * noise / scale
-    gain, singular = _pseudo_inverse(jacobian, scale)
-    if singular:
+    sizes = np.linalg.svd(found.jac, compute_uv=False)
+    if not sizes[-1] > _SINGULAR * sizes[0]:
         raise EstimationError(
             f"weak form: expected motion that separates {', '.join(free)}, got flights that do not. "
             "Hold one of them at a known value."
         )
-    influence = stacked.influence(best, gain)
-    return WeakForm(best, tuple(free), sigma**2 * gain @ gain.T, influence, sigma, stacked.misfit(best))
+    best = start.with_values(free, origin + scale * found.x)
+    return best, stacked.misfit(best)
 
 
 def robust_weak_form(
     flights: Sequence[WeightedFlight], start: Parameters, free: Sequence[str], noise: float
-) -> tuple[WeakForm, list[int]]:
+) -> tuple[Parameters, list[int]]:
     """Return the weak form over the flights that follow the model, and their places among all.
 
-    A flight with an impact that was not seen does not. The worst are left out until all that are kept follow within
-    the noise; then all are judged once more.
+    A flight with an impact that was not seen does not follow. The worst are left out until the misfit of all others
+    is that of noise; then all flights are judged once more.
 
     Parameters
     ----------
@@ -324,27 +271,27 @@ def robust_weak_form(
         good |= set(np.flatnonzero(misfit <= smallest * limits[kept]).tolist())
         return [k for place, k in enumerate(kept) if place in good]
 
-    def fit(best: Parameters) -> WeakForm:
+    def fit(best: Parameters) -> tuple[Parameters, Floats]:
         chosen = [flights[k] for k in kept]
         return weak_form(chosen, _nearest_start(chosen, best, free), free)
 
     best = _nearest_start(flights, start, free, _RATIOS_OF_START)
-    kept = better(_Stacked(flights).misfit(best))
-    found = fit(best)
-    while len(kept) > fewest and np.any(found.misfit > smallest * limits[kept]):
-        kept = better(found.misfit)
-        found = fit(found.parameters)
-    typical = max(smallest, float(np.median(found.misfit)))
-    misfit = _Stacked(flights).misfit(found.parameters)
-    again = np.flatnonzero(misfit <= typical * limits).tolist()
+    everything = _Stacked(flights)
+    kept = better(everything.misfit(best))
+    best, misfit = fit(best)
+    while len(kept) > fewest and np.any(misfit > smallest * limits[kept]):
+        kept = better(misfit)
+        best, misfit = fit(best)
+    typical = max(smallest, float(np.median(misfit)))
+    again = np.flatnonzero(everything.misfit(best) <= typical * limits).tolist()
     if again and again != kept:
         kept = again
-        found = fit(found.parameters)
-    return found, kept
+        best, _ = fit(best)
+    return best, kept
 
 
 def _misfit_limits(flights: Sequence[WeightedFlight]) -> Floats:
-    """Return the largest mean square of whitened rests that noise of unit variance gives, for each flight."""
+    """Return the largest mean square of whitened residuals that noise of unit variance gives, for each flight."""
     ranks = np.array([flight.weights.shape[1] for flight in flights])
     limits: Floats = _NOISE_DOUBT * chi2.isf(_SELDOM, ranks) / ranks
     return limits
@@ -365,14 +312,13 @@ def _nearest_start(
     linear = [name for name in free if name != "angular_frequency"]
     if not linear:
         return start
-    forcing = start.angular_frequency
     trials = [start]
     with suppress(EstimationError):
-        trials.append(linear_estimate(flights, forcing, start, linear))
+        trials.append(linear_estimate(flights, start, linear))
     others = [name for name in linear if name != "natural_frequency"]
     if len(others) < len(linear):
-        held = [replace(start, natural_frequency=ratio * forcing) for ratio in ratios]
-        trials += [linear_estimate(flights, forcing, one, others) if others else one for one in held]
+        held = [replace(start, natural_frequency=ratio * start.angular_frequency) for ratio in ratios]
+        trials += [linear_estimate(flights, one, others) if others else one for one in held]
     stacked = _Stacked(flights)
     return min(trials, key=lambda one: float(np.median(stacked.misfit(one))))
 
@@ -390,18 +336,9 @@ def _scales(start: Parameters, free: Sequence[str]) -> Floats:
     return np.array([size[name] for name in free])
 
 
-def _with(parameters: Parameters, names: Sequence[str], values: NDArray[np.float64]) -> Parameters:
-    changes: dict[str, Any] = {name: float(value) for name, value in zip(names, values, strict=True)}
-    return replace(parameters, **changes)
-
-
-def _pseudo_inverse(jacobian: Floats, scale: Floats) -> tuple[Floats, bool]:
-    """Return the pseudo-inverse of a Jacobian, and whether its columns (scaled) are as good as dependent."""
-    u, s, vt = np.linalg.svd(jacobian * scale, full_matrices=False)
-    singular = not s[-1] > 1e-9 * s[0]
-    s = np.maximum(s, 1e-300)
-    inverse: Floats = scale[:, None] * ((vt.T / s) @ u.T)
-    return inverse, singular
+def _factors(p: Parameters) -> Floats:
+    """Return the factors of the integrals with w, w', w''."""
+    return np.array([p.natural_frequency**2, -2.0 * p.damping_ratio * p.natural_frequency, 1.0])
 
 
 class _Stacked:
@@ -428,13 +365,9 @@ class _Stacked:
         self.ones = self.weights[0].sum(axis=2)
         self.identity = np.eye(functions) * self.pad[:, :, None]
 
-    def factors(self, p: Parameters) -> Floats:
-        """Return the factors of the integrals with w, w', w''."""
-        return np.array([p.natural_frequency**2, -2.0 * p.damping_ratio * p.natural_frequency, 1.0])
-
     def roots(self, p: Parameters) -> Floats:
         """Return the Cholesky factors of G, shape (flight, function, function)."""
-        factors = self.factors(p)
+        factors = _factors(p)
         gram = np.einsum("a,b,abjkl->jkl", factors, factors, self.products)
         largest = np.einsum("jkk->j", gram)[:, None, None]
         roots: Floats = np.linalg.cholesky(
@@ -443,25 +376,17 @@ class _Stacked:
         return roots
 
     def whitened(self, p: Parameters) -> Floats:
-        """Return the rests, of unit covariance for unit noise, shape (flight, function)."""
-        factors = self.factors(p)
+        """Return the residuals, of unit covariance for unit noise, shape (flight, function)."""
         wave = p.static_deflection * np.cos(p.angular_frequency * self.time + p.phase)
         load = np.einsum("jkn,jn->jk", self.weights[0], wave) + p.offset * self.ones
-        rests = np.einsum("a,ajk->jk", factors, self.integrals) - p.natural_frequency**2 * load
-        solved: Floats = np.linalg.solve(self.roots(p), rests[:, :, None])[:, :, 0]
+        residual = np.einsum("a,ajk->jk", _factors(p), self.integrals) - p.natural_frequency**2 * load
+        solved: Floats = np.linalg.solve(self.roots(p), residual[:, :, None])[:, :, 0]
         return solved
 
     def misfit(self, p: Parameters) -> Floats:
-        """Return the mean square of the whitened rests of each flight."""
+        """Return the mean square of the whitened residuals of each flight."""
         squares: Floats = np.sum(self.whitened(p) ** 2, axis=1) / self.ranks
         return squares
-
-    def influence(self, p: Parameters, gain: Floats) -> list[Floats]:
-        """Return d parameters / d samples of each flight: -gain * whitened weights."""
-        weights = np.einsum("a,ajkn->jkn", self.factors(p), self.weights)
-        whitened = np.linalg.solve(self.roots(p), weights)
-        parts = gain.reshape(gain.shape[0], *whitened.shape[:2])
-        return [-parts[:, j] @ whitened[j][:, : len(flight.time)] for j, flight in enumerate(self.flights)]
 
 
 def with_own_clock(
@@ -473,10 +398,13 @@ def with_own_clock(
     """
     length = max(float(flight.time[-1]) for flight in flights) - float(flights[0].time[0])
     steps = min(_MOST_CLOCKS, math.ceil(spread * start.angular_frequency * length / 0.25))
-    trials = start.angular_frequency * (1.0 + spread * np.linspace(-1.0, 1.0, 2 * steps + 1))
+    trials = [
+        replace(start, angular_frequency=start.angular_frequency * (1.0 + part))
+        for part in (spread * np.linspace(-1.0, 1.0, 2 * steps + 1)).tolist()
+    ]
     costs = []
     for trial in trials:
-        columns, target = _linear_system(flights, float(trial), start, free)
+        columns, target = _linear_system(flights, trial, free)
         solution = np.linalg.lstsq(columns, target, rcond=None)[0] if columns.size else np.empty(0)
         costs.append(float(np.linalg.norm(target - columns @ solution)))
-    return replace(start, angular_frequency=float(trials[int(np.argmin(costs))]))
+    return trials[int(np.argmin(costs))]

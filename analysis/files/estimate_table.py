@@ -43,16 +43,17 @@ def estimate_table(
         "interval_high": f"upper end of the {confidence:.0%} interval",
     }
     data = {
-        name: (("estimator", "quantity"), values[:, :, place], _attrs(said))
+        name: (("estimator", "quantity"), values[:, :, place], described(said))
         for place, (name, said) in enumerate(words.items())
     }
     coords = {
-        "estimator": ("estimator", list(cells), _attrs("method of estimation")),
-        "quantity": ("quantity", list(units), _attrs("estimated quantity")),
-        "unit": ("quantity", list(units.values()), _attrs("unit of the quantity")),
+        "estimator": ("estimator", list(cells), described("method of estimation")),
+        "quantity": ("quantity", list(units), described("estimated quantity")),
+        "unit": ("quantity", list(units.values()), described("unit of the quantity")),
     }
     return xr.Dataset(data, coords)
 
 
-def _attrs(words: str) -> dict[str, str]:
-    return {"units": "1", "long_name": words}
+def described(words: str, unit: str = "1") -> dict[str, str]:
+    """Return the attributes of a variable: its unit, and what it is in words."""
+    return {"units": unit, "long_name": words}

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from vibroimpact.analysis.decay.decrement import logarithmic_decrement
 from vibroimpact.analysis.decay.exponential import fit_exponential
-from vibroimpact.analysis.decay.half_swing import Coefficients, half_swings
 from vibroimpact.analysis.decay.laws import TERMS, damping_law
+from vibroimpact.analysis.decay.motion import Coefficients, half_swings
 from vibroimpact.analysis.decay.samples import DecaySamples
 
 TURN = np.arange(0.0, 100.0, 0.25)

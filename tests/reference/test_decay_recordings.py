@@ -9,7 +9,7 @@ from support.real_data import recording_folder
 from vibroimpact.analysis.decay.backbone import backbone
 from vibroimpact.analysis.decay.decrement import logarithmic_decrement
 from vibroimpact.analysis.decay.exponential import fit_exponential
-from vibroimpact.analysis.decay.law_choice import choose_law
+from vibroimpact.analysis.decay.law_fit import choose_law
 from vibroimpact.analysis.decay.samples import DecaySamples, decay_samples
 from vibroimpact.analysis.recording import Channel, Quality, TimeAxis
 

@@ -9,14 +9,11 @@ import pytest
 from support.decay_motion import Damped
 
 from vibroimpact.analysis.decay.estimate import Estimate
-from vibroimpact.analysis.decay.exponential import fit_exponential
-from vibroimpact.analysis.decay.half_swing import Coefficients
-from vibroimpact.analysis.decay.law_choice import choose_law
-from vibroimpact.analysis.decay.law_fit import fit_law
+from vibroimpact.analysis.decay.exponential import first_guess, fit_exponential
+from vibroimpact.analysis.decay.law_fit import choose_law, fit_law
 from vibroimpact.analysis.decay.laws import ALL_LAWS, damping_law, spoken
-from vibroimpact.analysis.decay.motion import decaying_motion
+from vibroimpact.analysis.decay.motion import Coefficients, decaying_motion
 from vibroimpact.analysis.decay.samples import DecaySamples
-from vibroimpact.analysis.decay.windows import first_guess
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
 # Released from 10: each law alone takes about two thirds of the amplitude in 30 s.

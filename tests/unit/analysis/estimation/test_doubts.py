@@ -11,10 +11,9 @@ from rich.console import Console
 from support.impact_records import CHAOTIC, THESIS, channel_of, record_of
 
 from vibroimpact.analysis.estimation import Forcing, Known, estimate_impacts, impacts, print_impacts
-from vibroimpact.analysis.estimation.coordinates import Coordinates
-from vibroimpact.analysis.estimation.doubts import _of_contradictions
 from vibroimpact.analysis.estimation.estimates import MethodEstimate
-from vibroimpact.analysis.estimation.physics import Parameters
+from vibroimpact.analysis.estimation.physics import Coordinates, Parameters
+from vibroimpact.analysis.estimation.remarks import _of_contradictions
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.fmus.errors import EstimationError
 

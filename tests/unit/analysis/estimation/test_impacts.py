@@ -10,12 +10,12 @@ from support.structure import Modes, Stop, Structure
 
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.estimation import Known, estimate_impacts, print_impacts
+from vibroimpact.analysis.estimation.flight_times import natural_frequency_of, stop_position_of
 from vibroimpact.analysis.estimation.modal import (
     estimate_modes,
     modal_coordinates,
     restitution_from_energy,
 )
-from vibroimpact.analysis.estimation.period_one import natural_frequency_of, stop_position_of
 from vibroimpact.analysis.estimation.physics import Forcing
 from vibroimpact.fmus.core import Oscillator, flow, motion, next_contact
 from vibroimpact.fmus.errors import EstimationError, UsageError

@@ -1,6 +1,7 @@
-"""Restitution from bounces without a force that oscillates: the ratio of successive flight times.
+"""What the instants of impact alone say: bounces without a force that oscillates, and start values of P(1,1) motion.
 
 Under a constant force alone a body comes back as fast as it has left, and flies for 2 V / g: T[n+1] = r T[n].
+P(1,1) motion gives natural frequency and stop as if it were free and undamped (thesis eq. 2.35).
 """
 
 from __future__ import annotations
@@ -12,23 +13,24 @@ import xarray as xr
 from scipy.stats import chi2
 from scipy.stats import t as student
 
-from vibroimpact.analysis.estimation.checks import check_displacement
 from vibroimpact.analysis.estimation.estimates import Doubt, FittedMotion, ImpactEstimates, MethodEstimate
-from vibroimpact.analysis.estimation.noise import Floats
-from vibroimpact.analysis.estimation.segments import Impact, Segmentation, segment
+from vibroimpact.analysis.estimation.physics import Floats, Known
+from vibroimpact.analysis.estimation.segments import Impact, Segmentation, segment_channel
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.fmus.errors import EstimationError
 
 FLIGHT_TIMES = "flight_times"
-# The fastest smooth motion is taken to turn so often in a record: windows are shortened until impacts appear.
+# Periods in a record of the fastest smooth motion; windows are shortened until impacts appear.
 _TURNS = 4.0
 _FEWEST_FLIGHTS = 3
-# Instants are known no better than this part of a sample, noise or not.
+# Smallest error of an instant, in sampling intervals.
 _INSTANT = 1e-4
-# Ratios that differ so much by chance alone are as seldom as this.
+# Probability of a larger scatter of the ratios by chance alone, below which they are not one ratio.
 _SELDOM = 1e-4
-# A flight longer than the one before it by so much has had impacts in it that were not seen.
+# Ratio of a flight's length to that of the one before above which impacts in it were not seen.
 _LONGER = 1.02
+# Relative deviation of a flight's length from the median above which it is none of P(1,1); the largest part of such.
+_SAME_LENGTH, _OTHER_LENGTHS = 0.05, 0.2
 
 
 def estimate_bounces(
@@ -73,15 +75,8 @@ def estimate_bounces(
     0.8
     """
     channel = channel_of(channel)
-    check_displacement(channel)
-    cut = segment(
-        channel.time,
-        np.where(channel.good, channel.values, 0.0),
-        channel.good,
-        fastest=2.0 * math.pi * _TURNS / float(channel.time[-1] - channel.time[0]),
-        side=side,
-        window=window,
-    )
+    fastest = 2.0 * math.pi * _TURNS / float(channel.time[-1] - channel.time[0])
+    cut = segment_channel(channel, fastest, Known(side=side), window)
     impacts = _falling(cut.impacts)
     if len(impacts) <= _FEWEST_FLIGHTS:
         raise EstimationError(
@@ -91,7 +86,9 @@ def estimate_bounces(
         )
     restitution, excess = _ratio(impacts, cut.signal.interval, confidence)
     levels = cut.signal.sign * np.array([impact.level for impact in impacts])
-    stop = _mean(levels, confidence)
+    error = float(np.std(levels, ddof=1)) / math.sqrt(len(levels))
+    reach = float(student.ppf(0.5 + confidence / 2.0, len(levels) - 1)) * error
+    stop = MethodEstimate.within(float(np.mean(levels)), error, reach)
     doubts: tuple[Doubt, ...] = ()
     if excess > 1.0:
         doubts = (
@@ -104,7 +101,12 @@ def estimate_bounces(
         channel.name,
         channel.unit,
         {FLIGHT_TIMES: {"restitution": restitution, "stop_position": stop}},
-        facts=_facts(cut, impacts),
+        facts={
+            "impacts": float(len(impacts)),
+            "noise": cut.signal.noise,
+            "window": cut.window,
+            "side": cut.signal.side,
+        },
         doubts=doubts,
         confidence=confidence,
         impact_times=np.array([impact.time for impact in impacts]),
@@ -145,12 +147,6 @@ def _ratio(impacts: list[Impact], interval: float, confidence: float) -> tuple[M
     return estimate, 0.0 if by_chance else widened
 
 
-def _mean(levels: Floats, confidence: float) -> MethodEstimate:
-    middle, error = float(np.mean(levels)), float(np.std(levels, ddof=1)) / math.sqrt(len(levels))
-    reach = float(student.ppf(0.5 + confidence / 2.0, len(levels) - 1)) * error
-    return MethodEstimate(middle, error, middle - reach, middle + reach)
-
-
 def _parabolas(cut: Segmentation, impacts: int) -> Floats:
     """Return the motion of constant acceleration that is nearest to each flight; NaN elsewhere."""
     signal = cut.signal
@@ -162,11 +158,58 @@ def _parabolas(cut: Segmentation, impacts: int) -> Floats:
     return found
 
 
-def _facts(cut: Segmentation, impacts: list[Impact]) -> dict[str, float | str]:
-    """Return what the record is like."""
+def natural_frequency_of(stop_position: float, deepest: float, flight_time: float) -> float:
+    """Return the natural angular frequency of free, undamped motion cut off by a stop, rad/s.
+
+    wn = (2 pi / T) arccos(-a / x_m) / pi: a stop position, x_m > |a| deepest excursion, both from rest, T flight time
+    (thesis eq. 2.35). For driven or damped motion it is biased, by several percent: a start value.
+
+    Examples
+    --------
+    >>> round(natural_frequency_of(0.0, 1.0, 1.0), 12)  # half of each swing is missing
+    3.14159265359
+    """
+    return 2.0 / flight_time * math.acos(max(-1.0, min(1.0, -stop_position / deepest)))
+
+
+def stop_position_of(natural_frequency: float, deepest: float, flight_time: float) -> float:
+    """Return the stop position from rest of the same motion, the natural frequency being known.
+
+    Examples
+    --------
+    >>> abs(round(stop_position_of(3.141592653589793, 1.0, 1.0), 12))
+    0.0
+    """
+    return -deepest * math.cos(0.5 * natural_frequency * flight_time)
+
+
+def period_one(
+    segmentation: Segmentation, natural_frequency: float, offset: float
+) -> dict[str, MethodEstimate]:
+    """Return both start values; the stop with the natural frequency and offset that the better methods found.
+
+    Raises
+    ------
+    EstimationError
+        The motion is not P(1,1), or its deepest point is not further from rest than the stop.
+    """
+    lengths = np.array([flight.duration for flight in segmentation.flights])
+    typical = float(np.median(lengths))
+    # a few impacts may not have been seen
+    if np.mean(np.abs(lengths - typical) > _SAME_LENGTH * typical) > _OTHER_LENGTHS:
+        raise EstimationError(
+            f"period_one: expected flights of one length, got {lengths.min():.4g} to {lengths.max():.4g} s. "
+            "Only P(1,1) motion gives these start values."
+        )
+    signal, stop = segmentation.signal, segmentation.stop_position - offset
+    depth = float(
+        np.median([offset - np.min(signal.values[one.index]) for one in segmentation.flights if one.usable])
+    )
+    if not depth > abs(stop):
+        raise EstimationError(
+            f"period_one: expected a deepest point further from rest than the stop, got {depth:.4g} and {stop:.4g}."
+        )
     return {
-        "impacts": float(len(impacts)),
-        "noise": cut.signal.noise,
-        "window": cut.window,
-        "side": "upper" if cut.signal.sign > 0.0 else "lower",
+        "natural_frequency": MethodEstimate(natural_frequency_of(stop, depth, typical)),
+        "stop_position": MethodEstimate(offset + stop_position_of(natural_frequency, depth, typical)),
     }
