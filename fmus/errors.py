@@ -88,7 +88,3 @@ class CampaignError(VibroimpactError):
 
 class EstimationError(VibroimpactError):
     """An estimation has no admissible answer for its data."""
-
-
-class RigError(VibroimpactError):
-    """The hardware, or its virtual stand-in, failed."""

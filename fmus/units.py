@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 from vibroimpact.fmus.errors import UsageError
@@ -70,7 +70,7 @@ class Unit:
             return self.label
         if self.offset:
             return "degC"
-        text = _quotient(self.powers)
+        text = _quotient(self.powers.items())
         return text if self.factor == 1.0 else f"{self.factor:.15g} {text}".rstrip()
 
     @property
@@ -155,7 +155,12 @@ def si_unit(text: str) -> Unit:
     if text == CELSIUS:
         return Unit({"K": 1}, 1.0, ZERO_CELSIUS)
     number = _NUMBER.match(text)
-    factor = 1.0 if number is None else _positive(number[0], text)
+    try:
+        factor = 1.0 if number is None else float(number[0])
+    except ValueError:
+        raise _unknown(text) from None
+    if not 0.0 < factor < math.inf:
+        raise _unknown(text)
     rest = ".".join(text[0 if number is None else number.end() :].replace(".", " ").split())
     product = parse_unit(rest if rest and rest[0] != "/" else f"1{rest}")
     if product is None or product.factor != 1.0:  # `g` is gravity in a recording, and a prefix a factor
@@ -190,7 +195,7 @@ def gain_unit_between(source: Unit, target: Unit) -> str | None:
     """
     ratio = _combined(target, source, -1).exponents
     divisor = f"({source.name})" if "." in source.name else source.name
-    in_base_units = _quotient({base: ratio[base] for base in BASE_UNITS if base in ratio}) or "1"
+    in_base_units = _quotient([(base, ratio[base]) for base in BASE_UNITS if base in ratio]) or "1"
     for text in (f"{target.name}/{divisor}", in_base_units):
         unit = parse_unit(text)
         if unit and text.count("/") <= 1 and product_agrees(source, unit, target):
@@ -198,16 +203,19 @@ def gain_unit_between(source: Unit, target: Unit) -> str | None:
     return None
 
 
-def _quotient(powers: Mapping[str, int]) -> str:
-    """Return powers as FMI writes them; empty without any."""
-    above = ".".join(_written(s, p) for s, p in powers.items() if p > 0)
-    below = [_written(s, -p) for s, p in powers.items() if p < 0]
-    divisor = f"({'.'.join(below)})" if len(below) > 1 else "".join(below)
-    return f"{above or '1'}/{divisor}" if divisor else above
-
-
 def _written(symbol: str, power: int) -> str:
     return symbol if power == 1 else f"{symbol}{power}"
+
+
+def _quotient(
+    powers: Iterable[tuple[str, int]], between: str = ".", written: Callable[[str, int], str] = _written
+) -> str:
+    """Return powers in one line as FMI writes them, negative ones behind a stroke; empty without any."""
+    powers = list(powers)
+    above = between.join(written(symbol, power) for symbol, power in powers if power > 0)
+    below = [written(symbol, -power) for symbol, power in powers if power < 0]
+    divisor = f"({between.join(below)})" if len(below) > 1 else "".join(below)
+    return f"{above or '1'}/{divisor}" if divisor else above
 
 
 def _product(text: str) -> Unit | None:
@@ -250,20 +258,9 @@ def _combined(unit: Unit, other: Unit, power: int) -> Unit:
     return Unit(kept, unit.factor * other.factor**power)
 
 
-def _positive(number: str, text: str) -> float:
-    try:
-        value = float(number)
-    except ValueError:
-        raise _unknown(text) from None
-    if not 0.0 < value < float("inf"):
-        raise _unknown(text)
-    return value
-
-
 def _unknown(text: str) -> UsageError:
-    known = ", ".join(SYMBOLS)
     return UsageError(
-        f"unit: expected a product of {known} such as m s-2, got {text[:60]!r}. Convert it to SI."
+        f"unit: expected a product of {', '.join(SYMBOLS)} such as m s-2, got {text[:60]!r}. Convert it to SI."
     )
 
 
@@ -301,7 +298,7 @@ def written_unit(cf: str) -> str:
     if not found or len(tokens) < len(found):
         return cf
     scaled = _scaled(factor, tokens)
-    return cf if scaled is None else _joined(scaled)
+    return cf if scaled is None else _quotient(scaled, " ", _raised)
 
 
 def _scaled(factor: float, tokens: list[tuple[str, int]]) -> list[tuple[str, int]] | None:
@@ -320,17 +317,5 @@ def _scaled(factor: float, tokens: list[tuple[str, int]]) -> list[tuple[str, int
     return None
 
 
-def _joined(tokens: list[tuple[str, int]]) -> str:
-    """Return the parts of a unit in one line, those with negative powers behind a stroke."""
-
-    def written(sign: int) -> list[str]:
-        return [
-            name + (str(abs(power)).translate(_SUPERSCRIPTS) if abs(power) > 1 else "")
-            for name, power in tokens
-            if power * sign > 0
-        ]
-
-    above, below = " ".join(written(1)) or "1", written(-1)
-    if not below:
-        return above
-    return f"{above}/{below[0]}" if len(below) == 1 else f"{above}/({' '.join(below)})"
+def _raised(symbol: str, power: int) -> str:
+    return _written(symbol, power).translate(_SUPERSCRIPTS)

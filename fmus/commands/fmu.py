@@ -12,10 +12,9 @@ from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.python_fmus import build_user_contact_law
 from vibroimpact.fmus.printing import table
-from vibroimpact.fmus.shipped import component_name, components, fmu_path
+from vibroimpact.fmus.shipped import FOLDERS, component_name, components, fmu_path
 from vibroimpact.fmus.terminal import say, wide_terminal
 
-VERSIONS = ("3.0", "2.0")
 USER_CONTACT_LAW = "user-contact-law"
 
 
@@ -23,7 +22,7 @@ def print_components() -> None:
     """Show every component, its FMUs and what they run on."""
     rows = table("Components", "<component", "<FMI", ">variables", "<platforms", "<file")
     for component in read_components():
-        for version in VERSIONS:
+        for version in FOLDERS:
             count = len(component.variables_of(int(version[0])))
             rows.add_row(component.name, version, str(count), *_binaries(component.name, version))
     wide_terminal().print(rows)
@@ -53,7 +52,7 @@ def build_into(output: Path | None) -> None:
 
 def check_all(files: Sequence[Path]) -> None:
     """Check FMUs, all of the package if none is named."""
-    paths = files or [fmu_path(name, version) for name in components() for version in VERSIONS]
+    paths = files or [fmu_path(name, version) for name in components() for version in FOLDERS]
     problems = [f"{path}: {problem}" for path in paths for problem in check_fmu(path)]
     if problems:
         raise ComponentFileError("\n".join(problems))

@@ -6,7 +6,7 @@ import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -19,12 +19,7 @@ Numbers = Sequence[float] | Array
 Boundary = Literal["clamped_free", "clamped_clamped", "clamped_pinned", "pinned_pinned"]
 
 #: The ends of a beam, each with the number that the FMU's enumeration BeamBoundary gives it.
-BOUNDARIES: dict[str, int] = {
-    "clamped_free": 1,
-    "clamped_clamped": 2,
-    "clamped_pinned": 3,
-    "pinned_pinned": 4,
-}
+BOUNDARIES: dict[str, int] = {name: number for number, name in enumerate(get_args(Boundary), 1)}
 HIGHEST_DERIVATIVE = 3
 
 
@@ -74,8 +69,15 @@ class BeamModes:
         [[ 0.  0.  0.]
          [ 2. -2.  2.]]
         """
-        s = _numbers("BeamModes.shapes: points", points)
-        _check_points("BeamModes.shapes", s)
+        s = np.ascontiguousarray(np.atleast_1d(np.asarray(points, dtype=np.float64)))
+        if s.ndim != 1:
+            raise UsageError(
+                f"BeamModes.shapes: points: expected a row of numbers, got an array of shape {s.shape}."
+            )
+        if not np.all((s >= 0.0) & (s <= 1.0)):
+            raise UsageError(
+                f"BeamModes.shapes: expected points 0 <= s <= 1 (fractions of the length), got {s}."
+            )
         if derivative not in range(HIGHEST_DERIVATIVE + 1):
             raise UsageError(
                 f"BeamModes.shapes: derivative: expected 0 to {HIGHEST_DERIVATIVE}, got {derivative}."
@@ -115,7 +117,8 @@ def beam_modes(boundary: Boundary, count: int) -> BeamModes:
         )
     eigenvalues, participation = np.empty(count), np.empty(count)
     _library().vi_door_beam_modes(BOUNDARIES[boundary], count, eigenvalues, participation)
-    _protect(eigenvalues, participation)
+    for array in (eigenvalues, participation):
+        array.setflags(write=False)
     return BeamModes(boundary, eigenvalues, participation)
 
 
@@ -127,20 +130,3 @@ def _library() -> ctypes.CDLL:
     library.vi_door_beam_modes.argtypes = [integer, integer, numbers, numbers]
     library.vi_door_beam_shapes.argtypes = [integer, integer, integer, numbers, integer, numbers]
     return library
-
-
-def _numbers(where: str, values: float | Numbers) -> Array:
-    array = np.ascontiguousarray(np.atleast_1d(np.asarray(values, dtype=np.float64)))
-    if array.ndim != 1:
-        raise UsageError(f"{where}: expected a row of numbers, got an array of shape {array.shape}.")
-    return array
-
-
-def _check_points(where: str, points: Array) -> None:
-    if not np.all((points >= 0.0) & (points <= 1.0)):
-        raise UsageError(f"{where}: expected points 0 <= s <= 1 (fractions of the length), got {points}.")
-
-
-def _protect(*arrays: Array) -> None:
-    for array in arrays:
-        array.setflags(write=False)

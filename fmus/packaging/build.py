@@ -22,22 +22,21 @@ from vibroimpact.fmus.packaging.compiler import LANGUAGE, WARNINGS, compile_libr
 from vibroimpact.fmus.packaging.description import (
     ComponentDescription,
     c_header,
-    fmi2_xml,
-    fmi3_xml,
     header_name,
+    model_description,
     read_component,
     with_table,
 )
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.shipped import FOLDERS
 
 HERE = Path(__file__).resolve().parent
 PACKAGE = HERE.parent
 NATIVE = PACKAGE / "native"
 BUILT = PACKAGE / "built"
-VERSIONS = {"fmi3": "3.0", "fmi2": "2.0"}
 CORE_LIBRARY = "libvibroimpact_core"
-#: In arrays of one element gcc warns of loops over the others, though they never run.
+#: Length of an array below which gcc warns of loops over its further elements, though they never run.
 SMALLEST_ARRAY = 2
 #: Name of the file that says from which sources the folder was built.
 FINGERPRINT = "sources.sha256"
@@ -144,7 +143,7 @@ def _build_component(component: ComponentDescription, output: Path, native: Path
         compile_library(library, sources, include, definitions=_sizes(component), strict=strict)
         binary = library.read_bytes()
     return [
-        _write_component(component, binary, output / folder, version) for folder, version in VERSIONS.items()
+        _write_component(component, binary, output / folder, version) for version, folder in FOLDERS.items()
     ]
 
 
@@ -156,9 +155,8 @@ def _sizes(component: ComponentDescription) -> dict[str, int]:
 
 
 def _write_component(component: ComponentDescription, binary: bytes, folder: Path, version: str) -> Path:
-    description = fmi3_xml(component) if version == "3.0" else fmi2_xml(component)
     members = {
-        "modelDescription.xml": description.encode("utf-8"),
+        "modelDescription.xml": model_description(component, version).encode("utf-8"),
         f"binaries/{binary_folder(version)}/{component.name}{library_suffix()}": binary,
         **_documentation(component),
     }
@@ -210,10 +208,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     try:
-        return _check(options.output) if options.check else _build_and_say(options.output)
+        if options.check:
+            return _check(options.output)
+        for path in (*update_readmes(), *build(options.output)):
+            print(path)
     except VibroimpactError as error:
         print(error, file=sys.stderr)
         return error.exit_code
+    return 0
 
 
 def _check(output: Path) -> int:
@@ -223,12 +225,6 @@ def _check(output: Path) -> int:
     for path in stale:
         print(f"{path}: out of date. Run `python -m vibroimpact.fmus.packaging.build`.", file=sys.stderr)
     return 1 if stale else 0
-
-
-def _build_and_say(output: Path) -> int:
-    for path in (*update_readmes(), *build(output)):
-        print(path)
-    return 0
 
 
 if __name__ == "__main__":

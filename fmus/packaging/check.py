@@ -17,14 +17,14 @@ from xml.etree import ElementTree
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.archive import INTERFACES, UnpackedFmu, binary_path, platforms, unpack
 from vibroimpact.fmus.packaging.fmpy_door import schema_folder, validate
-from vibroimpact.fmus.packaging.platform_names import SUFFIXES
+from vibroimpact.fmus.packaging.platform_names import FMI2_SYSTEMS, SUFFIXES
 from vibroimpact.fmus.python_child import python_command
 from vibroimpact.fmus.safe_xml import root_of
 
 #: Longest time that loading and instantiating an FMU may take, s.
 LOADING_LIMIT = 60.0
 DECLARATION = "{http://www.w3.org/2001/XMLSchema}attribute"
-SYSTEM_OF_PREFIX = {"linux": "linux", "win": "windows", "darwin": "darwin"}
+SYSTEM_OF_PREFIX = {prefix: system for system, prefix in FMI2_SYSTEMS.items()}
 
 
 def check_fmu(path: Path) -> tuple[str, ...]:
@@ -53,19 +53,18 @@ def check_fmu(path: Path) -> tuple[str, ...]:
 
 
 def _spelling_problems(fmu: UnpackedFmu) -> Iterator[str]:
-    known = _schema_attributes(fmu.fmi_version)
-    content = (fmu.folder / "modelDescription.xml").read_bytes()
-    for element in root_of(content, f"{fmu.source}: modelDescription.xml").iter():
+    schemas = (schema_folder() / f"fmi{fmu.fmi_version[0]}").glob("*.xsd")
+    known = {e.get("name", "") for path in schemas for e in ElementTree.parse(path).iter(DECLARATION)}
+    for element in _description(fmu).iter():
         for name in element.attrib.keys() - known:
             near = difflib.get_close_matches(name, known, n=1)
             hint = f" Did you mean {near[0]}?" if near else ""
             yield f"{element.tag}: expected an attribute of FMI {fmu.fmi_version}'s schema, got {name}.{hint}"
 
 
-def _schema_attributes(fmi_version: str) -> set[str]:
-    schemas = (schema_folder() / f"fmi{fmi_version[0]}").glob("*.xsd")
-    declarations = (e for path in schemas for e in ElementTree.parse(path).iter(DECLARATION))
-    return {e.get("name", "") for e in declarations}
+def _description(fmu: UnpackedFmu) -> ElementTree.Element:
+    content = (fmu.folder / "modelDescription.xml").read_bytes()
+    return root_of(content, f"{fmu.source}: modelDescription.xml")
 
 
 def _missing_binaries(fmu: UnpackedFmu) -> Iterator[str]:
@@ -91,13 +90,15 @@ def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
         binary = binary_path(fmu)
     except ComponentFileError as error:
         return (str(error).removeprefix(f"{fmu.source}: "),)
+    root = _description(fmu)
     facts = {
         "binary": str(binary),
         "fmi_version": fmu.fmi_version,
         "token": fmu.token,
-        "interface": _interface(fmu),
+        "interface": next(tag for tag in INTERFACES if root.find(tag) is not None),
         "resources": str(fmu.resources),
-        "any_token": _takes_any_token(fmu),
+        # PythonFMU's binary is the same for all its FMUs, and looks at no token
+        "any_token": root.get("generationTool", "").startswith("PythonFMU"),
     }
     command = python_command("-m", "vibroimpact.fmus.packaging.load_check", json.dumps(facts))
     try:
@@ -113,15 +114,3 @@ def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
         )
     # the FMU may print too: the answer is the last line
     return tuple(json.loads(result.stdout.splitlines()[-1]))
-
-
-def _takes_any_token(fmu: UnpackedFmu) -> bool:
-    """Is the binary one of PythonFMU, the same for all its FMUs, which looks at no token?"""
-    content = (fmu.folder / "modelDescription.xml").read_bytes()
-    return root_of(content, str(fmu.source)).get("generationTool", "").startswith("PythonFMU")
-
-
-def _interface(fmu: UnpackedFmu) -> str:
-    content = (fmu.folder / "modelDescription.xml").read_bytes()
-    root = root_of(content, str(fmu.source))
-    return next(tag for tag in INTERFACES if root.find(tag) is not None)

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.build import read_components
-from vibroimpact.fmus.packaging.description import ComponentDescription, fmi2_xml, fmi3_xml, plural
+from vibroimpact.fmus.packaging.description import ComponentDescription, model_description, plural
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.shipped import component_name, fmu_path
 
@@ -60,25 +60,18 @@ def export_fmu(
     target = Path(output)
     asked = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
     counts = {block: count for block, count in asked.items() if count is not None}
-    component = _component(component_name(name))
+    full_name = component_name(name)
+    component = next(component for component in read_components() if component.name == full_name)
     _check_counts(component, counts)
     component = component.with_repeats(counts)
-    description = fmi3_xml(component) if fmi == "3.0" else fmi2_xml(component)
     with zipfile.ZipFile(fmu_path(name, fmi)) as archive:
         members = {member: archive.read(member) for member in archive.namelist()}
-    members["modelDescription.xml"] = description.encode("utf-8")
+    members["modelDescription.xml"] = model_description(component, fmi).encode("utf-8")
     if counts:
         lines = (f"{plural(block)} {count}\n" for block, count in counts.items())
         members[SIZES_MEMBER] = "".join(lines).encode("ascii")
-    try:
-        write_fmu(target, members)
-    except OSError as error:
-        raise UsageError(f"{target}: expected a file that can be written, got: {error.strerror}.") from error
+    write_fmu(target, members)
     return target
-
-
-def _component(name: str) -> ComponentDescription:
-    return next(component for component in read_components() if component.name == name)
 
 
 def _check_counts(component: ComponentDescription, counts: Mapping[str, int]) -> None:
@@ -91,7 +84,7 @@ def _check_counts(component: ComponentDescription, counts: Mapping[str, int]) ->
                 f"{known}, got {count}. Leave the option out."
             )
             continue
-        # a body of no modes is none: what counts the block says the least
+        # the variable that counts the blocks has the least number as its minimum
         least = max((int(v.minimum or 0) for v in component.variables if v.counts == block), default=0)
         most = component.repeats[block]
         if not isinstance(count, int) or not least <= count <= most:

@@ -8,6 +8,8 @@ import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
+from vibroimpact.fmus.errors import UsageError
+
 #: The earliest time a zip file can hold: contents alone decide the bytes of an archive.
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)
 
@@ -21,22 +23,31 @@ def write_fmu(path: Path, members: Mapping[str, bytes]) -> None:
         The file; its folder is made.
     members : mapping of str to bytes
         Contents by member name, `/` between folders.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be written.
     """
+    try:
+        _write(path, members)
+    except OSError as error:
+        raise UsageError(f"{path}: expected a file that can be written, got: {error.strerror}.") from error
+
+
+def _write(path: Path, members: Mapping[str, bytes]) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
     temporary = Path(name)
     try:
         with os.fdopen(handle, "wb") as file, zipfile.ZipFile(file, "w") as archive:
-            for member in sorted(members, key=_description_first):
+            # the description is the first member
+            for member in sorted(members, key=lambda name: (name != "modelDescription.xml", name)):
                 archive.writestr(_info(member), members[member], zipfile.ZIP_DEFLATED, 9)
         temporary.chmod(0o644)
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)
-
-
-def _description_first(member: str) -> tuple[bool, str]:
-    return member != "modelDescription.xml", member
 
 
 def _info(member: str) -> zipfile.ZipInfo:

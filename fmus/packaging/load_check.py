@@ -97,7 +97,8 @@ def _instantiate3(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
     function = library[f"fmi3Instantiate{facts['interface']}"]
     function.restype = c_void_p
     log = CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)(lambda *_: None)
-    resources = c_char_p(_resource_path(facts))
+    # an absolute path that ends with a separator
+    resources = c_char_p(facts["resources"].encode() + b"/")
     head = (c_char_p(b"check"), c_char_p(token), resources, c_bool(False), c_bool(False))
     if facts["interface"] == "CoSimulation":
         # no event mode, no early return, no intermediate variables, no intermediate update
@@ -113,23 +114,14 @@ def _instantiate2(library: CDLL, facts: dict[str, Any], token: bytes) -> Any:
     kind = c_int(0 if facts["interface"] == "ModelExchange" else 1)
     location = c_char_p(Path(facts["resources"]).as_uri().encode())
     # FMI 2.0 keeps a pointer to the callbacks for as long as the instance lives: until this process ends
-    _kept.append(callbacks := _fmi2_callbacks())
-    pointer = ctypes.byref(callbacks)
+    runtime = ctypes.cdll.msvcrt if sys.platform == "win32" else CDLL(None)
+    allocate, free = Allocate(("calloc", runtime)), Free(("free", runtime))
+    _kept.append(Fmi2Callbacks(Logger(lambda *_: None), allocate, free, StepFinished(), None))
+    pointer = ctypes.byref(_kept[-1])
     return function(c_char_p(b"check"), kind, c_char_p(token), location, pointer, c_int(0), c_int(0))
 
 
 _kept: list[Fmi2Callbacks] = []
-
-
-def _fmi2_callbacks() -> Fmi2Callbacks:
-    runtime = ctypes.cdll.msvcrt if sys.platform == "win32" else CDLL(None)
-    allocate, free = Allocate(("calloc", runtime)), Free(("free", runtime))
-    return Fmi2Callbacks(Logger(lambda *_: None), allocate, free, StepFinished(), None)
-
-
-def _resource_path(facts: dict[str, Any]) -> bytes:
-    # FMI 3.0: an absolute path that ends with a separator
-    return str(Path(facts["resources"])).encode() + b"/"
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
+from vibroimpact.fmus.packaging.description import UnitDefinition, unit_definitions
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.python_child import python_command
 from vibroimpact.fmus.units import Unit
@@ -112,10 +113,7 @@ def make_fmu(parts: PythonFmu, output: Path) -> Path:
     members = _built(parts)
     members["documentation/README.md"] = parts.readme.read_bytes()
     members[DESCRIPTION] = _completed(members, parts.units)
-    try:
-        write_fmu(output, members)
-    except OSError as error:
-        raise UsageError(f"{output}: expected a file that can be written, got: {error.strerror}.") from error
+    write_fmu(output, members)
     return output
 
 
@@ -176,27 +174,17 @@ def _completed(members: Mapping[str, bytes], units: Mapping[str, Unit]) -> bytes
 
 
 def _add_units(root: ElementTree.Element, units: Mapping[str, Unit]) -> None:
-    definitions = ElementTree.Element("UnitDefinitions")
-    for name, unit in {unit.name: unit for unit in units.values() if unit.name}.items():
-        definition = ElementTree.SubElement(definitions, "Unit", name=name)
-        ElementTree.SubElement(definition, "BaseUnit", _base_unit(unit))
-    if len(definitions):
+    named = {unit.name: unit for unit in units.values() if unit.name}
+    if named:
         # the schema wants them just after the interface
         interface = root.find("CoSimulation")
-        root.insert(0 if interface is None else list(root).index(interface) + 1, definitions)
+        place = 0 if interface is None else list(root).index(interface) + 1
+        declared = [UnitDefinition(name, u.exponents, u.factor, u.offset) for name, u in named.items()]
+        root.insert(place, unit_definitions(declared))
     for variable in root.iter("ScalarVariable"):
         real, found = variable.find("Real"), units.get(variable.get("name", ""))
         if real is not None and found is not None and found.name:
             real.set("unit", found.name)
-
-
-def _base_unit(unit: Unit) -> dict[str, str]:
-    attributes = {base: str(exponent) for base, exponent in unit.exponents.items()}
-    if unit.factor != 1.0:
-        attributes["factor"] = repr(unit.factor)
-    if unit.offset:
-        attributes["offset"] = repr(unit.offset)
-    return attributes
 
 
 def _add_dependencies(root: ElementTree.Element) -> None:

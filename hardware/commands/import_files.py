@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
-from vibroimpact.analysis.recording import Recording, write_recording
+from vibroimpact.analysis.recording import write_recording
 from vibroimpact.analysis.recording.table import print_recording
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import wide_terminal
@@ -30,7 +30,15 @@ def import_into(
     recording = import_recording(files, given, common)
     sources = recording.attrs.get("source_sha256")
     refuse_overwriting(output, force, lambda there: there.get("source_sha256", "") == sources)
-    _write(recording, output, figure)
+    with writing(output):
+        write_recording(recording, output)
+    if figure is not None:
+        # matplotlib takes half a second to import; an import alone does not pay for it.
+        from vibroimpact.analysis import figures
+        from vibroimpact.analysis.figures.recordings import draw_recording
+
+        with writing(figure):
+            figures.save(draw_recording(recording), figure)
     console = wide_terminal()
     print_recording(console, recording)
     drawn = f" Figure: {figure}." if figure else ""
@@ -53,20 +61,3 @@ def span(text: str, option: str) -> list[float]:
             f"--{option}: expected START:END in s, got {text[:60]!r}. For example 0:30."
         ) from None
     return [begin, end]
-
-
-def _write(recording: Recording, output: Path, figure: Path | None) -> None:
-    targets: dict[Path, Any] = {output: lambda: write_recording(recording, output)}
-    if figure is not None:
-        targets[figure] = lambda: _draw(recording, figure)
-    for target, write in targets.items():
-        with writing(target):
-            write()
-
-
-def _draw(recording: Recording, path: Path) -> None:
-    # matplotlib takes half a second to import; an import alone does not pay for it.
-    from vibroimpact.analysis import figures
-    from vibroimpact.analysis.figures.recordings import draw_recording
-
-    figures.save(draw_recording(recording), path)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.formats.cells import sorted_out
+from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.labels import is_time_name, seconds_in
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, Table
 
@@ -99,7 +99,7 @@ def _columns_of(scope: Scope, remarks: list[str]) -> tuple[list[Column], Column 
             else:
                 remarks.append(f"{label}: the sampling rate of the file, {rate}, is left out")
         elif is_time_name(name) and values.size == max(values.shape) and values.size > 1:
-            time = _column(label, values.ravel(), unit if seconds_in(unit) is not None else "s")
+            time = _numbers(label, values.ravel(), unit if seconds_in(unit) is not None else "s")
         else:
             columns += _columns(label, values, unit, remarks)
     return columns, time
@@ -128,13 +128,12 @@ def _columns(label: str, values: Any, unit: str, remarks: list[str]) -> list[Col
         remarks.append(f"{label}: an array of {values.ndim} dimensions is left out; vectors are read")
         return []
     if values.ndim < 2 or min(values.shape) == 1:
-        return [_column(label, values.ravel(), unit)]
+        return [_numbers(label, values.ravel(), unit)]
     if values.shape[0] < values.shape[1]:
         remarks.append(f"{label}: {values.shape[0]} rows of {values.shape[1]} are taken as the channels")
         values = values.T
-    return [_column(f"{label}_{place + 1}", values[:, place], unit) for place in range(values.shape[1])]
+    return [_numbers(f"{label}_{place + 1}", values[:, place], unit) for place in range(values.shape[1])]
 
 
-def _column(label: str, values: Any, unit: str = "") -> Column:
-    numbers = sorted_out(np.array(values, dtype=np.float64))
-    return Column(label, numbers.values, unit, numbers.overrange)
+def _numbers(label: str, values: Any, unit: str) -> Column:
+    return column_of(label, np.array(values, dtype=np.float64), unit)

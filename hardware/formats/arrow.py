@@ -12,10 +12,9 @@ import numpy as np
 
 from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.formats.cells import sorted_out
-from vibroimpact.hardware.formats.extras import missing_extra
+from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.labels import split_label
-from vibroimpact.hardware.formats.probe import check_reads
+from vibroimpact.hardware.formats.probe import check_reads, missing_extra, one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, RawFile, Table
 from vibroimpact.hardware.formats.text import with_time
 
@@ -44,15 +43,8 @@ def read_arrow(path: os.PathLike[str] | str) -> RawFile:
     except ImportError as problem:
         raise missing_extra(f"a {kind} file", "pyarrow", "parquet") from problem
     check_reads(path, LibraryRead(kind))
-    try:
+    with one_refusal(f"a whole {kind} file"):
         table, remarks = _table_of(path, kind)
-    except DatasetError:
-        raise
-    # the library reports damage as errors of every kind, MemoryError too
-    except Exception as problem:
-        raise DatasetError(
-            f"expected a whole {kind} file, got one that cannot be read ({type(problem).__name__}: {problem})."
-        ) from problem
     columns = [
         _column(str(name), values) for name, values in zip(table.column_names, table.columns, strict=True)
     ]
@@ -120,8 +112,7 @@ def _column(name: str, values: Any) -> Column:
         stamps = values.cast(pa.int64())
         first = next((one for one in stamps.drop_null()[:1].to_pylist()), 0)
         later = pyarrow.compute.subtract(stamps, first).to_numpy()
-        return Column(label or name, later / per_second, "s", attrs={"time": 1})
+        return Column(label or name, later / per_second, "s", dated=True)
     if pa.types.is_boolean(values.type):
         values = values.cast(pa.uint8())
-    numbers = sorted_out(np.array(values.to_numpy(), dtype=np.float64))
-    return Column(label or name, numbers.values, unit, numbers.overrange)
+    return column_of(label or name, np.array(values.to_numpy(), dtype=np.float64), unit)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from itertools import zip_longest
+from typing import Any
 
 import numpy as np
 
-from vibroimpact.hardware.formats.table import Flags, Floats
+from vibroimpact.hardware.formats.table import Column, Floats
 
 # Instruments write these for an input that is beyond its range, or open.
 OVERRANGE_WORDS = frozenset(
@@ -37,33 +38,6 @@ _DAY = re.compile(r"\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.]\d{4}"
 # 29.990,96 and 29,990.96: both signs in one number.
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}(?:(?:\.\d{3})++,\d++|(?:,\d{3})++\.\d++)", re.ASCII)
 _LONGEST_QUOTE = 40
-
-
-@dataclass(frozen=True, slots=True)
-class Cells:
-    """One column of cells, read.
-
-    Attributes
-    ----------
-    values : ndarray of float, shape (row,)
-        Up to the last cell that is not empty.
-    overrange : ndarray of bool, shape (row,), or None
-        None where no cell says so.
-    strange : sequence of (row, text)
-        Cells that are neither a number nor a known marker; their values are NaN.
-    dated : bool
-        The cells were dates and times of day; the values are s after the first one.
-    """
-
-    values: Floats
-    overrange: Flags | None
-    strange: Sequence[tuple[int, str]] = ()
-    dated: bool = False
-
-    @property
-    def is_text(self) -> bool:
-        """Whether this is a column of words: remarks, names."""
-        return 2 * len(self.strange) >= max(1, int(np.isfinite(self.values).sum()) + len(self.strange))
 
 
 def is_number(text: str, decimal: str = ".") -> bool:
@@ -137,7 +111,7 @@ def split_line(line: str, delimiter: str | None) -> list[str]:
     return [cell.strip().strip('"') for cell in line.split(delimiter)]
 
 
-def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str) -> list[Cells]:
+def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str) -> list[Column]:
     """Read lines of cells, column by column.
 
     Parameters
@@ -150,12 +124,12 @@ def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str) -> lis
 
     Returns
     -------
-    list of Cells
-        One for each column; those that are empty all the way have no values.
+    list of Column
+        Without labels, each up to its last cell that is not empty.
     """
     quick = _read_regular(lines, delimiter, decimal)
     if quick is not None:
-        return [sorted_out(values) for values in quick]
+        return [column_of("", values) for values in quick]
     rows = [split_line(line, delimiter) for line in lines]
     return [_read_column(cells, decimal) for cells in zip_longest(*rows, fillvalue="")]
 
@@ -177,21 +151,31 @@ def _read_regular(lines: Sequence[str], delimiter: str | None, decimal: str) -> 
     return np.ascontiguousarray(table.T) if len(table) == len(lines) else None
 
 
-def sorted_out(values: Floats) -> Cells:
+def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Column:
     """Return a column of numbers in which those that stand for overrange, or for no sample, are NaN.
 
-    >>> column = sorted_out(np.array([1.0, 9.9e37, 9.91e37, -np.inf]))
+    Parameters
+    ----------
+    label : str
+    values : ndarray of float, shape (row,)
+    unit : str
+    **facts
+        What else is known of the column, by the names of its attributes.
+
+    Examples
+    --------
+    >>> column = column_of("base", np.array([1.0, 9.9e37, 9.91e37, -np.inf]))
     >>> column.values, column.overrange
     (array([ 1., nan, nan, nan]), array([False,  True, False,  True]))
     """
     missing = np.isclose(values, NOT_A_NUMBER, rtol=1e-4, atol=0.0)
     overrange = (np.isinf(values) | (np.abs(values) > OVERRANGE_FROM)) & ~missing
-    if not np.any(overrange | missing):
-        return Cells(values, None)
-    return Cells(np.where(overrange | missing, np.nan, values), overrange if np.any(overrange) else None)
+    if np.any(overrange | missing):
+        values = np.where(overrange | missing, np.nan, values)
+    return Column(label, values, unit, overrange if np.any(overrange) else None, **facts)
 
 
-def _read_column(cells: Sequence[str], decimal: str) -> Cells:
+def _read_column(cells: Sequence[str], decimal: str) -> Column:
     """Read one column up to its last cell that is not empty."""
     length = next((row for row in range(len(cells), 0, -1) if cells[row - 1].strip()), 0)
     cells = cells[:length]
@@ -209,12 +193,12 @@ def _read_column(cells: Sequence[str], decimal: str) -> Cells:
             marked[row] = True
         elif not is_marker(cell):
             strange.append((row, cell.strip()[:_LONGEST_QUOTE]))
-    numbers = sorted_out(values)
-    overrange = marked if numbers.overrange is None else marked | numbers.overrange
-    return Cells(numbers.values, overrange if np.any(overrange) else None, strange)
+    column = column_of("", values, strange=strange)
+    overrange = marked if column.overrange is None else marked | column.overrange
+    return replace(column, overrange=overrange if np.any(overrange) else None)
 
 
-def _read_dates(cells: Sequence[str]) -> Cells:
+def _read_dates(cells: Sequence[str]) -> Column:
     """Read dates with times of day as seconds after the first one."""
     strange: list[tuple[int, str]] = []
     stamps = np.full(len(cells), np.datetime64("NaT", "ns"))
@@ -226,6 +210,6 @@ def _read_dates(cells: Sequence[str]) -> Cells:
             strange.append((row, cell.strip()[:_LONGEST_QUOTE]))
     known = stamps[~np.isnat(stamps)]
     if not len(known):
-        return Cells(np.full(len(cells), np.nan), None, strange)
+        return Column("", np.full(len(cells), np.nan), strange=strange)
     seconds = (stamps - known[0]) / np.timedelta64(1, "ns") * 1e-9
-    return Cells(np.asarray(seconds, dtype=np.float64), None, strange, dated=True)
+    return Column("", np.asarray(seconds, dtype=np.float64), dated=True, strange=strange)

@@ -10,13 +10,12 @@ from vibroimpact.analysis.recording import is_recording
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.arrow import SIGNATURES as ARROW
 from vibroimpact.hardware.formats.arrow import read_arrow
-from vibroimpact.hardware.formats.extras import missing_extra
 from vibroimpact.hardware.formats.foreign_netcdf import check_netcdf4, read_foreign_netcdf
 from vibroimpact.hardware.formats.hdf5 import SIGNATURE as HDF5
 from vibroimpact.hardware.formats.hdf5 import is_h5py_there, is_netcdf4, read_hdf5
 from vibroimpact.hardware.formats.labview import SIGNATURE, read_labview
 from vibroimpact.hardware.formats.mat import read_mat
-from vibroimpact.hardware.formats.probe import UnreadableError
+from vibroimpact.hardware.formats.probe import UnreadableError, missing_extra
 from vibroimpact.hardware.formats.table import LARGEST_FILE, RawFile
 from vibroimpact.hardware.formats.tdms import read_tdms
 from vibroimpact.hardware.formats.text import read_text
@@ -86,6 +85,7 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFi
     Parameters
     ----------
     path : Path
+        One that `check_file` has passed.
     delimiter, decimal : str
         For tables of text, as `text.read_text` takes them.
 
@@ -94,12 +94,8 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFi
     DatasetError
         The file is none of the formats, or is damaged.
     """
-    check_file(path)
-    try:
-        with path.open("rb") as file:
-            start = file.read(512)
-    except OSError as problem:
-        raise DatasetError(f"expected a readable file, got an error: {problem.strerror}.") from problem
+    with path.open("rb") as file:
+        start = file.read(512)
     if start.startswith((b"TDSm", b"TDSh")):
         return read_tdms(path)
     if start.startswith(b"MATLAB 7.3"):

@@ -9,17 +9,16 @@ from __future__ import annotations
 import os
 import re
 import warnings
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
 from vibroimpact.analysis.files.probing import NETCDF
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.formats.cells import sorted_out
+from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.labels import is_time_name, seconds_in
-from vibroimpact.hardware.formats.probe import check_reads
+from vibroimpact.hardware.formats.probe import check_reads, one_refusal
 from vibroimpact.hardware.formats.table import (
     MOST_COLUMNS,
     MOST_SAMPLES,
@@ -30,18 +29,6 @@ from vibroimpact.hardware.formats.table import (
 )
 
 _SINCE = re.compile(r"(?P<unit>\w+)\s+since\s+(?P<date>.+)")
-
-
-@dataclass(frozen=True, slots=True)
-class _Variable:
-    """A variable of either format; no values where it is not numeric or not of one dimension."""
-
-    name: str
-    dimension: str
-    values: Floats | None
-    unit: str
-    label: str
-    remark: str
 
 
 def check_netcdf4(path: os.PathLike[str] | str) -> None:
@@ -63,21 +50,18 @@ def read_foreign_netcdf(path: os.PathLike[str] | str) -> RawFile:
     DatasetError
         The file is damaged, or has no such variables.
     """
-    try:
+    with one_refusal("a whole NetCDF file"):
         with open(path, "rb") as file:
             classic = file.read(3) == b"CDF"
         variables = list(_classic(path) if classic else _hdf5(path))
-    except DatasetError:
-        raise
-    # the libraries report damage as errors of every kind, MemoryError too
-    except Exception as problem:
-        raise DatasetError(
-            f"expected a whole NetCDF file, got one that cannot be read ({type(problem).__name__}: {problem})."
-        ) from problem
     return _sorted_out(variables)
 
 
-def _classic(path: os.PathLike[str] | str) -> Iterable[_Variable]:
+#: Name and dimension of a variable, its column where it is numeric and of one dimension, and what is to be said of it.
+_Variable = tuple[str, str, Column | None, str]
+
+
+def _classic(path: os.PathLike[str] | str) -> Iterator[_Variable]:
     from scipy.io import netcdf_file
 
     with open(path, "rb") as stream:
@@ -89,13 +73,13 @@ def _classic(path: os.PathLike[str] | str) -> Iterable[_Variable]:
             yield _variable(name, variable, values)
 
 
-def _hdf5(path: os.PathLike[str] | str) -> Iterable[_Variable]:
+def _hdf5(path: os.PathLike[str] | str) -> Iterator[_Variable]:
     import netCDF4
 
     with netCDF4.Dataset(os.fspath(path), "r") as file:
         _check_sizes([int(variable.size) for variable in file.variables.values()])
         for name in file.groups:
-            yield _Variable(name, "", None, "", "", "a group is left out; variables outside groups are read")
+            yield name, "", None, "a group is left out; variables outside groups are read"
         for name, variable in file.variables.items():
             numeric = getattr(variable.dtype, "kind", "O") in "fiu" and len(variable.dimensions) == 1
             # the library warns of a scale or a fill value that means nothing, and goes on without it
@@ -111,9 +95,16 @@ def _check_sizes(sizes: list[int]) -> None:
 
 
 def _variable(name: str, variable: Any, values: Floats | None, remark: str = "") -> _Variable:
-    dimension = variable.dimensions[0] if len(variable.dimensions) == 1 else ""
+    if values is None:
+        return name, "", None, remark or "is left out; numeric variables of one dimension are read"
     label = _text(variable, "long_name") or name
-    return _Variable(name, dimension, values, _text(variable, "units"), label, remark)
+    attrs = {} if label == name else {"source_label": label}
+    return (
+        name,
+        variable.dimensions[0],
+        column_of(name, values, _text(variable, "units"), attrs=attrs),
+        remark,
+    )
 
 
 def _text(variable: Any, key: str) -> str:
@@ -121,53 +112,39 @@ def _text(variable: Any, key: str) -> str:
     return found.decode("utf-8", "replace") if isinstance(found, bytes) else str(found)
 
 
-def _sorted_out(variables: list[_Variable]) -> RawFile:
+def _sorted_out(variables: Iterable[_Variable]) -> RawFile:
     """Put the variables of each dimension into one table, with its coordinate of time."""
     remarks: list[str] = []
-    by_dimension: dict[str, list[_Variable]] = {}
-    for variable in variables:
-        if variable.remark:
-            remarks.append(f"{variable.name}: {variable.remark[:200]}")
-        if variable.values is None and not variable.remark:
-            remarks.append(f"{variable.name}: is left out; numeric variables of one dimension are read")
-        elif variable.values is not None and len(variable.values):
-            by_dimension.setdefault(variable.dimension, []).append(variable)
+    by_dimension: dict[str, list[Column]] = {}
+    for name, dimension, column, remark in variables:
+        if remark:
+            remarks.append(f"{name}: {remark[:200]}")
+        if column is not None and len(column.values):
+            by_dimension.setdefault(dimension, []).append(column)
     tables: list[Table] = []
     attrs: dict[str, Any] = {}
     for dimension, found in by_dimension.items():
-        time = next((variable for variable in found if _is_time(variable)), None)
-        columns = [_column(variable) for variable in found if variable is not time]
+        time = next((column for column in found if _is_time(column, dimension)), None)
+        columns = [column for column in found if column is not time]
+        clock = None if time is None else _counted(time, attrs)
         if columns:
-            title = dimension if len(by_dimension) > 1 else ""
-            tables.append(Table(columns, None if time is None else _time(time, attrs), title))
-        elif time is not None:
-            tables.append(Table([_time(time, attrs)]))
+            tables.append(Table(columns, clock, dimension if len(by_dimension) > 1 else ""))
+        elif clock is not None:
+            tables.append(Table([clock]))
     return RawFile("NetCDF", tables, remarks, attrs)
 
 
-def _is_time(variable: _Variable) -> bool:
-    in_time = seconds_in(variable.unit) is not None or _SINCE.fullmatch(variable.unit) is not None
-    named = is_time_name(variable.name)
-    return (variable.name == variable.dimension and (in_time or named)) or (named and in_time)
+def _is_time(column: Column, dimension: str) -> bool:
+    in_time = seconds_in(column.unit) is not None or _SINCE.fullmatch(column.unit) is not None
+    named = is_time_name(column.label)
+    return (column.label == dimension and (in_time or named)) or (named and in_time)
 
 
-def _time(variable: _Variable, attrs: dict[str, Any]) -> Column:
-    column = _column(variable)
-    since = _SINCE.fullmatch(variable.unit)
+def _counted(time: Column, attrs: dict[str, Any]) -> Column:
+    """Return instants that count from a date as counted from the first of them; note the date."""
+    since = _SINCE.fullmatch(time.unit)
     if since is None:
-        return column
+        return time
     attrs["source_date"] = since["date"]
     # a clock's seconds since 1970 would leave too few digits for the interval
-    return Column(column.label, column.values - column.values[0], since["unit"])
-
-
-def _column(variable: _Variable) -> Column:
-    assert variable.values is not None
-    numbers = sorted_out(variable.values)
-    return Column(
-        variable.name,
-        numbers.values,
-        variable.unit,
-        numbers.overrange,
-        attrs={} if variable.label == variable.name else {"source_label": variable.label},
-    )
+    return Column(time.label, time.values - time.values[0], since["unit"])

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -16,9 +15,8 @@ import numpy as np
 from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.arrays import INTERVALS, RATES, Scope, tables_of
-from vibroimpact.hardware.formats.extras import missing_extra
 from vibroimpact.hardware.formats.mat import NUMERIC
-from vibroimpact.hardware.formats.probe import check_reads
+from vibroimpact.hardware.formats.probe import check_reads, missing_extra, one_refusal
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, RawFile
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -45,23 +43,10 @@ def is_netcdf4(path: os.PathLike[str] | str) -> bool:
     import h5py
 
     check_reads(path, _READING)
-    with _one_refusal("an HDF5 file"), h5py.File(path, "r") as file:
+    with one_refusal("an HDF5 file that is whole"), h5py.File(path, "r") as file:
         return "_NCProperties" in file.attrs or any(
             _text(item.attrs.get("CLASS")) == "DIMENSION_SCALE" for _, item in _items(file, [])
         )
-
-
-@contextmanager
-def _one_refusal(what: str) -> Iterator[None]:
-    """Turn what the library raises into one refusal: it reports damage as errors of every kind, MemoryError too."""
-    try:
-        yield
-    except DatasetError:
-        raise
-    except Exception as problem:
-        raise DatasetError(
-            f"expected {what} that is whole, got one that cannot be read ({type(problem).__name__}: {problem})."
-        ) from problem
 
 
 def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
@@ -86,7 +71,7 @@ def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
     check_reads(path, _READING)
     remarks: list[str] = []
     scopes = [Scope()]
-    with _one_refusal(what), h5py.File(path, "r") as file:
+    with one_refusal(f"{what} that is whole"), h5py.File(path, "r") as file:
         _read_group(file, scopes[0], scopes, remarks, matlab)
     tables, told = tables_of(scopes)
     return RawFile("MATLAB 7.3" if matlab else "HDF5", tables, remarks + told)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.formats.cells import Cells, date_of, is_marker, is_number, read_cells, split_line
+from vibroimpact.hardware.formats.cells import date_of, is_marker, is_number, read_cells, split_line
 from vibroimpact.hardware.formats.cut_off import without_cut_cells
 from vibroimpact.hardware.formats.labels import is_time_name, seconds_in, split_label
 from vibroimpact.hardware.formats.table import Column, RawFile, Table
@@ -28,12 +28,11 @@ Header = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True, slots=True)
 class _Segment:
-    """One segment: its header by key (cells after the key), its headings, its rows, and its first line."""
+    """One segment: its header by key (cells after the key), its headings and its rows."""
 
     header: Header
     headings: Sequence[str]
     rows: Sequence[str]
-    line: int
 
 
 def read_labview(content: str) -> RawFile:
@@ -56,11 +55,7 @@ def read_labview(content: str) -> RawFile:
         rows, cut = without_cut_cells(segment.rows, content, separator, decimal)
         begins = _earliest(segment.header) or _earliest(header)
         origin = begins if origin is None else origin
-        late = (
-            0.0
-            if begins is None or origin is None
-            else float((begins - origin) / np.timedelta64(1, "ns")) * 1e-9
-        )
+        late = _seconds_between(origin, begins)
         title = "" if number == 1 else f"segment {number}"
         # what began at the same instant has one trigger, whatever its segment
         own = "" if begins is not None and not late else title
@@ -137,7 +132,7 @@ def _segments(lines: Sequence[str], start: int, separator: str, decimal: str) ->
         if end == place:
             raise DatasetError(f"line {place + 1}: expected a row of numbers, got {lines[place][:40]!r}.")
         if end > first:
-            found.append(_Segment(header, headings, lines[first:end], first + 1))
+            found.append(_Segment(header, headings, lines[first:end]))
         if len(found) > _MOST_SEGMENTS:
             raise DatasetError(f"expected at most {_MOST_SEGMENTS} segments, got more.")
         place = end
@@ -167,6 +162,13 @@ def _earliest(header: Header) -> np.datetime64 | None:
     return min(stamps) if stamps else None
 
 
+def _seconds_between(first: np.datetime64 | None, later: np.datetime64 | None) -> float:
+    """Return the time between two instants, s; 0 where one is not known."""
+    if first is None or later is None:
+        return 0.0
+    return float((later - first) / np.timedelta64(1, "ns")) * 1e-9
+
+
 def _stamps(header: Header) -> list[np.datetime64 | None]:
     """Return when each channel began, cell by cell; None where the header does not say, or says 1904 or earlier."""
     found: list[np.datetime64 | None] = []
@@ -186,8 +188,8 @@ def _tables(
         len(split_line(line, separator)) for line in (*segment.rows[:100], separator.join(segment.headings))
     )
     cells = read_cells(segment.rows, separator, decimal)
-    cells += [Cells(np.empty(0), None)] * (width - len(cells))
-    labels = _labels(segment.headings, len(cells))
+    cells += [Column("", np.empty(0))] * (width - len(cells))
+    labels = [*segment.headings, *[""] * len(cells)][: len(cells)]
     columns, told = columns_of(cells, labels, [""] * len(cells))
     if "Notes" in segment.header:
         told.append(f"the file notes: {' '.join(cell for cell in segment.header['Notes'] if cell)}")
@@ -195,10 +197,8 @@ def _tables(
         return _paired_tables(columns, segment.header, late, title), told
     declared = _declared(segment.header, len(columns))
     channels = [
-        column
-        for column in (
-            _declare(columns[place], declared, place - 1, late) for place in range(1, len(columns))
-        )
+        _declare(column, declared, number, late)
+        for number, column in enumerate(columns[1:])
         if len(column.values)
     ]
     channels = _without_false_units(channels, told)
@@ -223,10 +223,6 @@ def _without_false_units(columns: list[Column], told: list[str]) -> list[Column]
         return columns
     told.append(f"the header gives every channel the unit {units.pop()}, which is that of time: not believed")
     return [replace(column, unit="") if not is_time_name(column.label) else column for column in columns]
-
-
-def _labels(headings: Sequence[str], width: int) -> list[str]:
-    return [*headings, *[""] * width][:width]
 
 
 def _paired_tables(columns: Sequence[Column], header: Header, late: float, title: str) -> list[Table]:
@@ -270,8 +266,7 @@ def _declare(column: Column, declared: Mapping[str, Sequence[str]], number: int,
     interval = quantity("Delta_X") if over_time else None
     samples = quantity("Samples")
     stamps = _stamps(declared)
-    own, first = (stamps[number] if number < len(stamps) else None), _earliest(declared)
-    behind = 0.0 if own is None or first is None else float((own - first) / np.timedelta64(1, "ns")) * 1e-9
+    behind = _seconds_between(_earliest(declared), stamps[number] if number < len(stamps) else None)
     return Column(
         label or column.label,
         column.values,

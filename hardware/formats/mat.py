@@ -16,7 +16,7 @@ import numpy as np
 from vibroimpact.analysis.files.probing import LibraryRead
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.arrays import Scope, tables_of
-from vibroimpact.hardware.formats.probe import check_reads
+from vibroimpact.hardware.formats.probe import check_reads, one_refusal
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, RawFile
 
 _CREATED = re.compile(r"Created on: (?P<date>.{5,40})")
@@ -41,19 +41,12 @@ def read_mat(path: os.PathLike[str] | str) -> RawFile:
     """
     from scipy.io import loadmat, whosmat
 
-    try:
+    with one_refusal("a whole MATLAB file"):
         check_reads(path, _READING)
         listed = whosmat(path)
         _check_sizes(listed)
         chosen = [name for name, _, kind in listed if kind in _READ]
         contents = loadmat(path, variable_names=chosen, squeeze_me=False)
-    except DatasetError:
-        raise
-    # damaged bytes lead scipy to errors of every kind, MemoryError too
-    except Exception as problem:
-        raise DatasetError(
-            f"expected a whole MATLAB file, got one that cannot be read ({type(problem).__name__}: {problem})."
-        ) from problem
     remarks = [
         f"{name}: a {kind} array is left out; vectors of numbers are read"
         for name, _, kind in listed

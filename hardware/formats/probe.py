@@ -1,8 +1,10 @@
-"""Refuse a file on which the compiled library that reads it crashes, or which it never ends to read."""
+"""Refuse a file that a library cannot read: for damage, since it would crash or never end, or since it is not there."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from vibroimpact.analysis.files.probing import LibraryRead, UnsoundFileError, check_sound
 from vibroimpact.fmus.errors import DatasetError
@@ -37,3 +39,41 @@ def check_reads(path: os.PathLike[str] | str, reading: LibraryRead) -> None:
         raise UnreadableError(message, problem.raised) from problem
     except DatasetError as problem:
         raise UnreadableError(str(problem).removeprefix(f"{os.path.abspath(path)}: "), "") from problem
+
+
+@contextmanager
+def one_refusal(what: str) -> Iterator[None]:
+    """Turn what a library raises on a damaged file, errors of every kind and MemoryError too, into one refusal.
+
+    Raises
+    ------
+    DatasetError
+        Of any other exception within.
+
+    Examples
+    --------
+    >>> with one_refusal("a whole MATLAB file"):
+    ...     raise KeyError("t")
+    Traceback (most recent call last):
+    vibroimpact.fmus.errors.DatasetError: expected a whole MATLAB file, got one that cannot be read (KeyError: 't').
+    """
+    try:
+        yield
+    except DatasetError:
+        raise
+    except Exception as problem:
+        raise DatasetError(
+            f"expected {what}, got one that cannot be read ({type(problem).__name__}: {problem})."
+        ) from problem
+
+
+def missing_extra(what: str, package: str, extra: str) -> DatasetError:
+    """Return the error of a format whose package is not installed.
+
+    >>> str(missing_extra("a universal file (UFF)", "pyuff", "uff")).partition(". ")[0]
+    'a universal file (UFF): expected the package pyuff to read it, got none'
+    """
+    return DatasetError(
+        f"{what}: expected the package {package} to read it, got none. Install it: pip install "
+        f"'vibroimpact[{extra}]', or in a clone pip install '.[{extra}]'."
+    )

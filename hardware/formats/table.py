@@ -47,6 +47,10 @@ class Column:
         Smallest and largest value that the converter can give, in the unit of `values`.
     attrs : dict
         What else the file says.
+    dated : bool
+        The cells are dates or times of day, and so instants; the values are s after the first one.
+    strange : sequence of (row, text)
+        Cells of text that are neither a number nor a known marker; their values are NaN.
     """
 
     label: str
@@ -58,6 +62,8 @@ class Column:
     group: str = ""
     rails: tuple[float, float] | None = None
     attrs: dict[str, Any] = field(default_factory=dict)
+    dated: bool = False
+    strange: Sequence[tuple[int, str]] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.formats.cells import sorted_out
+from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.labels import is_time_name
+from vibroimpact.hardware.formats.probe import one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, Column, Floats, RawFile, Table
 
 _MOST_HEARD = 20
@@ -42,21 +43,17 @@ def read_tdms(path: os.PathLike[str] | str) -> RawFile:
     """
     from nptdms import TdmsFile
 
-    size = os.stat(path).st_size
-    try:
-        # opened here, so that it is closed too where the reader gives up
-        with _heard() as heard, open(path, "rb") as stream, TdmsFile.open(stream) as file:
-            raw = _read(file, size)
-            damage = _CUT_OFF if any(_SAYS_CUT_OFF.match(line) for line in heard) else ""
-            others = dict.fromkeys(f"npTDMS says: {line}" for line in heard if not _SAYS_CUT_OFF.match(line))
-            return replace(raw, remarks=[*raw.remarks, *others][:_MOST_HEARD], damage=damage)
-    except DatasetError:
-        raise
-    # the reader gives up on damaged bytes with whatever error they lead to
-    except Exception as problem:
-        raise DatasetError(
-            f"expected a whole TDMS file, got one that cannot be read ({type(problem).__name__}: {problem})."
-        ) from problem
+    # opened here, so that it is closed too where the reader gives up
+    with (
+        one_refusal("a whole TDMS file"),
+        _heard() as heard,
+        open(path, "rb") as stream,
+        TdmsFile.open(stream) as file,
+    ):
+        raw = _read(file, os.stat(path).st_size)
+    damage = _CUT_OFF if any(_SAYS_CUT_OFF.match(line) for line in heard) else ""
+    others = dict.fromkeys(f"npTDMS says: {line}" for line in heard if not _SAYS_CUT_OFF.match(line))
+    return replace(raw, remarks=[*raw.remarks, *others][:_MOST_HEARD], damage=damage)
 
 
 @contextmanager
@@ -87,18 +84,14 @@ def _read(file: Any, size: int) -> RawFile:
         raise DatasetError(
             f"expected at most {size} samples in as many bytes, got {declared}. It is damaged."
         )
-    starts = [_start(channel) for channel in channels]
-    known = [stamp for stamp in starts if stamp is not None]
-    origin = min(known) if known else None
+    starts = [stamp for channel in channels if (stamp := _start(channel)) is not None]
+    origin = min(starts, default=None)
     # what began at the same instant has one trigger, whatever its group
     tables = [
         _table(group, origin, remarks, len(groups) > 1 and None in [_start(one) for one in group.channels()])
         for group in groups
     ]
-    if any(
-        stamp is None and "wf_start_time" in channel.properties
-        for stamp, channel in zip(starts, channels, strict=True)
-    ):
+    if any(_start(channel) is None and "wf_start_time" in channel.properties for channel in channels):
         remarks.append(
             "the start is given as 1904, the epoch of LabVIEW: time is relative, its date is not known"
         )
@@ -155,16 +148,14 @@ def _column(channel: Any, values: Floats, origin: np.datetime64 | None, remarks:
     said = "wf_samples is the size of a block, not the length: the samples are counted"
     if samples is not None and samples != len(values) and said not in remarks:
         remarks.append(said)
-    numbers = sorted_out(values)
-    return Column(
+    return column_of(
         channel.name,
-        numbers.values,
+        values,
         str(known.get("unit_string", "")),
-        numbers.overrange,
-        increment if increment is not None and 0.0 < increment < np.inf else None,
-        (_number(known.get("wf_start_offset")) or 0.0) + late,
-        f"start {start}" if late else "",
-        _rails(channel),
+        interval=increment if increment is not None and 0.0 < increment < np.inf else None,
+        start=(_number(known.get("wf_start_offset")) or 0.0) + late,
+        group=f"start {start}" if late else "",
+        rails=_rails(channel),
     )
 
 

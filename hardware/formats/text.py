@@ -11,7 +11,6 @@ import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.cells import (
-    Cells,
     has_thousands,
     is_date,
     is_day,
@@ -49,12 +48,16 @@ class Dialect:
     decimal: str
     words: bool = False
 
+    def cells(self, line: str) -> list[str]:
+        """Return the cells of a line."""
+        return split_line(line, self.delimiter)
+
     def is_row(self, line: str) -> bool:
         """Whether a line is a row of numbers, markers and dates, with at least one that says something.
 
         Where there are columns of words, a row begins with a number, a time or a day.
         """
-        cells = split_line(line, self.delimiter)
+        cells = self.cells(line)
         kinds = [is_number(cell, self.decimal) or is_date(cell) for cell in cells]
         if self.words:
             return any(kinds) and (kinds[0] or is_day(cells[0]))
@@ -157,7 +160,7 @@ def _best_of(dialects: Sequence[Dialect], lines: Sequence[str]) -> tuple[Dialect
     best: Dialect | None = None
     score = (0, 0, 0)
     for dialect in dialects:
-        rows = [split_line(line, dialect.delimiter) for line in lines if dialect.is_row(line)]
+        rows = [dialect.cells(line) for line in lines if dialect.is_row(line)]
         if rows:
             width, count = Counter(map(len, rows)).most_common(1)[0]
             numbers = sum(is_number(cell, dialect.decimal) for row in rows for cell in row)
@@ -178,8 +181,8 @@ def _rows(body: Sequence[tuple[int, str]], dialect: Dialect) -> tuple[list[str],
     words = [
         (place, line)
         for place, line in body
-        if not any(is_number(cell, dialect.decimal) or is_date(cell) for cell in _cells(line, dialect))
-        and not all(is_marker(cell) for cell in _cells(line, dialect))
+        if not any(is_number(cell, dialect.decimal) or is_date(cell) for cell in dialect.cells(line))
+        and not all(is_marker(cell) for cell in dialect.cells(line))
     ]
     if not words:
         return [line for _, line in body], []
@@ -194,10 +197,6 @@ def _rows(body: Sequence[tuple[int, str]], dialect: Dialect) -> tuple[list[str],
         f"line {place + 1} holds no numbers and is left out: {line.strip()[:60]!r}" for place, line in words
     ]
     return [line for place, line in body if place not in skipped], told[:5]
-
-
-def _cells(line: str, dialect: Dialect) -> list[str]:
-    return split_line(line, dialect.delimiter)
 
 
 def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[list[str], list[str]]:
@@ -270,7 +269,7 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def columns_of(
-    cells: Sequence[Cells], labels: Sequence[str], units: Sequence[str]
+    cells: Sequence[Column], labels: Sequence[str], units: Sequence[str]
 ) -> tuple[list[Column], list[str]]:
     """Return the columns of numbers; those of words are left out. And what is to be said of them."""
     columns, told = [], []
@@ -279,7 +278,7 @@ def columns_of(
         grouped = next((text for _, text in column.strange if has_thousands(text)), None)
         if grouped is not None:
             raise _thousands(name, grouped)
-        if len(column.values) and column.is_text:
+        if len(column.values) and _is_text(column):
             words = [text for _, text in column.strange][:3]
             told.append(f"{name}: a column of words is left out: {'; '.join(words)}")
             column = replace(column, values=column.values[:0])
@@ -294,10 +293,13 @@ def columns_of(
                 f"{name}: {len(column.strange)} cells are no numbers and count as missing, the first is "
                 f"{text!r} in row {row + 1}"
             )
-        shown = unit or ("s" if column.dated else "")
-        kind = {"time": 1} if column.dated else {}
-        columns.append(Column(name, column.values, shown, column.overrange, attrs=kind))
+        columns.append(replace(column, label=name, unit=unit or ("s" if column.dated else "")))
     return columns, told
+
+
+def _is_text(column: Column) -> bool:
+    """Whether a column is one of words: remarks, names."""
+    return 2 * len(column.strange) >= max(1, int(np.isfinite(column.values).sum()) + len(column.strange))
 
 
 def with_time(table: Table) -> Table:
@@ -307,7 +309,7 @@ def with_time(table: Table) -> Table:
     followed by others.
     """
     for place, column in enumerate(table.columns):
-        if column.attrs.get("time") or is_time_name(column.label) or _is_time_by_unit(column, place):
+        if column.dated or is_time_name(column.label) or _is_time_by_unit(column, place):
             return _apart(table, place)
     if len(table.columns) > 1 and table.columns[0].label == FIRST and _ascends(table.columns[0]):
         return _apart(table, 0)

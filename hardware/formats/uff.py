@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.formats.cells import sorted_out
-from vibroimpact.hardware.formats.extras import missing_extra
+from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.labels import seconds_in
+from vibroimpact.hardware.formats.probe import missing_extra
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, Floats, RawFile, Table
 
 SIGNATURE = re.compile(rb"(?:[ ]*\r?\n)*[ ]{4}-1[ ]*\r?\n[ ]{1,5}\d{1,5}(?:[bB][^\r\n]*)?[ ]*\r?\n")
@@ -111,13 +111,15 @@ def _sorted_out(
         if why:
             remarks.append(f"{name}: {why}, is left out; functions over time are read")
             continue
-        remarks += _told_length(name, found)
+        declared, there = int(found.get("num_pts", 0)), len(found["data"])
+        if declared > there:
+            remarks.append(f"{name}: the header says {declared} samples, the file has {there}")
         column, instants = _column(name, found, bool(units) and in_si)
         if instants is None:
             even.append(column)
         else:
-            tables.append(Table([column], Column("instants", instants, "s"), name))
-    if sum(len(table.columns[0].values) for table in tables) + sum(map(_length, even)) > MOST_SAMPLES:
+            _add(tables, column, Column("instants", instants, "s"))
+    if sum(len(column.values) for table in (*tables, Table(even)) for column in table.columns) > MOST_SAMPLES:
         raise DatasetError(f"expected at most {MOST_SAMPLES} samples, got more. Cut it into pieces.")
     if even:
         tables.insert(0, Table(even, vectors=True))
@@ -129,29 +131,16 @@ def _sorted_out(
             "expected a universal file (UFF) with functions over time (dataset 58), got datasets of type "
             f"{kinds}{f' ({what})' if what else ''}.{lost}"
         )
-    return RawFile("universal file (UFF 58)", _together(tables), remarks)
+    return RawFile("universal file (UFF 58)", tables, remarks)
 
 
-def _together(tables: Sequence[Table]) -> list[Table]:
-    """Return tables in which functions on the same instants share one."""
-    found: list[Table] = []
-    for table in tables:
-        like = next((at for at, other in enumerate(found) if _same_instants(table, other)), None)
-        if like is None:
-            found.append(table)
-        else:
-            found[like] = replace(found[like], columns=[*found[like].columns, *table.columns], title="")
-    return found
-
-
-def _same_instants(one: Table, other: Table) -> bool:
-    return (
-        one.time is not None and other.time is not None and np.array_equal(one.time.values, other.time.values)
-    )
-
-
-def _length(column: Column) -> int:
-    return len(column.values)
+def _add(tables: list[Table], column: Column, instants: Column) -> None:
+    """Add a function to the table that has its instants, or a table of its own."""
+    for at, table in enumerate(tables):
+        if table.time is not None and np.array_equal(table.time.values, instants.values):
+            tables[at] = replace(table, columns=[*table.columns, column], title="")
+            return
+    tables.append(Table([column], instants, column.label))
 
 
 def _why_not(found: Mapping[str, Any]) -> str:
@@ -168,24 +157,19 @@ def _why_not(found: Mapping[str, Any]) -> str:
     return ""
 
 
-def _told_length(name: str, found: Mapping[str, Any]) -> list[str]:
-    declared, there = int(found.get("num_pts", 0)), len(found["data"])
-    return [f"{name}: the header says {declared} samples, the file has {there}"] if declared > there else []
-
-
 def _column(name: str, found: Mapping[str, Any], in_si: bool) -> tuple[Column, Floats | None]:
     """Return a function, and its instants (s) where they are not counted by an increment."""
     declared = int(found.get("num_pts", 0))
-    numbers = sorted_out(np.asarray(found["data"], dtype=np.float64)[: declared or None])
+    values = np.asarray(found["data"], dtype=np.float64)[: declared or None]
     unit = _text(found.get("ordinate_axis_units_lab"))
     if not unit and in_si:
         unit = _SI_UNITS.get(int(found.get("ordinate_spec_data_type", 0)), "")
     told = {key: _text(found.get(source)) for key, source in (("function", "id2"), ("date", "id3"))}
     attrs = {f"source_{key}": text for key, text in told.items() if text}
     second = seconds_in(_text(found.get("abscissa_axis_units_lab"))) or 1.0
-    column = Column(name, numbers.values, unit, numbers.overrange, attrs=attrs)
+    column = column_of(name, values, unit, attrs=attrs)
     if int(found.get("abscissa_spacing", 1)) == 0:
-        return column, np.asarray(found["x"], dtype=np.float64)[: len(numbers.values)] * second
+        return column, np.asarray(found["x"], dtype=np.float64)[: len(values)] * second
     interval = float(found.get("abscissa_inc", 0.0)) * second
     start = float(found.get("abscissa_min", 0.0)) * second
     return replace(column, interval=interval if interval > 0.0 else None, start=start), None

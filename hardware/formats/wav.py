@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
-from vibroimpact.hardware.formats.cells import sorted_out
+from vibroimpact.hardware.formats.cells import column_of
+from vibroimpact.hardware.formats.probe import one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, RawFile, Table
 
 SIGNATURES = (b"RIFF", b"RIFX", b"RF64")
@@ -37,17 +38,10 @@ def read_wav(content: bytes) -> RawFile:
     from scipy.io import wavfile
 
     data = _samples_of(content)
-    try:
-        with warnings.catch_warnings(record=True) as said:
-            warnings.simplefilter("always")
-            # a frame that was cut off is none
-            rate, samples = wavfile.read(io.BytesIO(content[: data.end] if data.is_cut else content))
-    # the reader gives up on damaged bytes with whatever error they lead to
-    except Exception as problem:
-        raise DatasetError(
-            "expected a whole WAV file of plain samples, got one that cannot be read "
-            f"({type(problem).__name__}: {problem})."
-        ) from problem
+    with one_refusal("a whole WAV file of plain samples"), warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        # a frame that was cut off is none
+        rate, samples = wavfile.read(io.BytesIO(content[: data.end] if data.is_cut else content))
     if samples.size > MOST_SAMPLES:
         raise DatasetError(
             f"expected at most {MOST_SAMPLES} samples, got {samples.size}. Cut it into pieces."
@@ -107,8 +101,7 @@ def _samples_of(content: bytes) -> _Samples:
 def _column(samples: Any, label: str, interval: float, data: _Samples) -> Column:
     """Return one channel; integers as parts of full scale, with the ends of their range."""
     if samples.dtype.kind == "f":
-        numbers = sorted_out(samples.astype(np.float64))
-        return Column(label, numbers.values, "", numbers.overrange, interval)
+        return column_of(label, samples.astype(np.float64), interval=interval)
     limits = np.iinfo(samples.dtype)
     scale, middle = -float(limits.min), 0.0
     if samples.dtype.kind == "u":
@@ -116,4 +109,4 @@ def _column(samples: Any, label: str, interval: float, data: _Samples) -> Column
     values = (samples.astype(np.float64) - middle) / scale
     # scipy writes samples of 24 bits into the upper ones of 32
     steps = 2.0 ** (min(data.bits, limits.bits) - 1)
-    return Column(label, values, "", None, interval, rails=(-1.0, 1.0 - 1.0 / steps))
+    return Column(label, values, interval=interval, rails=(-1.0, 1.0 - 1.0 / steps))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.recording import Channel, EventTrain, SingleValue, TimeAxis
+from vibroimpact.analysis.recording import Channel, EventTrain, SingleValue
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.labels import is_known_unit, seconds_in
@@ -24,7 +24,7 @@ from vibroimpact.hardware.recordings.events import (
 )
 from vibroimpact.hardware.recordings.naming import channel_name
 from vibroimpact.hardware.recordings.settings import ImportSettings
-from vibroimpact.hardware.recordings.sources import Source, named, shortened
+from vibroimpact.hardware.recordings.sources import Source, naming, shortened
 from vibroimpact.hardware.recordings.time_axis import Placement, place
 
 _NUMBERED = re.compile(r"column_\d+")
@@ -47,34 +47,31 @@ class Parts:
     scalars: dict[str, SingleValue] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
-    def add(self, source: Source, titled: bool) -> None:
+    def add(self, source: Source, title: str) -> None:
         """Add the columns of one file.
 
         Parameters
         ----------
         source : Source
-        titled : bool
-            Whether its remarks begin with the name of the file.
+        title : str
+            What its remarks begin with; empty for one file alone.
 
         Raises
         ------
         DatasetError
             A column cannot be placed in time; the message has the name of the file.
         """
-        title = source.path.name if titled else ""
-        self.remark(source.remarks, title)
-        self.remark([line for table in source.tables for line in _told_lengths(table)], title)
-        axes: dict[Any, tuple[Placement, TimeAxis]] = {}
-        rasters = [is_raster(table, source.settings.events) for table in source.tables]
-        columns = [(at, column) for at, table in enumerate(source.tables) for column in table.columns]
+        tables = source.raw.tables
+        self.remark(source.raw.remarks, title)
+        self.remark([line for table in tables for line in _told_lengths(table)], title)
+        placements: dict[Any, Placement] = {}
+        rasters = [is_raster(table, source.settings.events) for table in tables]
+        columns = [(at, column) for at, table in enumerate(tables) for column in table.columns]
         if sum(len(column.values) for _, column in columns) > MOST_SAMPLES:
             raise DatasetError(f"{source.path}: expected at most {MOST_SAMPLES} samples, got more.")
         for number, (at, column) in enumerate(columns):
-            try:
-                self.remark(self._add_column(number, at, column, source, axes, rasters[at]), title)
-            except DatasetError as problem:
-                besides = f" Besides, {source.damage}." if source.damage else ""
-                raise named(DatasetError(f"{problem}{besides}"), source.path) from problem
+            with naming(source.path, besides=source.raw.damage):
+                self.remark(self._add_column(number, at, column, source, placements, rasters[at]), title)
 
     def remark(self, lines: Sequence[str], title: str = "") -> None:
         """Add what was noticed, each line once."""
@@ -89,12 +86,13 @@ class Parts:
         at: int,
         column: Column,
         source: Source,
-        axes: dict[Any, tuple[Placement, TimeAxis]],
+        placements: dict[Any, Placement],
         in_raster: bool,
     ) -> list[str]:
         """Add one column as what it is; return what is to be said of it."""
-        settings, table = source.settings, source.tables[at]
-        in_raster = in_raster and _has_clock(column, table, settings)
+        settings, table = source.settings, source.raw.tables[at]
+        clocks = (settings.rate, table.rate, column.interval, table.clock_of(column))
+        in_raster = in_raster and any(clock is not None for clock in clocks)
         as_events = not in_raster and _is_event_train(column, table, settings)
         name = self._name(column, number, settings, as_events)
         changed, told = described(name, column, settings, number)
@@ -108,25 +106,23 @@ class Parts:
                 )
             return told + more
         if len(column.values) == 1:
-            value, beyond = (
-                float(changed.values[0]),
-                column.overrange is not None and bool(column.overrange[0]),
-            )
+            value = float(changed.values[0])
+            beyond = column.overrange is not None and bool(column.overrange[0])
             self.scalars[name] = SingleValue(value, measured_unit(changed.unit).cf, column.label, beyond)
             said = "which the file marks as overrange" if beyond else f"{value:g}"
             return [*told, f"{name}: one value only, {said}: kept beside the channels"]
         key = (at, len(column.values), column.interval, column.start, column.group)
-        if key not in axes:
-            placement = place(table, column, settings.rate, settings.start)
-            axes[key] = placement, _axis(placement, column, table, source)
-            told += placement.remarks
+        if key not in placements:
+            trigger = ", ".join(part for part in (source.path.name, table.title, column.group) if part)
+            placements[key] = place(table, column, settings.rate, settings.start, trigger)
+            told += placements[key].remarks
         if in_raster:
-            train = raster_train(name, column, *axes[key], settings.window, settings.masked)
+            train = raster_train(name, column, placements[key], settings.window, settings.masked)
             if train is None:
                 return [*told, f"{name}: has no event, and is left out"]
             self.events[name] = train
             return [*told, AS_RASTER]
-        self.channels[name], more = channel_of(name, changed, *axes[key], settings.masked)
+        self.channels[name], more = channel_of(name, changed, placements[key], settings.masked)
         return told + more
 
     def _name(self, column: Column, number: int, settings: ImportSettings, as_events: bool) -> str:
@@ -164,7 +160,7 @@ def described(name: str, column: Column, settings: ImportSettings, number: int) 
     if not is_known_unit(unit):
         told.append(f"{name}: the unit {unit[:40]!r} is not known: taken as a pure number (--unit)")
         unit = "1"
-    attrs = {key: value for key, value in column.attrs.items() if key != "time"}
+    attrs = dict(column.attrs)
     if column.unit and column.unit != unit:
         attrs["source_unit"] = column.unit
     scale, offset = _picked(settings.scale, number), _picked(settings.offset, number)
@@ -190,12 +186,6 @@ def _picked(values: Sequence[Any], number: int) -> Any:
     return values[number] if number < len(values) else None
 
 
-def _has_clock(column: Column, table: Table, settings: ImportSettings) -> bool:
-    """Whether something says when the rows of a column were sampled."""
-    stated = (settings.rate, table.rate, column.interval, table.clock_of(column))
-    return any(one is not None for one in stated)
-
-
 def _is_event_train(column: Column, table: Table, settings: ImportSettings) -> bool:
     """Whether a column is instants: as the user says, or where nothing gives it a time and it looks so."""
     if settings.events is not None:
@@ -203,8 +193,3 @@ def _is_event_train(column: Column, table: Table, settings: ImportSettings) -> b
     if settings.rate is not None or table.clock_of(column) is not None:
         return False
     return (table.vectors or len(table.columns) == 1) and looks_like_events(column)
-
-
-def _axis(placement: Placement, column: Column, table: Table, source: Source) -> TimeAxis:
-    trigger = ", ".join(part for part in (source.path.name, table.title, column.group) if part)
-    return TimeAxis(placement.time, placement.interval, placement.uncertainty, placement.source, trigger)

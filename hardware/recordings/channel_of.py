@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from vibroimpact.analysis.recording import Channel, TimeAxis
+from vibroimpact.analysis.recording import Channel
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.hardware.formats.table import Column, Flags, Floats
 from vibroimpact.hardware.recordings.sample_quality import clipped_samples, flags
 from vibroimpact.hardware.recordings.time_axis import Placement
 
 _OFFSET_SHOWS = 3.0
-"""Of the usual distance from the median: a level of rest that is farther from zero is an offset."""
+"""Distance of the median from zero, in median absolute deviations, above which it is an offset."""
 
 
 def channel_of(
     name: str,
     column: Column,
     placement: Placement,
-    axis: TimeAxis,
     masked: tuple[tuple[float, float], ...] = (),
 ) -> tuple[Channel, list[str]]:
     """Return the channel of a column, and what was noticed.
@@ -29,9 +28,7 @@ def channel_of(
     column : Column
         Its unit is one that is known.
     placement : Placement
-        Which row each sample has.
-    axis : TimeAxis
-        Of the placement; shared by all channels that have it.
+        Its axis is shared by all channels that have it.
     masked : tuple of tuple of float
         Spans of time, s, in which the samples are no measurement: they become missing.
     """
@@ -42,16 +39,15 @@ def channel_of(
         overrange = (placement.row >= 0) & column.overrange[placement.row]
     hidden = np.zeros(len(values), dtype=bool)
     for begin, end in masked:
-        hidden |= (axis.time >= begin) & (axis.time <= end)
+        hidden |= (placement.axis.time >= begin) & (placement.axis.time <= end)
     overrange |= np.isinf(values)
     values[hidden | overrange] = np.nan
     overrange &= ~hidden
     clipped = clipped_samples(values, column.rails)
     quality = flags(values, overrange, clipped, placement.suspect)
     remarks = _remarks(name, column, values, clipped, overrange, hidden, placement)
-    unit = measured_unit(column.unit).cf
-    attrs = {"role": "measured", **column.attrs}
-    return Channel(name, values, unit, axis, quality, column.label, attrs), remarks
+    unit, attrs = measured_unit(column.unit).cf, {"role": "measured", **column.attrs}
+    return Channel(name, values, unit, placement.axis, quality, column.label, attrs), remarks
 
 
 def _remarks(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.recording import EventTrain, TimeAxis
+from vibroimpact.analysis.recording import EventTrain
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.labels import is_time_name, seconds_in
 from vibroimpact.hardware.formats.table import Column, Floats, Table
@@ -18,7 +18,7 @@ _FEW_ONES = 0.2
 """Share of ones up to which a column of 0 and 1 is one of events."""
 AS_RASTER = "the columns hold 0 and 1 only: an event train each, with an event where it becomes 1 (--no-events if not)"
 _UNEVEN = 0.01
-"""Of the mean interval: the spread from which on ascending numbers are no clock."""
+"""Standard deviation of the steps, in mean steps, above which ascending numbers are no clock."""
 
 
 def looks_like_events(column: Column) -> bool:
@@ -64,7 +64,6 @@ def raster_train(
     name: str,
     column: Column,
     placement: Placement,
-    axis: TimeAxis,
     window: tuple[float, float] | None,
     masked: tuple[tuple[float, float], ...],
 ) -> EventTrain | None:
@@ -75,14 +74,13 @@ def raster_train(
     name : str
     column : Column
     placement : Placement
-        Which row each sample has.
-    axis : TimeAxis
-        Of the placement; without a window, the observation is as long.
+        Without a window, the observation is as long as its axis.
     window : tuple of float or None
         Observed from, to, s.
     masked : tuple of tuple of float
         Parts of it in which nothing could be seen, s.
     """
+    axis = placement.axis
     on = (placement.row >= 0) & (column.values[placement.row] == 1.0)
     times = axis.time[on & ~np.append(False, on[:-1])]
     if not len(times):

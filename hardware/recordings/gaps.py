@@ -11,11 +11,11 @@ from vibroimpact.hardware.formats.table import MOST_SAMPLES, Floats
 from vibroimpact.hardware.recordings.printed_grid import digits_of
 
 AGREEMENT = 1e-4
-"""Relative difference of two intervals that is no contradiction."""
+"""Relative difference of two intervals up to which they agree."""
 EVEN = 1e-3
-"""Of the interval: what an evenly sampled instant may be off, where no digits explain it."""
+"""Largest residual of an evenly sampled instant, in intervals, where no digits explain it."""
 _GAP = 0.5
-"""Of the interval: what a step has above it where samples are missing."""
+"""Excess of a step over the interval, in intervals, above which samples are missing."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from vibroimpact.hardware.formats.choosing import check_file, holds_recording
 from vibroimpact.hardware.recordings.building import Parts
 from vibroimpact.hardware.recordings.gaps import AGREEMENT
 from vibroimpact.hardware.recordings.settings import ImportSettings, checked
-from vibroimpact.hardware.recordings.sources import Source, named, read_source, spread
+from vibroimpact.hardware.recordings.sources import Source, naming, read_source, spread
 
 PathLike = str | os.PathLike[str]
 
@@ -52,13 +52,17 @@ def import_recording(
     paths = [Path(one) for one in ([files] if isinstance(files, str | os.PathLike) else files)]
     if not paths:
         raise UsageError("files: expected one or more, got none.")
-    if any(_is_ours(path) for path in paths):
-        return _passed_on(paths, given)
+    for path in paths:
+        with naming(path):
+            check_file(path)
+            is_ours = holds_recording(path)
+        if is_ours:
+            return _passed_on(paths, given)
     sources = [read_source(path, given, common) for path in paths]
     spread(sources, given)
     parts = Parts()
     for source in sources:
-        parts.add(source, titled=len(sources) > 1)
+        parts.add(source, title=source.path.name if len(sources) > 1 else "")
     if not parts.channels and not parts.events:
         left_out = [line for line in parts.remarks if "left out" in line]
         besides = f" Besides, {'; '.join(left_out[:3])}." if left_out else ""
@@ -67,18 +71,6 @@ def import_recording(
         )
     parts.remark(_of_the_whole(parts))
     return Recording(parts.channels, parts.events, parts.scalars, _provenance(sources, parts))
-
-
-def _is_ours(path: Path) -> bool:
-    try:
-        check_file(path)
-        return holds_recording(path)
-    except OSError as problem:
-        raise DatasetError(
-            f"{path}: expected a readable file, got an error: {problem.strerror}."
-        ) from problem
-    except DatasetError as problem:
-        raise named(problem, path) from problem
 
 
 def _passed_on(files: Sequence[Path], given: ImportSettings) -> Recording:
@@ -115,15 +107,14 @@ def _provenance(sources: Sequence[Source], parts: Parts) -> dict[str, Any]:
     """Return where the recording comes from: names of files, not their folders."""
     attrs: dict[str, Any] = {}
     for source in sources:
-        for key, value in source.attrs.items():
-            attrs.setdefault(key, value)
+        attrs = attrs | source.raw.attrs | attrs  # of what several files say, the first one's
     settings = {
         source.path.name: source.settings.model_dump(exclude_unset=True, mode="json") for source in sources
     }
     return {
         "source_file": ", ".join(source.path.name for source in sources),
         "source_sha256": ", ".join(_hash(source.path) for source in sources),
-        "source_format": ", ".join(dict.fromkeys(source.source_format for source in sources)),
+        "source_format": ", ".join(dict.fromkeys(source.raw.source_format for source in sources)),
         "import_settings": json.dumps(settings, sort_keys=True),
         **attrs,
         "remarks": "\n".join(" ".join(line.split()) for line in parts.remarks),

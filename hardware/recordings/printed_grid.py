@@ -10,7 +10,7 @@ _MOST_DIGITS = 12
 _MOST_READ = 20_000
 _NEARLY_ALL = 0.9
 _DIGIT_LOST = 0.2
-"""Of the last digit, what may be lost in binary; of arbitrary numbers 40 % are as near to their digits."""
+"""Largest error of binary, in units of the last digit; 40 % of arbitrary numbers are as near to their digits."""
 
 
 def decimal_step(values: Floats) -> float:

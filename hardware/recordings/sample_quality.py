@@ -9,11 +9,11 @@ from vibroimpact.analysis.recording import Quality
 from vibroimpact.hardware.formats.table import Flags, Floats
 
 FEWEST_CLIPPED = 3
-"""Equal samples at the extreme from which on they are no chance."""
+"""Least number of equal samples at the extreme that is no chance."""
 _REST = 0.2
-"""Share of the samples from which on a value is the level of rest, or a state of a switch, and no limit."""
+"""Share of the samples above which a value is the level of rest, or a state of a switch, and no limit."""
 _SMOOTH_TOP = 6.0
-"""Steps of the converter by which a smooth top falls, at most, beside its flat part; see `_falls_steeply`."""
+"""Largest fall of a smooth top beside its flat part, in steps of the converter; see `_falls_steeply`."""
 
 
 def clipped_samples(values: Floats, rails: tuple[float, float] | None = None) -> Flags:

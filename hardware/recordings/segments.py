@@ -13,9 +13,9 @@ from vibroimpact.hardware.formats.table import Column, Floats, Table
 _MOST_RESTARTS = 100
 _FEWEST_ROWS = 3
 _LATE = 1.5
-"""Intervals after the end of a part from which on the next one does not follow at once."""
+"""Distance of two parts, in intervals, above which the later one does not follow at once."""
 _BACK_BY = 3.0
-"""Intervals that a clock goes back by when it begins again, at least; less is disorder."""
+"""Step back of a clock, in intervals, above which it begins again; a smaller one is disorder."""
 
 
 def joined(tables: Sequence[Table]) -> tuple[list[Table], list[str]]:

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
     Field,
     FiniteFloat,
     ValidationError,
-    field_validator,
 )
 
 from vibroimpact.fmus.errors import UsageError
@@ -31,7 +31,24 @@ def _listed(value: Any) -> Any:
     return [value] if isinstance(value, str | int | float) and not isinstance(value, bool) else value
 
 
-_One = BeforeValidator(_listed)
+def _only(holds: Callable[[Any], bool]) -> AfterValidator:
+    """Return a validator that refuses values for which something does not hold."""
+
+    def check(value: Any) -> Any:
+        if not holds(value):
+            raise ValueError("the rule of the field says what is expected")
+        return value
+
+    return AfterValidator(check)
+
+
+def _ascends(span: tuple[float, float] | None) -> bool:
+    return span is None or span[0] < span[1]
+
+
+_Item = TypeVar("_Item")
+_Several = Annotated[tuple[_Item, ...], BeforeValidator(_listed), Field(strict=False)]
+_Span = Annotated[tuple[FiniteFloat, FiniteFloat], Field(strict=False)]
 
 
 class ImportSettings(BaseModel):
@@ -44,15 +61,11 @@ class ImportSettings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     name: Annotated[
-        tuple[str, ...],
-        _One,
-        Field(strict=False),
-        Rule("names of the columns", item="a name", hint='Write ["base", "board"].'),
+        _Several[str], Rule("names of the columns", item="a name", hint='Write ["base", "board"].')
     ] = ()
     unit: Annotated[
-        tuple[str, ...],
-        _One,
-        Field(strict=False),
+        _Several[str],
+        _only(lambda units: all(map(is_known_unit, units))),
         Rule(
             "units of the columns",
             item="a unit such as m/s^2, g, V, mV, N",
@@ -60,14 +73,11 @@ class ImportSettings(BaseModel):
         ),
     ] = ()
     scale: Annotated[
-        tuple[FiniteFloat, ...],
-        _One,
-        Field(strict=False),
+        _Several[FiniteFloat],
+        _only(lambda scales: 0.0 not in scales),
         Rule("finite factors, none of them 0", item="a finite factor, not 0"),
     ] = ()
-    offset: Annotated[
-        tuple[FiniteFloat, ...], _One, Field(strict=False), Rule("finite numbers", item="a finite number")
-    ] = ()
+    offset: Annotated[_Several[FiniteFloat], Rule("finite numbers", item="a finite number")] = ()
     rate: Annotated[FiniteFloat | None, Field(gt=0.0), Rule("samples per second > 0", "Hz")] = None
     start: Annotated[FiniteFloat | None, Rule("the instant of the first sample", "s")] = None
     time_column: Annotated[
@@ -75,17 +85,15 @@ class ImportSettings(BaseModel):
         Rule('the heading or the number of a column, or "none"', hint="The first column is 1."),
     ] = None
     columns: Annotated[
-        tuple[str | int, ...],
-        _One,
-        Field(strict=False),
+        _Several[str | int],
         Rule("headings or numbers of columns", item="a heading or a number", hint="The first column is 1."),
     ] = ()
     events: Annotated[bool | None, Rule("true (all columns are instants of events) or false (none is)")] = (
         None
     )
     window: Annotated[
-        tuple[FiniteFloat, FiniteFloat] | None,
-        Field(strict=False),
+        _Span | None,
+        _only(_ascends),
         Rule(
             "start and end of the observation, the end later",
             "s",
@@ -94,8 +102,9 @@ class ImportSettings(BaseModel):
         ),
     ] = None
     masked: Annotated[
-        tuple[Annotated[tuple[FiniteFloat, FiniteFloat], Field(strict=False)], ...],
+        tuple[_Span, ...],
         Field(strict=False),
+        _only(lambda spans: all(map(_ascends, spans))),
         Rule(
             "pairs of start and end, each end later",
             "s",
@@ -108,35 +117,6 @@ class ImportSettings(BaseModel):
         Rule("tab, comma, semicolon, bar or blank"),
     ] = None
     decimal: Annotated[Literal[".", ","] | None, Rule('"." or ","')] = None
-
-    @field_validator("unit")
-    @classmethod
-    def _known(cls, units: tuple[str, ...]) -> tuple[str, ...]:
-        for unit in units:
-            if not is_known_unit(unit):
-                raise ValueError(unit)
-        return units
-
-    @field_validator("scale")
-    @classmethod
-    def _not_zero(cls, scales: tuple[float, ...]) -> tuple[float, ...]:
-        if 0.0 in scales:
-            raise ValueError("0")
-        return scales
-
-    @field_validator("window")
-    @classmethod
-    def _ascends(cls, window: tuple[float, float] | None) -> tuple[float, float] | None:
-        if window is not None and not window[0] < window[1]:
-            raise ValueError("order")
-        return window
-
-    @field_validator("masked")
-    @classmethod
-    def _all_ascend(cls, masked: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
-        if not all(begin < end for begin, end in masked):
-            raise ValueError("order")
-        return masked
 
 
 def checked(values: Mapping[str, Any], source: str) -> ImportSettings:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.hardware.formats.choosing import read_raw
-from vibroimpact.hardware.formats.table import Table
+from vibroimpact.hardware.formats.table import RawFile
 from vibroimpact.hardware.formats.text import WORDS_FOR_DELIMITERS
 from vibroimpact.hardware.recordings.columns import chosen_tables
 from vibroimpact.hardware.recordings.segments import joined, split_at_restarts
@@ -31,28 +32,18 @@ class Source:
     path : Path
     settings : ImportSettings
         Its lists go through the columns of this file.
-    source_format : str
-    tables : list of Table
+    raw : RawFile
         With the columns that are wanted, instants in s.
-    remarks : list of str
-    attrs : dict
-        Provenance that the file gives.
-    damage : str
-        What is wrong with the file as a whole.
     """
 
     path: Path
     settings: ImportSettings
-    source_format: str
-    tables: list[Table]
-    remarks: list[str]
-    attrs: dict[str, Any]
-    damage: str = ""
+    raw: RawFile
 
     @property
     def columns(self) -> int:
         """Columns of data in all tables."""
-        return sum(len(table.columns) for table in self.tables)
+        return sum(len(table.columns) for table in self.raw.tables)
 
 
 def read_source(path: Path, given: ImportSettings, common: ImportSettings | None = None) -> Source:
@@ -73,17 +64,12 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     """
     own = settings_beside(path) if common is None else common
     own = own.model_copy(update={key: getattr(given, key) for key in given.model_fields_set - _PER_COLUMN})
-    try:
+    with naming(path):
         delimiter = "" if own.delimiter is None else WORDS_FOR_DELIMITERS[own.delimiter]
         raw = read_raw(path, delimiter, own.decimal or "")
         chosen, counted, date = counted_from_start(chosen_tables(raw, own))
         tables, remarks = joined(chosen)
         pieces = [split_at_restarts(table) for table in tables]
-    except DatasetError as problem:
-        raise named(problem, path) from problem
-    except MemoryError as problem:
-        raise DatasetError(f"{path}: expected a file that fits into memory, got a larger one.") from problem
-    found = [table for split, _ in pieces for table in split]
     told = [
         *([raw.damage] if raw.damage else []),
         *raw.remarks,
@@ -91,7 +77,8 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
         *remarks,
         *(line for _, lines in pieces for line in lines),
     ]
-    return Source(path, own, raw.source_format, found, told, {**date, **raw.attrs}, raw.damage)
+    found = [table for split, _ in pieces for table in split]
+    return Source(path, own, replace(raw, tables=found, remarks=told, attrs={**date, **raw.attrs}))
 
 
 def shortened(line: str) -> str:
@@ -99,9 +86,26 @@ def shortened(line: str) -> str:
     return line if len(line) <= _LONGEST_LINE else f"{line[: _LONGEST_LINE - 3]}..."
 
 
-def named(problem: DatasetError, path: Path) -> DatasetError:
-    """Return an error whose lines begin with the name of their file."""
-    return DatasetError("\n".join(f"{path}: {line}" for line in map(shortened, str(problem).splitlines())))
+@contextmanager
+def naming(path: Path, besides: str = "") -> Iterator[None]:
+    """Let the lines of an error begin with the name of their file, and end with what else is wrong with it.
+
+    Raises
+    ------
+    DatasetError
+        Of one within, of a file that cannot be read, and of one too large for the memory.
+    """
+    try:
+        yield
+    except DatasetError as problem:
+        lines = f"{problem}{f' Besides, {besides}.' if besides else ''}".splitlines()
+        raise DatasetError("\n".join(f"{path}: {line}" for line in map(shortened, lines))) from problem
+    except OSError as problem:
+        raise DatasetError(
+            f"{path}: expected a readable file, got an error: {problem.strerror or problem}."
+        ) from problem
+    except MemoryError as problem:
+        raise DatasetError(f"{path}: expected a file that fits into memory, got a larger one.") from problem
 
 
 def spread(sources: Sequence[Source], given: ImportSettings) -> None:

@@ -13,17 +13,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.recording import TimeAxis
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Flags, Floats, Table
 from vibroimpact.hardware.recordings.gaps import AGREEMENT, EVEN, Gaps, are_whole, gaps_in
 from vibroimpact.hardware.recordings.printed_grid import digits_of
 
 _ROUNDED = 0.7
-"""Of the last digit: rounding moves an instant by half of it, and a line through such instants by a little more."""
+"""Largest residual, in units of the last digit, of a line through instants that are only rounded."""
 _FEW_HOLES = 0.1
+"""Share of missing samples up to which whole multiples of an interval are a grid with holes."""
 _MOST_DOUBTFUL = 0.1
+"""Share of rows out of order or repeated above which the instants are refused."""
 _MOST_FILLED = 10
-"""Times as many samples missing as there are: then it is no gap but another kind of record."""
+"""Ratio of samples to rows above which gaps are not filled: it is no gap but another kind of record."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,14 +35,7 @@ class Placement:
 
     Attributes
     ----------
-    time : ndarray of float, shape (sample,)
-        s, ascending strictly.
-    interval : float or None
-        s; None where the samples are not even.
-    uncertainty : float
-        Relative, of the interval.
-    source : str
-        Where the instants come from.
+    axis : TimeAxis
     row : ndarray of int, shape (sample,)
         Row of the file that each sample has; -1 for one that is missing there.
     suspect : ndarray of bool, shape (sample,)
@@ -47,10 +43,7 @@ class Placement:
     remarks : tuple of str
     """
 
-    time: Floats
-    interval: float | None
-    uncertainty: float
-    source: str
+    axis: TimeAxis
     row: NDArray[np.intp]
     suspect: Flags
     remarks: tuple[str, ...] = ()
@@ -61,7 +54,9 @@ class Placement:
         return int(np.sum(self.row < 0))
 
 
-def place(table: Table, column: Column, rate: float | None = None, start: float | None = None) -> Placement:
+def place(
+    table: Table, column: Column, rate: float | None = None, start: float | None = None, trigger: str = ""
+) -> Placement:
     """Decide the instants of one column of a table.
 
     Parameters
@@ -73,25 +68,34 @@ def place(table: Table, column: Column, rate: float | None = None, start: float 
         Samples per second by the user, who knows better than the file.
     start : float or None
         Instant of the first sample by the user, s.
+    trigger : str
+        Which trigger began the axis.
 
     Raises
     ------
     DatasetError
         Nothing says when the samples were taken, or what says so is in disorder.
     """
+    placement = _placed(table, column, rate)
+    time = placement.axis.time
+    if start is not None:
+        time = time - time[0] + start
+    return replace(placement, axis=replace(placement.axis, time=time, trigger=trigger))
+
+
+def _placed(table: Table, column: Column, rate: float | None) -> Placement:
     length = len(column.values)
     instants = table.clock_of(column)
     if column.interval is None and table.rate is not None:
         column = replace(column, interval=1.0 / table.rate)
     if rate is not None:
-        return _moved(_by_rate(rate, column, instants), start)
+        return _by_rate(rate, column, instants)
     if instants is not None and length > 1:
-        return _moved(_by_instants(instants, column, _comparable(table, column), length), start)
+        return _by_instants(instants, column, _comparable(table, column), length)
     if column.interval is not None and np.isfinite(column.interval):
         source = "the sampling interval of the header"
         late = f"{column.label}: by the header it begins at {column.start:.6g} s ({length} samples)"
-        remarks = (late,) if column.group else ()
-        return _moved(_even(column.start, column.interval, length, source, 0.0, remarks), start)
+        return _even(column.start, column.interval, length, source, [late] if column.group else [])
     raise DatasetError(
         f"{column.label}: expected a column of instants or a sampling interval, got neither. "
         "Give --rate (samples per second), or --time-column."
@@ -99,27 +103,15 @@ def place(table: Table, column: Column, rate: float | None = None, start: float 
 
 
 def _even(
-    start: float,
-    interval: float,
-    length: int,
-    source: str,
-    uncertainty: float = 0.0,
-    remarks: tuple[str, ...] = (),
+    start: float, interval: float, length: int, source: str, remarks: Sequence[str], uncertainty: float = 0.0
 ) -> Placement:
     time = np.asarray(start + interval * np.arange(length), dtype=np.float64)
     if not np.all(np.isfinite(time)) or (length > 1 and not np.all(np.diff(time) > 0.0)):
         raise DatasetError(
             f"interval: expected one of which {length} samples can be counted, got {interval:g} s."
         )
-    rows = np.arange(length)
-    return Placement(time, interval, uncertainty, source, rows, np.zeros(length, dtype=bool), remarks)
-
-
-def _moved(placement: Placement, start: float | None) -> Placement:
-    """Let the axis begin where the user says."""
-    if start is None:
-        return placement
-    return replace(placement, time=placement.time - placement.time[0] + start)
+    axis = TimeAxis(time, interval, uncertainty, source)
+    return Placement(axis, np.arange(length), np.zeros(length, dtype=bool), tuple(remarks))
 
 
 def _by_rate(rate: float, column: Column, instants: Floats | None) -> Placement:
@@ -167,8 +159,8 @@ def _on_grid(
     start: float, interval: float, count: NDArray[np.intp], source: str, remarks: Sequence[str]
 ) -> Placement:
     """Place rows on an even grid, each at its count; what no row has is missing."""
-    placed = _even(start, interval, int(count[-1]) + 1 if len(count) else 0, source, 0.0, tuple(remarks))
-    row = np.full(len(placed.time), -1, dtype=np.intp)
+    placed = _even(start, interval, int(count[-1]) + 1 if len(count) else 0, source, remarks)
+    row = np.full(len(placed.axis.time), -1, dtype=np.intp)
     row[count] = np.arange(len(count))
     return replace(placed, row=row)
 
@@ -256,7 +248,7 @@ def _by_line(
         if line.is_rounded:
             begin = float(instants[0]) if np.isfinite(instants[0]) else line.start
             source = "the first instant, and the sampling interval of the header"
-            return _even(begin, own, length, source, 0.0, tuple(remarks))
+            return _even(begin, own, length, source, remarks)
     if declared and len(agreeing) < len(declared):
         spread = [line.interval, *declared]
         uncertainty = (max(spread) - min(spread)) / line.interval
@@ -267,8 +259,8 @@ def _by_line(
             f"{uncertainty:.1%}"
         )
         source = f"the column of instants ({line.interval:.6g} s); the header says {said} s"
-        return _even(line.start, line.interval, length, source, uncertainty, tuple(remarks))
-    placed = _even(line.start, line.interval, length, "the column of instants", 0.0, tuple(remarks))
+        return _even(line.start, line.interval, length, source, remarks, uncertainty)
+    placed = _even(line.start, line.interval, length, "the column of instants", remarks)
     gone = ~np.isfinite(instants)
     placed.suspect[: len(instants)][gone] = True
     return placed
@@ -293,7 +285,7 @@ def _uneven(instants: Floats) -> Placement:
     row, suspect, remarks = _in_order(instants)
     time = instants[row]
     if len(time) < 2:
-        return Placement(time, None, 0.0, "the column of instants", row, suspect, tuple(remarks))
+        return Placement(TimeAxis(time, None, source="the column of instants"), row, suspect, tuple(remarks))
     filled = _with_gaps(time)
     if filled is None:
         steps = np.diff(time)
@@ -301,7 +293,8 @@ def _uneven(instants: Floats) -> Placement:
             f"the samples are not evenly spaced ({steps.min():.6g} to {steps.max():.6g} s apart): "
             "their instants are kept"
         )
-        return Placement(time, None, 0.0, "the column of instants, uneven", row, suspect, tuple(remarks))
+        axis = TimeAxis(time, None, source="the column of instants, uneven")
+        return Placement(axis, row, suspect, tuple(remarks))
     gaps, line = filled
     count = np.arange(len(row)) + gaps.before(np.arange(len(row)))
     source = "the column of instants, its gaps filled"

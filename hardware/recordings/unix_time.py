@@ -30,26 +30,18 @@ def counted_from_start(tables: Sequence[Table]) -> tuple[list[Table], list[str],
     attrs : dict
         `source_date` of the first instant.
     """
-    parts = [None if table.time is None else _parts_of(table.time) for table in tables]
-    firsts = [
-        _first(table.time) / part
-        for table, part in zip(tables, parts, strict=True)
-        if part and table.time is not None
+    counting = [
+        (table.time, part)
+        for table in tables
+        if table.time is not None and (part := _parts_of(table.time)) is not None
     ]
-    if not firsts:
+    if not counting:
         return list(tables), [], {}
-    origin = min(firsts)
-    counted = [
-        table if part is None or table.time is None else replace(table, time=_since(table.time, origin, part))
-        for table, part in zip(tables, parts, strict=True)
-    ]
+    origin = min(float(time.values[np.isfinite(time.values)][0]) / part for time, part in counting)
     date = str(np.datetime64(round(origin * 1e6), "us"))
-    what = " and ".join(dict.fromkeys(_PARTS[part] for part in parts if part))
-    return (
-        counted,
-        [f"the instants are {what} since 1970: they are counted from {date} (UTC)"],
-        {"source_date": date},
-    )
+    what = " and ".join(dict.fromkeys(_PARTS[part] for _, part in counting))
+    remark = f"the instants are {what} since 1970: they are counted from {date} (UTC)"
+    return [_since(table, origin) for table in tables], [remark], {"source_date": date}
 
 
 def _parts_of(time: Column) -> float | None:
@@ -63,12 +55,16 @@ def _parts_of(time: Column) -> float | None:
     return None
 
 
-def _first(time: Column) -> float:
-    return float(time.values[np.isfinite(time.values)][0])
+def _since(table: Table, origin: float) -> Table:
+    """Return a table whose instants count from an origin (s since 1970), if they counted from 1970.
 
-
-def _since(time: Column, origin: float, part: float) -> Column:
-    """Return instants from an origin (s since 1970); what binary took of their last digits is put back or dropped."""
-    left = float(np.spacing(np.abs(time.values[np.isfinite(time.values)]).max())) / part
-    step = decimal_step(time.values) / part or 10.0 ** np.ceil(np.log10(left))
-    return replace(time, values=np.rint((time.values - origin * part) / part / step) * step, unit="s")
+    What binary took of their last digits is put back or dropped.
+    """
+    part = None if table.time is None else _parts_of(table.time)
+    if table.time is None or part is None:
+        return table
+    values = table.time.values
+    left = float(np.spacing(np.abs(values[np.isfinite(values)]).max())) / part
+    step = decimal_step(values) / part or 10.0 ** np.ceil(np.log10(left))
+    since = np.rint((values - origin * part) / part / step) * step
+    return replace(table, time=replace(table.time, values=since, unit="s"))

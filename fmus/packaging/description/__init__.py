@@ -5,8 +5,6 @@ README come from the same file. Imports the standard library only: the package's
 """
 
 from vibroimpact.fmus.packaging.description.c_header import c_header, header_name
-from vibroimpact.fmus.packaging.description.fmi2_xml import fmi2_xml
-from vibroimpact.fmus.packaging.description.fmi3_xml import fmi3_xml
 from vibroimpact.fmus.packaging.description.model import (
     ComponentDescription,
     Enumeration,
@@ -15,6 +13,7 @@ from vibroimpact.fmus.packaging.description.model import (
     Variable,
     plural,
 )
+from vibroimpact.fmus.packaging.description.model_xml import model_description, unit_definitions
 from vibroimpact.fmus.packaging.description.reading import read_component
 from vibroimpact.fmus.packaging.description.readme_table import readme_table, with_table
 
@@ -25,11 +24,11 @@ __all__ = [
     "UnitDefinition",
     "Variable",
     "c_header",
-    "fmi2_xml",
-    "fmi3_xml",
     "header_name",
+    "model_description",
     "plural",
     "read_component",
     "readme_table",
+    "unit_definitions",
     "with_table",
 ]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import tomllib
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -24,12 +23,12 @@ from vibroimpact.fmus.packaging.description.model import (
     Variable,
     plural,
 )
+from vibroimpact.fmus.units import BASE_UNITS
 
 #: Namespace of the tokens: a uuid5 of the bytes of variables.toml in it, so equal files have equal tokens.
 TOKEN_NAMESPACE = uuid.uuid5(uuid.NAMESPACE_DNS, "vibroimpact")
 
 TYPES = ("Float64", "Int64", "Boolean", "Enumeration")
-BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 REQUIRED_KEYS = {"name", "description", "causality", "variability", "type", "field", "code"}
 OPTIONAL_KEYS = {
     *("unit", "enumeration", "start", "min", "max", "initial"),
@@ -135,11 +134,9 @@ def _repeat_count(head: Mapping[str, Any], repeat: str) -> int | None:
 def _numbered(entries: list[Mapping[str, Any]], repeats: Mapping[str, int]) -> Iterator[Variable]:
     blocks = {entry["name"]: entry.get("repeat", "") for entry in entries}
     for reference, (entry, index) in enumerate(_written_out(entries, repeats)):
-        variable = _variable(entry, index, reference)
-        if variable.dependencies is not None:
-            written = (_dependency(d, index, blocks, repeats) for d in entry["dependencies"])
-            variable = replace(variable, dependencies=tuple(name for names in written for name in names))
-        yield variable
+        written = (_dependency(d, index, blocks, repeats) for d in entry.get("dependencies", ()))
+        dependencies = tuple(name for names in written for name in names)
+        yield _variable(entry, index, reference, dependencies if "dependencies" in entry else None)
 
 
 def _dependency(
@@ -162,9 +159,9 @@ def _written_out(
             yield from ((entry, index) for entry in members)
 
 
-def _variable(entry: Mapping[str, Any], index: int, reference: int) -> Variable:
-    dimensions = tuple(entry.get("dimensions", ()))
-    dependencies = entry.get("dependencies")
+def _variable(
+    entry: Mapping[str, Any], index: int, reference: int, dependencies: tuple[str, ...] | None
+) -> Variable:
     default = DEFAULT_INITIAL[entry["causality"], entry["variability"]]
     return Variable(
         name=_indexed(entry["name"], index),
@@ -181,8 +178,8 @@ def _variable(entry: Mapping[str, Any], index: int, reference: int) -> Variable:
         start=entry.get("start"),
         minimum=entry.get("min"),
         maximum=entry.get("max"),
-        dimensions=dimensions,
-        dependencies=None if dependencies is None else tuple(dependencies),
+        dimensions=tuple(entry.get("dimensions", ())),
+        dependencies=dependencies,
         versions=_versions(entry),
         repeat=entry.get("repeat", ""),
         repeat_index=index,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.packaging.description.model import ComponentDescription, Variable
-from vibroimpact.fmus.packaging.description.xml_text import literal
+from vibroimpact.fmus.packaging.description.model_xml import literal
 
 BEGIN = "<!-- variables: generated from variables.toml -->"
 END = "<!-- end of variables -->"
@@ -13,7 +13,7 @@ END = "<!-- end of variables -->"
 def readme_table(component: ComponentDescription) -> str:
     """Return the Markdown table; a repeated block is shown once, with index k."""
     head = ["| variable | causality | unit | start | meaning |", "|---|---|---|---|---|"]
-    return "\n".join(head + [_row(component, v) for v in _shown_once(component)])
+    return "\n".join(head + [_row(component, v) for v in component.variables if v.repeat_index <= 1])
 
 
 def with_table(readme: str, component: ComponentDescription) -> str:
@@ -31,10 +31,6 @@ def with_table(readme: str, component: ComponentDescription) -> str:
             f"{component.folder}/README.md: expected the lines {BEGIN} and {END}, got none."
         )
     return f"{before}{BEGIN}\n{readme_table(component)}\n{END}{after}"
-
-
-def _shown_once(component: ComponentDescription) -> list[Variable]:
-    return [v for v in component.variables if v.repeat_index <= 1]
 
 
 def _row(component: ComponentDescription, variable: Variable) -> str:

@@ -13,9 +13,8 @@ from vibroimpact.fmus.packaging.compiler import find_compiler
 from vibroimpact.fmus.packaging.description import (
     ComponentDescription,
     c_header,
-    fmi2_xml,
-    fmi3_xml,
     header_name,
+    model_description,
     read_component,
     readme_table,
     with_table,
@@ -157,14 +156,14 @@ def test_value_references_count_through_the_file_block_by_block(small: Component
 
 @pytest.mark.slow
 @pytest.mark.parametrize("contacts", [0, 1, 2])
-@pytest.mark.parametrize("emit", [fmi2_xml, fmi3_xml])
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 def test_fmpy_finds_nothing_wrong_with_either_version(
-    small: ComponentDescription, tmp_path: Path, contacts: int, emit: object
+    small: ComponentDescription, tmp_path: Path, contacts: int, fmi: str
 ) -> None:
     # two masses or modes stand for all: FMPy takes seconds over a thousand names, which test_fmu_check spends
     for component in (small, *read_components()):
         repeats = {block: 2 for block in component.repeats} | {"contact": contacts}
-        text = (fmi2_xml if emit is fmi2_xml else fmi3_xml)(component.with_repeats(repeats))
+        text = model_description(component.with_repeats(repeats), fmi)
         (tmp_path / "modelDescription.xml").write_text(text, encoding="utf-8")
         assert validate_fmu(str(tmp_path)) == []
 
@@ -177,24 +176,24 @@ def test_fewer_contacts_leave_the_other_value_references_alone(small: ComponentD
 
 
 def test_fmi_2_has_no_arrays_and_no_time(small: ComponentDescription) -> None:
-    names = [a["name"] for a in attributes(fmi2_xml(small), "ScalarVariable")]
+    names = [a["name"] for a in attributes(model_description(small, "2.0"), "ScalarVariable")]
     assert "rows" not in names
     assert "time" not in names
     assert "gain" in names
 
 
 def test_outputs_depend_on_inputs_by_reference_or_by_position(small: ComponentDescription) -> None:
-    three = attributes(fmi3_xml(small), "Output")
+    three = attributes(model_description(small, "3.0"), "Output")
     assert {"valueReference": "3", "dependencies": "1"} in three
     assert {"valueReference": "7", "dependencies": ""} in three
-    outputs = ElementTree.fromstring(fmi2_xml(small)).find("ModelStructure/Outputs")
+    outputs = ElementTree.fromstring(model_description(small, "2.0")).find("ModelStructure/Outputs")
     assert outputs is not None
     # without time, push is the first variable of FMI 2.0
     assert outputs[0].attrib == {"index": "3", "dependencies": "1"}
 
 
 def test_numbers_are_spelled_as_xml_schema_wants(small: ComponentDescription) -> None:
-    starts = {a["name"]: a.get("start") for a in attributes(fmi3_xml(small), "Float64")}
+    starts = {a["name"]: a.get("start") for a in attributes(model_description(small, "3.0"), "Float64")}
     assert starts["gain"] == "INF"
     assert starts["push"] == "0.0"
 
@@ -202,8 +201,8 @@ def test_numbers_are_spelled_as_xml_schema_wants(small: ComponentDescription) ->
 def test_both_versions_and_the_c_code_have_one_token_that_follows_the_file(
     small: ComponentDescription, tmp_path: Path
 ) -> None:
-    assert f'instantiationToken="{small.token}"' in fmi3_xml(small)
-    assert f'guid="{small.token}"' in fmi2_xml(small)
+    assert f'instantiationToken="{small.token}"' in model_description(small, "3.0")
+    assert f'guid="{small.token}"' in model_description(small, "2.0")
     assert f'#define SMALL_TOKEN "{small.token}"' in c_header(small)
     other = tmp_path / "other.toml"
     other.write_text(SMALL + "# changed\n", encoding="utf-8")
@@ -329,10 +328,12 @@ def test_what_counts_a_block_starts_with_the_number_asked_for(joined: ComponentD
         (joined, ("4", "1", "6")),
         (joined.with_repeats({"mode": 2}), ("2", "1", "2")),
     ):
-        for text, tag in ((fmi3_xml(component), "Int64"), (fmi2_xml(component), "Integer")):
-            values = attributes(text, tag)[0]
+        for fmi, tag in (("3.0", "Int64"), ("2.0", "Integer")):
+            values = attributes(model_description(component, fmi), tag)[0]
             assert (values["start"], values["min"], values["max"]) == expected
-    (joined.source.parent / "modelDescription.xml").write_text(fmi3_xml(joined), encoding="utf-8")
+    (joined.source.parent / "modelDescription.xml").write_text(
+        model_description(joined, "3.0"), encoding="utf-8"
+    )
     assert validate_fmu(str(joined.source.parent)) == []
 
 

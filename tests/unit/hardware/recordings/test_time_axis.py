@@ -36,11 +36,11 @@ def test_samples_that_are_missing_on_an_even_grid_are_put_back_as_missing(
     whole = begin + interval * np.arange(count)
     kept = np.setdiff1d(np.arange(count), list(lost))
     placement = placed(whole[kept])
-    assert len(placement.time) == count
+    assert len(placement.axis.time) == count
     assert placement.missing == len(lost)
     np.testing.assert_array_equal(np.flatnonzero(placement.row >= 0), kept)
-    assert placement.interval == pytest.approx(interval, rel=1e-6)
-    np.testing.assert_allclose(placement.time, whole, rtol=0.0, atol=1e-3 * interval)
+    assert placement.axis.interval == pytest.approx(interval, rel=1e-6)
+    np.testing.assert_allclose(placement.axis.time, whole, rtol=0.0, atol=1e-3 * interval)
 
 
 @pytest.mark.parametrize("digits", [3, 4, 5, 6])
@@ -48,15 +48,15 @@ def test_even_instants_are_recognized_behind_their_rounding(digits: int) -> None
     """20 kHz: with three digits twenty rows share an instant."""
     exact = np.arange(8000) * 5e-5
     placement = placed(np.round(exact, digits))
-    assert placement.interval == pytest.approx(5e-5, rel=1e-3 * 10.0 ** (3 - digits))
-    np.testing.assert_allclose(placement.time, exact, rtol=0.0, atol=0.6 * 10.0**-digits)
+    assert placement.axis.interval == pytest.approx(5e-5, rel=1e-3 * 10.0 ** (3 - digits))
+    np.testing.assert_allclose(placement.axis.time, exact, rtol=0.0, atol=0.6 * 10.0**-digits)
 
 
 def test_a_clock_that_jitters_is_kept_as_it_is() -> None:
     instants = np.cumsum(RANDOM.uniform(0.04, 0.06, 300))
     placement = placed(instants)
-    assert placement.interval is None
-    np.testing.assert_array_equal(placement.time, instants)
+    assert placement.axis.interval is None
+    np.testing.assert_array_equal(placement.axis.time, instants)
     assert "not evenly spaced" in placement.remarks[-1]
 
 
@@ -65,7 +65,7 @@ def test_repeated_and_swapped_rows_are_put_right_and_marked() -> None:
     instants[[40, 41]] = instants[[41, 40]]
     instants = np.insert(instants, 70, instants[70])
     placement = placed(instants)
-    np.testing.assert_allclose(placement.time, np.arange(100) * 0.1, atol=1e-12)
+    np.testing.assert_allclose(placement.axis.time, np.arange(100) * 0.1, atol=1e-12)
     assert np.flatnonzero(placement.suspect).tolist() == [40, 41, 70]
     assert placement.row[[40, 41, 70, 71]].tolist() == [41, 40, 70, 72]
     assert "go back 1 times" in placement.remarks[0]
@@ -83,7 +83,7 @@ def test_rows_without_an_instant_are_counted_on() -> None:
     instants = np.arange(50) * 0.25
     instants[[10, 11, 30]] = np.nan
     placement = placed(instants)
-    np.testing.assert_allclose(placement.time, np.arange(50) * 0.25, atol=1e-12)
+    np.testing.assert_allclose(placement.axis.time, np.arange(50) * 0.25, atol=1e-12)
     assert np.flatnonzero(placement.suspect).tolist() == [10, 11, 30]
 
 
@@ -95,14 +95,16 @@ def test_the_uncertainty_of_contradicting_intervals_is_their_whole_spread() -> N
     table = Table(columns, time)
     for column in columns:
         placement = place(table, column)
-        assert placement.interval == pytest.approx(0.000605, rel=1e-9)
-        assert placement.uncertainty == pytest.approx((0.000606 - 0.000586) / 0.000605, rel=1e-9)
-        assert len(placement.time) == len(column.values)
+        assert placement.axis.interval == pytest.approx(0.000605, rel=1e-9)
+        assert placement.axis.interval_uncertainty == pytest.approx(
+            (0.000606 - 0.000586) / 0.000605, rel=1e-9
+        )
+        assert len(placement.axis.time) == len(column.values)
 
 
 def test_the_rate_of_the_user_is_used_and_what_contradicts_it_is_told() -> None:
     placement = placed(np.arange(40) * 0.01, interval=0.02, rate=1000.0)
-    assert placement.interval == 0.001
+    assert placement.axis.interval == 0.001
     assert len(placement.remarks) == 2
 
 
@@ -114,7 +116,7 @@ def test_a_gap_stays_a_gap_under_the_rate_of_the_user(digits: int, lost: int) ->
     kept = np.delete(np.arange(3000), np.arange(900, 900 + lost))
     placement = placed(np.round(whole[kept], digits), rate=5120.0)
     np.testing.assert_array_equal(np.flatnonzero(placement.row >= 0), kept)
-    np.testing.assert_allclose(placement.time, whole, rtol=0.0, atol=0.6 * 10.0**-digits)
+    np.testing.assert_allclose(placement.axis.time, whole, rtol=0.0, atol=0.6 * 10.0**-digits)
     (told,) = placement.remarks
     assert told.startswith(f"{lost} sample")
     assert "missing in 1 gap" in told
@@ -124,7 +126,7 @@ def test_a_gap_in_instants_that_a_rate_contradicts_stays_a_gap_too() -> None:
     kept = np.delete(np.arange(60), [20, 21, 22])
     placement = placed(kept * 0.01, rate=1000.0)
     np.testing.assert_array_equal(np.flatnonzero(placement.row < 0), [20, 21, 22])
-    assert placement.interval == 0.001
+    assert placement.axis.interval == 0.001
     assert ["0.01 s apart" in placement.remarks[0], "3 samples are missing" in placement.remarks[1]] == [
         True
     ] * 2
@@ -136,7 +138,7 @@ def test_a_gap_of_thousands_of_samples_between_rounded_instants_is_counted_exact
     for rate in (None, 5120.0):
         placement = placed(np.round(kept / 5120.0, 6), rate=rate)
         np.testing.assert_array_equal(np.flatnonzero(placement.row >= 0), kept)
-        assert placement.interval == pytest.approx(1.0 / 5120.0, rel=1e-6)
+        assert placement.axis.interval == pytest.approx(1.0 / 5120.0, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -149,7 +151,7 @@ def test_a_gap_of_thousands_of_samples_between_rounded_instants_is_counted_exact
 )
 def test_a_gap_that_the_rate_of_the_user_closes_is_said(instants: Floats) -> None:
     placement = placed(instants, rate=1000.0)
-    assert len(placement.time) == len(instants)
+    assert len(placement.axis.time) == len(instants)
     assert "one after the other, and closes" in placement.remarks[-1]
 
 
@@ -165,14 +167,14 @@ def test_a_clock_without_gaps_says_nothing_of_gaps_under_its_own_rate(step: floa
 def test_instants_since_1970_are_even_within_their_digits() -> None:
     """Six decimals of some 1.8e9 s at 5120 Hz; in binary a quarter of the last one is lost."""
     placement = placed(np.round(1795255200.0 + np.arange(4000) / 5120.0, 6))
-    assert placement.interval == pytest.approx(1.0 / 5120.0, rel=1e-6)
+    assert placement.axis.interval == pytest.approx(1.0 / 5120.0, rel=1e-6)
 
 
 def test_a_record_far_longer_than_its_rows_is_not_filled() -> None:
     instants = np.concatenate([np.arange(50) * 1e-3, [1e6, 1e6 + 1e-3]])
     placement = placed(instants)
     assert placement.missing == 0
-    assert len(placement.time) == 52
+    assert len(placement.axis.time) == 52
 
 
 def test_a_clock_that_begins_again_makes_two_records() -> None:

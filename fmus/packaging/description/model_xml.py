@@ -1,0 +1,179 @@
+"""modelDescription.xml of FMI 2.0 and 3.0, which say the same in different words.
+
+FMI 3.0 names unknowns by their value references, FMI 2.0 by their position, counted from 1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from vibroimpact.fmus.packaging.description.model import (
+    ComponentDescription,
+    Enumeration,
+    Number,
+    UnitDefinition,
+    Variable,
+)
+
+LOG_CATEGORIES = {
+    "logStatusError": "Why a call failed",
+    "logStatusWarning": "What is unusual but was dealt with",
+    "logEvents": "Contacts, sticking and release, as they happen",
+}
+#: Start and stop time and step that a tool offers first, s.
+DEFAULT_EXPERIMENT = {"startTime": "0", "stopTime": "10", "stepSize": "0.01"}
+FMI2_TYPES = {"Float64": "Real", "Int64": "Integer", "Boolean": "Boolean", "Enumeration": "Enumeration"}
+
+
+def model_description(component: ComponentDescription, fmi: str) -> str:
+    """Return a component's model description; the same component gives the same bytes.
+
+    Parameters
+    ----------
+    component : ComponentDescription
+    fmi : str
+        `2.0` or `3.0`. Variables that only FMI 3.0 knows are left out for `2.0`.
+    """
+    version = int(fmi[0])
+    identity = {"fmiVersion": fmi, "guid" if version == 2 else "instantiationToken": component.token}
+    head = {
+        "modelName": component.name,
+        "description": component.description,
+        "author": "vibroimpact developers",
+        "license": "BSD-3-Clause",
+        "generationTool": "vibroimpact",
+        "variableNamingConvention": "structured",
+    }
+    root = Element("fmiModelDescription", identity | head)
+    SubElement(root, "CoSimulation", _capabilities(component, version))
+    if component.units:
+        root.append(unit_definitions(component.units))
+    _add_types(root, component.enumerations, version)
+    categories = SubElement(root, "LogCategories")
+    for name, description in LOG_CATEGORIES.items():
+        SubElement(categories, "Category", name=name, description=description)
+    SubElement(root, "DefaultExperiment", DEFAULT_EXPERIMENT)
+    variables = SubElement(root, "ModelVariables")
+    for variable in component.variables_of(version):
+        _add_variable(variables, variable, version)
+    _add_structure(root, component, version)
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def literal(value: Number) -> str:
+    """Return a value as XML Schema spells it: `true`, `INF`, `NaN`, and the shortest exact decimal."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int):
+        return str(value)
+    if math.isfinite(value):
+        return repr(value)
+    return "NaN" if math.isnan(value) else ("INF" if value > 0 else "-INF")
+
+
+def _capabilities(component: ComponentDescription, version: int) -> dict[str, str]:
+    if version == 2:
+        return {
+            "modelIdentifier": component.name,
+            "canHandleVariableCommunicationStepSize": "true",
+            "canBeInstantiatedOnlyOncePerProcess": "false",
+            "canGetAndSetFMUstate": "true",
+            "canSerializeFMUstate": "true",
+        }
+    events = literal(component.event_mode)
+    return {
+        "modelIdentifier": component.name,
+        "canBeInstantiatedOnlyOncePerProcess": "false",
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "canHandleVariableCommunicationStepSize": "true",
+        "mightReturnEarlyFromDoStep": events,
+        "canReturnEarlyAfterIntermediateUpdate": "false",
+        "hasEventMode": events,
+    }
+
+
+def unit_definitions(units: Iterable[UnitDefinition]) -> Element:
+    """Return UnitDefinitions, which are the same in both versions."""
+    definitions = Element("UnitDefinitions")
+    for unit in units:
+        base = {name: str(exponent) for name, exponent in unit.base.items() if exponent}
+        if unit.factor != 1.0:
+            base["factor"] = literal(float(unit.factor))
+        if unit.offset != 0.0:
+            base["offset"] = literal(float(unit.offset))
+        SubElement(SubElement(definitions, "Unit", name=unit.name), "BaseUnit", base)
+    return definitions
+
+
+def _add_types(root: Element, enumerations: tuple[Enumeration, ...], version: int) -> None:
+    if not enumerations:
+        return
+    definitions = SubElement(root, "TypeDefinitions")
+    for enumeration in enumerations:
+        named = _present({"name": enumeration.name, "description": enumeration.description})
+        if version == 2:
+            element = SubElement(SubElement(definitions, "SimpleType", named), "Enumeration")
+        else:
+            element = SubElement(definitions, "EnumerationType", named)
+        for item in enumeration.items:
+            values = {"name": item.name, "value": str(item.value), "description": item.description}
+            SubElement(element, "Item", _present(values))
+
+
+def _add_variable(parent: Element, variable: Variable, version: int) -> None:
+    attributes = {
+        "name": variable.name,
+        "valueReference": str(variable.value_reference),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "initial": variable.initial,
+    }
+    if version == 2:
+        scalar = SubElement(parent, "ScalarVariable", _present(attributes))
+        SubElement(scalar, FMI2_TYPES[variable.type], _value_attributes(variable))
+        return
+    element = SubElement(parent, variable.type, _present(attributes) | _value_attributes(variable))
+    for size in variable.dimensions:
+        SubElement(element, "Dimension", start=str(size))
+
+
+def _value_attributes(variable: Variable) -> dict[str, str]:
+    """Return the attributes of a variable's value: declared type, unit, bounds, start."""
+    attributes = {"declaredType": variable.enumeration, "unit": variable.unit}
+    for key, value in (("min", variable.minimum), ("max", variable.maximum), ("start", variable.start)):
+        if value is not None:  # TOML's `1` is `1.0` for a Float64
+            attributes[key] = literal(float(value) if variable.type == "Float64" else value)
+    return _present(attributes)
+
+
+def _present(attributes: Mapping[str, str | None]) -> dict[str, str]:
+    """Return the attributes that have a value."""
+    return {key: value for key, value in attributes.items() if value}
+
+
+def _add_structure(root: Element, component: ComponentDescription, version: int) -> None:
+    variables = component.variables_of(version)
+    if version == 2:
+        key, references = "index", {v.name: str(place) for place, v in enumerate(variables, 1)}
+    else:
+        key, references = "valueReference", {v.name: str(v.value_reference) for v in variables}
+    structure = SubElement(root, "ModelStructure")
+    for kind, unknowns in (
+        ("Output", [v for v in variables if v.causality == "output"]),
+        ("InitialUnknown", [v for v in variables if v.is_initial_unknown]),
+    ):
+        # FMI 2.0 has a list of each kind, and none that is empty
+        parent = SubElement(structure, f"{kind}s") if version == 2 and unknowns else structure
+        for variable in unknowns:
+            unknown = SubElement(
+                parent, "Unknown" if version == 2 else kind, {key: references[variable.name]}
+            )
+            if kind == "Output" and variable.dependencies is not None:
+                inputs = component.direct_inputs(variable, version)
+                unknown.set("dependencies", " ".join(references[name] for name in inputs))
