@@ -188,6 +188,15 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     return ChunkResult(done, carried, outcomes, computed - began, time.perf_counter() - computed)
 
 
+def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
+    """Run the points of a chunk, kept ones too, and return their rows; nothing is written."""
+    opened = _opened(work.scene_text, work.source, work.runner)
+    _refuse_other_runner(work, opened.runner)
+    points = points_of(opened.branches, chunk)
+    records, _ = run_points(opened.scene, opened.runner, points, chunk.start)
+    return dataset_of(opened.scene, points, records, {})
+
+
 def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     """Write the part of points that kill the process that runs them; nothing of the points is run."""
     began = time.perf_counter()
