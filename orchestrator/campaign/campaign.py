@@ -12,8 +12,10 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,6 @@ from vibroimpact.orchestrator.campaign.chunks import (
     DEFAULT_RUNNER,
     Chunk,
     ChunkResult,
-    RunnerIdentity,
     Work,
     get_ready,
 )
@@ -63,15 +64,19 @@ from vibroimpact.orchestrator.campaign.parts import (
     remove_temporary_files,
     unfit_parts,
 )
-from vibroimpact.orchestrator.campaign.progress import Progress, Silence
+from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
+from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
 MOST_ROUNDS = 3
 """How often parts that turn out unfit are computed again by one command."""
 MOST_NAMED = 5
+
+
+OpenedWorkers = Callable[[], AbstractContextManager[WorkerPool]]
 
 
 class CampaignInterrupted(KeyboardInterrupt):
@@ -150,8 +155,9 @@ def run_campaign(
     home = Path(folder).absolute()
     make_folder(home)
     with locked_folder(home):
-        campaign = _Campaign(scene, home, runner, progress or Silence())
-        return campaign.finished_before() or campaign.run(workers, scheduler)
+        campaign = _Campaign(scene, home, runner, progress or Progress())
+        opened = partial(open_workers, workers=workers, scheduler=scheduler, progress=progress)
+        return campaign.finished_before() or campaign.run(opened)
 
 
 class _Campaign:
@@ -234,14 +240,14 @@ class _Campaign:
             write_dataset(rows.assign_attrs(attributes), self._report.dataset)
             self._progress.note(f"{self._report.dataset} has the title {self._scene.title!r} now.")
 
-    def run(self, workers: int | None, scheduler: str | Client | None) -> CampaignReport:
+    def run(self, workers: OpenedWorkers) -> CampaignReport:
         """Compute what is left and compact it; parts that turn out unfit are computed again."""
         make_folder(self._parts_folder)
         remove_temporary_files(self._home)
         unfit: list[tuple[Path, str]] = []
         try:
             for _ in range(MOST_ROUNDS):
-                paths = self._complete(workers, scheduler)
+                paths = self._complete(workers)
                 unfit = self._compact(paths)
                 if not unfit:
                     return self._report
@@ -253,7 +259,7 @@ class _Campaign:
             f"{MOST_ROUNDS} times: {names}"
         )
 
-    def _complete(self, workers: int | None, scheduler: str | Client | None) -> list[Path]:
+    def _complete(self, workers: OpenedWorkers) -> list[Path]:
         """Compute what no part holds, and return the files that hold all runs."""
         remove_temporary_files(self._parts_folder)
         self._report.chunks.clear()
@@ -266,7 +272,7 @@ class _Campaign:
         )
         stored = [part.path for part in parts] + ([kept.path] if kept is not None else [])
         if self._report.resumed < self._report.runs:
-            self._compute_on(held, stored, workers, scheduler)
+            self._compute_on(held, stored, workers)
         return stored + [self._parts_folder / chunk.part_name for chunk in self._report.chunks]
 
     def _read_kept(self) -> Kept | None:
@@ -292,15 +298,11 @@ class _Campaign:
         )
 
     def _compute_on(
-        self,
-        parts: Sequence[StoredPart],
-        stored: Sequence[Path],
-        workers: int | None,
-        scheduler: str | Client | None,
+        self, parts: Sequence[StoredPart], stored: Sequence[Path], workers: OpenedWorkers
     ) -> None:
         try:
-            with open_workers(workers=workers, scheduler=scheduler, progress=self._progress) as pool:
-                if scheduler is not None:
+            with workers() as pool:
+                if not pool.is_local:
                     refuse_blind_workers(pool, self._home)
                 work = replace(self._work, identity=_common_identity(pool, self._work))
                 self._agree_with_manifest(pool, work, stored)

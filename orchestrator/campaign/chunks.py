@@ -28,7 +28,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
-from vibroimpact.orchestrator.run import Runner, dataset_of_runs, named_runner
+from vibroimpact.orchestrator.run import Runner, RunnerIdentity, dataset_of_runs, identity_of, named_runner
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Point, expand
@@ -45,15 +45,6 @@ CARRYING = (Outcome.ok, Outcome.stuck)
 
 State = tuple[float, ...]
 """Displacement (m) and velocity (m/s) of an oscillator; of a structure N displacements, then N velocities."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunnerIdentity:
-    """What must be the same for all points of a campaign, or its rows could not be compared."""
-
-    execution: str
-    instruction_set: str
-    fmu_hashes: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,11 +138,6 @@ class _Opened:
 def _opened(scene_text: str, source: str, runner: str) -> _Opened:
     scene = parse_scene(scene_text, source)
     return _Opened(scene, expand(scene), named_runner(scene, runner))
-
-
-def identity_of(runner: Runner) -> RunnerIdentity:
-    """Return what a runner is: its execution, instruction set and FMU hashes."""
-    return RunnerIdentity(runner.execution, runner.instruction_set, dict(runner.fmu_hashes))
 
 
 def get_ready(work: Work) -> RunnerIdentity:

@@ -15,8 +15,8 @@ from typing import Any, NoReturn
 
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.orchestrator.campaign.chunks import RunnerIdentity
 from vibroimpact.orchestrator.campaign.provenance import git_commit, provenance, versions
+from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 FORMAT = 2
@@ -158,14 +158,11 @@ def add_build(path: Path, identity: RunnerIdentity, compared: int) -> None:
         "points_compared": compared,
     }
     content["continued_with"] = [*content.get("continued_with", ()), build]
-    if content.pop("sha256", None) is None:
-        # Format 1: the hash of its scene is all that it has.
-        write_atomically(path, json.dumps(content, indent=1).encode())
-    else:
-        _write(path, content)
+    _write(path, content)
 
 
 def _write(path: Path, content: dict[str, Any]) -> None:
+    content.pop("sha256", None)
     content["sha256"] = _hash_of(content)
     write_atomically(path, json.dumps(content, indent=1).encode())
 
