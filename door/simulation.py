@@ -17,7 +17,7 @@ from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import SceneCost, run_campaign, run_scene
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
-from vibroimpact.orchestrator.campaign.progress import Progress, Silence, shown_progress
+from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
 from vibroimpact.orchestrator.replay.replaying import replay_scene
 from vibroimpact.orchestrator.scene import Scene
 
@@ -224,7 +224,7 @@ def _path(given: object) -> Path:
 
 
 def _shown(progress: bool) -> AbstractContextManager[Progress]:
-    return shown_progress() if progress else nullcontext(Silence())
+    return shown_progress() if progress else nullcontext(Progress())
 
 
 def _refuse_workers(workers: int | None, scheduler: object) -> None:

@@ -7,6 +7,7 @@ stranger's `scipy.py` beside a recording, would be imported in place of what it 
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -50,3 +51,17 @@ def _nameless_main() -> Iterator[None]:
         yield
     finally:
         main.update(names)
+
+
+def ending(code: int | None) -> str:
+    """Return in words how a process ended, by its exit code (negative: the signal).
+
+    >>> ending(3), ending(-9)
+    ('ended with exit code 3', 'was ended by SIGKILL')
+    """
+    if code is None or code >= 0:
+        return f"ended with exit code {code}"
+    try:
+        return f"was ended by {signal.Signals(-code).name}"
+    except ValueError:
+        return f"was ended by signal {-code}"

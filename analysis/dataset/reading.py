@@ -23,7 +23,6 @@ from vibroimpact.analysis.dataset.schema import (
     RULES,
     SCHEMA_VERSION,
     Direction,
-    Outcome,
     constant_names,
     swept_names,
 )
@@ -42,19 +41,11 @@ class Part:
     Attributes
     ----------
     run_index : ndarray of int, shape (run,)
-    final_displacement, final_velocity, final_phase : float
-        State of the last run at its end (m, m/s, rad).
-    last_outcome : Outcome
-        Outcome of the last run.
     attrs : dict
         Global attributes.
     """
 
     run_index: NDArray[np.int32]
-    final_displacement: float
-    final_velocity: float
-    final_phase: float
-    last_outcome: Outcome
     attrs: dict[str, Any]
 
 
@@ -76,7 +67,7 @@ def _refuse_foreign(path: str | os.PathLike[str], attributes: Any, variables: An
 
 
 def read_part(path: str | os.PathLike[str]) -> Part:
-    """Read what resuming needs of a part: which runs it holds and the final state of the last one.
+    """Read what resuming needs of a part: which runs it holds, and its attributes.
 
     Raises
     ------
@@ -88,13 +79,8 @@ def read_part(path: str | os.PathLike[str]) -> Part:
             raise DatasetError(
                 f"{os.fspath(path)}: expected a part with at least one run, got none. Delete the file."
             )
-        variables = file.variables
         return Part(
-            run_index=variables["run_index"][:],
-            final_displacement=float(variables["final_displacement"][-1]),
-            final_velocity=float(variables["final_velocity"][-1]),
-            final_phase=float(variables["final_phase"][-1]),
-            last_outcome=Outcome(int(variables["outcome"][-1])),
+            run_index=file.variables["run_index"][:],
             attrs={name: file.getncattr(name) for name in file.ncattrs()},
         )
 

@@ -84,14 +84,14 @@ class RunRecord:
 
     outcome: Outcome
     message: str
-    periods: NDArray[np.float64] | None
-    impacts: NDArray[np.float64] | None
-    sticks: NDArray[np.float64] | None
-    samples: NDArray[np.float64] | None
-    final_displacement: float
-    final_velocity: float
-    final_phase: float
-    seconds: float
+    periods: NDArray[np.float64] | None = None
+    impacts: NDArray[np.float64] | None = None
+    sticks: NDArray[np.float64] | None = None
+    samples: NDArray[np.float64] | None = None
+    final_displacement: float = np.nan
+    final_velocity: float = np.nan
+    final_phase: float = np.nan
+    seconds: float = 0.0
     events: NDArray[np.float64] | None = None
     energy_residual: NDArray[np.float64] | None = None
     loop_residual: float | None = None

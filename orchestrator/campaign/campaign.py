@@ -12,8 +12,10 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,6 @@ from vibroimpact.orchestrator.campaign.chunks import (
     DEFAULT_RUNNER,
     Chunk,
     ChunkResult,
-    RunnerIdentity,
     Work,
     get_ready,
 )
@@ -42,14 +43,17 @@ from vibroimpact.orchestrator.campaign.extension import (
 )
 from vibroimpact.orchestrator.campaign.manifest import (
     Manifest,
+    add_build,
     differences,
     flat_scene,
     read_manifest,
     refuse_other_runner,
     refuse_other_scene,
+    runner_differences,
     scene_hash,
     write_manifest,
 )
+from vibroimpact.orchestrator.campaign.other_build import compare_with_stored
 from vibroimpact.orchestrator.campaign.parts import (
     NO_RUNS,
     StoredPart,
@@ -60,16 +64,19 @@ from vibroimpact.orchestrator.campaign.parts import (
     remove_temporary_files,
     unfit_parts,
 )
-from vibroimpact.orchestrator.campaign.progress import Progress, Silence
-from vibroimpact.orchestrator.campaign.provenance import provenance
+from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
+from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
 MOST_ROUNDS = 3
 """How often parts that turn out unfit are computed again by one command."""
 MOST_NAMED = 5
+
+
+OpenedWorkers = Callable[[], AbstractContextManager[WorkerPool]]
 
 
 class CampaignInterrupted(KeyboardInterrupt):
@@ -148,8 +155,9 @@ def run_campaign(
     home = Path(folder).absolute()
     make_folder(home)
     with locked_folder(home):
-        campaign = _Campaign(scene, home, runner, progress or Silence())
-        return campaign.finished_before() or campaign.run(workers, scheduler)
+        campaign = _Campaign(scene, home, runner, progress or Progress())
+        opened = partial(open_workers, workers=workers, scheduler=scheduler, progress=progress)
+        return campaign.finished_before() or campaign.run(opened)
 
 
 class _Campaign:
@@ -236,14 +244,14 @@ class _Campaign:
             write_dataset(rows.assign_attrs(attributes), self._report.dataset)
             self._progress.note(f"{self._report.dataset} has the title {self._scene.title!r} now.")
 
-    def run(self, workers: int | None, scheduler: str | Client | None) -> CampaignReport:
+    def run(self, workers: OpenedWorkers) -> CampaignReport:
         """Compute what is left and compact it; parts that turn out unfit are computed again."""
         make_folder(self._parts_folder)
         remove_temporary_files(self._home)
         unfit: list[tuple[Path, str]] = []
         try:
             for _ in range(MOST_ROUNDS):
-                paths = self._complete(workers, scheduler)
+                paths = self._complete(workers)
                 unfit = self._compact(paths)
                 if not unfit:
                     return self._report
@@ -255,7 +263,7 @@ class _Campaign:
             f"{MOST_ROUNDS} times: {names}"
         )
 
-    def _complete(self, workers: int | None, scheduler: str | Client | None) -> list[Path]:
+    def _complete(self, workers: OpenedWorkers) -> list[Path]:
         """Compute what no part holds, and return the files that hold all runs."""
         remove_temporary_files(self._parts_folder)
         self._report.chunks.clear()
@@ -266,10 +274,10 @@ class _Campaign:
         held = sorted(
             [*parts, *(kept.stretches if kept is not None else ())], key=lambda part: part.chunk.first
         )
+        stored = [part.path for part in parts] + ([kept.path] if kept is not None else [])
         if self._report.resumed < self._report.runs:
-            self._compute_on(held, workers, scheduler)
-        computed = [self._parts_folder / chunk.part_name for chunk in self._report.chunks]
-        return [part.path for part in parts] + computed + ([kept.path] if kept is not None else [])
+            self._compute_on(held, stored, workers)
+        return stored + [self._parts_folder / chunk.part_name for chunk in self._report.chunks]
 
     def _read_kept(self) -> Kept | None:
         for path in own_files(self._parts_folder):
@@ -294,37 +302,49 @@ class _Campaign:
         )
 
     def _compute_on(
-        self, parts: Sequence[StoredPart], workers: int | None, scheduler: str | Client | None
+        self, parts: Sequence[StoredPart], stored: Sequence[Path], workers: OpenedWorkers
     ) -> None:
         try:
-            with open_workers(workers=workers, scheduler=scheduler, progress=self._progress) as pool:
-                self._compute_with(pool, parts, shared=scheduler is not None)
+            with workers() as pool:
+                if not pool.is_local:
+                    refuse_blind_workers(pool, self._home)
+                work = replace(self._work, identity=_common_identity(pool, self._work))
+                self._agree_with_manifest(pool, work, stored)
+                self._compute_with(pool, work, parts)
         finally:
             # A worker that was stopped may have been writing.
             remove_temporary_files(self._parts_folder)
 
-    def _compute_with(self, pool: WorkerPool, parts: Sequence[StoredPart], *, shared: bool) -> None:
-        if shared:
-            refuse_blind_workers(pool, self._home)
-        identity = _common_identity(pool, self._work)
-        self._agree_with_manifest(identity)
+    def _compute_with(self, pool: WorkerPool, work: Work, parts: Sequence[StoredPart]) -> None:
         self._report.workers = len(pool.worker_addresses())
         schedule = ChunkSchedule(self._branches, parts, self._report.workers)
         began = time.perf_counter()
         self._progress.begin(self._report.runs, self._report.resumed)
         try:
-            Computation(pool, replace(self._work, identity=identity), schedule, self._take).run()
+            Computation(pool, work, schedule, self._take).run()
         finally:
             self._report.compute_seconds += time.perf_counter() - began
             self._report.lost_workers += pool.lost_workers
             pool.cancel_all()
 
-    def _agree_with_manifest(self, identity: RunnerIdentity) -> None:
-        if self._manifest is not None:
-            refuse_other_runner(self._manifest_path, self._manifest, identity)
-        else:
-            write_manifest(self._manifest_path, self._scene, identity, self._report.runs)
-            self._manifest = read_manifest(self._manifest_path)
+    def _agree_with_manifest(self, pool: WorkerPool, work: Work, stored: Sequence[Path]) -> None:
+        """Let a new campaign note what runs it, and an old one refuse what would give it other results."""
+        assert work.identity is not None
+        if self._manifest is None:
+            write_manifest(self._manifest_path, self._scene, work.identity, self._report.runs)
+        elif different := runner_differences(self._manifest, work.identity):
+            began = replace(work.identity, fmu_hashes=self._manifest.identity.fmu_hashes)
+            if runner_differences(self._manifest, began):
+                refuse_other_runner(self._manifest_path, different)
+            compared, reason = compare_with_stored(pool, work, self._scene, stored)
+            if reason:
+                refuse_other_runner(self._manifest_path, different, f"{reason}. ")
+            add_build(self._manifest_path, work.identity, compared)
+            self._progress.note(
+                f"The components differ from those that began this campaign ({'; '.join(different)}); "
+                f"{compared} of its points computed again are equal bit for bit."
+            )
+        self._manifest = read_manifest(self._manifest_path)
 
     def _take(self, result: ChunkResult) -> None:
         if result.outcomes:  # else all its runs were kept from an earlier sweep: there is no part
@@ -363,7 +383,7 @@ class _Campaign:
             raise CampaignError(
                 f"{self._manifest_path}: expected the manifest of this campaign, got no file. Put it back."
             )
-        return provenance(self._scene, manifest.identity) | {"scene_hash": scene_hash(self._scene)}
+        return manifest.attributes(self._scene) | {"scene_hash": scene_hash(self._scene)}
 
 
 def _common_identity(pool: WorkerPool, work: Work) -> RunnerIdentity:

@@ -28,7 +28,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
-from vibroimpact.orchestrator.run import Runner, dataset_of_runs, named_runner
+from vibroimpact.orchestrator.run import Runner, RunnerIdentity, dataset_of_runs, identity_of, named_runner
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Point, expand
@@ -45,15 +45,6 @@ CARRYING = (Outcome.ok, Outcome.stuck)
 
 State = tuple[float, ...]
 """Displacement (m) and velocity (m/s) of an oscillator; of a structure N displacements, then N velocities."""
-
-
-@dataclass(frozen=True, slots=True)
-class RunnerIdentity:
-    """What must be the same for all points of a campaign, or its rows could not be compared."""
-
-    execution: str
-    instruction_set: str
-    fmu_hashes: Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +137,6 @@ def _opened(scene: Scene, runner: str) -> _Opened:
     return _Opened(expand(scene), named_runner(scene, runner))
 
 
-def identity_of(runner: Runner) -> RunnerIdentity:
-    """Return what a runner is: its execution, instruction set and FMU hashes."""
-    return RunnerIdentity(runner.execution, runner.instruction_set, dict(runner.fmu_hashes))
-
-
 def get_ready(work: Work) -> RunnerIdentity:
     """Load all that a worker needs before its first chunk, and return which runner it has."""
     opened = _opened(work.scene, work.runner)
@@ -183,6 +169,15 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     done = replace(chunk, stop=left[0].point.index if left else chunk.stop)
     outcomes = write_part(work, done, points[: len(records)], records, carried)
     return ChunkResult(done, carried, outcomes, computed - began, time.perf_counter() - computed)
+
+
+def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
+    """Run the points of a chunk, kept ones too, and return their rows; nothing is written."""
+    opened = _opened(work.scene_text, work.source, work.runner)
+    _refuse_other_runner(work, opened.runner)
+    points = points_of(opened.branches, chunk)
+    records, _ = run_points(opened.scene, opened.runner, points, chunk.start)
+    return dataset_of(opened.scene, points, records, {})
 
 
 def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:

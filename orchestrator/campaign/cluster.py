@@ -20,8 +20,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, suppre
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import dask
 from distributed import CancelledError, Future, LocalCluster
@@ -35,7 +34,7 @@ from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.fmus.python_child import safe_module_path
 from vibroimpact.orchestrator.campaign.dask_settings import QUIET
 from vibroimpact.orchestrator.campaign.lone_process import interrupts_blocked
-from vibroimpact.orchestrator.campaign.progress import Progress, Silence
+from vibroimpact.orchestrator.campaign.progress import Progress
 
 CONNECT_SECONDS = 5.0
 """How long a scheduler may take to answer before it counts as absent."""
@@ -114,6 +113,8 @@ class WorkerPool:
         How many died so far.
     is_local : bool
         Whether the workers are processes of this command.
+    connection : ExitStack
+        What closes the connection; a pool that connects anew goes on with it.
     """
 
     def __init__(
@@ -127,23 +128,15 @@ class WorkerPool:
         self._tickets = self._replacements = self._restarts = 0
         self.lost_workers = 0
         self.is_local = False
-        self._connection = ExitStack()
+        self.connection = ExitStack()
         self._open()
 
     def _open(self) -> None:
-        self._cluster = self._connection.enter_context(self._connect())
+        self._cluster = self.connection.enter_context(self._connect())
         self._client, self.is_local = self._cluster.client, self._cluster.size > 0
         self._ended: queue.SimpleQueue[int] = queue.SimpleQueue()
         self._present: frozenset[str] = frozenset()
         self._looked = self._last_present = self._last_complete = self._last_moved = time.monotonic()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._connection.__exit__(kind, error, trace)
 
     def worker_addresses(self) -> tuple[str, ...]:
         """Return the addresses of the workers that are there now; take note of those that are not any more.
@@ -345,7 +338,7 @@ class WorkerPool:
             f"{self._where}: nothing moves although work is there, as after a clock that was set back; "
             "connecting to the workers anew."
         )
-        self._connection.__exit__(CampaignError, stalled, None)
+        self.connection.__exit__(CampaignError, stalled, None)
         self._open()
         self.wait_for_workers()
         for ticket in self._calls:
@@ -397,7 +390,8 @@ def open_workers(
         else:
             address, security = _reached_by(scheduler)
             connect, where = partial(_remote_cluster, address, security), address
-        pool = stack.enter_context(WorkerPool(connect, where, progress or Silence()))
+        pool = WorkerPool(connect, where, progress or Progress())
+        stack.push(pool.connection)
         pool.wait_for_workers()
         yield pool
 

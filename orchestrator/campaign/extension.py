@@ -45,7 +45,6 @@ from vibroimpact.orchestrator.campaign.parts import (
     list_parts,
     own_files,
 )
-from vibroimpact.orchestrator.campaign.provenance import provenance
 from vibroimpact.orchestrator.run.dataset import coordinate_names, stored_samples, with_constants_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, SweepAxis, run_count
@@ -226,7 +225,7 @@ def _on_new_coordinates(rows: xr.Dataset, old: Scene, new: Scene, runs: Runs) ->
     if "loop_residual" in rows.variables:
         variables["loop_residual"] = rows.variables["loop_residual"]
     coords = {str(name): variables.pop(str(name)) for name in like.coords}
-    return _without_empty_periods(xr.Dataset(variables, coords=coords, attrs=like.attrs))
+    return without_empty_periods(xr.Dataset(variables, coords=coords, attrs=like.attrs))
 
 
 def _coordinates(scene: Scene, runs: Runs) -> dict[str, NDArray[np.float64]]:
@@ -244,7 +243,7 @@ def _coordinates(scene: Scene, runs: Runs) -> dict[str, NDArray[np.float64]]:
     return found
 
 
-def _without_empty_periods(rows: xr.Dataset) -> xr.Dataset:
+def without_empty_periods(rows: xr.Dataset) -> xr.Dataset:
     """Cut off the periods that no run has: the runs that had them are not among these."""
     tables = [v.values for v in rows.variables.values() if v.dims == ("run", "period")]
     if not tables:
@@ -302,15 +301,19 @@ def read_kept(path: Path, scene: Scene) -> Kept:
 
 def _carried(rows: xr.Dataset, begin: int, stop: int) -> State | None:
     """Return the state that the runs from the beginning of a branch hand on, as `chunks.run_points` finds it."""
-    if "final_state" in rows.variables:
-        states = rows.final_state.values[begin:stop]
-    else:
-        columns = (rows.final_displacement.values, rows.final_velocity.values)
-        states = np.stack([column[begin:stop] for column in columns], axis=1)
+    states = final_states(rows, slice(begin, stop))
     outcome = rows.outcome.values[begin:stop]
     # A run that was marked for its values has handed on its state; one that failed has none.
     usable = np.isin(outcome, [*CARRYING, Outcome.error]) & np.isfinite(states).all(axis=1)
     return tuple(states[np.flatnonzero(usable)[-1]].tolist()) if usable.any() else None
+
+
+def final_states(rows: xr.Dataset, part: slice) -> NDArray[np.float64]:
+    """Return the states at the end of some runs, shape (run, 2 N): displacements (m), then velocities (m/s)."""
+    if "final_state" in rows.variables:
+        states: NDArray[np.float64] = rows.final_state.values[part]
+        return states
+    return np.stack([rows.final_displacement.values[part], rows.final_velocity.values[part]], axis=1)
 
 
 class EarlierSweep:
@@ -351,7 +354,8 @@ class EarlierSweep:
             write_dataset(kept.assign_attrs(scene_hash=hashed), kept_path(self._folder, hashed))
             self._note(f"{count} of {runs} points are kept from the earlier sweep.")
         outdated = own_files(self._folder)
-        write_manifest(self._home / "campaign.json", new, self._manifest.identity, runs)
+        begun = self._manifest
+        write_manifest(self._home / "campaign.json", new, begun.identity, runs, begun.continued_with)
         for path in outdated:
             if path != kept_path(self._folder, scene_hash(new)):
                 path.unlink(missing_ok=True)
@@ -372,7 +376,7 @@ class EarlierSweep:
     def _store(self, rows: xr.Dataset, left: int) -> None:
         """Keep the points that the new sweep does not have where they can be opened."""
         path = self._home / f"earlier-{self._manifest.scene_hash[:8]}.nc"
-        attributed = rows.assign_attrs(provenance(self._scene, self._manifest.identity))
+        attributed = rows.assign_attrs(self._manifest.attributes(self._scene))
         write_dataset(with_constants_of(attributed, self._scene), path)
         self._note(f"{left} points of the earlier sweep are not in this one; they stay in {path.name}.")
 

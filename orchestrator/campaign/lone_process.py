@@ -12,7 +12,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
-from vibroimpact.fmus.python_child import safe_module_path
+from vibroimpact.fmus.python_child import ending, safe_module_path
 
 POLL_SECONDS = 0.5
 """How often the waiting process looks up, s."""
@@ -49,7 +49,7 @@ def call_alone(function: Callable[..., Any], *arguments: Any) -> Any:
         result, error = receiver.recv()
     except EOFError:
         process.join()
-        raise ProcessDied(_ending(process.exitcode)) from None
+        raise ProcessDied(f"it {ending(process.exitcode)}") from None
     finally:
         process.kill()
         process.join()
@@ -74,15 +74,6 @@ def _end_with_parent() -> None:
     assert parent is not None
     wait([parent.sentinel])
     os._exit(1)
-
-
-def _ending(code: int | None) -> str:
-    if code is not None and code < 0:
-        try:
-            return f"it was ended by {signal.Signals(-code).name}"
-        except ValueError:
-            return f"it was ended by signal {-code}"
-    return f"it ended with exit code {code}"
 
 
 @contextmanager

@@ -9,14 +9,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.orchestrator.campaign.chunks import RunnerIdentity
-from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+from vibroimpact.orchestrator.campaign.provenance import git_commit, provenance, versions
+from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 FORMAT = 2
@@ -43,7 +43,9 @@ class Manifest:
     runs : int
         Runs of the campaign.
     identity : RunnerIdentity
-        What ran.
+        What ran when it was started.
+    continued_with : tuple of dict
+        Other builds of its components that went on with it, each as `add_build` wrote it.
     """
 
     scene: Mapping[str, Any]
@@ -51,6 +53,14 @@ class Manifest:
     scene_text: str
     runs: int
     identity: RunnerIdentity
+    continued_with: tuple[Mapping[str, Any], ...] = ()
+
+    def attributes(self, scene: Scene) -> dict[str, Any]:
+        """Return the global attributes of the dataset of this campaign: what began it, and what went on with it."""
+        found = provenance(scene, self.identity)
+        if self.continued_with:
+            found["continued_with"] = json.dumps(self.continued_with)
+        return found
 
 
 def flat_scene(scene: Scene) -> dict[str, Any]:
@@ -104,7 +114,13 @@ def holds_scene(attrs: Mapping[str, Any], scene: Scene) -> bool:
         return False
 
 
-def write_manifest(path: Path, scene: Scene, identity: RunnerIdentity, runs: int) -> None:
+def write_manifest(
+    path: Path,
+    scene: Scene,
+    identity: RunnerIdentity,
+    runs: int,
+    continued_with: Sequence[Mapping[str, Any]] = (),
+) -> None:
     """Write the manifest of a campaign that begins, whole or not at all."""
     content = {
         "format": FORMAT,
@@ -118,6 +134,35 @@ def write_manifest(path: Path, scene: Scene, identity: RunnerIdentity, runs: int
         "scene": flat_scene(scene),
         "scene_text": scene.text,
     }
+    if continued_with:
+        content["continued_with"] = list(continued_with)
+    _write(path, content)
+
+
+def add_build(path: Path, identity: RunnerIdentity, compared: int) -> None:
+    """Note in a manifest that a campaign goes on with other builds of its components.
+
+    Parameters
+    ----------
+    path : Path
+    identity : RunnerIdentity
+        What runs now.
+    compared : int
+        How many points, computed again, were equal bit for bit.
+    """
+    content = json.loads(path.read_bytes())
+    build = {
+        "fmu_hashes": dict(identity.fmu_hashes),
+        "versions": versions(),
+        "git_commit": git_commit(),
+        "points_compared": compared,
+    }
+    content["continued_with"] = [*content.get("continued_with", ()), build]
+    _write(path, content)
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    content.pop("sha256", None)
     content["sha256"] = _hash_of(content)
     write_atomically(path, json.dumps(content, indent=1).encode())
 
@@ -163,7 +208,12 @@ def _checked(content: dict[str, Any]) -> Manifest:
         raise ValueError("its content is not the one whose SHA-256 it has")
     identity = RunnerIdentity(content["execution"], content["instruction_set"], dict(content["fmu_hashes"]))
     return Manifest(
-        dict(content["scene"]), content["scene_hash"], content["scene_text"], int(content["runs"]), identity
+        dict(content["scene"]),
+        content["scene_hash"],
+        content["scene_text"],
+        int(content["runs"]),
+        identity,
+        tuple(content.get("continued_with", ())),
     )
 
 
@@ -204,22 +254,33 @@ def _shown(value: Any) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
-def refuse_other_runner(path: Path, manifest: Manifest, identity: RunnerIdentity) -> None:
+def runner_differences(manifest: Manifest, identity: RunnerIdentity) -> list[str]:
+    """Return in words what differs between what runs now and what has run a campaign; empty when nothing does."""
+    if any(build["fmu_hashes"] == identity.fmu_hashes for build in manifest.continued_with):
+        identity = replace(identity, fmu_hashes=manifest.identity.fmu_hashes)
+    was, now = (dict(_flat("", asdict(one))) for one in (manifest.identity, identity))
+    return differences(was, now)
+
+
+def refuse_other_runner(path: Path, different: Sequence[str], reason: str = "") -> NoReturn:
     """Refuse to mix results of different components, ways of running or instruction sets.
+
+    Parameters
+    ----------
+    path : Path
+        The manifest.
+    different : sequence of str
+        As `runner_differences` returns it.
+    reason : str
+        Why the points do not show that the results are the same all the same.
 
     Raises
     ------
     UsageError
         With what differs.
     """
-    now, old = _facts(identity), _facts(manifest.identity)
-    different = "; ".join(differences(old, now))
-    if different:
-        raise UsageError(
-            f"{path.parent}: expected the components and machine that this campaign was started with: "
-            f"{different}. Results of two kinds are never mixed: choose another folder with -o."
-        )
-
-
-def _facts(identity: RunnerIdentity) -> dict[str, Any]:
-    return dict(_flat("", asdict(identity)))
+    raise UsageError(
+        f"{path.parent}: expected the components and machine that this campaign was started with: "
+        f"{'; '.join(different)}. {reason}Results of two kinds are never mixed: choose another folder with -o, "
+        "or go on with what it was started with."
+    )

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from html import escape
-from typing import TYPE_CHECKING, Protocol, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 from vibroimpact.fmus.terminal import Terminal, printable
 
@@ -21,95 +21,82 @@ REFRESHES_PER_SECOND = 2
 """How often the bar is drawn; each drawing is taken from the workers where they use all processors."""
 
 
-class Progress(Protocol):
-    """Told by a campaign how far it is."""
+class Progress:
+    """Told by a campaign how far it is; shows nothing, its subclasses show what it counts."""
+
+    def __init__(self) -> None:
+        self._total = self._done = self._resumed = 0
+        self._lost = ""
+        self._began = time.monotonic()
 
     def begin(self, total: int, done: int) -> None:
-        """Take note that `done` of `total` points are there already."""
+        """Take note that `done` of `total` points are there already, and start the clock."""
+        self._total, self._done, self._resumed = total, done, done
+        self._began = time.monotonic()
 
     def advance(self, points: int) -> None:
         """Take note that more points are done."""
+        self._done += points
 
     def lost_workers(self, count: int) -> None:
         """Take note that so many workers have died so far."""
+        self._lost = lost_text(count)
 
     def note(self, text: str) -> None:
         """Say something once."""
 
-
-class Silence:
-    """Shows nothing."""
-
-    def begin(self, total: int, done: int) -> None:
-        """Show nothing."""
-
-    def advance(self, points: int) -> None:
-        """Show nothing."""
-
-    def lost_workers(self, count: int) -> None:
-        """Show nothing."""
-
-    def note(self, text: str) -> None:
-        """Show nothing."""
+    def _pace(self) -> tuple[str, str]:
+        """Return points a second and the time that the others will take, both in words."""
+        rate = (self._done - self._resumed) / max(time.monotonic() - self._began, 1e-9)
+        remaining = clock((self._total - self._done) / rate) if rate > 0 else "?"
+        return f"{rate:.0f} points/s", remaining
 
 
-class Lines:
+class Lines(Progress):
     """Writes a line now and then; for files, pipes and continuous integration."""
 
     def __init__(self, stream: TextIO) -> None:
+        super().__init__()
         self._stream = stream
-        self._total = self._done = self._resumed = 0
-        self._lost = ""
-        self._began = self._last_line = time.monotonic()
+        self._last_line = self._began
 
     def begin(self, total: int, done: int) -> None:
-        """Start the clock."""
-        self._total, self._done, self._resumed = total, done, done
-        self._began = self._last_line = time.monotonic()
+        """Start the clock, of the lines too."""
+        super().begin(total, done)
+        self._last_line = self._began
 
     def advance(self, points: int) -> None:
         """Write a line when the last one is old, and at the end."""
-        self._done += points
+        super().advance(points)
         now = time.monotonic()
         if now - self._last_line >= LINE_SECONDS or self._done == self._total:
             self._last_line = now
-            self.note(self._line(now - self._began))
-
-    def lost_workers(self, count: int) -> None:
-        """Say it with the next line."""
-        self._lost = lost_text(count)
+            rate, remaining = self._pace()
+            self.note(f"{self._done} of {self._total} points, {rate}, {remaining} remaining{self._lost}")
 
     def note(self, text: str) -> None:
         """Write a line."""
         print(printable(text), file=self._stream, flush=True)
 
-    def _line(self, seconds: float) -> str:
-        rate = (self._done - self._resumed) / max(seconds, 1e-9)
-        remaining = clock((self._total - self._done) / rate) if rate > 0 else "?"
-        return f"{self._done} of {self._total} points, {rate:.0f} points/s, {remaining} remaining{self._lost}"
 
-
-class Bar:
+class Bar(Progress):
     """Draws a bar in a terminal."""
 
     def __init__(self, bar: RichBar) -> None:
+        super().__init__()
         self._bar = bar
         self._task = bar.add_task("points", total=None, rate="", remaining="", lost="")
-        self._total = self._done = self._resumed = 0
-        self._began = time.monotonic()
 
     def begin(self, total: int, done: int) -> None:
         """Show the bar."""
-        self._total, self._done, self._resumed = total, done, done
-        self._began = time.monotonic()
+        super().begin(total, done)
         self._bar.update(self._task, total=total, completed=done)
 
     def advance(self, points: int) -> None:
         """Move the bar; it is drawn by a clock, not here."""
-        self._done += points
-        rate = (self._done - self._resumed) / max(time.monotonic() - self._began, 1e-9)
-        remaining = clock((self._total - self._done) / rate)
-        self._bar.update(self._task, completed=self._done, rate=f"{rate:.0f} points/s", remaining=remaining)
+        super().advance(points)
+        rate, remaining = self._pace()
+        self._bar.update(self._task, completed=self._done, rate=rate, remaining=remaining)
 
     def lost_workers(self, count: int) -> None:
         """Say it at the end of the bar."""
@@ -120,30 +107,24 @@ class Bar:
         self._bar.console.print(text)
 
 
-class NotebookBar:
+class NotebookBar(Progress):
     """Draws a bar below the cell of a notebook; `show` replaces what is there."""
 
     def __init__(self, show: Callable[[str], None]) -> None:
+        super().__init__()
         self._show = show
-        self._total = self._done = self._resumed = 0
-        self._lost, self._notes = "", ""
-        self._began, self._drawn = time.monotonic(), 0.0
+        self._notes, self._drawn = "", 0.0
 
     def begin(self, total: int, done: int) -> None:
         """Show the bar."""
-        self._total, self._done, self._resumed = total, done, done
-        self._began = time.monotonic()
+        super().begin(total, done)
         self._draw()
 
     def advance(self, points: int) -> None:
         """Move the bar when the last drawing is old, and at the end."""
-        self._done += points
+        super().advance(points)
         if time.monotonic() - self._drawn >= 1.0 / REFRESHES_PER_SECOND or self._done == self._total:
             self._draw()
-
-    def lost_workers(self, count: int) -> None:
-        """Say it behind the bar."""
-        self._lost = lost_text(count)
 
     def note(self, text: str) -> None:
         """Write a line below the bar."""
@@ -152,10 +133,8 @@ class NotebookBar:
 
     def _draw(self) -> None:
         self._drawn = time.monotonic()
-        rate = (self._done - self._resumed) / max(self._drawn - self._began, 1e-9)
-        left = (
-            f", {rate:.0f} points/s, {clock((self._total - self._done) / rate)} remaining" if rate > 0 else ""
-        )
+        rate, remaining = self._pace()
+        left = f", {rate}, {remaining} remaining" if self._done > self._resumed else ""
         bar = f'<progress max="{self._total}" value="{self._done}"></progress>'
         self._show(f"{bar} {self._done} of {self._total} points{left}{self._lost}{self._notes}")
 

@@ -10,7 +10,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.orchestrator.campaign.chunks import RunnerIdentity
+from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.summary import in_one_line
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, State
 from vibroimpact.orchestrator.campaign.parts import StoredPart
@@ -68,14 +68,6 @@ class _Strand:
     pace: float | None = None
 
 
-@dataclass(slots=True)
-class _Queues:
-    """Runs not handed out: whole units, and the strands that can go on now."""
-
-    units: deque[Gap] = field(default_factory=deque)
-    strands: deque[_Strand] = field(default_factory=deque)
-
-
 class ChunkSchedule:
     """Cuts what is left of a campaign into chunks.
 
@@ -95,7 +87,8 @@ class ChunkSchedule:
         self._chained = branches[0].direction != "independent"
         self._unit = len(branches[0].points) if self._chained else 1
         self._pace: float | None = None
-        self._queues = _Queues()
+        self._units: deque[Gap] = deque()
+        self._strands: deque[_Strand] = deque()
         self._begun: dict[int, _Strand] = {}
         runs = self._first_runs[-1] + len(branches[-1].points)
         for gap in gaps_between(parts, runs):
@@ -109,10 +102,10 @@ class ChunkSchedule:
 
     def next_chunk(self) -> Chunk | None:
         """Hand out a chunk; None when nothing can be computed before another chunk has ended."""
-        if self._queues.units and len(self._begun) < self.most_in_flight:
+        if self._units and len(self._begun) < self.most_in_flight:
             return self._cut_units()
-        if self._queues.strands:
-            return self._cut_strand(self._queues.strands.popleft())
+        if self._strands:
+            return self._cut_strand(self._strands.popleft())
         return None
 
     def finished(self, asked: Chunk, result: ChunkResult) -> None:
@@ -150,7 +143,7 @@ class ChunkSchedule:
 
     def _go_on(self, strand: _Strand) -> None:
         if strand.gaps:
-            self._queues.strands.append(strand)
+            self._strands.append(strand)
         else:
             del self._begun[strand.branch]
 
@@ -159,12 +152,12 @@ class ChunkSchedule:
         for piece in self._at_branch_ends(gap):
             branch = self._branch_of(piece.first)
             if (piece.stop - piece.first) % self._unit == 0:
-                self._queues.units.append(piece)
+                self._units.append(piece)
             elif branch in self._begun:
                 self._begun[branch].gaps.append(piece)
             else:
                 strand = self._begun[branch] = _Strand(branch, deque([piece]))
-                self._queues.strands.append(strand)
+                self._strands.append(strand)
 
     def _at_branch_ends(self, gap: Gap) -> Iterator[Gap]:
         """Split a gap into the rest of a branch, whole branches, and the beginning of a branch."""
@@ -183,12 +176,12 @@ class ChunkSchedule:
         return bisect_right(self._first_runs, run) - 1
 
     def _cut_units(self) -> Chunk:
-        gap = self._queues.units[0]
+        gap = self._units[0]
         seconds = self._fair_seconds()
         points = min(_points_in(seconds, self._pace), gap.most)
         taken = gap.take(max(points // self._unit, 1) * self._unit)
         if gap.first == gap.stop:
-            self._queues.units.popleft()
+            self._units.popleft()
         branch = self._branch_of(taken.first)
         if points < self._unit:
             strand = self._begun[branch] = _Strand(branch, deque([taken]), self._pace)

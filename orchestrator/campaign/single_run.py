@@ -13,14 +13,13 @@ from vibroimpact.orchestrator.campaign.chunks import (
     BranchPoint,
     Chunk,
     dataset_of,
-    identity_of,
     points_of,
     run_points,
     tally,
 )
-from vibroimpact.orchestrator.campaign.progress import Progress, Silence
+from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.provenance import provenance
-from vibroimpact.orchestrator.run import Runner, named_runner
+from vibroimpact.orchestrator.run import Runner, identity_of, named_runner
 from vibroimpact.orchestrator.run.dataset import with_constants_of
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
@@ -66,7 +65,7 @@ def run_scene(
         # A dataset that cannot be made is found out before an hour of work, not after it.
         rehearsal = [empty_record(scene, Outcome.error, "rehearsal", 0.0)]
         with_constants_of(dataset_of(scene, points[:1], rehearsal, {}), scene)
-        records = _run_all(scene, opened, points, progress or Silence())
+        records = _run_all(scene, opened, points, progress or Progress())
         dataset = dataset_of(scene, points, records, provenance(scene, identity_of(opened)))
         dataset = with_constants_of(dataset, scene)
     finally:

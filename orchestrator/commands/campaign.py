@@ -40,7 +40,14 @@ def refuse_two_kinds_of_workers(workers: int | None, scheduler: str | None) -> N
 
 
 def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
-    """Run a campaign and say what it did.
+    """Run a campaign and say what it did."""
+    _print(computed(scene, folder, workers=workers, scheduler=scheduler))
+
+
+def computed(
+    scene: Scene, folder: Path, *, workers: int | None = None, scheduler: str | None = None
+) -> CampaignReport:
+    """Run a campaign.
 
     Raises
     ------
@@ -49,11 +56,10 @@ def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | No
     """
     try:
         with shown_progress() as progress:
-            report = run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)
+            return run_campaign(scene, folder, workers=workers, scheduler=scheduler, progress=progress)
     except CampaignInterrupted as interrupted:
         say(str(interrupted), err=True)
         raise typer.Exit(130) from None
-    _print(report)
 
 
 def _print(report: CampaignReport) -> None:

@@ -6,8 +6,6 @@ import time
 from importlib import resources
 from pathlib import Path
 
-import typer
-import xarray as xr
 from rich.table import Table
 
 from vibroimpact.analysis import figures
@@ -15,9 +13,9 @@ from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.landmarks import Reading, bifurcation_readings
 from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.fmus.printing import table
-from vibroimpact.fmus.terminal import Terminal, say
-from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
-from vibroimpact.orchestrator.campaign.progress import shown_progress
+from vibroimpact.fmus.terminal import Terminal
+from vibroimpact.orchestrator.campaign import CampaignReport
+from vibroimpact.orchestrator.commands.campaign import computed
 from vibroimpact.orchestrator.scene import Scene, load_scene
 
 SCENE = "demo_scene.toml"
@@ -45,15 +43,11 @@ def run_demo(output: Path) -> None:
     with resources.as_file(resources.files("vibroimpact.orchestrator.commands") / SCENE) as path:
         scene = load_scene(path)
     console.print(f"Scene: {scene.title}; {len(scene.sweep[0].values)} frequencies, up and down.")
-    try:
-        with shown_progress() as progress:
-            report = run_campaign(scene, output, progress=progress)
-    except CampaignInterrupted as interrupted:
-        say(str(interrupted), err=True)
-        raise typer.Exit(130) from None
+    report = computed(scene, output)
     console.print(_told(report, scene))
     with open_dataset(report.dataset) as dataset:
-        figure = _draw(dataset, output / "bifurcation.png")
+        figure = output / "bifurcation.png"
+        figures.save(figures.draw(dataset, "bifurcation"), figure)
         readings = bifurcation_readings(dataset)
     console.print(_table(readings))
     for reading in readings:
@@ -71,11 +65,6 @@ def _told(report: CampaignReport, scene: Scene) -> str:
         f"{report.runs - report.resumed} points of {periods} forcing periods each, computed by "
         f"{report.workers} workers in {report.compute_seconds:.1f} s."
     )
-
-
-def _draw(dataset: xr.Dataset, path: Path) -> Path:
-    figures.save(figures.draw(dataset, "bifurcation"), path)
-    return path
 
 
 def _table(readings: list[Reading]) -> Table:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_double, c_void_p
 from functools import partial
 from typing import Any, ClassVar, NoReturn
@@ -65,6 +65,8 @@ class Instance(ABC):
 
     fmi_version: ClassVar[str]
     prefix: ClassVar[str]
+    type_names: ClassVar[Mapping[str, str]] = {}
+    """Names of types in the names of functions, where they are not those of FMI 3.0."""
 
     def __init__(
         self, fmu: UnpackedFmu, name: str, *, log: LogTail | None = None, wrap: Wrapper | None = None
@@ -135,19 +137,16 @@ class Instance(ABC):
         if values is None:
             count = len(references) if size is None else size
             values = np.zeros(count, dtype=DTYPES[self.fmi_version][kind])
+        name = self.type_names.get(kind, kind)
         return VariableGroup(
-            self._type_name(kind),
-            (self._function("Get" + self._type_name(kind)), self._function("Set" + self._type_name(kind))),
+            name,
+            (self._function("Get" + name), self._function("Set" + name)),
             self._pointer,
             references,
             values,
             self,
             with_value_count=self.fmi_version == "3.0",
         )
-
-    @abstractmethod
-    def _type_name(self, kind: str) -> str:
-        """FMI's name of a type in the names of its functions."""
 
     # ---- life ----
 
@@ -220,8 +219,14 @@ class Instance(ABC):
 
     # ---- states ----
 
-    _get_state: Function
-    _set_state: Function
+    def _bind_states(self, what: str) -> None:
+        """Bind the functions of saved states; `what` is FMI's word for one, which its versions write differently."""
+        self._get_state, self._set_state = self._function(f"Get{what}"), self._function(f"Set{what}")
+        self._free_state = f"Free{what}"
+
+    def free_state(self, slot: c_void_p) -> None:
+        """Give a saved state's memory back."""
+        self.check(self._function(self._free_state)(self._pointer, ctypes.byref(slot)), self._free_state)
 
     def save(self, slot: c_void_p) -> None:
         """Save the state into `slot`, which is allocated at first use and used again later."""

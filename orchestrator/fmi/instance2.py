@@ -45,6 +45,7 @@ class Instance2(Instance):
 
     fmi_version = "2.0"
     prefix = "fmi2"
+    type_names = FMI2_NAMES
     event_mode = False
 
     def __init__(
@@ -66,8 +67,7 @@ class Instance2(Instance):
         self._keep_rounding()
         self._bind_life()
         self._do_step: Callable[[], int] = self._bound("DoStep", self._step_time, self._step_size, c_int(0))
-        self._get_state = self._function("GetFMUstate")
-        self._set_state = self._function("SetFMUstate")
+        self._bind_states("FMUstate")
 
     def _instantiate(self) -> None:
         instantiate = self._function("Instantiate", c_void_p)
@@ -103,9 +103,6 @@ class Instance2(Instance):
             _kept.setdefault(place, []).append((self._pointer.value or 0, self._callbacks))
             self._pointer.value = None
         super().free()
-
-    def _type_name(self, kind: str) -> str:
-        return FMI2_NAMES[kind]
 
     def enter_initialization(self, start_time: float) -> None:
         """Set the experiment up and enter initialization mode at `start_time`, s."""
@@ -152,9 +149,3 @@ class Instance2(Instance):
         if not self._ends_inside(reached.value, end):
             self._refuse_end("a time of the step", reached.value)
         return min(reached.value, end)
-
-    # ---- states ----
-
-    def free_state(self, slot: c_void_p) -> None:
-        """Give a saved state's memory back."""
-        self.check(self._function("FreeFMUstate")(self._pointer, ctypes.byref(slot)), "FreeFMUstate")

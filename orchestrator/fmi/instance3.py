@@ -56,7 +56,7 @@ class Instance3(Instance):
         self._keep_rounding()
         self._bind_life()
         self._bind_events()
-        self._bind_states()
+        self._bind_states("FMUState")
 
     def _instantiate(self) -> None:
         instantiate = self._function("InstantiateCoSimulation", c_void_p)
@@ -87,13 +87,6 @@ class Instance3(Instance):
         self._do_step: Callable[[], int] = self._bound(
             "DoStep", self._step_time, self._step_size, c_bool(False), *outputs
         )
-
-    def _bind_states(self) -> None:
-        self._get_state = self._function("GetFMUState")
-        self._set_state = self._function("SetFMUState")
-
-    def _type_name(self, kind: str) -> str:
-        return kind
 
     def enter_initialization(self, start_time: float) -> None:
         """Enter initialization mode at `start_time`, s."""
@@ -143,26 +136,7 @@ class Instance3(Instance):
         self.wants_to_end = self._ends.value
         self.is_flagged = True
 
-    def enter_event_mode(self) -> None:
-        """Enter event mode at the present time."""
-        self.check(self.enter_event_call(), "EnterEventMode")
-
-    def enter_step_mode(self) -> None:
-        """Leave event mode."""
-        self.check(self.enter_step_call(), "EnterStepMode")
-
-    def update_discrete_states(self) -> bool:
-        """One event iteration; returns whether the FMU needs another."""
-        self.check(self.update_call(), "UpdateDiscreteStates")
-        return self.needs_update.value
-
     @property
     def event_wants_to_end(self) -> bool:
         """Did the last event iteration ask for the end of the simulation?"""
         return self._event_flags[0].value
-
-    # ---- states ----
-
-    def free_state(self, slot: c_void_p) -> None:
-        """Give a saved state's memory back."""
-        self.check(self._function("FreeFMUState")(self._pointer, ctypes.byref(slot)), "FreeFMUState")

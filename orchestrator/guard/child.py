@@ -12,8 +12,8 @@ from typing import Any, BinaryIO
 
 from vibroimpact.fmus.errors import ComponentFileError, VibroimpactError
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
-from vibroimpact.orchestrator.guard.pipe import Failure, Identity, Order, PointTask, receive, send
-from vibroimpact.orchestrator.run import Runner, open_runner
+from vibroimpact.orchestrator.guard.pipe import Failure, Order, PointTask, receive, send
+from vibroimpact.orchestrator.run import Runner, identity_of, open_runner
 
 #: How often the child looks at its parent and at what it is doing itself, s.
 LOOK = 0.1
@@ -76,7 +76,7 @@ def main() -> None:
     except VibroimpactError as error:
         send(answers, Failure(str(error), misuse=isinstance(error, ComponentFileError)))
         return
-    send(answers, Identity.of(runner))
+    send(answers, identity_of(runner))
     while isinstance(point := receive(orders), PointTask):
         send(answers, _answer(runner, point))
     runner.close()

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 import os
 import queue
-import signal
 import subprocess
 import threading
 import time
@@ -27,10 +26,10 @@ from typing import IO, Any
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
-from vibroimpact.fmus.python_child import python_command
+from vibroimpact.fmus.python_child import ending, python_command
 from vibroimpact.orchestrator.guard.breadcrumbs import Breadcrumbs
-from vibroimpact.orchestrator.guard.pipe import Failure, Identity, Order, PointTask, receive, send
-from vibroimpact.orchestrator.run import Runner, open_runner
+from vibroimpact.orchestrator.guard.pipe import Failure, Order, PointTask, receive, send
+from vibroimpact.orchestrator.run import Runner, RunnerIdentity, open_runner
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.scene import Scene
 
@@ -159,7 +158,7 @@ class GuardedRunner:
         deadline = scene.execution.deadline
         self._deadline = DEFAULT_DEADLINE if deadline is None else deadline
 
-    def _start(self) -> Identity:
+    def _start(self) -> RunnerIdentity:
         path = Path(self._folder.name) / "notes"
         Breadcrumbs.create(path)
         self._notes = Breadcrumbs(path)
@@ -169,13 +168,13 @@ class GuardedRunner:
             answer = self._child.answer(START_TIME)
         except TimeoutError:
             answer = Failure(self._what_happened(f"no answer within {START_TIME:g} s"))
-        if isinstance(answer, Identity):
+        if isinstance(answer, RunnerIdentity):
             self._points = 0
             return answer
         code = self._end_child(at_once=answer is not None)
         if isinstance(answer, Failure):
             raise (ComponentFileError if answer.misuse else ComponentError)(answer.message)
-        raise ComponentError(self._what_happened(_ending(code)))
+        raise ComponentError(self._what_happened(f"the process {ending(code)}"))
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point; a crash or a missed deadline is its outcome.
@@ -209,7 +208,7 @@ class GuardedRunner:
         except TimeoutError:
             return self._lost(Outcome.timeout, f"no answer within {self._deadline:g} s")
         if answer is None:
-            return self._lost(Outcome.crash, _ending(self._end_child()))
+            return self._lost(Outcome.crash, f"the process {ending(self._end_child())}")
         if isinstance(answer, Failure):
             raise ComponentError(answer.message)
         record: RunRecord = answer
@@ -273,16 +272,6 @@ class GuardedRunner:
             self._child.end()
             self._child = None
         self._folder.cleanup()
-
-
-def _ending(code: int) -> str:
-    if code < 0:
-        try:
-            name = signal.Signals(-code).name
-        except ValueError:
-            name = f"signal {-code}"
-        return f"the process was ended by {name}"
-    return f"the process ended with exit code {code}"
 
 
 def make_runner(scene: Scene, *, execution: str = "auto") -> Runner:

@@ -27,20 +27,6 @@ class Order:
 
 
 @dataclass(frozen=True, slots=True)
-class Identity:
-    """What the child runs with."""
-
-    execution: str
-    instruction_set: str
-    fmu_hashes: Mapping[str, str]
-
-    @staticmethod
-    def of(runner: Any) -> Identity:
-        """Return the identity of a runner."""
-        return Identity(runner.execution, runner.instruction_set, dict(runner.fmu_hashes))
-
-
-@dataclass(frozen=True, slots=True)
 class PointTask:
     """One point to run."""
 

@@ -442,11 +442,6 @@ class ContactBonds:
         self._following: list[ContactBond] = []
         self.active = False
 
-    @property
-    def revisable(self) -> bool:
-        """May a step have to be repeated for one of them?"""
-        return any(bond.revisable for bond in self._following)
-
     def begin(self) -> None:
         """Start a run."""
         for bond in self.all:

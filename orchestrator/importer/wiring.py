@@ -350,10 +350,7 @@ class LoopSolver:
         self.iterations = 0
 
     def _values(self) -> NDArray[np.float64]:
-        values = []
-        for transfer in self.transfers:
-            values.append(float(transfer.take()[0]))
-        return np.array(values)
+        return np.array([float(transfer.take()[0]) for transfer in self.transfers])
 
     def _write(self, values: NDArray[np.float64]) -> None:
         for transfer, value in zip(self.transfers, values, strict=True):

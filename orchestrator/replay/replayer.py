@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -245,9 +244,7 @@ class Replayer:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
 
@@ -290,21 +287,20 @@ def opened_replays(scene: Scene, paths: Sequence[Path], execution: str = "auto")
     replayers: list[Replayer] = []
     try:
         for path in paths:
-            recording = open_signals(path)
-            try:
-                replayers.append(Replayer(scene, recording, execution=execution))
-            except DatasetError as problem:
-                raise named(problem, path) from problem
+            replayers.append(opened_replay(scene, path, execution))
         yield replayers
     finally:
         for replayer in replayers:
             replayer.close()
 
 
-def named(problem: DatasetError, path: Path) -> DatasetError:
-    """Return a problem of a recording with the name of its file in front."""
-    # always a new one: an error that is its own cause sends whoever walks along the causes round in circles
-    return DatasetError(str(problem) if str(problem).startswith(str(path)) else f"{path}: {problem}")
+def opened_replay(scene: Scene, path: Path, execution: str) -> Replayer:
+    """Open a replay of a scene for a recording; a problem of it begins with the name of its file."""
+    try:
+        return Replayer(scene, open_signals(path), execution=execution)
+    except DatasetError as problem:
+        text = str(problem)
+        raise DatasetError(text if text.startswith(str(path)) else f"{path}: {text}") from problem
 
 
 def _cut(times: Floats, start: float | None, stop: float | None) -> Floats:

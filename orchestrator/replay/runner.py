@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import platform
 import time
 from collections.abc import Mapping
@@ -12,10 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
-from vibroimpact.analysis.recording import open_signals
 from vibroimpact.analysis.replay.comparison import Comparison
-from vibroimpact.fmus.errors import DatasetError, UsageError
-from vibroimpact.orchestrator.replay.replayer import Motion, Replayer, named, recording_of, replay_table
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.replay.replayer import (
+    Motion,
+    Replayer,
+    opened_replay,
+    recording_of,
+    replay_table,
+)
 from vibroimpact.orchestrator.replay.scoring import compare_motion
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
@@ -52,10 +56,7 @@ class ReplayRunner:
     def _replayer(self, number: int) -> Replayer:
         if number not in self._replayers:
             path = self._paths[number - 1]
-            try:
-                self._replayers[number] = Replayer(self._scene, open_signals(path), execution=self.execution)
-            except DatasetError as problem:
-                raise named(problem, path) from problem
+            self._replayers[number] = opened_replay(self._scene, path, self.execution)
         return self._replayers[number]
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
@@ -84,13 +85,10 @@ class ReplayRunner:
         return RunRecord(
             outcome=Outcome.ok,
             message="; ".join(told),
-            periods=None,
             impacts=motion.impacts if impacts else None,
             sticks=motion.sticks if impacts else None,
-            samples=None,
             final_displacement=displacement,
             final_velocity=velocity,
-            final_phase=math.nan,
             seconds=seconds,
             final_state=state,
             scores=np.array([_score_row(comparison) for comparison in comparisons]) if comparisons else None,

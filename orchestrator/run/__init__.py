@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from vibroimpact.orchestrator.run.dataset import dataset_of_runs
 from vibroimpact.orchestrator.run.general import GeneralRunner
-from vibroimpact.orchestrator.run.opening import Runner, named_runner, open_runner
+from vibroimpact.orchestrator.run.opening import (
+    Runner,
+    RunnerIdentity,
+    identity_of,
+    named_runner,
+    open_runner,
+)
 from vibroimpact.orchestrator.run.point import PointRunner
 from vibroimpact.orchestrator.run.session import Session
 
@@ -12,8 +18,10 @@ __all__ = [
     "GeneralRunner",
     "PointRunner",
     "Runner",
+    "RunnerIdentity",
     "Session",
     "dataset_of_runs",
+    "identity_of",
     "named_runner",
     "open_runner",
 ]

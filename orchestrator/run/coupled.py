@@ -6,21 +6,18 @@ The same interface as `fused.BodyDriver`, so that a run does not know which of t
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping, Sequence
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import Value, description_of
-from vibroimpact.orchestrator.importer.events import Event, StepWatcher
+from vibroimpact.orchestrator.importer.events import Event
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, Exchange
-from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached, RecordedBody
+from vibroimpact.orchestrator.run.record import ImpactLimitReached, RecordedBody
 
 #: Impacts between two emptyings of the body's record: one impact writes at most two rows, of room for 512.
 IMPACTS_PER_BLOCK = 200
-#: Communication steps between two looks at the clock.
-STEPS_PER_LOOK = 100
 BODY = "body"
 #: Contact laws by their numbers in the FMUs. A body leaves those of its stops to them: an impulse, or a force.
 RESTITUTION, EXTERNAL, EXTERNAL_FORCE = 1, 5, 6
@@ -98,11 +95,10 @@ class CoupledDriver(RecordedBody):
         self.importer = Importer(specs, joined, macro_step=macro_step, exchange=exchange)
         self.importer.on_event = self._count_event
         self.importer.on_pause = self._make_room
-        self.importer.watchers.append(StepWatcher(self._look_at_clock, lambda time, end: None))
         self._stop_floats = self._stop_parameters(floats)
         super().__init__(self._group)
-        self._deadline = math.inf
-        self._events = self._steps = 0
+        self.importer.watchers.append(self._deadline.watcher)
+        self._events = 0
 
     @staticmethod
     def _stop(k: int, integers: Mapping[str, int]) -> ComponentSpec:
@@ -139,13 +135,13 @@ class CoupledDriver(RecordedBody):
 
     def begin(self, floats: Mapping[str, float], deadline: float | None) -> None:
         """Start a run at time 0 with these parameters; it may take `deadline` seconds of wall time."""
-        self._deadline = math.inf if deadline is None else time.perf_counter() + deadline
-        self._events = self._steps = 0
+        self._deadline.begin(deadline)
+        self._events = 0
         self.rows.blocks = []
         values: dict[tuple[str, str], Value] = {(BODY, name): value for name, value in floats.items()}
         values |= {target: floats[source] for target, source in self._stop_floats.items()}
         self.importer.begin(0.0, values)
-        self._warnings = self.importer.components[BODY].instance.log.take()
+        self.warnings = self.importer.components[BODY].instance.log.take()
 
     def advance(self, end: float) -> None:
         """Advance to time `end`, s."""
@@ -155,16 +151,7 @@ class CoupledDriver(RecordedBody):
     def _make_room(self) -> None:
         """Empty the record; the body pauses when it is full, and after some hundredths of a second of work."""
         self.take_rows()
-        self._refuse_late()
-
-    def _look_at_clock(self, step_start: float) -> None:
-        self._steps += 1
-        if self._steps % STEPS_PER_LOOK == 0:
-            self._refuse_late()
-
-    def _refuse_late(self) -> None:
-        if time.perf_counter() > self._deadline:
-            raise DeadlineReached
+        self._deadline.refuse_late()
 
     def _count_event(self, event: Event) -> None:
         self._events += 1

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
-
-import numpy as np
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.packaging.archive import unpack
@@ -13,7 +10,7 @@ from vibroimpact.orchestrator.fmi.instance import DISCARD
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import description_of
-from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached, RecordedBody
+from vibroimpact.orchestrator.run.record import ImpactLimitReached, RecordedBody
 
 
 class BodyDriver(RecordedBody):
@@ -41,7 +38,6 @@ class BodyDriver(RecordedBody):
         self._float_names = tuple(floats)
         self._integers = self._group("Int64", tuple(integers))
         self._integers.values[:] = list(integers.values())
-        self._deadline = np.inf
 
     def _group(self, kind: str, names: Sequence[str], size: int | None = None) -> VariableGroup:
         return self.instance.group(kind, [self._references[name] for name in names], size=size)
@@ -58,7 +54,7 @@ class BodyDriver(RecordedBody):
 
     def begin(self, floats: Mapping[str, float], deadline: float | None) -> None:
         """Start a run at time 0 with these parameters; it may take `deadline` seconds of wall time."""
-        self._deadline = np.inf if deadline is None else time.perf_counter() + deadline
+        self._deadline.begin(deadline)
         self.rows.blocks = []
         instance = self.instance
         instance.reset()
@@ -67,7 +63,7 @@ class BodyDriver(RecordedBody):
         self._integers.set()
         instance.enter_initialization(0.0)
         instance.exit_initialization()
-        self._warnings = instance.log.take()
+        self.warnings = instance.log.take()
 
     def advance(self, end: float) -> None:
         """Advance to time `end`, s.
@@ -77,8 +73,7 @@ class BodyDriver(RecordedBody):
         """
         instance = self.instance
         while instance.time < end:
-            if time.perf_counter() > self._deadline:
-                raise DeadlineReached
+            self._deadline.refuse_late()
             if instance.step(instance.time, end - instance.time) == DISCARD:
                 raise ImpactLimitReached
             if instance.returned_early:

@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import math
 import platform
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
-from vibroimpact.orchestrator.fmi.instance import Wrapper
-from vibroimpact.orchestrator.fmi.log import LogTail
+from vibroimpact.orchestrator.fmi.instance import LogOf, WrapOf
 from vibroimpact.orchestrator.importer.component import Value
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
-from vibroimpact.orchestrator.importer.events import Event, StepWatcher
+from vibroimpact.orchestrator.importer.events import Event
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.sampling import Sampler
-from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached, in_time_order
+from vibroimpact.orchestrator.run.record import (
+    Deadline,
+    DeadlineReached,
+    ImpactLimitReached,
+    in_time_order,
+)
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
-
-#: Communication steps between two looks at the clock, for a run with a deadline.
-STEPS_PER_LOOK = 100
 
 
 def component_variable(name: str) -> tuple[str, str]:
@@ -58,8 +57,8 @@ class GeneralRunner:
         scene: Scene,
         *,
         execution: str = "auto",
-        log: Callable[[str], LogTail] | None = None,
-        wrap: Callable[[str], Wrapper] | None = None,
+        log: LogOf | None = None,
+        wrap: WrapOf | None = None,
     ) -> None:
         if execution not in ("auto", "coupled") or scene.general is None:
             problem = (
@@ -68,16 +67,17 @@ class GeneralRunner:
             raise SceneError([problem])
         self.execution = "coupled"
         self.instruction_set = platform.machine()
-        self._scene = scene
+        self._scene, self._general = scene, scene.general
         self._log, self._wrap = log, wrap
-        self._build(scene.general)
+        self._deadline = Deadline()
+        self._build()
         self.fmu_hashes = {name: c.sha256 for name, c in self._importer.components.items()}
         self._events: list[tuple[float, int, int]] = []
         self._recording = False
-        self._deadline = math.inf
 
-    def _build(self, general: GeneralScene) -> None:
+    def _build(self) -> None:
         """Make the importer with all that watches it."""
+        general = self._general
         self._importer = Importer(
             general.components,
             general.connections,
@@ -89,8 +89,8 @@ class GeneralRunner:
         )
         self._names = tuple(self._importer.components)
         self._importer.on_event = self._note_event
-        self._importer.on_pause = self._refuse_late
-        self._importer.watchers.append(StepWatcher(self._look_at_clock, lambda time, end: None))
+        self._importer.on_pause = self._deadline.refuse_late
+        self._importer.watchers.append(self._deadline.watcher)
         self._energy = InterfaceEnergy(self._importer, general.connections)
         self._sampler = self._make_sampler(general)
         self._broken = False
@@ -99,16 +99,6 @@ class GeneralRunner:
         if general.rate is None or not general.variables:
             return None
         return Sampler(self._importer, [component_variable(name) for name in general.variables], general.rate)
-
-    @property
-    def connection_names(self) -> tuple[str, ...]:
-        """The force-displacement connections whose energy residual is recorded."""
-        return self._energy.names
-
-    @property
-    def component_names(self) -> tuple[str, ...]:
-        """The components, in the order that events name them by."""
-        return self._names
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point from the scene's start values; a general scene carries no state over.
@@ -135,16 +125,18 @@ class GeneralRunner:
 
     def _rebuild(self) -> None:
         """Make all components anew."""
-        assert self._scene.general is not None  # the constructor refuses any other
         self._importer.free()
-        self._build(self._scene.general)
+        self._build()
 
     def _run(self, scene: Scene) -> tuple[Outcome, str]:
         general, record, execution = scene.general, scene.record, scene.execution
         assert general is not None  # the constructor refuses any other
-        self._deadline = math.inf if execution.deadline is None else time.perf_counter() + execution.deadline
-        self._limit, self._seen, self._steps = execution.impact_limit, 0, 0
+        self._deadline.begin(execution.deadline)
+        self._limit, self._seen = execution.impact_limit, 0
         self._events, self._recording = [], False
+        start: dict[tuple[str, str], Value] = {
+            (c.name, name): value for c in general.components for name, value in c.parameters.items()
+        }
         self._importer.keeps_start = False
         for component in self._importer.components.values():
             component.instance.log.take()  # what it said in the point before is no reason for this one's end
@@ -152,7 +144,7 @@ class GeneralRunner:
         end = record.transient_time + record.recorded_time
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused at the end
-                self._importer.begin(0.0, _start_values(general))
+                self._importer.begin(0.0, start)
                 self._energy.begin(general.connections)
                 self._importer.advance(record.transient_time)
                 self._recording = True
@@ -209,7 +201,7 @@ class GeneralRunner:
         bad = np.argwhere(~np.isfinite(rows))
         if len(bad):
             row, column = bad[0]
-            name = self._scene.general.variables[column - 1] if self._scene.general is not None else ""
+            name = self._general.variables[column - 1]
             raise ComponentError(
                 f"{name}: expected a finite value, got {rows[row, column]} at time {rows[row, 0]:.17g}.",
                 instance=component_variable(name)[0],
@@ -225,28 +217,11 @@ class GeneralRunner:
         if self._recording:
             self._events.append((event.time, event.index, self._names.index(event.component) + 1))
 
-    def _look_at_clock(self, step_start: float) -> None:
-        self._steps += 1
-        if self._steps % STEPS_PER_LOOK == 0:
-            self._refuse_late()
-
-    def _refuse_late(self) -> None:
-        if time.perf_counter() > self._deadline:
-            raise DeadlineReached
-
     def _record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
-        general = self._scene.general
-        assert general is not None
         return RunRecord(
             outcome=outcome,
             message=message,
-            periods=None,
-            impacts=None,
-            sticks=None,
-            samples=self._sample_rows(),
-            final_displacement=math.nan,
-            final_velocity=math.nan,
-            final_phase=math.nan,
+            samples=None if self._sampler is None else self._sampler.rows,
             seconds=seconds,
             events=in_time_order(np.array(self._events, dtype=np.float64).reshape(-1, 3))
             if self._scene.record.impacts
@@ -255,13 +230,6 @@ class GeneralRunner:
             loop_residual=self._importer.loops.residual if self._importer.loops.names else None,
         )
 
-    def _sample_rows(self) -> NDArray[np.float64] | None:
-        return None if self._sampler is None else self._sampler.rows
-
     def close(self) -> None:
         """Free the components."""
         self._importer.free()
-
-
-def _start_values(general: GeneralScene) -> dict[tuple[str, str], Value]:
-    return {(c.name, name): value for c in general.components for name, value in c.parameters.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Protocol
 
 from vibroimpact.analysis.dataset import RunRecord
@@ -14,6 +15,20 @@ from vibroimpact.orchestrator.scene import Scene
 
 REPLAY_RUNNER = "vibroimpact.orchestrator.replay.runner:ReplayRunner"
 """Replays are a floor above: named here, loaded by those who replay."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunnerIdentity:
+    """What must be the same for all points of a campaign, or its rows could not be compared."""
+
+    execution: str
+    instruction_set: str
+    fmu_hashes: Mapping[str, str]
+
+
+def identity_of(runner: Runner) -> RunnerIdentity:
+    """Return what a runner is: its execution, instruction set and FMU hashes."""
+    return RunnerIdentity(runner.execution, runner.instruction_set, dict(runner.fmu_hashes))
 
 
 class Runner(Protocol):

@@ -92,7 +92,7 @@ def _carried(scene: Scene, start: tuple[float, ...]) -> dict[str, float]:
     # what finds the shapes of a beam takes time to load, and only a continuation of structures needs it
     from vibroimpact.orchestrator.run.carried_state import on_free_side
 
-    names = _start_variables(scene)
+    names = [name.replace("[", "_start[") for name in state_variables(scene)]
     return dict(zip(names, on_free_side(scene, scene.body, start), strict=True))
 
 
@@ -118,10 +118,6 @@ def state_variables(scene: Scene) -> tuple[str, ...]:
     kind = "" if isinstance(body, ChainBody) else "modal_"
     numbers = range(1, body.size + 1)
     return tuple(f"{kind}{name}[{i}]" for name in ("displacement", "velocity") for i in numbers)
-
-
-def _start_variables(scene: Scene) -> tuple[str, ...]:
-    return tuple(name.replace("[", "_start[") for name in state_variables(scene))
 
 
 def contact_floats(scene: Scene) -> dict[str, float]:

@@ -10,13 +10,14 @@ import math
 import platform
 import time
 from array import array
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.run.coupled import CoupledDriver
 from vibroimpact.orchestrator.run.fused import BodyDriver
 from vibroimpact.orchestrator.run.parameters import (
@@ -101,8 +102,13 @@ class PointRunner:
         self._driver.close()
 
 
-def driver_of(scene: Scene, execution: str) -> RecordedBody:
-    """Return what drives a scene's body: fused, or coupled to its stops."""
+def driver_of(
+    scene: Scene,
+    execution: str,
+    others: Sequence[ComponentSpec] = (),
+    connections: Sequence[ConnectionSpec] = (),
+) -> RecordedBody:
+    """Return what drives a scene's body: fused, or coupled to its stops and to other components."""
     floats, integers = float_parameters(scene, None), integer_parameters(scene)
     fmu = FMU_NAMES[scene.body.kind]
     if execution == "fused":
@@ -116,6 +122,8 @@ def driver_of(scene: Scene, execution: str) -> RecordedBody:
             macro_step=math.inf if step is None else step,
             exchange=scene.execution.exchange,
             body=fmu,
+            others=others,
+            connections=connections,
         )
     raise SceneError([f'{scene.source}: execution.how: expected "fused" or "coupled", got "{execution}".'])
 

@@ -6,6 +6,8 @@ or FMI is made for them.
 
 from __future__ import annotations
 
+import math
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,10 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
+from vibroimpact.orchestrator.importer.events import StepWatcher
 
 ROW_WIDTH = 8
 ROW_CAPACITY = 512
 ROW_IMPACT, ROW_STICK, ROW_PERIOD = 1.0, 2.0, 3.0
+#: Communication steps of an importer between two looks at the clock.
+STEPS_PER_LOOK = 100
 _NOTHING: NDArray[np.float64] = np.empty(0)
 OBSERVED = ("displacement", "velocity")
 
@@ -28,6 +33,34 @@ class ImpactLimitReached(Exception):
 
 class DeadlineReached(Exception):
     """A run took longer than its deadline; it ends here with what it has."""
+
+
+class Deadline:
+    """The wall time at which a run is given up."""
+
+    def __init__(self) -> None:
+        self.begin(None)
+
+    def begin(self, seconds: float | None) -> None:
+        """Give the run that begins so many seconds; None: as long as it takes."""
+        self._end = math.inf if seconds is None else time.perf_counter() + seconds
+        self._steps = 0
+
+    def refuse_late(self) -> None:
+        """Raise DeadlineReached when the time is over."""
+        if time.perf_counter() > self._end:
+            raise DeadlineReached
+
+    def look_on(self, step_start: float) -> None:
+        """Take note of a communication step; one in `STEPS_PER_LOOK` looks at the clock."""
+        self._steps += 1
+        if self._steps % STEPS_PER_LOOK == 0:
+            self.refuse_late()
+
+    @property
+    def watcher(self) -> StepWatcher:
+        """What looks on at the steps of an importer."""
+        return StepWatcher(self.look_on, lambda time, end: None)
 
 
 def in_time_order(rows: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -64,6 +97,11 @@ class RecordedBody(ABC):
     ----------
     group : callable
         Makes a group of the body's variables: kind, names, number of values (None: one for each name).
+
+    Attributes
+    ----------
+    warnings : tuple of str
+        What the body had to say when the run began; it goes with the results.
     """
 
     def __init__(self, group: Callable[[str, Sequence[str], int | None], VariableGroup]) -> None:
@@ -75,7 +113,8 @@ class RecordedBody(ABC):
         self._rows = group("Float64", ("record.rows",), ROW_CAPACITY * ROW_WIDTH)
         self._table = self._rows.values.reshape(ROW_CAPACITY, ROW_WIDTH)
         self.rows = Rows()
-        self._warnings: tuple[str, ...] = ()
+        self.warnings: tuple[str, ...] = ()
+        self._deadline = Deadline()
         self.watch(contacts=0)
 
     def watch(
@@ -112,11 +151,6 @@ class RecordedBody(ABC):
 
     def _some(self, kind: str, names: Sequence[str]) -> VariableGroup | None:
         return self._group_of(kind, names, None) if names else None
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What the body had to say when the run began; it goes with the results."""
-        return self._warnings
 
     @property
     @abstractmethod

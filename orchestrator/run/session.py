@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from types import TracebackType
 from typing import Self
 
 import numpy as np
@@ -12,15 +10,8 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
-from vibroimpact.orchestrator.run.coupled import CoupledDriver
-from vibroimpact.orchestrator.run.parameters import (
-    FMU_NAMES,
-    float_parameters,
-    integer_parameters,
-    state_variables,
-)
+from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
 from vibroimpact.orchestrator.run.point import driver_of
-from vibroimpact.orchestrator.run.record import RecordedBody
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
 from vibroimpact.orchestrator.scene import Scene
 
@@ -73,7 +64,7 @@ class Session:
         self.outputs = self._plan.names
         wanted = "fused" if execution == "auto" and not others else execution
         self.execution = "coupled" if others else wanted
-        self._driver = _coupled(scene, others, connections) if others else driver_of(scene, self.execution)
+        self._driver = driver_of(scene, self.execution, others, connections)
         self._driver.watch(
             contacts=len(scene.stops),
             sampled=self._plan.variables,
@@ -210,23 +201,5 @@ class Session:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
-
-
-def _coupled(
-    scene: Scene, others: Sequence[ComponentSpec], connections: Sequence[ConnectionSpec]
-) -> RecordedBody:
-    step = scene.execution.macro_step
-    return CoupledDriver(
-        float_parameters(scene, None),
-        integer_parameters(scene),
-        len(scene.stops),
-        macro_step=math.inf if step is None else step,
-        exchange=scene.execution.exchange,
-        body=FMU_NAMES[scene.body.kind],
-        others=others,
-        connections=connections,
-    )

@@ -18,7 +18,7 @@ from support.command_line import in_this_process, vibroimpact
 from support.tolerance import SEQUENCE
 
 from vibroimpact.analysis import open_dataset
-from vibroimpact.analysis.dataset import read_flat
+from vibroimpact.analysis.dataset import constant_names, read_flat, take_runs, write_dataset
 from vibroimpact.orchestrator.run.fused import BodyDriver
 
 FILES = Path(__file__).with_name("version_0_1.zip")
@@ -74,14 +74,33 @@ def test_a_half_done_campaign_of_other_components_is_refused_in_one_line_and_kee
     old: Path,
 ) -> None:
     half = old / "half"
-    content = components_of(half) | {"fmu_hashes": {"body": "0" * 64}}
-    (half / "campaign.json").write_text(json.dumps(content))
+    manifest = (half / "campaign.json").read_bytes()
     parts = {path: path.read_bytes() for path in (half / "parts").iterdir()}
     done = vibroimpact("campaign", old / "half.toml", "-o", half)
     assert done.returncode == 2
     assert "fmu_hashes.body was" in done.stderr
+    assert "(angular_frequency = 0.8, restitution = 0.5) is stored as" in done.stderr
     assert "choose another folder" in done.stderr
     assert {path: path.read_bytes() for path in (half / "parts").iterdir()} == parts
+    assert (half / "campaign.json").read_bytes() == manifest
+
+
+def test_a_half_done_campaign_of_another_build_goes_on_where_its_points_are_equal(old: Path) -> None:
+    half = old / "half"
+    done = vibroimpact("run", old / "half.toml", "-o", old / "now.nc")
+    assert done.returncode == 0, done.stderr
+    [part] = (half / "parts").iterdir()
+    now = take_runs(read_flat(old / "now.nc"), np.arange(3))
+    now = now.drop_vars(constant_names(now))
+    write_dataset(now.assign_attrs(read_flat(part).attrs), part)
+    done = vibroimpact("campaign", old / "half.toml", "-o", half, "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    assert "3 of its points computed again are equal bit for bit" in done.stderr
+    resumed = read_flat(half / "dataset.nc")
+    assert resumed.attrs["fmu_hashes"] == json.dumps(components_of(half)["fmu_hashes"])
+    assert len(json.loads(resumed.attrs["continued_with"])) == 1
+    again = vibroimpact("campaign", old / "half.toml", "-o", half)
+    assert again.returncode == 0, again.stderr
 
 
 def test_a_half_done_campaign_goes_on_from_its_parts(old: Path) -> None:

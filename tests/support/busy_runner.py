@@ -81,6 +81,14 @@ class SceneRunner(BusyRunner):
         return math.fsum(map(scene.value, keys))
 
 
+class OtherBuildRunner(SceneRunner):
+    """The same of another build."""
+
+    def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
+        super().__init__(scene, execution=execution)
+        self.fmu_hashes = {"Busy": "1" * 64}
+
+
 class BrittleRunner(BusyRunner):
     """Fails, with a message, at every point whose forcing amplitude is negative."""
 

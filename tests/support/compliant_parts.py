@@ -131,8 +131,8 @@ def plain_contact(exchange: str, steps: int, stiffness: float, law: str) -> tupl
         component.begin({}, 0.0, first=True)
         component.instance.exit_initialization()
     assert isinstance(mass.instance, Instance3)
-    mass.instance.update_discrete_states()
-    mass.instance.enter_step_mode()
+    mass.instance.check(mass.instance.update_call(), "UpdateDiscreteStates")
+    mass.instance.check(mass.instance.enter_step_call(), "EnterStepMode")
     motion, force = mass.group("Float64", ["displacement", "velocity"]), mass.group("Float64", ["force"])
     seen, answer = (
         stop.group("Float64", ["displacement", "velocity"]),

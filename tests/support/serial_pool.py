@@ -13,7 +13,7 @@ import pytest
 import vibroimpact.orchestrator.campaign.campaign as campaign
 from vibroimpact.orchestrator.campaign import CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.cluster import Finished
-from vibroimpact.orchestrator.campaign.progress import Silence
+from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.scene import parse_scene
 
 
@@ -25,6 +25,7 @@ class SerialPool:
         self._tickets = 0
         self._left = most_chunks
         self.lost_workers = 0
+        self.is_local = True
 
     def worker_addresses(self) -> tuple[str, ...]:
         """Return one address."""
@@ -54,10 +55,11 @@ class SerialPool:
         self._queue.clear()
 
 
-class Notes(Silence):
+class Notes(Progress):
     """Keeps what a campaign says."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.lines: list[str] = []
 
     def note(self, text: str) -> None:

@@ -488,8 +488,6 @@ def test_merging_files_with_different_variables_is_refused(tmp_path: Path) -> No
 def test_a_part_gives_what_resuming_needs(tmp_path: Path) -> None:
     part = read_part(written(up_down(), tmp_path))
     assert part.run_index.tolist() == list(range(6))
-    assert (part.final_displacement, part.final_velocity, part.final_phase) == (5.0, -5.0, 0.5)
-    assert part.last_outcome is Outcome.ok
     assert part.attrs["title"] == "example"
 
 

@@ -11,7 +11,6 @@ from vibroimpact.fmus.errors import CampaignError
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.campaign.chunks import (
     Chunk,
-    RunnerIdentity,
     Work,
     get_ready,
     points_of,
@@ -28,6 +27,7 @@ from vibroimpact.orchestrator.campaign.parts import (
     unfit_parts,
 )
 from vibroimpact.orchestrator.campaign.schedule import gaps_between
+from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene.sweep import expand
 
 BUSY = "support.busy_runner:BusyRunner"

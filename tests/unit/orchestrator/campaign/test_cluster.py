@@ -20,7 +20,7 @@ from support.busy_runner import die_while, freeze_once, same
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign import cluster
 from vibroimpact.orchestrator.campaign.cluster import MOST_DEATHS, MOST_STARTS, open_workers
-from vibroimpact.orchestrator.campaign.progress import Silence
+from vibroimpact.orchestrator.campaign.progress import Progress
 
 pytestmark = pytest.mark.slow
 
@@ -108,10 +108,11 @@ def test_a_call_of_dask_that_ctrl_c_ended_before_it_began_says_nothing(
     assert not [one for one in recwarn if "never awaited" in str(one.message)]
 
 
-class Said(Silence):
+class Said(Progress):
     """Keeps what it is told."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.notes: list[str] = []
 
     def note(self, text: str) -> None:

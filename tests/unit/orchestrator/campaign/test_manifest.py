@@ -6,18 +6,20 @@ from support.campaign_scenes import frequency_text, scene_of
 
 from vibroimpact.analysis.files.folder_lock import locked_folder
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.campaign.chunks import RunnerIdentity
 from vibroimpact.orchestrator.campaign.manifest import (
     Manifest,
+    add_build,
     differences,
     flat_scene,
     read_manifest,
     refuse_other_runner,
     refuse_other_scene,
+    runner_differences,
     scene_hash,
     write_manifest,
 )
 from vibroimpact.orchestrator.campaign.shared_folder import answer_question, refuse_blind_workers
+from vibroimpact.orchestrator.run import RunnerIdentity
 
 TEXT = frequency_text(11, "up")
 LOWER_STOP = "[[stop]]\nposition = -1.0\nside = 'lower'\nrestitution = 1.0\n"
@@ -58,7 +60,7 @@ def test_a_changed_scene_is_refused_with_the_key(tmp_path: Path, old: str, new: 
 
 def test_the_same_scene_is_not_refused(tmp_path: Path) -> None:
     assert not differences(written(tmp_path).scene, flat_scene(scene_of(TEXT)))
-    refuse_other_runner(tmp_path / "campaign.json", written(tmp_path), IDENTITY)
+    assert not runner_differences(written(tmp_path), IDENTITY)
 
 
 @pytest.mark.parametrize(
@@ -70,9 +72,21 @@ def test_the_same_scene_is_not_refused(tmp_path: Path) -> None:
     ],
 )
 def test_results_of_two_kinds_are_never_mixed(tmp_path: Path, other: RunnerIdentity, told: str) -> None:
+    different = runner_differences(written(tmp_path), other)
     with pytest.raises(UsageError) as caught:
-        refuse_other_runner(tmp_path / "campaign.json", written(tmp_path), other)
+        refuse_other_runner(tmp_path / "campaign.json", different)
     assert told in str(caught.value)
+
+
+def test_a_build_that_is_added_is_known_and_the_manifest_sound(tmp_path: Path) -> None:
+    other = RunnerIdentity("fused", "x86_64", {"body": "b" * 64})
+    written(tmp_path)
+    add_build(tmp_path / "campaign.json", other, 8)
+    manifest = read_manifest(tmp_path / "campaign.json")
+    assert manifest is not None
+    assert not runner_differences(manifest, other)
+    assert not runner_differences(manifest, IDENTITY)
+    assert runner_differences(manifest, RunnerIdentity("fused", "x86_64", {"body": "c" * 64}))
 
 
 def test_a_folder_without_a_manifest_has_none(tmp_path: Path) -> None:
