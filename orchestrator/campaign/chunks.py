@@ -173,11 +173,11 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
 
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
     """Run the points of a chunk, kept ones too, and return their rows; nothing is written."""
-    opened = _opened(work.scene_text, work.source, work.runner)
+    opened = _opened(work.scene, work.runner)
     _refuse_other_runner(work, opened.runner)
     points = points_of(opened.branches, chunk)
-    records, _ = run_points(opened.scene, opened.runner, points, chunk.start)
-    return dataset_of(opened.scene, points, records, {})
+    records, _ = run_points(work.scene, opened.runner, points, chunk.start)
+    return dataset_of(work.scene, points, records, {})
 
 
 def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
