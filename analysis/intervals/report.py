@@ -107,19 +107,16 @@ def interval_report(
         slopes, said = interval_dimension(train, scale, embedding=embedding, theiler=theiler, seed=seed)
         rows |= slopes
         attributes |= said
-    return xr.Dataset(
-        described(rows),
-        attrs=attributes
-        | {
-            "events": len(train.times),
-            "window": [float(edge) for edge in train.window],
-            "window_from": "given" if train.stated else "first and last event",
-            "masked_spans": len(train.masked),
-            "resolution": resolution,
-            "forcing_period": forcing_period or 0.0,
-            "seed": seed,
-        },
-    )
+    attributes |= {
+        "events": len(train.times),
+        "window": [float(edge) for edge in train.window],
+        "window_from": "given" if train.stated else "first and last event",
+        "masked_spans": len(train.masked),
+        "resolution": resolution,
+        "forcing_period": forcing_period or 0.0,
+        "seed": seed,
+    }
+    return xr.Dataset(described(rows), attrs=attributes)
 
 
 def read_motion(train: IntervalTrain, forcing_period: float | None) -> tuple[Cycle, Lattice]:
