@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -17,8 +18,8 @@ _SMALL = 1e-4
 """Values below this are written with an exponent."""
 
 
-def table(title: str, *headings: str) -> Table:
-    """Return an empty table.
+def table(title: str, *headings: str, rows: Iterable[Iterable[str]] = ()) -> Table:
+    """Return a table.
 
     Parameters
     ----------
@@ -26,6 +27,7 @@ def table(title: str, *headings: str) -> Table:
     *headings : str
         Each behind `<` for words, which go on in the next line where the terminal is narrow, or `>` for numbers, which
         do not.
+    rows : iterable of rows of cells, optional
     """
     made = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
     for heading in headings:
@@ -33,6 +35,8 @@ def table(title: str, *headings: str) -> Table:
             made.add_column(heading[1:], justify="right", no_wrap=True)
         else:
             made.add_column(heading[1:], overflow="fold")
+    for row in rows:
+        made.add_row(*row)
     return made
 
 

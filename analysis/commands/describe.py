@@ -171,8 +171,10 @@ def _range(errors: np.ndarray[Any, Any]) -> str:
 
 def _flags(variable: xr.DataArray, values: np.ndarray[Any, Any]) -> str:
     meanings = str(variable.attrs["flag_meanings"]).split()
-    flags = np.atleast_1d(variable.attrs["flag_values"])
-    counts = {word: int(np.sum(values == flag)) for flag, word in zip(flags, meanings, strict=True)}
+    masked = "flag_masks" in variable.attrs
+    flags = np.atleast_1d(variable.attrs["flag_masks" if masked else "flag_values"])
+    hits = (values & flag if masked else values == flag for flag in flags)
+    counts = {word: int(np.count_nonzero(hit)) for word, hit in zip(meanings, hits, strict=True)}
     return ", ".join(f"{count} {word}" for word, count in counts.items() if count) or "none"
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,22 @@ from vibroimpact.analysis.files.opening import opened_netcdf
 from vibroimpact.fmus.errors import DatasetError
 
 RESULTS_SCHEMA = "1"
+
+Row = tuple[str | tuple[str, ...], Any, str, str]
+"""A variable: dimensions (none: a number), values, CF unit, name in words."""
+Rows = Mapping[str, Row]
+
+
+def described(rows: Rows) -> dict[str, Any]:
+    """Return variables as xarray takes them, each with its `units` and `long_name`.
+
+    >>> described({"rate": ((), 2.0, "Hz", "events per second")})
+    {'rate': ((), 2.0, {'units': 'Hz', 'long_name': 'events per second'})}
+    """
+    return {
+        name: (dims, values, {"units": unit, "long_name": words})
+        for name, (dims, values, unit, words) in rows.items()
+    }
 
 
 def results_kind(path: str | os.PathLike[str]) -> str | None:

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibroimpact.analysis.intervals.density import FINEST, Density, spread_within, typical_interval
+from vibroimpact.analysis.intervals.density import FINEST, spread_within, typical_interval
 from vibroimpact.analysis.intervals.lattice import Lattice
 from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
 
 # Longest cycle looked for, and the fewest repeats of it that count as one.
 LONGEST_CYCLE, FEWEST_REPEATS = 16, 4
-# Intervals one cycle apart differ by less than so many standard deviations of their cluster, and by less than so much
-# of the median interval, in so many of all cases.
+# Difference of intervals one cycle apart, in standard deviations of their cluster and relative to the median interval,
+# below which they are the same; share of all intervals that must be.
 SAME, AT_MOST, MOSTLY = 4.5, 0.1, 0.8
-# A cycle lasts a whole number of forcing periods to this part of one.
+# Forcing periods by which a cycle may miss a whole number of them.
 WHOLE = 0.1
 
 
@@ -31,8 +31,6 @@ class Cycle:
     ----------
     impacts : int
         p, the smallest that the intervals allow; 0: they do not repeat.
-    peaks : int
-        Distinct maxima of the density.
     duration : float
         Of one cycle, s: median sum of p successive intervals; NaN without one.
     periods : int
@@ -42,61 +40,52 @@ class Cycle:
     """
 
     impacts: int
-    peaks: int
     duration: float
     periods: int
     words: str
 
 
-def read_cycle(train: IntervalTrain, density: Density, forcing_period: float | None) -> Cycle:
+def read_cycle(train: IntervalTrain, forcing_period: float | None) -> Cycle:
     """Return the motion P(p,q) that the intervals show.
 
     Parameters
     ----------
     train : IntervalTrain
-    density : Density
-        Of its intervals.
     forcing_period : float or None
         s; without it q stays unknown.
 
     Examples
     --------
     >>> from vibroimpact.analysis.intervals import interval_train
-    >>> from vibroimpact.analysis.intervals.density import interval_density
     >>> train = interval_train(np.cumsum(np.tile([0.4, 1.6], 20)))
-    >>> cycle = read_cycle(train, interval_density(train.intervals), 1.0)
-    >>> cycle.impacts, cycle.periods, cycle.peaks
-    (2, 2, 2)
+    >>> cycle = read_cycle(train, 1.0)
+    >>> cycle.impacts, cycle.periods
+    (2, 2)
     """
-    peaks = len(density.peaks)
     tolerance = _tolerance(train)
     impacts = _repeats_after(train.separated, tolerance)
     if not impacts:
-        return Cycle(
-            0,
-            peaks,
-            float("nan"),
-            0,
+        words = (
             f"the intervals repeat after no cycle of up to {LONGEST_CYCLE} (to within {tolerance:.2g} s): "
-            "no P(p,q) is read from them",
+            "no P(p,q) is read from them"
         )
+        return Cycle(0, float("nan"), 0, words)
     windows = np.lib.stride_tricks.sliding_window_view(train.separated, impacts)
     duration = float(np.nanmedian(windows.sum(axis=1)))
-    return _verdict(impacts, peaks, duration, forcing_period, f"repeat to within {tolerance:.2g} s")
+    return _verdict(impacts, duration, forcing_period, f"repeat to within {tolerance:.2g} s")
 
 
-def cycle_of_lattice(lattice: Lattice, peaks: int, forcing_period: float | None) -> Cycle:
+def cycle_of_lattice(lattice: Lattice, forcing_period: float | None) -> Cycle:
     """Return the motion of a train whose intervals do not repeat only because spikes are missed or spurious."""
-    return _verdict(1, peaks, lattice.interval, forcing_period, "lie on a lattice")
+    return _verdict(1, lattice.interval, forcing_period, "lie on a lattice")
 
 
-def _verdict(impacts: int, peaks: int, duration: float, forcing_period: float | None, how: str) -> Cycle:
+def _verdict(impacts: int, duration: float, forcing_period: float | None, how: str) -> Cycle:
     same = f"the intervals {how}"
     if impacts == 1:
         same += "; equal intervals hide p: k impacts in k q periods look the same"
     if forcing_period is None:
-        words = f"P({impacts},q), q needs the forcing period; {same}"
-        return Cycle(impacts, peaks, duration, 0, words)
+        return Cycle(impacts, duration, 0, f"P({impacts},q), q needs the forcing period; {same}")
     ratio = duration / forcing_period
     periods = round(ratio)
     if periods < 1 or abs(ratio - periods) > WHOLE:
@@ -104,9 +93,9 @@ def _verdict(impacts: int, peaks: int, duration: float, forcing_period: float | 
             f"{same}; a cycle of {impacts} lasts {ratio:.3f} forcing periods, not a whole number of them: the "
             "response is not locked to that forcing, or spikes are missed"
         )
-        return Cycle(impacts, peaks, duration, 0, words)
+        return Cycle(impacts, duration, 0, words)
     words = f"P({impacts},{periods}), a cycle of {ratio:.4g} forcing periods; {same}"
-    return Cycle(impacts, peaks, duration, periods, words)
+    return Cycle(impacts, duration, periods, words)
 
 
 def _tolerance(train: IntervalTrain) -> float:

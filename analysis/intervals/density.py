@@ -13,16 +13,16 @@ from vibroimpact.analysis.intervals.trains import Floats
 
 # Points of the kernel estimate; most bins of the histogram.
 FEWEST_POINTS, MOST_POINTS, MOST_BINS = 64, 30_000, 400
-# The bandwidth never falls below this part of the median interval: two intervals nearer than that are one.
+# Smallest bandwidth, relative to the median interval: two intervals nearer than that are one.
 FINEST = 0.005
-# A peak stands out from its saddle by this part of its height and by so many standard errors of the estimate there, and
-# reaches this part of the highest.
+# Least prominence of a peak, relative to its height and in standard errors of the estimate there; least height of one,
+# relative to the highest.
 PROMINENCE, SIGNIFICANT, LOWEST_PEAK = 0.3, 2.5, 0.02
 # Integral of the squared Gaussian kernel of bandwidth 1: variance of the estimate over density / (number * bandwidth).
 ROUGHNESS = 0.2821
 # Width of the window about the mean that holds a quarter of a normal distribution, in standard deviations.
 QUARTER_WINDOW = 0.6373
-# Kernels reach so many bandwidths.
+# Reach of a kernel, in bandwidths.
 REACH = 4.0
 
 
@@ -56,9 +56,7 @@ class Density:
         return float(self.edges[1] - self.edges[0])
 
 
-def interval_density(
-    intervals: Floats, *, resolution: float = 0.0, bandwidth: float | None = None
-) -> Density:
+def interval_density(intervals: Floats, *, resolution: float = 0.0) -> Density:
     """Return the density of intervals.
 
     The bandwidth is Silverman's rule for the spread of the intervals within their densest cluster, so that narrow bands
@@ -70,8 +68,6 @@ def interval_density(
         s.
     resolution : float
         Grid of the instants, s: no width is smaller.
-    bandwidth : float, optional
-        s; chosen from the data when not given.
 
     Examples
     --------
@@ -79,7 +75,7 @@ def interval_density(
     >>> [round(float(peak), 2) for peak in density.peaks]
     [0.2, 0.8]
     """
-    width = bandwidth if bandwidth is not None else usual_bandwidth(intervals, resolution)
+    width = _bandwidth(intervals, resolution)
     low, high = float(intervals.min()), float(intervals.max())
     at, kernel = _kernel_estimate(intervals, width, max(low - REACH * width, 0.0), high + REACH * width)
     edges = _edges(low, high, width, resolution)
@@ -87,7 +83,7 @@ def interval_density(
     return Density(at, kernel, width, edges, histogram, at[_distinct(kernel, len(intervals) * width)])
 
 
-def usual_bandwidth(intervals: Floats, resolution: float = 0.0) -> float:
+def _bandwidth(intervals: Floats, resolution: float) -> float:
     """Return Silverman's bandwidth for the spread within clusters, s; at least the grid, and .5 % of the median."""
     sigma = spread_within(intervals)
     return max(0.9 * sigma / math.pow(len(intervals), 0.2), resolution, FINEST * typical_interval(intervals))

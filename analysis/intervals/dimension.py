@@ -6,12 +6,13 @@ intervals show and it does not is dynamics. A slope that keeps growing with the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Iterable
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.results import Rows
 from vibroimpact.analysis.intervals.correlation import (
     FEWEST_PAIRS,
     WINDOW,
@@ -20,7 +21,7 @@ from vibroimpact.analysis.intervals.correlation import (
     count_pairs,
     fitted_slopes,
 )
-from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain, Span
+from vibroimpact.analysis.intervals.trains import Floats, IntervalTrain
 from vibroimpact.fmus.core import RADII_PER_OCTAVE
 
 Scale = Literal["raw", "log"]
@@ -28,69 +29,27 @@ SCALES: tuple[Scale, ...] = ("raw", "log")
 
 EMBEDDING, SURROGATES, THEILER = 6, 8, 1
 MOST_INTERVALS, FEWEST_INTERVALS, FEWEST_DISTINCT = 10_000, 200, 50
-# Ties are warned of where fewer than this part of the intervals are distinct.
+# Share of distinct intervals below which ties are warned of.
 MOSTLY_DISTINCT = 0.9
-# Instants that differ by this part of the latest one or less differ by rounding alone.
+# Difference of instants, relative to the latest one, up to which they differ by rounding alone.
 ROUNDING = 2.0**-44
-# A motion repeats where so many of the pairs that are the same in one interval are the same in all.
+# Share of the pairs equal in one interval that are equal in all, above which the motion repeats.
 REPEATS = 0.5
-# Growth of the slope per embedding, against that of the surrogate: stands still, keeps up, runs ahead; a surrogate that
-# flattens.
+# Growth of the slope per embedding below which it stands still; its top over the surrogate's, above which it keeps up
+# and runs ahead; the surrogate's over noise, below which that flattens.
 STILL, KEEPS_UP, AHEAD, FLATTENS = 0.15, 0.85, 1.3, 0.75
-# So near to its end a slope has saturated.
+# Distance from its last value within which a slope has saturated.
 REACHED = 0.2
-# Embeddings whose slopes make a verdict, one after the other.
+# Fewest successive embeddings with a slope that make a verdict.
 FEWEST_SLOPES = 3
-# Slope of a plateau, and how much of all pairs it leaves out at least.
+# Slope up to which a stretch is a plateau, and the least share of all pairs beyond it.
 FLAT, LEFT_OUT = 0.1, 0.1
 
 
-@dataclass(frozen=True, slots=True)
-class Dimension:
-    """Slopes of the correlation sums of one sequence and of its shuffled surrogates.
-
-    Attributes
-    ----------
-    scale : {"raw", "log"}
-        Intervals (s), or their natural logarithms.
-    sums : CorrelationSums or None
-        None where they were refused.
-    slopes : ndarray of float, shape (embedding,)
-        Fitted over `window`.
-    surrogate_sums, surrogate_local_slopes : ndarray of float, shape (embedding, radius)
-        Means over the surrogates.
-    surrogate_slopes, surrogate_spread : ndarray of float, shape (embedding,)
-        Mean and standard deviation over the surrogates.
-    window : tuple of float
-        Lowest and highest C of the fits.
-    words : str
-        What the slopes say, or why there are none.
-    warnings : tuple of str
-        What limits them.
-    """
-
-    scale: Scale
-    sums: CorrelationSums | None
-    slopes: Floats
-    surrogate_sums: Floats
-    surrogate_local_slopes: Floats
-    surrogate_slopes: Floats
-    surrogate_spread: Floats
-    window: Span
-    words: str
-    warnings: tuple[str, ...] = ()
-
-
 def interval_dimension(
-    train: IntervalTrain,
-    scale: Scale,
-    *,
-    embedding: int = EMBEDDING,
-    theiler: int = THEILER,
-    window: Span = WINDOW,
-    seed: int = 0,
-) -> Dimension:
-    """Return the slopes of the correlation sums of a train's intervals, beside those of their shuffled surrogates.
+    train: IntervalTrain, scale: Scale, *, embedding: int = EMBEDDING, theiler: int = THEILER, seed: int = 0
+) -> tuple[Rows, dict[str, Any]]:
+    """Return the correlation sums of a train's intervals, their slopes, those of shuffled surrogates, and a verdict.
 
     Parameters
     ----------
@@ -98,43 +57,70 @@ def interval_dimension(
         At most its first 10,000 intervals are used.
     scale : {"raw", "log"}
         Heavy-tailed intervals flatten the raw slopes falsely; take their logarithms.
-    embedding, theiler, window
-        Largest m; pairs so near in order do not count; C of the fits.
+    embedding, theiler
+        Largest m; pairs so near in order do not count.
     seed : int
         Of the shuffles.
 
     Returns
     -------
-    Dimension
-        With words for a reason, and no sums, where the intervals cannot tell.
+    variables, attributes
+        With words for a reason, and no radii, where the intervals cannot tell.
     """
     values = _values(train, scale)
     reason = _refusal(train, values, embedding)
     if reason:
-        return _refused(scale, reason, embedding, window)
+        nothing = np.empty((embedding, 0), np.int64)
+        sums = CorrelationSums(np.empty(0), nothing, np.ones(embedding, np.int64))
+        slopes = np.full(embedding, 0.0 if reason.startswith("slope 0") else np.nan)
+        rows = _rows(scale, sums, slopes, [sums], np.full((SURROGATES, embedding), np.nan))
+        return rows, _attributes(scale, reason)
     values = values[:MOST_INTERVALS]
     sums = correlation_sums(values, embedding, theiler=theiler)
     # between two points of a grid a radius tells nothing
     above = 2.0 * train.resolution / (float(np.median(train.intervals)) if scale == "log" else 1.0)
-    slopes = fitted_slopes(sums, window, above=above)
+    slopes = fitted_slopes(sums, above=above)
     rng = np.random.default_rng(seed)
     shuffled = [
         correlation_sums(_shuffled(values, rng), embedding, theiler=theiler, radii=sums.radii)
         for _ in range(SURROGATES)
     ]
-    others = np.array([fitted_slopes(s, window, above=above) for s in shuffled])
-    return Dimension(
-        scale,
-        sums,
-        slopes,
-        np.mean([s.sums for s in shuffled], axis=0),
-        np.mean([s.local_slopes for s in shuffled], axis=0),
-        others.mean(axis=0),
-        others.std(axis=0, ddof=1),
-        window,
-        verdict(slopes, others.mean(axis=0)) + _plateau(sums),
-        _warnings(train, values),
-    )
+    others = np.array([fitted_slopes(s, above=above) for s in shuffled])
+    words = verdict(slopes, others.mean(axis=0)) + _plateau(sums)
+    attributes = _attributes(scale, words, _warnings(train, values))
+    return _rows(scale, sums, slopes, shuffled, others), attributes | {"theiler": theiler}
+
+
+def _rows(
+    scale: Scale, sums: CorrelationSums, slopes: Floats, shuffled: list[CorrelationSums], others: Floats
+) -> Rows:
+    """Return the variables of one scale; `others`: slopes of the surrogates, shape (surrogate, embedding)."""
+    kind, unit = {"raw": ("intervals", "s"), "log": ("ln(interval / 1 s)", "1")}[scale]
+    by_m, radius = "embedding", f"radius_{scale}"
+    both = (by_m, radius)
+    sum_of, slope_of = "correlation sum of", "correlation slope of"
+    mean_sums = np.mean([each.sums for each in shuffled], axis=0)
+    mean_slopes = np.mean([each.local_slopes for each in shuffled], axis=0)
+    spread, words = others.std(axis=0, ddof=1), f"{slope_of} shuffled {kind}, standard deviation"
+    return {
+        f"slope_{scale}": (by_m, slopes, "1", f"{slope_of} {kind}"),
+        f"surrogate_slope_{scale}": (by_m, others.mean(axis=0), "1", f"{slope_of} shuffled {kind}, mean"),
+        f"surrogate_spread_{scale}": (by_m, spread, "1", words),
+        f"correlation_sum_{scale}": (both, sums.sums, "1", f"{sum_of} {kind}"),
+        f"local_slope_{scale}": (both, sums.local_slopes, "1", f"local slope of {kind}, over half an octave"),
+        f"surrogate_sum_{scale}": (both, mean_sums, "1", f"{sum_of} shuffled {kind}, mean"),
+        f"surrogate_local_slope_{scale}": (both, mean_slopes, "1", f"local slope of shuffled {kind}, mean"),
+        by_m: (by_m, np.arange(1, len(slopes) + 1), "1", "numbers in a delay vector"),
+        radius: (radius, sums.radii, unit, "radius in the max norm"),
+    }
+
+
+def _attributes(scale: Scale, words: str, warnings: Iterable[str] = ()) -> dict[str, Any]:
+    return {
+        f"dimension_{scale}": words,
+        f"dimension_{scale}_warnings": "\n".join(warnings),
+        "slope_window": list(WINDOW),
+    }
 
 
 def verdict(slopes: Floats, surrogate: Floats) -> str:
@@ -266,7 +252,7 @@ def _shuffled(values: Floats, rng: np.random.Generator) -> Floats:
     return shuffled
 
 
-def _warnings(train: IntervalTrain, values: Floats) -> tuple[str, ...]:
+def _warnings(train: IntervalTrain, values: Floats) -> list[str]:
     known = values[np.isfinite(values)]
     distinct = len(np.unique(known))
     lines = [
@@ -279,10 +265,4 @@ def _warnings(train: IntervalTrain, values: Floats) -> tuple[str, ...]:
         lines.append(
             f"ties: only {distinct} of {len(known)} intervals are distinct; small radii are not trustworthy"
         )
-    return tuple(lines)
-
-
-def _refused(scale: Scale, reason: str, embedding: int, window: Span) -> Dimension:
-    slopes = np.full(embedding, 0.0 if reason.startswith("slope 0") else np.nan)
-    unknown, nothing = np.full(embedding, np.nan), np.empty((embedding, 0))
-    return Dimension(scale, None, slopes, nothing, nothing, unknown, unknown, window, reason)
+    return lines

@@ -6,7 +6,7 @@ neighbouring gap.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from vibroimpact.analysis.robust import robust_sigma
 
 # Intervals on either side of one that make its median.
 NEIGHBOURS = 10
-# A gap is longer than so many local medians: between one beat and two.
+# Length, in local medians, above which an interval is a gap: between one beat and two.
 LONGEST_BEAT = 1.5
 # Robust coefficient of variation about the local median up to which one beat and two can be told apart.
 NEARLY_PERIODIC = 0.2
@@ -29,22 +29,22 @@ class MissedBeats:
 
     Attributes
     ----------
-    place : ndarray of int, shape (gap,)
-        Index of the interval among all intervals of the train.
-    missing : ndarray of int, shape (gap,)
-        Beats that each would have had: its length in local medians, rounded, less one.
     ratio : ndarray of float, shape (interval,)
         Each interval over its local median; NaN where masked.
     spread : float
         Robust coefficient of variation about the local median.
+    place : ndarray of int, shape (gap,)
+        Index of the interval among all intervals of the train.
+    missing : ndarray of int, shape (gap,)
+        Beats that each would have had: its length in local medians, rounded, less one.
     reason : str
         Why none were looked for; empty when they were.
     """
 
-    place: NDArray[np.intp]
-    missing: NDArray[np.int64]
     ratio: Floats
-    spread: float
+    spread: float = float("nan")
+    place: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, np.intp))
+    missing: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
     reason: str = ""
 
 
@@ -63,16 +63,13 @@ def find_gaps(train: IntervalTrain) -> MissedBeats:
     ([6, 18], [1, 2])
     """
     intervals = train.intervals
-    nothing = np.empty(0, dtype=np.intp)
     ratio = np.full(len(train.kept), np.nan)
     if len(intervals) < FEWEST_INTERVALS:
         reason = f"expected at least {FEWEST_INTERVALS} intervals, got {len(intervals)}"
-        return MissedBeats(nothing, nothing, ratio, float("nan"), reason)
+        return MissedBeats(ratio, reason=reason)
     typical = local_median(intervals)
     if not np.all(typical > 0.0):
-        return MissedBeats(
-            nothing, nothing, ratio, float("nan"), "most events of some neighbourhood coincide"
-        )
+        return MissedBeats(ratio, reason="most events of some neighbourhood coincide")
     ratio[train.kept] = intervals / typical
     centred = ratio[train.kept]
     spread = robust_sigma(centred - np.median(centred))
@@ -81,10 +78,10 @@ def find_gaps(train: IntervalTrain) -> MissedBeats:
             f"the train is not nearly periodic: its intervals scatter by {100 * spread:.0f} % about their local "
             f"median; expected at most {100 * NEARLY_PERIODIC:.0f} %"
         )
-        return MissedBeats(nothing, nothing, ratio, spread, reason)
+        return MissedBeats(ratio, spread, reason=reason)
     place = np.flatnonzero(np.nan_to_num(ratio) > LONGEST_BEAT)
     missing = np.maximum(np.rint(ratio[place]).astype(np.int64) - 1, 1)
-    return MissedBeats(place, missing, ratio, spread)
+    return MissedBeats(ratio, spread, place, missing)
 
 
 def local_median(values: Floats) -> Floats:

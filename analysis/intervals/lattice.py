@@ -8,7 +8,7 @@ true, the others spurious, and places of the lattice without an event were misse
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,13 @@ from vibroimpact.analysis.robust import robust_sigma
 FEWEST_EVENTS = 30
 # Events whose phases are averaged for the place of the lattice: it may drift, slowly.
 WINDOW = 41
-# An event is on the lattice within so many standard deviations of the true ones, but never nearer than NEAREST of an
-# interval, and where that would be more than FARTHEST of one the lattice is blurred.
+# Distance from its place, in standard deviations of the true events, within which an event is on the lattice; least and
+# most of it, relative to the interval: beyond the most the lattice is blurred.
 SIGMAS, NEAREST, FARTHEST = 5.0, 0.005, 0.2
-# Least part of all events on the lattice.
+# Least share of all events on the lattice.
 MOSTLY = 0.7
 ROUNDS = 4
-# Spans of up to so many events sharpen the interval; their ends are on the lattice within this part of it.
+# Longest span that sharpens the interval, in events; distance of its end from the lattice, relative to the interval.
 LONGEST_SPAN, HALF_WAY = 64, 0.25
 
 
@@ -35,14 +35,14 @@ LONGEST_SPAN, HALF_WAY = 64, 0.25
 class Share:
     """A probability from a count: its estimate, standard error, and one-sided 95 % upper bound (Clopper-Pearson)."""
 
-    value: float
-    standard_error: float
-    upper: float
+    value: float = float("nan")
+    standard_error: float = float("nan")
+    upper: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
 class Lattice:
-    """What the lattice of a period-1 train says.
+    """What the lattice of a period-1 train says; nothing but a reason where there is none.
 
     Attributes
     ----------
@@ -59,14 +59,14 @@ class Lattice:
         Why there is no lattice; empty when there is.
     """
 
-    interval: float
-    jitter: float
-    missed: Share
-    spurious: Share
-    places: int
-    counted_missed: int
-    counted_spurious: int
-    on_lattice: NDArray[np.bool_]
+    interval: float = float("nan")
+    jitter: float = float("nan")
+    missed: Share = Share()
+    spurious: Share = Share()
+    places: int = 0
+    counted_missed: int = 0
+    counted_spurious: int = 0
+    on_lattice: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, np.bool_))
     reason: str = ""
 
 
@@ -97,31 +97,25 @@ def interval_lattice(train: IntervalTrain) -> Lattice:
     """
     times = train.times
     if len(times) < FEWEST_EVENTS:
-        return no_lattice(train, f"expected at least {FEWEST_EVENTS} events, got {len(times)}")
-    guess = _most_frequent(train)
+        return Lattice(reason=f"expected at least {FEWEST_EVENTS} events, got {len(times)}")
+    density = interval_density(train.intervals, resolution=train.resolution)
+    guess = float(density.at[np.argmax(density.kernel)])
     if not guess > 0.0:
-        return no_lattice(train, "the most frequent interval is 0 s")
+        return Lattice(reason="the most frequent interval is 0 s")
     interval, offset = _clock(times, guess)
     jitter, width = _widths(offset, train.resolution / interval)
     on_lattice = np.abs(offset) < width
     if width > FARTHEST:
-        return no_lattice(
-            train,
-            f"no single lattice: events scatter by {100 * jitter:.0f} % of the most frequent interval "
+        return Lattice(
+            reason=f"no single lattice: events scatter by {100 * jitter:.0f} % of the most frequent interval "
             f"({interval:.4g} s) about its multiples; expected at most {100 * FARTHEST / SIGMAS:.0f} %",
         )
     if np.mean(on_lattice) < MOSTLY:
-        return no_lattice(
-            train,
-            f"no single lattice: {100 * np.mean(on_lattice):.0f} % of the events lie at multiples of the most "
+        return Lattice(
+            reason=f"no single lattice: {100 * np.mean(on_lattice):.0f} % of the events lie at multiples of the most "
             f"frequent interval ({interval:.4g} s); expected at least {100 * MOSTLY:.0f} %",
         )
     return _shares(train, interval, jitter, width, offset, on_lattice)
-
-
-def _most_frequent(train: IntervalTrain) -> float:
-    density = interval_density(train.intervals, resolution=train.resolution)
-    return float(density.at[np.argmax(density.kernel)])
 
 
 def _clock(times: Floats, guess: float) -> tuple[float, Floats]:
@@ -135,7 +129,7 @@ def _clock(times: Floats, guess: float) -> tuple[float, Floats]:
     offset = np.zeros(len(times))
     for _ in range(ROUNDS):
         mean = _running_sum(phase * weight)
-        # what is left of a drift is smaller each time
+        # each round leaves less of a drift
         phase = phase * np.exp(-1j * np.angle(mean))
         offset = np.angle(phase) / (2.0 * np.pi)
         weight = (np.abs(offset) < max(_widths(offset, 0.0)[1], NEAREST)).astype(np.float64)
@@ -190,7 +184,7 @@ def _shares(
     between = np.where(clear, np.diff(true) - 1, 0)
     places = int(steps[clear].sum())
     if not places:
-        return no_lattice(train, "masked spans leave no two places of it side by side")
+        return Lattice(reason="masked spans leave no two places of it side by side")
     empty = int(np.maximum(steps[clear] - 1, 0).sum())
     extra = int(between.sum())
     # a spurious event within `width` of a place is taken for a true one, or stands in for a missed one
@@ -207,19 +201,3 @@ def _share(count: int, trials: int, seen: float) -> Share:
     error = np.sqrt(value * (1.0 - value) / trials) if value < 1.0 else float("nan")
     upper = float(beta.ppf(0.95, count + 1, trials - count)) if count < trials else 1.0
     return Share(min(value / seen, 1.0), float(error / seen), min(upper / seen, 1.0))
-
-
-def no_lattice(train: IntervalTrain, reason: str) -> Lattice:
-    """Return a lattice that is none, for a reason."""
-    unknown = Share(*(float("nan"),) * 3)
-    return Lattice(
-        float("nan"),
-        float("nan"),
-        unknown,
-        unknown,
-        0,
-        0,
-        0,
-        np.zeros(len(train.times), dtype=np.bool_),
-        reason,
-    )

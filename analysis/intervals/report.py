@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import xarray as xr
 
+from vibroimpact.analysis.dataset.results import Row, described
 from vibroimpact.analysis.intervals.cycles import Cycle, cycle_of_lattice, read_cycle
-from vibroimpact.analysis.intervals.density import Density, interval_density
+from vibroimpact.analysis.intervals.density import interval_density
 from vibroimpact.analysis.intervals.dimension import EMBEDDING, SCALES, THEILER, interval_dimension
 from vibroimpact.analysis.intervals.gaps import find_gaps
-from vibroimpact.analysis.intervals.lattice import Lattice, interval_lattice, no_lattice
+from vibroimpact.analysis.intervals.lattice import Lattice, interval_lattice
 from vibroimpact.analysis.intervals.report_parts import (
     density_part,
-    dimension_part,
     gap_part,
+    gap_words,
     interval_part,
     lattice_part,
     variability_part,
@@ -90,43 +92,43 @@ def interval_report(
         )
     train = interval_train(times, window=window, masked=masked, resolution=resolution)
     density = interval_density(train.intervals, resolution=resolution)
-    cycle, lattice = read_motion(train, density, forcing_period)
-    parts = (
-        interval_part(train),
-        variability_part(train, count_bin),
-        density_part(density, cycle),
-        gap_part(train, find_gaps(train)),
-        lattice_part(train, lattice),
-        *(
-            dimension_part(interval_dimension(train, scale, embedding=embedding, theiler=theiler, seed=seed))
-            for scale in SCALES
-        ),
-    )
-    report = xr.merge(parts, combine_attrs="no_conflicts")
-    return report.assign_attrs(
-        events=len(train.times),
-        window=[float(edge) for edge in train.window],
-        window_from="given" if train.stated else "first and last event",
-        masked_spans=len(train.masked),
-        resolution=resolution,
-        forcing_period=forcing_period or 0.0,
-        seed=seed,
-    )
+    cycle, lattice = read_motion(train, forcing_period)
+    gaps = find_gaps(train)
+    on_lattice, words = lattice_part(train, lattice)
+    rows: dict[str, Row] = {
+        **interval_part(train),
+        **variability_part(train, count_bin),
+        **density_part(density, cycle),
+        **gap_part(train, gaps),
+        **on_lattice,
+    }
+    attributes: dict[str, Any] = {"cycle": cycle.words, "gaps": gap_words(gaps), "lattice": words}
+    for scale in SCALES:
+        slopes, said = interval_dimension(train, scale, embedding=embedding, theiler=theiler, seed=seed)
+        rows |= slopes
+        attributes |= said
+    attributes |= {
+        "events": len(train.times),
+        "window": [float(edge) for edge in train.window],
+        "window_from": "given" if train.stated else "first and last event",
+        "masked_spans": len(train.masked),
+        "resolution": resolution,
+        "forcing_period": forcing_period or 0.0,
+        "seed": seed,
+    }
+    return xr.Dataset(described(rows), attrs=attributes)
 
 
-def read_motion(
-    train: IntervalTrain, density: Density, forcing_period: float | None
-) -> tuple[Cycle, Lattice]:
+def read_motion(train: IntervalTrain, forcing_period: float | None) -> tuple[Cycle, Lattice]:
     """Return the motion that the intervals show, and the lattice if it has one spike per cycle.
 
     Intervals that repeat after two or more make no single lattice; with missed spikes a lattice often repeats after
     nothing, and the motion is read from the lattice.
     """
-    cycle = read_cycle(train, density, forcing_period)
+    cycle = read_cycle(train, forcing_period)
     if cycle.impacts > 1:
-        reason = f"no single lattice: the intervals repeat after {cycle.impacts}"
-        return cycle, no_lattice(train, reason)
+        return cycle, Lattice(reason=f"no single lattice: the intervals repeat after {cycle.impacts}")
     lattice = interval_lattice(train)
     if not cycle.impacts and not lattice.reason:
-        return cycle_of_lattice(lattice, cycle.peaks, forcing_period), lattice
+        return cycle_of_lattice(lattice, forcing_period), lattice
     return cycle, lattice

@@ -123,7 +123,7 @@ def interval_train(
 
 
 MOST_SEAMS = 10_000
-"""Recordings are joined from hours or days, and each seam costs an interval."""
+"""Most seams: recordings are joined from hours or days, and each seam costs an interval."""
 
 
 def seams(period: float, window: Span, half_width: float = 0.0) -> tuple[Span, ...]:

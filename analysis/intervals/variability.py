@@ -18,16 +18,8 @@ RATE_BINS, OFFSETS = 20, 20
 # Widths of the Fano curve, in mean intervals, and the fewest bins that give a variance.
 CURVE = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 FEWEST_BINS = 10
-# Of a bin: ends that differ by rounding alone are the same.
+# Difference of ends, relative to the bin, up to which they differ by rounding alone.
 ROUNDING = 1e-9
-
-
-@dataclass(frozen=True, slots=True)
-class Rate:
-    """Events per second, and its standard error."""
-
-    value: float
-    standard_error: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +30,8 @@ class FanoFactor:
     ----------
     width : float
         Of the bins, s.
-    bins : int
-        How many.
     value : float
-        With the first bin at the start of the window.
+        With the first bin at the start of the window; NaN, as the others, where there are fewer than 10 bins.
     standard_error : float
         sqrt(2 / (bins - 1)) of the value: as if the counts were normal and independent.
     lowest, highest : float
@@ -49,15 +39,14 @@ class FanoFactor:
     """
 
     width: float
-    bins: int
-    value: float
-    standard_error: float
-    lowest: float
-    highest: float
+    value: float = float("nan")
+    standard_error: float = float("nan")
+    lowest: float = float("nan")
+    highest: float = float("nan")
 
 
-def rate(train: IntervalTrain) -> Rate:
-    """Return events per second of observation.
+def rate(train: IntervalTrain) -> tuple[float, float]:
+    """Return events per second of observation, and the standard error.
 
     In a window that was given, events over its duration; otherwise intervals over the span from the first event to
     the last. The standard error comes from the counts in 20 long bins (as it would from any 20 independent repeats);
@@ -67,9 +56,9 @@ def rate(train: IntervalTrain) -> Rate:
     value = events / train.duration
     counts = bin_counts(train, (train.window[1] - train.window[0]) / RATE_BINS)
     if len(counts) < FEWEST_BINS or events < 2 * RATE_BINS:
-        return Rate(value, float("nan"))
+        return value, float("nan")
     relative = np.std(counts, ddof=1) / np.mean(counts) / np.sqrt(len(counts))
-    return Rate(value, float(value * relative))
+    return value, float(value * relative)
 
 
 def coefficient_of_variation(train: IntervalTrain) -> float:
@@ -82,15 +71,15 @@ def fano_factor(train: IntervalTrain, width: float) -> FanoFactor:
     """Return the Fano factor of the counts in bins of a width (s).
 
     The bins start with the window; the part of the window that they do not fill, and bins that touch a masked span,
-    do not count. All values are NaN where there are fewer than 10 bins.
+    do not count.
     """
     counts = bin_counts(train, width)
     if len(counts) < FEWEST_BINS:
-        return FanoFactor(width, len(counts), *(float("nan"),) * 4)
+        return FanoFactor(width)
     value = _variance_to_mean(counts)
     shifted = [_variance_to_mean(bin_counts(train, width, k * width / OFFSETS)) for k in range(OFFSETS)]
     error = value * np.sqrt(2.0 / (len(counts) - 1))
-    return FanoFactor(width, len(counts), value, float(error), min(shifted), max(shifted))
+    return FanoFactor(width, value, float(error), min(shifted), max(shifted))
 
 
 def fano_curve(train: IntervalTrain) -> list[FanoFactor]:
@@ -107,7 +96,7 @@ def usual_bin(train: IntervalTrain) -> float:
 
 
 MOST_BINS = 10**7
-"""Beyond it counts are 0 and 1 in any recording, and memory is all that they fill."""
+"""Bins above which counts are 0 and 1 in any recording, and only fill memory."""
 
 
 def bin_counts(train: IntervalTrain, width: float, offset: float = 0.0) -> Floats:

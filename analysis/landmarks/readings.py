@@ -23,9 +23,9 @@ from vibroimpact.fmus.errors import DatasetError
 Floats = npt.NDArray[np.float64]
 
 _FREQUENCY = "angular_frequency"
-# Non-impacting points that the amplitude is extrapolated from.
+# Most non-impacting points from which the amplitude is extrapolated.
 _EXTRAPOLATED_POINTS = 12
-# Two impact velocities that differ by less than this fraction are one: rounding, not alternation.
+# Relative difference of impact velocities below which they differ by rounding and do not alternate.
 _SAME_VELOCITY = 1e-9
 
 
@@ -96,7 +96,10 @@ def bifurcation_readings(dataset: xr.Dataset) -> list[Reading]:
         raise DatasetError(
             "readings: expected a period doubling and a fold of P(1,1), got an oscillator without."
         )
-    at_doubling, at_graze, at_fold = _doubling_bracket(down, w), _onset_bracket(down, w), _fall_bracket(up, w)
+    at_doubling = _doubling_bracket(down, w)
+    begin = "upper graze: expected impacts to begin within the down sweep, got none or all"
+    end = "fold: expected impacts to end within the up sweep, got none or no end"
+    at_graze, at_fold = _last_impact(down, w, begin), _last_impact(up, w, end)
     return [
         _lower_graze(up, w, lower, oscillator.stop_position),
         _bracketed(
@@ -142,21 +145,11 @@ def _impacting(sweep: xr.Dataset) -> npt.NDArray[np.bool_]:
     return np.asarray(sweep["impact_count"].values > 0)
 
 
-def _onset_bracket(down: xr.Dataset, w: Floats) -> tuple[float, float]:
-    """Return the neighbours between which impacts begin on the way down from high frequency."""
-    hits = np.flatnonzero(_impacting(down))
+def _last_impact(sweep: xr.Dataset, w: Floats, expected: str) -> tuple[float, float]:
+    """Return the neighbours of which the lower is the highest frequency with impacts; there must be a higher one."""
+    hits = np.flatnonzero(_impacting(sweep))
     if hits.size == 0 or hits[-1] == w.size - 1:
-        raise DatasetError(
-            "readings: upper graze: expected impacts to begin within the down sweep, got none or all."
-        )
-    return float(w[hits[-1]]), float(w[hits[-1] + 1])
-
-
-def _fall_bracket(up: xr.Dataset, w: Floats) -> tuple[float, float]:
-    """Return the neighbours between which impacts end for good on the way up."""
-    hits = np.flatnonzero(_impacting(up))
-    if hits.size == 0 or hits[-1] == w.size - 1:
-        raise DatasetError("readings: fold: expected impacts to end within the up sweep, got none or no end.")
+        raise DatasetError(f"readings: {expected}.")
     return float(w[hits[-1]]), float(w[hits[-1] + 1])
 
 

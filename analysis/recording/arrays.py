@@ -9,9 +9,6 @@ from vibroimpact.analysis.recording.channels import Channel, Floats, Quality, Ti
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
 
-# Of the mean interval: intervals that differ by less are even.
-_EVEN = 1e-6
-
 
 def channel_of(signal: Channel | xr.DataArray) -> Channel:
     """Return a signal as a channel.
@@ -49,17 +46,14 @@ def channel_of(signal: Channel | xr.DataArray) -> Channel:
         )
     values = _numbers(signal, name)
     time = _instants(signal, name)
-    steps = np.diff(time)
-    if not np.all(steps > 0.0):
+    if not np.all(np.diff(time) > 0.0):
         raise DatasetError(
             f"{name}: time: expected finite instants that ascend, got others. Sort the array by time."
         )
-    mean = float(np.mean(steps))
-    even = float(np.ptp(steps)) <= _EVEN * mean
     quality = np.where(np.isfinite(values), 0, Quality.missing).astype(np.uint8)
     unit = measured_unit(str(signal.attrs.get("units", "1"))).cf
     label = str(signal.attrs.get("long_name", ""))
-    return Channel(name, values, unit, TimeAxis(time, mean if even else None), quality, label)
+    return Channel(name, values, unit, TimeAxis.through(time), quality, label)
 
 
 def array_of(channel: Channel) -> xr.DataArray:

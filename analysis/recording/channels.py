@@ -26,6 +26,8 @@ RECORDING_SCHEMA = "1"
 
 Floats = NDArray[np.float64]
 T = TypeVar("T")
+#: Relative difference of intervals up to which they are even.
+_EVEN = 1e-6
 
 
 class Quality(IntFlag):
@@ -39,6 +41,13 @@ class Quality(IntFlag):
     """The file has a marker of overrange or of an open input; its value is NaN."""
     suspect = 8
     """Kept as it is, but its time was doubtful: repeated, or out of order."""
+
+
+QUALITY_FLAGS = {
+    "flag_masks": np.array([int(flag) for flag in Quality], dtype=np.uint8),
+    "flag_meanings": " ".join(str(flag.name) for flag in Quality),
+}
+"""Attributes of a variable of `Quality`, as CF writes them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +74,13 @@ class TimeAxis:
     interval_uncertainty: float = 0.0
     source: str = ""
     trigger: str = ""
+
+    @classmethod
+    def through(cls, time: Floats, source: str = "") -> TimeAxis:
+        """Return the axis of instants (s), which is even where their intervals differ by rounding alone."""
+        steps = np.diff(time)
+        even = len(steps) > 0 and float(np.ptp(steps)) <= _EVEN * float(np.mean(steps))
+        return cls(time, float(np.mean(steps)) if even else None, source=source)
 
     @property
     def rate(self) -> float:

@@ -17,6 +17,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
 from vibroimpact.analysis.files.opening import one_error, opened_netcdf
 from vibroimpact.analysis.recording.channels import (
+    QUALITY_FLAGS,
     RECORDING_SCHEMA,
     Channel,
     EventTrain,
@@ -30,8 +31,8 @@ from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
 
 MOST_VALUES = 10**8
-"""Values of a recording that are read: some bytes of a damaged file can promise any number."""
-# What the file itself needs of an attribute, and no channel carries.
+"""Values above which a recording is refused: some bytes of a damaged file can promise any number."""
+# Attributes that the file itself needs and no channel carries.
 _STORED = frozenset(
     {"units", "long_name", "ancillary_variables", "_FillValue", "coordinates", "event_train", "resolution"}
     | {"window_start", "window_end", "flag_masks", "flag_meanings"}
@@ -121,14 +122,7 @@ def _store_channel(file: netCDF4.Dataset, dimension: str, channel: Channel) -> N
     name = channel.name + QUALITY_ENDING
     variable.setncattr("ancillary_variables", name)
     flags = file.createVariable(name, "u1", (dimension,), compression="zlib", complevel=1)
-    flags.setncatts(
-        {
-            "units": "1",
-            "long_name": f"quality of {channel.name}",
-            "flag_masks": np.array([int(flag) for flag in Quality], dtype=np.uint8),
-            "flag_meanings": " ".join(str(flag.name) for flag in Quality),
-        }
-    )
+    flags.setncatts({"units": "1", "long_name": f"quality of {channel.name}", **QUALITY_FLAGS})
     flags[...] = channel.quality
 
 
@@ -241,13 +235,13 @@ def _check_attributes(variable: Any) -> None:
 
 
 def _read_axis(variable: Any) -> TimeAxis:
-    known = set(variable.ncattrs())
+    interval = getattr(variable, "sampling_interval", None)
     return TimeAxis(
         np.asarray(variable[...], dtype=np.float64),
-        float(variable.sampling_interval) if "sampling_interval" in known else None,
-        float(variable.interval_uncertainty) if "interval_uncertainty" in known else 0.0,
-        str(variable.source) if "source" in known else "",
-        str(variable.trigger) if "trigger" in known else "",
+        None if interval is None else float(interval),
+        float(getattr(variable, "interval_uncertainty", 0.0)),
+        str(getattr(variable, "source", "")),
+        str(getattr(variable, "trigger", "")),
     )
 
 
@@ -261,9 +255,8 @@ def _read_channel(file: netCDF4.Dataset, name: str, axis: TimeAxis) -> Channel:
     stored: Any = file.variables.get(name + QUALITY_ENDING)
     quality = np.zeros(len(values), np.uint8) if stored is None else _quality(np.asarray(stored[...]))
     unit = str(variable.units)
-    measured_unit(
-        unit
-    )  # a unit that nothing can be made of is refused here, not in the middle of an analysis
+    # a unit that nothing can be made of is refused here, not in the middle of an analysis
+    measured_unit(unit)
     return Channel(name, values, unit, axis, quality, str(variable.long_name), _others(variable))
 
 
@@ -275,12 +268,11 @@ def _quality(flags: NDArray[Any]) -> NDArray[np.uint8]:
 
 
 def _read_events(name: str, variable: Any) -> EventTrain:
-    known = set(variable.ncattrs())
     window = None
-    if {"window_start", "window_end"} <= known:
+    if {"window_start", "window_end"} <= set(variable.ncattrs()):
         window = float(variable.window_start), float(variable.window_end)
     times = np.asarray(variable[...], dtype=np.float64)
-    resolution = float(variable.resolution) if "resolution" in known else 0.0
+    resolution = float(getattr(variable, "resolution", 0.0))
     return EventTrain(name, times, window, resolution, str(variable.long_name), _others(variable))
 
 
@@ -336,14 +328,11 @@ def _run_signals(flat: Any, row: int, title: str) -> Recording:
     nondimensional = flat.attrs.get("units_system") == "nondimensional"
     if "sample_count" in flat:
         part = flat.isel(sample=rows("sample"))
-        time = part.time.values
-        steps = np.diff(time)
-        even = len(time) > 1 and float(np.ptp(steps)) <= 1e-6 * float(np.mean(steps))
-        axis = TimeAxis(time, float(np.mean(steps)) if even else None, 0.0, "simulated")
+        axis = TimeAxis.through(part.time.values, "simulated")
         for name, variable in part.data_vars.items():
             if variable.dims == ("sample",) and name != "time":
                 unit = "1" if nondimensional else str(variable.attrs["units"])
-                quality = np.zeros(len(time), np.uint8)
+                quality = np.zeros(len(axis.time), np.uint8)
                 label = str(variable.attrs["long_name"])
                 channels[str(name)] = Channel(
                     str(name), variable.values, unit, axis, quality, label, {"role": "simulated"}

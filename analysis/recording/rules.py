@@ -8,12 +8,12 @@ from math import isfinite
 import numpy as np
 
 from vibroimpact.analysis.dataset.schema import file_name_of
-from vibroimpact.analysis.recording.channels import Channel, EventTrain, Floats, Recording, TimeAxis
+from vibroimpact.analysis.recording.channels import Channel, EventTrain, Recording, TimeAxis
 
 QUALITY_ENDING, EVENT_ENDING = "_quality", "_event"
-#: No sensor reads beyond, and squares of what is within neither overflow nor vanish.
+#: Magnitudes beyond which no sensor reads; squares of those within neither overflow nor vanish.
 LARGEST, SMALLEST = 1e100, 1e-100
-#: An interval and the instants beside it agree within this share, and what the axis itself says of its doubt.
+#: Relative difference of an interval and its instants, beside the axis's own uncertainty, up to which they agree.
 AGREEMENT = 0.01
 
 
@@ -51,16 +51,12 @@ def _of_channel(channel: Channel) -> Iterator[str]:
     for what, got in (("values", channel.values.shape), ("quality", channel.quality.shape)):
         if got != (length,):
             yield f"{what}: expected the shape ({length},) of its time axis, got {got}."
-    most = _largest(channel.values)
+    most = float(np.max(np.abs(channel.values), initial=0.0, where=np.isfinite(channel.values)))
     if most > LARGEST or 0.0 < most < SMALLEST:
         yield (
             f"values: expected a largest magnitude from {SMALLEST:g} to {LARGEST:g}, or all 0, got {most:g}. "
             "Give the unit or the scale in which it was measured."
         )
-
-
-def _largest(values: Floats) -> float:
-    return float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
 
 
 def _of_axis(axis: TimeAxis) -> Iterator[str]:

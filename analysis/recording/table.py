@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from rich.table import Table
 
 from vibroimpact.analysis.recording.channels import Channel, EventTrain, Quality, Recording
 from vibroimpact.fmus.printing import table
@@ -13,23 +12,19 @@ from vibroimpact.fmus.units import written_unit
 
 def print_recording(console: Terminal, recording: Recording) -> None:
     """Print tables of the channels and events of a recording, then its single values and remarks, a line each."""
-    if recording.channels:
-        console.print(_channel_table(recording))
-    if recording.events:
-        console.print(_event_table(recording))
+    channels, trains = recording.channels.values(), recording.events.values()
+    if channels:
+        heads = [">samples", ">rate (Hz)", ">unit", ">min", ">max", ">clipped", ">missing", ">overrange"]
+        console.print(table(recording.title, "<channel", *heads, rows=map(_channel_row, channels)))
+    if trains:
+        heads = [">events", ">first (s)", ">last (s)", ">window (s)", ">grid (s)", ">per second"]
+        title = "" if channels else recording.title
+        console.print(table(title, "<event train", *heads, rows=map(_event_row, trains)))
     for name, scalar in recording.scalars.items():
         shown = "overrange" if scalar.overrange else f"{scalar.value:.6g} {written_unit(scalar.unit)}"
         console.print(f"{name} = {shown}")
     for line in recording.remarks:
         console.print(f"- {line}", soft_wrap=True)
-
-
-def _channel_table(recording: Recording) -> Table:
-    heads = (">samples", ">rate (Hz)", ">unit", ">min", ">max", ">clipped", ">missing", ">overrange")
-    rows = table(recording.title, "<channel", *heads)
-    for channel in recording.channels.values():
-        rows.add_row(*_channel_row(channel))
-    return rows
 
 
 def _channel_row(channel: Channel) -> tuple[str, ...]:
@@ -39,28 +34,9 @@ def _channel_row(channel: Channel) -> tuple[str, ...]:
     if channel.axis.interval_uncertainty:
         rate += f" ±{channel.axis.interval_uncertainty:.1%}"
 
-    def counted(flag: Quality) -> str:
-        return str(int(np.sum(channel.quality & np.uint8(flag) != 0)))
-
-    return (
-        channel.name,
-        str(len(channel.values)),
-        rate,
-        written_unit(channel.unit),
-        least,
-        most,
-        counted(Quality.clipped),
-        counted(Quality.missing),
-        counted(Quality.overrange),
-    )
-
-
-def _event_table(recording: Recording) -> Table:
-    heads = (">events", ">first (s)", ">last (s)", ">window (s)", ">grid (s)", ">per second")
-    rows = table("" if recording.channels else recording.title, "<event train", *heads)
-    for train in recording.events.values():
-        rows.add_row(*_event_row(train))
-    return rows
+    flags = (Quality.clipped, Quality.missing, Quality.overrange)
+    counts = (str(int(np.sum(channel.quality & np.uint8(flag) != 0))) for flag in flags)
+    return channel.name, str(len(channel.values)), rate, written_unit(channel.unit), least, most, *counts
 
 
 def _event_row(train: EventTrain) -> tuple[str, ...]:

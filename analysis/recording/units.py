@@ -16,23 +16,11 @@ import pint
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.units import written_unit
 
-STANDARD_GRAVITY = 9.80665
-"""m/s^2, exact by definition."""
-
 # What instruments write, in pint's words; `g` and `G` are gravity here.
 _LABELS = {
-    "": "dimensionless",
-    "1": "dimensionless",
-    "-": "dimensionless",
-    "au": "dimensionless",
-    "a.u.": "dimensionless",
-    "counts": "dimensionless",
-    "g": "standard_gravity",
-    "G": "standard_gravity",
-    "gn": "standard_gravity",
-    "g0": "standard_gravity",
-    "volts": "volt",
-    "Volts": "volt",
+    **dict.fromkeys(("", "1", "-", "au", "a.u.", "counts"), "dimensionless"),
+    **dict.fromkeys(("g", "G", "gn", "g0"), "standard_gravity"),
+    **dict.fromkeys(("volts", "Volts"), "volt"),
     "Amps": "ampere",
 }
 _OFFSET_LABELS = ("degC", "deg C", "°C", "Celsius", "degree_Celsius")

@@ -15,8 +15,7 @@ Examples
 from __future__ import annotations
 
 from vibroimpact.analysis.replay.alignment import Alignment, align
-from vibroimpact.analysis.replay.baseline import naive_variance
-from vibroimpact.analysis.replay.comparison import Comparison, compare
+from vibroimpact.analysis.replay.comparison import Comparison, compare, naive_variance
 from vibroimpact.analysis.replay.event import ChannelEvent, find_event
 from vibroimpact.analysis.replay.held import Held, held_over
 from vibroimpact.analysis.replay.matching import EventMatch, match_events

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,21 @@ Floats = NDArray[np.float64]
 PERIODS_BEFORE, PERIODS_AFTER = 0.5, 3.0
 """The window of the alignment, in dominant periods of the measured event, from its onset."""
 FEWEST_SAMPLES = 8
-"""Good samples that a window must have."""
+"""Fewest good samples in a window."""
 CLEAR_ODDS = 100.0
-"""A rival lag or polarity is called ambiguous where the best is less than so many times as likely."""
+"""Likelihood ratio of the best to a rival lag or polarity below which it is called ambiguous."""
 POOR_CORRELATION = 0.7
-"""Below it the model explains less than half of the start of the event."""
+"""Correlation below which the model explains less than half of the start of the event."""
 CANDIDATES = 3
 """Highest peaks of the correlation, of each polarity, that are refined."""
 _LAG_TOLERANCE = 1e-6
+
+
+class Window(NamedTuple):
+    """Start and stop, s on the clock of the measured channel."""
+
+    start: float
+    stop: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +64,7 @@ class Alignment:
         Correlation less the best of the same polarity at a lag half a period or more away; NaN where none is.
     correlation : float
         Of aligned and measured signal in the window (Pearson, good samples only).
-    window : tuple of float
-        s, start and end on the clock of the measured channel.
+    window : Window
     at_bound : bool
         The best lag is the largest allowed: the true one may be beyond.
     remarks : tuple of str
@@ -71,7 +77,7 @@ class Alignment:
     polarity_margin: float
     lag_margin: float
     correlation: float
-    window: tuple[float, float]
+    window: Window
     at_bound: bool
     remarks: tuple[str, ...] = ()
 
@@ -163,8 +169,7 @@ class _Start:
             method="bounded",
             options={"xatol": _LAG_TOLERANCE * self.step},
         )
-        best = min((float(found.x), low, high), key=lambda trial: -polarity * self.correlation(trial))
-        return best
+        return min((float(found.x), low, high), key=lambda trial: -polarity * self.correlation(trial))
 
     def first_half(self) -> _Start:
         """Return the samples up to half of the energy of the window."""
@@ -240,7 +245,7 @@ def align(
     """
     event = event or find_event(measured)
     start = _start_of_event(Interpolated(simulated_time, simulated), measured, event, event_window)
-    window = (float(start.time[0]), float(start.time[-1]))
+    window = Window(float(start.time[0]), float(start.time[-1]))
     if lag != "auto":
         return _given_lag(start, float(lag), polarity, window)
     signs = (1, -1) if polarity == "auto" else (polarity,)
@@ -301,9 +306,7 @@ def _start_of_event(
     return _Start(measured.time[rows], measured.si()[rows], step, simulated)
 
 
-def _given_lag(
-    start: _Start, lag: float, polarity: Literal["auto"] | int, window: tuple[float, float]
-) -> Alignment:
+def _given_lag(start: _Start, lag: float, polarity: Literal["auto"] | int, window: Window) -> Alignment:
     correlation = start.correlation(lag)
     sign = (1 if correlation >= 0.0 else -1) if polarity == "auto" else polarity
     margin = 2.0 * abs(correlation) if polarity == "auto" else np.nan

@@ -1,4 +1,4 @@
-"""A simulated response beside the measured one: aligned, its residual, and every score of it.
+"""A simulated response beside the measured one: aligned, its residual, and every score of it; its yardstick.
 
 The measured samples stay as they are (only their offset is removed): the simulated signal, smooth and free of noise,
 is brought to their instants, their clock and their sign.
@@ -33,11 +33,11 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 RUNNING_WINDOWS = 10
-"""The record after the onset is scored in so many windows where no length is given."""
+"""Running windows in which the record after the onset is scored."""
 RUNNING_PERIODS = 2.0
-"""A running window holds at least so many dominant periods of the event."""
+"""Fewest dominant periods of the event in a running window."""
 EVENT_TOLERANCE = 0.25
-"""Events are paired within this share of the dominant period where no tolerance is given."""
+"""Share of the dominant period within which events are paired."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,11 +174,9 @@ def compare(
     event_window: Span | None = None,
     offset: Literal["before", "level", "none"] | float = "before",
     windows: Sequence[Span] = (),
-    running: float | None = None,
     peak_window: Span | None = None,
     measured_events: Floats | None = None,
     simulated_events: Floats | None = None,
-    event_tolerance: float | None = None,
     simulated_name: str = "simulated",
 ) -> Comparison:
     """Compare a simulated signal with a measured channel.
@@ -198,14 +196,10 @@ def compare(
         nothing; or a value in the SI unit.
     windows : sequence of tuple of float
         To be scored one by one, s from the onset of the event.
-    running : float, optional
-        Length of the running windows, s; default: a tenth of the record after the onset, two periods at least.
     peak_window : tuple of float, optional
         Where extremes are compared, s from the onset.
     measured_events, simulated_events : ndarray of float, shape (event,), optional
         s, each on its own clock: impacts, or spikes.
-    event_tolerance : float, optional
-        s; default: a quarter of the dominant period.
     simulated_name : str
         What the simulated signal is called in tables: `beam.sensor.acceleration`.
 
@@ -230,7 +224,13 @@ def compare(
     scored = measured.good & np.isfinite(brought)
     removed = _offset(offset, event, values[scored], brought[scored])
     values = values - removed
-    signals = (time - event.onset, values, brought, scored)
+    peaks = None
+    if peak_window is not None:
+        # heights count from the rest value: 0 where that was removed, else the mean
+        level = 0.0 if offset == "before" and event.quiet is not None else float(np.mean(values[scored]))
+        peaks = compare_peaks(time - event.onset, values, brought, scored, peak_window, event.period, level)
+    stretch = float(time[-1]) - event.onset
+    length = max(stretch / RUNNING_WINDOWS, RUNNING_PERIODS * event.period)
     return Comparison(
         measured=measured,
         simulated_name=simulated_name,
@@ -242,14 +242,10 @@ def compare(
         alignment=alignment,
         variance=variance_accounted_for(values, brought, scored),
         windows=list(windows),
-        running=_side_by_side(float(time[-1]), event, running),
-        peaks=_peaks(signals, peak_window, event, offset),
-        events=_matched(
-            measured_events,
-            simulated_events,
-            alignment.lag,
-            event_tolerance or EVENT_TOLERANCE * event.period,
-        ),
+        # the last sample is within the last window
+        running=running_windows(0.0, stretch * (1.0 + 1e-9), length),
+        peaks=peaks,
+        events=_matched(measured_events, simulated_events, alignment.lag, EVENT_TOLERANCE * event.period),
         remarks=(*alignment.remarks, *_remarks(measured, event, offset, scored)),
     )
 
@@ -270,31 +266,10 @@ def _brought(simulated_time: Floats, simulated: Floats, measured: Channel, align
     return np.where(inside, alignment.polarity * model(at), np.nan)
 
 
-def _side_by_side(end: float, event: ChannelEvent, running: float | None) -> list[Span]:
-    """Return the running windows, s from the onset; the last sample is within the last."""
-    stretch = end - event.onset
-    length = running or max(stretch / RUNNING_WINDOWS, RUNNING_PERIODS * event.period)
-    return running_windows(0.0, stretch * (1.0 + 1e-9), length)
-
-
 def _offset(offset: str | float, event: ChannelEvent, values: Floats, brought: Floats) -> float:
     if offset == "level":
         return float(np.mean(values) - np.mean(brought))
     return {"before": event.offset, "none": 0.0}[offset] if isinstance(offset, str) else float(offset)
-
-
-def _peaks(
-    signals: tuple[Floats, Floats, Floats, Flags],
-    window: Span | None,
-    event: ChannelEvent,
-    offset: str | float,
-) -> PeakErrors | None:
-    """Compare extremes, their heights from the rest value: 0 where that was removed, else the mean."""
-    if window is None:
-        return None
-    _, values, _, scored = signals
-    level = 0.0 if offset == "before" and event.quiet is not None else float(np.mean(values[scored]))
-    return compare_peaks(*signals, window, event.period, level)
 
 
 def _matched(
@@ -302,12 +277,8 @@ def _matched(
 ) -> EventMatch | None:
     if measured is None and simulated is None:
         return None
-    none = np.empty(0)
-    return match_events(
-        none if measured is None else np.asarray(measured, dtype=np.float64),
-        none if simulated is None else np.asarray(simulated, dtype=np.float64) + lag,
-        tolerance,
-    )
+    own, others = (np.asarray(() if t is None else t, dtype=np.float64) for t in (measured, simulated))
+    return match_events(own, others + lag, tolerance)
 
 
 def _remarks(measured: Channel, event: ChannelEvent, offset: str | float, scored: Flags) -> list[str]:
@@ -329,3 +300,36 @@ def _remarks(measured: Channel, event: ChannelEvent, offset: str | float, scored
             "every frequency"
         )
     return said
+
+
+def naive_variance(
+    drive_time: Floats,
+    drive: Floats,
+    measured: Channel,
+    *,
+    most_lag: float,
+    lag: Literal["auto"] | float = "auto",
+    event_window: tuple[float, float] | None = None,
+) -> float:
+    """Return the variance that the drive itself accounts for, with the gain and offset that suit it best, percent.
+
+    A body that follows its base rigidly would reach 100. No response at all scores 0, and so this is never less.
+    Lag and polarity are found as for a replay; gain and offset are the best of the whole record, an advantage that
+    a replay does not have.
+
+    Parameters
+    ----------
+    drive_time, drive : ndarray of float, shape (drive sample,)
+        s, ascending; any unit. Before and after, the drive rests.
+    measured : Channel
+    most_lag, lag, event_window
+        As in `align`.
+    """
+    found = align(drive_time, drive, measured, most_lag=most_lag, lag=lag, event_window=event_window)
+    good = measured.good
+    brought = Interpolated(drive_time, drive)(measured.time[good] - found.lag)
+    brought = brought - np.mean(brought)
+    values = measured.si()[good]
+    values = values - np.mean(values)
+    size = float(np.sum(brought**2) * np.sum(values**2))
+    return 100.0 * float(np.sum(brought * values)) ** 2 / size if size > 0.0 else 0.0

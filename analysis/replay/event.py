@@ -20,14 +20,14 @@ Flags = NDArray[np.bool_]
 HEAD_SHARE, HEAD_FEWEST = 0.02, 16
 """Samples at the start from which the noise is taken: this share of the record, and at least so many."""
 ONSET_LEVEL = 0.1
-"""The event begins where the signal first reaches this share of its largest deviation, and leaves the noise."""
+"""Share of the largest deviation at which the event begins, where that is beyond the noise."""
 NOISE_FACTOR = 6.0
-"""What leaves the noise is beyond so many of its standard deviations."""
+"""Standard deviations of the noise beyond which a sample has left it."""
 QUIET_PERIODS = 0.5
 """A start is quiet where it lasts this share of a period of the event: an oscillation stays within a tenth of its
 largest value for arccos(.9)/pi = 14 % of a period only."""
 ENERGY_SHARE = 0.99
-"""The event lasts until this share of its energy (sum of squares) has passed."""
+"""Share of the energy (sum of squares) that has passed at the end of the event."""
 
 
 @dataclass(frozen=True, slots=True)

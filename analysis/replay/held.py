@@ -20,7 +20,7 @@ MOST_ERROR = 0.25
 """Largest error per standard deviation of the measured signal, about VAF 94: the geometric mean between an error in
 which a motion is recognised and no more (.5, VAF 75) and that of a good linear replay of a real structure (.12)."""
 NOISE_TIMES = 2.0
-"""A residual of less than so many times the energy of the noise may be noise: the window does not tell."""
+"""Energy of a residual, relative to that of the noise, below which it may be noise: the window does not tell."""
 _MOST_SPANS = 3
 
 

@@ -12,11 +12,11 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 PROMINENCE = 0.5
-"""An extreme stands out from its neighbourhood by this share of the largest value in the window: ripple is none."""
+"""Least prominence of an extreme, relative to the largest value in the window: ripple is none."""
 NEIGHBOUR = 0.25
-"""Two extremes of one sign are this share of a period apart at least, and so near are those that are paired."""
+"""Least distance of two extremes of one sign, and most of two that are paired, in periods."""
 REACH = 0.125
-"""The height of an extreme is taken from the samples within this share of a period on either side."""
+"""Distance within which samples give the height of an extreme, in periods."""
 
 
 @dataclass(frozen=True, slots=True)

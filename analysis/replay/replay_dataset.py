@@ -2,79 +2,60 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.recording import Quality, TimeAxis
+from vibroimpact.analysis.dataset.results import Rows, described
+from vibroimpact.analysis.recording import TimeAxis
+from vibroimpact.analysis.recording.channels import QUALITY_FLAGS
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.scoring import Span
 
 Floats = NDArray[np.float64]
 
-# One number for each comparison: name, unit, in words, and where it is found.
-_NUMBERS: tuple[tuple[str, str, str, Callable[[Comparison], float]], ...] = (
-    ("variance_accounted_for", "%", "variance accounted for, all scored samples", lambda c: c.variance),
-    ("noise_ceiling", "%", "variance that a perfect model would account for", lambda c: c.noise_ceiling),
-    ("gain", "1", "factor that would bring the simulated signal nearest", lambda c: c.gain),
-    ("lag", "s", "measured clock less clock of the drive", lambda c: c.alignment.lag),
-    ("lag_error", "s", "standard error of the lag", lambda c: c.alignment.lag_error),
-    ("polarity", "1", "sign given to the simulated signal", lambda c: c.alignment.polarity),
-    (
-        "polarity_margin",
-        "1",
-        "correlation less that of the other polarity",
-        lambda c: c.alignment.polarity_margin,
-    ),
-    ("lag_margin", "1", "correlation less that of the next best lag", lambda c: c.alignment.lag_margin),
-    (
-        "alignment_correlation",
-        "1",
-        "correlation at the start of the event",
-        lambda c: c.alignment.correlation,
-    ),
-    ("alignment_start", "s", "first instant used for the alignment", lambda c: c.alignment.window[0]),
-    ("alignment_stop", "s", "last instant used for the alignment", lambda c: c.alignment.window[1]),
-    ("lag_at_bound", "1", "1 where the lag is the largest allowed", lambda c: c.alignment.at_bound),
-    ("onset", "s", "onset of the measured event", lambda c: c.event.onset),
-    (
-        "measured_frequency",
-        "Hz",
-        "dominant frequency of the measured event",
-        lambda c: c.measured_frequency.frequency,
-    ),
+# One number for each comparison: name, unit, in words, and where a comparison has it.
+_NUMBERS = (
+    ("variance_accounted_for", "%", "variance accounted for, all scored samples", "variance"),
+    ("noise_ceiling", "%", "variance that a perfect model would account for", "noise_ceiling"),
+    ("gain", "1", "factor that would bring the simulated signal nearest", "gain"),
+    ("lag", "s", "measured clock less clock of the drive", "alignment.lag"),
+    ("lag_error", "s", "standard error of the lag", "alignment.lag_error"),
+    ("polarity", "1", "sign given to the simulated signal", "alignment.polarity"),
+    ("polarity_margin", "1", "correlation less that of the other polarity", "alignment.polarity_margin"),
+    ("lag_margin", "1", "correlation less that of the next best lag", "alignment.lag_margin"),
+    ("alignment_correlation", "1", "correlation at the start of the event", "alignment.correlation"),
+    ("alignment_start", "s", "first instant used for the alignment", "alignment.window.start"),
+    ("alignment_stop", "s", "last instant used for the alignment", "alignment.window.stop"),
+    ("lag_at_bound", "1", "1 where the lag is the largest allowed", "alignment.at_bound"),
+    ("onset", "s", "onset of the measured event", "event.onset"),
+    ("measured_frequency", "Hz", "dominant frequency of the measured event", "measured_frequency.frequency"),
     (
         "simulated_frequency",
         "Hz",
         "dominant frequency of the simulated event",
-        lambda c: c.simulated_frequency.frequency,
+        "simulated_frequency.frequency",
     ),
     (
         "frequency_resolution",
         "Hz",
         "frequencies closer than this are one line",
-        lambda c: c.measured_frequency.resolution,
+        "measured_frequency.resolution",
     ),
-    (
-        "frequency_uncertainty",
-        "Hz",
-        "from the sampling interval alone",
-        lambda c: c.measured_frequency.uncertainty,
-    ),
-    ("samples_scored", "1", "samples that were scored", lambda c: c.counts["scored"]),
-    ("samples_clipped", "1", "clipped samples, not scored", lambda c: c.counts["clipped"]),
-    ("samples_missing", "1", "missing or overrange samples, not scored", lambda c: c.counts["missing"]),
-    (
-        "samples_not_simulated",
-        "1",
-        "good samples outside the simulated time",
-        lambda c: c.counts["not_simulated"],
-    ),
+    ("frequency_uncertainty", "Hz", "from the sampling interval alone", "measured_frequency.uncertainty"),
 )
+# Samples of `Comparison.counts`, in words.
+_COUNTS = {
+    "scored": "samples that were scored",
+    "clipped": "clipped samples, not scored",
+    "missing": "missing or overrange samples, not scored",
+    "not_simulated": "good samples outside the simulated time",
+}
 
 
 def comparison_names(comparisons: Sequence[Comparison]) -> list[str]:
@@ -104,103 +85,99 @@ def comparison_dataset(comparisons: Sequence[Comparison]) -> xr.Dataset:
     """
     names = comparison_names(comparisons)
     variables: dict[str, Any] = {}
-    axes: list[TimeAxis] = []
+    axes: dict[int, tuple[str, TimeAxis]] = {}
     for name, comparison in zip(names, comparisons, strict=True):
-        place = next((k for k, axis in enumerate(axes) if axis is comparison.measured.axis), len(axes))
-        if place == len(axes):
-            axes.append(comparison.measured.axis)
-        variables |= _signals(name, comparison, "time" if place == 0 else f"time_{place + 1}")
-        variables |= _peaks(name, comparison) | _events(name, comparison)
-    for name, unit, words, read in _NUMBERS:
-        numbers = np.array([float(read(comparison)) for comparison in comparisons])
-        variables[name] = ("comparison", numbers, _attrs(unit, words))
-    simulated = [comparison.simulated_name for comparison in comparisons]
-    variables["simulated_name"] = ("comparison", simulated, _attrs("1", "what was compared"))
-    held = [comparison.held.words for comparison in comparisons]
-    variables["held"] = ("comparison", held, _attrs("1", "where the error stays within what is trusted"))
-    variables |= _windows(
-        "window",
-        "window from the onset",
-        [(comparison.windows, comparison.window_variance) for comparison in comparisons],
-    )
-    variables |= _windows(
-        "running_window",
-        "running window from the onset",
-        [(comparison.running, comparison.running_variance) for comparison in comparisons],
-    )
-    coordinates: dict[str, Any] = {"comparison": ("comparison", names, _attrs("1", "measured channel"))}
-    for place, axis in enumerate(axes):
-        name = "time" if place == 0 else f"time_{place + 1}"
-        attrs = _attrs("s", "time of the recording") | {
-            "interval_uncertainty": axis.interval_uncertainty,
-            "trigger": axis.trigger,
+        axis, number = comparison.measured.axis, len(axes) + 1
+        dimension, _ = axes.setdefault(id(axis), ("time" if number == 1 else f"time_{number}", axis))
+        variables |= _signals(name, comparison, dimension)
+        variables |= described({**_peaks(name, comparison), **_events(name, comparison)})
+    windows = [(comparison.windows, comparison.window_variance) for comparison in comparisons]
+    running = [(comparison.running, comparison.running_variance) for comparison in comparisons]
+    variables |= described(
+        {
+            **_scores(comparisons),
+            **_windows("window", "window from the onset", windows),
+            **_windows("running_window", "running window from the onset", running),
         }
+    )
+    coordinates = described({"comparison": ("comparison", names, "1", "measured channel")})
+    for name, axis in axes.values():
+        known = {"interval_uncertainty": axis.interval_uncertainty, "trigger": axis.trigger}
+        attrs = {"units": "s", "long_name": "time of the recording", **known}
         coordinates[name] = (name, axis.time, attrs)
     remarks = [f"{name}: {line}" for name, c in zip(names, comparisons, strict=True) for line in c.remarks]
     return xr.Dataset(variables, coordinates, {"remarks": "\n".join(remarks)})
 
 
-def _attrs(unit: str, words: str) -> dict[str, Any]:
-    return {"units": unit, "long_name": words}
+def _scores(comparisons: Sequence[Comparison]) -> Rows:
+    """Return one value for each comparison: its numbers, what was counted, what was compared, where it holds."""
+    along = "comparison"
+
+    def numbers(path: str) -> Floats:
+        return np.array([float(attrgetter(path)(comparison)) for comparison in comparisons])
+
+    counts = [comparison.counts for comparison in comparisons]
+    simulated = [comparison.simulated_name for comparison in comparisons]
+    held = [comparison.held.words for comparison in comparisons]
+    return {
+        **{name: (along, numbers(path), unit, words) for name, unit, words, path in _NUMBERS},
+        **{
+            f"samples_{why}": (along, np.array([float(each[why]) for each in counts]), "1", words)
+            for why, words in _COUNTS.items()
+        },
+        "simulated_name": (along, simulated, "1", "what was compared"),
+        "held": (along, held, "1", "where the error stays within what is trusted"),
+    }
 
 
 def _signals(name: str, comparison: Comparison, dimension: str) -> dict[str, Any]:
-    channel = comparison.measured
+    channel, simulated = comparison.measured, comparison.simulated_name
     unit = measured_unit(channel.unit).si
     label = channel.label or channel.name
-    known = {"role": "measured", "offset_removed": comparison.offset, "noise": comparison.event.noise}
-    flags = {
-        "flag_masks": np.array([int(flag) for flag in Quality], dtype=np.uint8),
-        "flag_meanings": " ".join(str(flag.name) for flag in Quality),
+    known = {"offset_removed": comparison.offset, "noise": comparison.event.noise}
+    signals: dict[str, tuple[Any, str, dict[str, Any]]] = {
+        "measured": (comparison.values, f"{label}, measured, less its offset", known),
+        "simulated": (comparison.simulated, f"{simulated}, simulated, aligned", {}),
+        "residual": (comparison.residual, f"{label}, measured less simulated", {}),
     }
-    measured = _attrs(unit, f"{label}, measured, less its offset") | known
-    simulated = _attrs(unit, f"{comparison.simulated_name}, simulated, aligned") | {"role": "simulated"}
-    residual = _attrs(unit, f"{label}, measured less simulated") | {"role": "residual"}
-    quality = _attrs("1", f"quality of {label}") | flags
-    return {
-        f"{name}_measured": (dimension, comparison.values, measured),
-        f"{name}_simulated": (dimension, comparison.simulated, simulated),
-        f"{name}_residual": (dimension, comparison.residual, residual),
-        f"{name}_quality": (dimension, channel.quality, quality),
+    variables: dict[str, Any] = {
+        f"{name}_{role}": (dimension, values, {"units": unit, "long_name": words, "role": role} | more)
+        for role, (values, words, more) in signals.items()
     }
+    quality = {"units": "1", "long_name": f"quality of {label}"} | QUALITY_FLAGS
+    return variables | {f"{name}_quality": (dimension, channel.quality, quality)}
 
 
-def _peaks(name: str, comparison: Comparison) -> dict[str, Any]:
+def _peaks(name: str, comparison: Comparison) -> Rows:
     peaks = comparison.peaks
     if peaks is None:
         return {}
-    unit, dimension = measured_unit(comparison.measured.unit).si, f"{name}_peak"
-    onset = comparison.event.onset
+    unit, along = measured_unit(comparison.measured.unit).si, f"{name}_peak"
+    instants, errors = peaks.time + comparison.event.onset, peaks.relative_error
     return {
-        f"{name}_peak_time": (dimension, peaks.time + onset, _attrs("s", "instant of the measured extreme")),
-        f"{name}_peak_measured": (dimension, peaks.measured, _attrs(unit, "measured extreme")),
-        f"{name}_peak_simulated": (dimension, peaks.simulated, _attrs(unit, "simulated extreme")),
-        f"{name}_peak_error": (
-            dimension,
-            peaks.relative_error,
-            _attrs("1", "relative error of the simulated extreme"),
-        ),
-        f"{name}_peak_delay": (dimension, peaks.delay, _attrs("s", "simulated less measured instant")),
+        f"{along}_time": (along, instants, "s", "instant of the measured extreme"),
+        f"{along}_measured": (along, peaks.measured, unit, "measured extreme"),
+        f"{along}_simulated": (along, peaks.simulated, unit, "simulated extreme"),
+        f"{along}_error": (along, errors, "1", "relative error of the simulated extreme"),
+        f"{along}_delay": (along, peaks.delay, "s", "simulated less measured instant"),
     }
 
 
-def _events(name: str, comparison: Comparison) -> dict[str, Any]:
+def _events(name: str, comparison: Comparison) -> Rows:
     match = comparison.events
     if match is None:
         return {}
-    parts = (
-        ("matched", match.measured, "measured event that has a simulated one"),
-        ("missed", match.missed, "measured event without a simulated one"),
-        ("extra", match.extra, "simulated event without a measured one, on the measured clock"),
-    )
-    found: dict[str, Any] = {
-        f"{name}_event_{part}": (f"{name}_{part}", times, _attrs("s", words)) for part, times, words in parts
+    matched, event = f"{name}_matched", f"{name}_event"
+    alone = "simulated event without a measured one, on the measured clock"
+    return {
+        f"{event}_matched": (matched, match.measured, "s", "measured event that has a simulated one"),
+        f"{event}_missed": (f"{name}_missed", match.missed, "s", "measured event without a simulated one"),
+        f"{event}_extra": (f"{name}_extra", match.extra, "s", alone),
+        f"{event}_delay": (matched, match.delay, "s", "simulated less measured instant"),
     }
-    delay = _attrs("s", "simulated less measured instant")
-    return found | {f"{name}_event_delay": (f"{name}_matched", match.delay, delay)}
 
 
-def _windows(name: str, words: str, scored: Sequence[tuple[list[Span], Floats]]) -> dict[str, Any]:
+def _windows(name: str, words: str, scored: Sequence[tuple[list[Span], Floats]]) -> Rows:
     """Return start, stop and score of windows, NaN where a comparison has fewer than another."""
     most = max(len(spans) for spans, _ in scored)
     if not most:
@@ -211,7 +188,7 @@ def _windows(name: str, words: str, scored: Sequence[tuple[list[Span], Floats]])
             table[:, row, place] = (*span, variance[place])
     shape = ("comparison", name)
     return {
-        f"{name}_start": (shape, table[0], _attrs("s", f"start of a {words}")),
-        f"{name}_stop": (shape, table[1], _attrs("s", f"stop of a {words}")),
-        f"{name}_variance": (shape, table[2], _attrs("%", f"variance accounted for in a {words}")),
+        f"{name}_start": (shape, table[0], "s", f"start of a {words}"),
+        f"{name}_stop": (shape, table[1], "s", f"stop of a {words}"),
+        f"{name}_variance": (shape, table[2], "%", f"variance accounted for in a {words}"),
     }

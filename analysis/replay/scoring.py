@@ -68,9 +68,10 @@ def windowed_variance(
     simulated: Floats,
     good: Flags,
     windows: Sequence[Span],
-    reference: float | None = None,
 ) -> Floats:
     """Return the variance accounted for in windows, percent, shape (window,).
+
+    The measured energy is taken about the mean of all good samples of the record.
 
     Parameters
     ----------
@@ -78,11 +79,8 @@ def windowed_variance(
         As in `variance_accounted_for`; instants in s.
     windows : sequence of tuple of float
         Start (within) and stop (not within), s on the clock of `time`.
-    reference : float, optional
-        About which the measured energy is taken; default: the mean of all good samples of the record.
     """
-    if reference is None:
-        reference = float(np.mean(measured[good])) if np.any(good) else 0.0
+    reference = float(np.mean(measured[good])) if np.any(good) else 0.0
     return np.array(
         [
             variance_accounted_for(measured, simulated, good & (time >= start) & (time < stop), reference)

@@ -12,11 +12,11 @@ from scipy.signal import get_window
 Floats = NDArray[np.float64]
 
 FEWEST_SAMPLES = 8
-"""A spectrum of fewer samples says nothing."""
+"""Fewest samples of a spectrum that says anything."""
 PADDING = 8
-"""Zero padding: the spectrum is read at so many points within one resolved frequency."""
+"""Zero padding: points of the spectrum within one resolved frequency."""
 LOWEST_CYCLES = 1.0
-"""Below so many cycles in the record, a frequency cannot be told from a drift."""
+"""Cycles in the record below which a frequency cannot be told from a drift."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,18 +107,13 @@ _ROWS: tuple[tuple[str, Callable[[Comparison], str]], ...] = (
 
 def _add_windows(rows: Table, comparisons: Sequence[Comparison]) -> None:
     """Add a row for each window: those asked for, then the running ones, from the onset in ms."""
-    for what in ("windows", "running"):
-        spans = sorted({span for comparison in comparisons for span in getattr(comparison, what)})
+    asked = [dict(zip(c.windows, c.window_variance, strict=True)) for c in comparisons]
+    running = [dict(zip(c.running, c.running_variance, strict=True)) for c in comparisons]
+    for heading, scored in (("window", asked), ("running", running)):
+        spans = sorted({span for scores in scored for span in scores})
         if len(spans) > _MOST_WINDOWS:
             # those of each channel differ; the dataset and the figure have them
             continue
-        for start, stop in spans:
-            cells = []
-            for comparison in comparisons:
-                mine: list[tuple[float, float]] = getattr(comparison, what)
-                scores = comparison.window_variance if what == "windows" else comparison.running_variance
-                cells.append(
-                    _percent(float(scores[mine.index((start, stop))])) if (start, stop) in mine else ""
-                )
-            heading = "  window" if what == "windows" else "  running"
-            rows.add_row(f"{heading} {instant(start)} to {instant(stop)}", *cells)
+        for span in spans:
+            cells = [_percent(scores[span]) if span in scores else "" for scores in scored]
+            rows.add_row(f"  {heading} {instant(span[0])} to {instant(span[1])}", *cells)

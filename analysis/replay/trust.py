@@ -15,11 +15,11 @@ import numpy as np
 from vibroimpact.analysis.replay.held import MOST_ERROR, Held, instant
 
 LEAST_SKILL = 0.5
-"""A model must leave less than this share of the residual energy of a prediction without dynamics."""
+"""Residual energy, relative to that of a prediction without dynamics, above which a model has no skill."""
 MOST_LOSS = 2.0
 """Residual energy on other records per that on its own, above which the fit has learnt its record."""
 LEAST_LOSS = 1.0
-"""Percent of the variance of other records, an error of 10 %: what is left of less says nothing of learning."""
+"""Residual on other records, percent of their variance (an error of 10 %), below which it says nothing of learning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,11 +93,13 @@ def trust(
     scored = {name: value for name, value in (others or {}).items() if np.isfinite(value)}
     other = ", which it was not fitted on," if fitted else ""
     reasons = [
-        *_own(fitted, most_error),
-        *_other(scored, other, most_error),
+        *_errors("even on", fitted, ", which it was fitted on,", most_error),
+        *_errors("on", scored, other, most_error),
         *_skill(scored or fitted, baseline or {}),
-        *_nothing_scored(fitted, scored),
     ]
+    if not scored:
+        lacking = "that it was not fitted on: give one to be scored, or fit on a part"
+        reasons.append(f"there is no record with an event {lacking if fitted else 'to be scored'}")
     judged = {name: span for name, span in (held or {}).items() if name in scored or name in fitted}
     beside = (*_breaks(judged, most_error, trusted=not reasons), *_loss(fitted, scored))
     replay = "linear replay" if linear else "replay"
@@ -111,16 +113,6 @@ def trust(
         f"{_said(scored[name])}."
     )
     return Verdict(words, True, beside)
-
-
-def _nothing_scored(fitted: Mapping[str, float], scored: Mapping[str, float]) -> list[str]:
-    if scored:
-        return []
-    if not fitted:
-        return ["there is no record with an event to be scored"]
-    return [
-        "there is no record with an event that it was not fitted on: give one to be scored, or fit on a part"
-    ]
 
 
 def _span(judged: Mapping[str, Held], name: str) -> str:
@@ -157,19 +149,11 @@ def _said(variance: float) -> str:
     return f"{100 * _error(variance):.0f} % (VAF {variance:.1f} %)"
 
 
-def _own(fitted: Mapping[str, float], most_error: float) -> list[str]:
+def _errors(where: str, scores: Mapping[str, float], clause: str, most_error: float) -> list[str]:
     # a NaN is no good score either
     return [
-        f"even on {name}, which it was fitted on, it errs by {_said(value)}"
-        for name, value in fitted.items()
-        if not _error(value) <= most_error
-    ]
-
-
-def _other(scored: Mapping[str, float], clause: str, most_error: float) -> list[str]:
-    return [
-        f"on {name}{clause} it errs by {_said(value)}"
-        for name, value in scored.items()
+        f"{where} {name}{clause} it errs by {_said(value)}"
+        for name, value in scores.items()
         if not _error(value) <= most_error
     ]
 

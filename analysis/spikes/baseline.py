@@ -12,13 +12,13 @@ from vibroimpact.analysis.robust import robust_sigma
 
 Floats = NDArray[np.float64]
 
-#: A median of fewer samples is no offset.
+#: Fewest samples whose median is an offset.
 _FEWEST_SAMPLES = 32
-#: Of a block, this part must be free of spikes for its median to be used.
+#: Share of a block's samples, free of spikes, below which its median is not used.
 _LEAST_FREE = 0.25
-#: A window half as long is taken only if it lowers the noise by more than this.
+#: Relative fall of the noise above which a window half as long is taken.
 _WORTH = 0.05
-#: Windows are at least this many times the longest spike, which then moves their median by 3 % of the noise.
+#: Shortest window, in lengths of the longest spike, which then moves its median by 3 % of the noise.
 _SPIKES_IN_WINDOW = 20
 
 
@@ -57,7 +57,7 @@ def running_median(values: Floats, window: int, used: NDArray[np.bool_] | None =
             medians.append(float(np.median(part)))
     if not medians:
         return running_median(values, length, used)
-    # straight on to both ends: a constant there would leave the slope of the drift as a spike
+    # extend by straight lines to both ends: a constant there would leave the slope of the drift as a spike
     for end, beside, place in ((0, 1, -0.5), (-1, -2, length - 0.5)):
         if len(medians) > 1 and len(centres) > 1:
             slope = (medians[end] - medians[beside]) / (centres[end] - centres[beside])

@@ -20,12 +20,10 @@ SHORT_CONTACT = 0.025
 
 @dataclass(frozen=True, slots=True)
 class ContactTime:
-    """The contact-time measure: part of the time in contact, with its standard error and the time it is over (s)."""
+    """The contact-time measure: part of the time in contact, with its standard error."""
 
     measure: float
     standard_error: float
-    span: float
-    count: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,14 +63,13 @@ def contact_time_measure(start: Floats, duration: Floats) -> ContactTime:
     if len(start) < 2:
         raise EstimationError(f"contact time: expected at least 2 spikes, got {len(start)}.")
     intervals, contacts = np.diff(start), duration[:-1]
-    span = float(intervals.sum())
-    measure = float(contacts.sum()) / span
+    measure = float(contacts.sum()) / float(intervals.sum())
     count = len(intervals)
     error = np.nan
     if count > 1:
-        left = contacts - measure * intervals
-        error = float(np.sqrt(np.sum(left**2) / (count - 1) / count) / np.mean(intervals))
-    return ContactTime(measure, error, span, count)
+        residual = contacts - measure * intervals
+        error = float(np.sqrt(np.sum(residual**2) / (count - 1) / count) / np.mean(intervals))
+    return ContactTime(measure, error)
 
 
 def impact_velocity(impulse: Floats, restitution: float, mass: float | None) -> Floats:
@@ -137,9 +134,9 @@ def calibrate(measured: Floats, known: Floats) -> Calibration:
     if power == 0.0:
         raise EstimationError("calibration: expected known impulses other than 0, got none.")
     sensitivity = float(np.sum(measured * known)) / power
-    left = measured - sensitivity * known
+    residual = measured - sensitivity * known
     if len(known) < 2:
         return Calibration(sensitivity, np.nan, np.nan)
-    variance = float(np.sum(left**2)) / (len(known) - 1)
+    variance = float(np.sum(residual**2)) / (len(known) - 1)
     scatter = float(np.sqrt(variance * len(known) / power) / abs(sensitivity)) if sensitivity else np.nan
     return Calibration(sensitivity, float(np.sqrt(variance / power)), scatter)

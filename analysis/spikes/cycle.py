@@ -19,17 +19,17 @@ from vibroimpact.fmus.errors import UsageError
 
 Floats = NDArray[np.float64]
 
-#: A median over fewer cycles is not the periodic part.
+#: Fewest cycles whose median is the periodic part.
 FEWEST_CYCLES = 10
-#: Fewer samples in a cycle do not show its waveform.
+#: Fewest samples in a cycle that show its waveform.
 _FEWEST_SAMPLES = 8
-#: The signal without its periodic part must be quieter than this part of the signal.
+#: Magnitude of the residual, relative to the signal, above which there is no periodic part.
 _MOST_LEFT = 0.5
-#: Largest change of the amplitude from the first to the last third of the cycles; a ring decays by more.
+#: Relative change of the amplitude, first to last third of the cycles, above which a signal is a decaying ring.
 _STEADY = 0.1
-#: The strongest line may be a harmonic of the fundamental, up to this one.
+#: Highest harmonic of the fundamental that the strongest line may be.
 _HARMONICS = 8
-#: A longer period must lower what is left by this factor to be the true one.
+#: Ratio of the residuals below which the longer of two periods is the true one.
 _LONGER_PAYS = 0.7
 _REFINEMENTS = 5
 

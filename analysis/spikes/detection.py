@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-#: Excursions less than half as high, and closer than so many lengths of the main one, are its ringing. Contacts as
-#: close would fill a tenth of the time, four times what the rigid-impact model allows (thesis section 5.2.4).
+#: Distance, in lengths of the main excursion, below which one less than half as high is its ringing. Contacts as close
+#: would fill a tenth of the time, four times what the rigid-impact model allows (thesis section 5.2.4).
 RINGING_LENGTHS = 10.0
-#: One of comparable height belongs to it only if it follows at once.
+#: Distance, in the same lengths, below which one of comparable height belongs to it; least ratio of such heights.
 _AT_ONCE, _COMPARABLE = 2.0, 0.5
-#: Ringing beats: what is smaller than a tenth of the spike may pause for half as long as the group has lasted.
+#: Pause of ringing that beats, relative to the group's duration, and the height below which it is granted.
 _BEATS, _BEATS_BELOW = 0.5, 0.1
 
 

@@ -23,16 +23,16 @@ Floats = NDArray[np.float64]
 
 METHODS = ("auto", "threshold", "cycle_median", "cycle_threshold")
 POLARITIES = {"both": 0, "positive": 1, "negative": -1}
-#: The RMS of a smooth shock is taken over this part of a cycle.
+#: Windows of the RMS of a smooth shock in one cycle.
 _RMS_WINDOWS_IN_CYCLE = 10
-#: A forced motion is given so many cycles to settle: at its start, and after a shock.
+#: Cycles in which a forced motion settles, at its start and after a shock.
 _CYCLES_TO_SETTLE = 2.0
-#: Nothing below this part of the largest value is a spike: simulated signals have no noise to set a threshold by.
+#: Lowest threshold, relative to the largest value, for simulated signals, which have no noise.
 _SMALLEST_PART = 1e-3
-#: Windows of a first look at the drift are no shorter than this part (1 / 2000 * 20) of the record.
+#: Longest spike assumed in the first look at the drift, as one over its share of the record.
 _FIRST_LOOK = 2000
 _FEWEST_SAMPLES = 16
-#: Noise changes its sign after fewer samples than this, if it is not filtered far below the sampling rate.
+#: Mean samples between two changes of sign above which a signal is a motion and no noise.
 _HALF_WAVE_OF_MOTION = 12.0
 
 
@@ -44,7 +44,7 @@ class SpikeSettings:
     ----------
     method : {"auto", "threshold", "cycle_median", "cycle_threshold"}
         `threshold`: the signal without its baseline against a threshold. `cycle_median`: the periodic part is removed
-        and the short-window RMS of the rest compared with the same phase of the other cycles.
+        and the short-window RMS of the residual compared with the same phase of the other cycles.
         `cycle_threshold`: the periodic part is removed, then as `threshold`.
     threshold : float or None
         SI unit of the channel; a robust score with `cycle_median`.
@@ -207,7 +207,8 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
     start = np.arange(len(time)) < (_CYCLES_TO_SETTLE * cycle.period if method != "threshold" else 0.0)
     tail, noise = _noise(statistic, residual, bad | start, chosen, polarity, method)
     threshold = _threshold(statistic, tail, chosen, polarity)
-    excursions, short = _excursions(time, statistic, threshold, chosen, polarity)
+    looked_at = statistic if polarity == 0 else np.where(polarity * statistic > 0.0, statistic, 0.0)
+    excursions, short = find_excursions(time, looked_at, threshold, chosen.hysteresis, chosen.minimum_samples)
     settling = _CYCLES_TO_SETTLE * cycle.period * interval
     merge = settling if method == "cycle_median" and chosen.merge is None else chosen.merge
     groups = group_excursions(excursions, time, merge)
@@ -290,7 +291,7 @@ def _baseline(
     if settings.baseline_window is not None:
         window = min(length, max(2, round(settings.baseline_window / interval)))
         return running_median(values, window, ~bad), window
-    # a first look shows where the spikes are; they are taken to be shorter than a hundredth of the record by far
+    # the first look shows where the spikes are
     first = running_median(values, drift_window(values, length // _FIRST_LOOK, ~bad), ~bad)
     level = tail_threshold((values - first)[~bad], settings.false_alarms).threshold
     places = np.arange(length, dtype=np.float64)
@@ -318,7 +319,7 @@ def _noise(
     noise = settings.noise
     if noise is not None and method != "cycle_median":
         normal = -float(ndtri(settings.false_alarms / (2.0 * len(statistic))))
-        return Tail(noise, 0.0, noise * normal, 0), noise
+        return Tail(noise, 0.0, noise * normal), noise
     if noise is not None:
         return tail, noise
     return tail, tail.sigma if method != "cycle_median" else tail_threshold(residual[~bad], 0.01).sigma
@@ -332,13 +333,6 @@ def _threshold(statistic: Floats, tail: Tail, settings: SpikeSettings, polarity:
     if settings.threshold_part is not None:
         return settings.threshold_part * largest
     return max(tail.threshold, _SMALLEST_PART * largest, float(np.finfo(float).tiny))
-
-
-def _excursions(
-    time: Floats, statistic: Floats, threshold: float, settings: SpikeSettings, polarity: int
-) -> tuple[Excursions, int]:
-    looked_at = statistic if polarity == 0 else np.where(polarity * statistic > 0.0, statistic, 0.0)
-    return find_excursions(time, looked_at, threshold, settings.hysteresis, settings.minimum_samples)
 
 
 def _after_start(

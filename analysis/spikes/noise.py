@@ -24,22 +24,22 @@ from vibroimpact.analysis.robust import robust_sigma
 
 Floats = NDArray[np.float64]
 
-#: Peaks above this quantile are the tail; of few peaks more are taken, at most the upper half.
+#: Quantile above which peaks are the tail; of few peaks more are taken, at most the upper half.
 _TAIL_QUANTILE = 0.8
 _PEAKS_WANTED = 50
-#: Fewer peaks than this make no tail; a normal one is assumed then.
+#: Fewest peaks that make a tail; below, a normal one is assumed.
 _FEWEST_PEAKS = 20
-#: What the fit starts with, as a part of the tail: at least so much of it is taken to be noise.
+#: Share of the tail that the fit starts with: all of it is taken to be noise.
 _FIRST_PART = 0.5
 _MOST_ROUNDS = 200
-#: A peak is left out of the noise only if the law expects it a hundred times more rarely than a false alarm: to leave
-#: out the largest peaks of heavy-tailed noise would make its tail look light.
+#: Expected number, relative to a false alarm, below which a peak is left out of the noise: leaving out the largest
+#: peaks of heavy-tailed noise would make its tail look light.
 _GROWN = 0.01
-#: The record is looked at in so many stretches, none shorter than this many samples.
+#: Stretches in which the record is searched for ringing, and fewest samples in one.
 _STRETCHES = 200
 _SHORTEST_STRETCH = 32
-#: A stretch rings if its median magnitude is more than so many times that of the median stretch. Noise alone, even
-#: Cauchy's in 32 samples, stays below.
+#: Median magnitude, relative to that of the median stretch, above which a stretch rings. Noise alone, even Cauchy's in
+#: 32 samples, stays below.
 _RINGS = 3.0
 
 
@@ -55,14 +55,11 @@ class Tail:
         Shape of the tail, with one standard error added where it is positive.
     threshold : float
         What noise passes `false_alarms` times in a record like this.
-    peaks : int
-        Half waves of noise that the tail was fitted to.
     """
 
     sigma: float
     shape: float
     threshold: float
-    peaks: int
 
 
 def half_wave_peaks(values: Floats) -> Floats:
@@ -135,8 +132,8 @@ def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Ta
     values = values[quiet(values)]
     sigma = robust_sigma(values)
     if sigma == 0.0:
-        # a signal that rests exactly: nothing but what is not rest
-        return Tail(0.0, 0.0, 0.0, 0)
+        # a signal that is constant but for its spikes has no noise
+        return Tail(0.0, 0.0, 0.0)
     signed = values * polarity if polarity else values
     peaks = half_wave_peaks(signed) if not polarity else _peaks_of_one_sign(signed)
     part = float(np.clip(1.0 - _PEAKS_WANTED / max(peaks.size, 1), 0.5, _TAIL_QUANTILE))
@@ -144,13 +141,13 @@ def tail_threshold(values: Floats, false_alarms: float, polarity: int = 0) -> Ta
     excesses = np.sort(peaks[peaks > level] - level)
     if excesses.size < _FEWEST_PEAKS:
         normal = -float(ndtri(min(0.5, false_alarms / (2.0 * max(1, len(values))))))
-        return Tail(sigma, 0.0, sigma * normal, int(excesses.size))
-    shape, height, count = _grown_fit(excesses, false_alarms)
-    return Tail(sigma, shape, level + height, count)
+        return Tail(sigma, 0.0, sigma * normal)
+    shape, height = _grown_fit(excesses, false_alarms)
+    return Tail(sigma, shape, level + height)
 
 
-def _grown_fit(excesses: Floats, false_alarms: float) -> tuple[float, float, int]:
-    """Return shape, threshold above the level, and the number of peaks that are noise."""
+def _grown_fit(excesses: Floats, false_alarms: float) -> tuple[float, float]:
+    """Return shape and threshold above the level, of the peaks that are noise."""
     count = max(_FEWEST_PEAKS // 2, int(_FIRST_PART * excesses.size))
     for _ in range(_MOST_ROUNDS):
         height = _exceeded(*_pareto(excesses[:count], 0.0), count / (_GROWN * false_alarms))
@@ -159,7 +156,7 @@ def _grown_fit(excesses: Floats, false_alarms: float) -> tuple[float, float, int
             break
         count = grown
     shape, scale = _pareto(excesses[:count], 1.0)
-    return shape, _exceeded(shape, scale, count / false_alarms), count
+    return shape, _exceeded(shape, scale, count / false_alarms)
 
 
 def _exceeded(shape: float, scale: float, ratio: float) -> float:

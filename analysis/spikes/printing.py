@@ -12,7 +12,7 @@ from vibroimpact.fmus.printing import table, with_error
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.fmus.units import written_unit
 
-#: A longer list of spikes is cut; all of them are in the dataset.
+#: Most spikes printed; all of them are in the dataset.
 _MOST_ROWS = 12
 
 
@@ -31,8 +31,9 @@ def print_spikes(console: Terminal, report: SpikeReport) -> None:
         console.print(line, style="yellow")
     console.print(_settings(report))
     if count:
-        console.print(_spikes(data))
-        console.print(_contacts(data))
+        shown = [data.isel(spike=place) for place in range(min(count, _MOST_ROWS))]
+        console.print(_spikes(data, shown))
+        console.print(_contacts(data, shown))
         if count > _MOST_ROWS:
             console.print(f"{count - _MOST_ROWS} more spikes are in the dataset.")
         console.print(_waveforms(data))
@@ -80,16 +81,13 @@ def _settings(report: SpikeReport) -> Table:
         "baseline", f"{found.baseline_window * found.interval:.4g} s", "window of the running median"
     )
     rows.add_row("polarity", chosen.polarity, f"at least {chosen.minimum_samples} samples")
-    merge = f"{chosen.merge:g} s" if chosen.merge is not None else _automatic_merge(found.method)
+    automatic = "2 cycles" if found.method == "cycle_median" else "2 to 10 lengths of the spike"
+    merge = automatic if chosen.merge is None else f"{chosen.merge:g} s"
     rows.add_row("ringing", merge, "excursions as close are one spike")
     return rows
 
 
-def _automatic_merge(method: str) -> str:
-    return "2 cycles" if method == "cycle_median" else "2 to 10 lengths of the spike"
-
-
-def _spikes(data: xr.Dataset) -> Table:
+def _spikes(data: xr.Dataset, shown: list[xr.Dataset]) -> Table:
     """Return one row for each spike."""
     peak, impulse = (written_unit(str(data[name].attrs["units"])) for name in ("spike_peak", "spike_impulse"))
     heads = [">time (s)", f">peak ({peak})", f">impulse ({impulse})", ">passes"]
@@ -98,8 +96,7 @@ def _spikes(data: xr.Dataset) -> Table:
         heads.insert(3, ">velocity (m/s)")
         columns.append(("spike_velocity", "spike_velocity_error"))
     rows = table("Spikes", *heads)
-    for place in range(min(int(data.sizes["spike"]), _MOST_ROWS)):
-        one = data.isel(spike=place)
+    for one in shown:
         clipped = " clipped" if int(one["spike_clipped"]) else ""
         rows.add_row(
             f"{float(one['spike_time']):.6f}{clipped}",
@@ -109,20 +106,20 @@ def _spikes(data: xr.Dataset) -> Table:
     return rows
 
 
-def _contacts(data: xr.Dataset) -> Table:
+def _contacts(data: xr.Dataset, shown: list[xr.Dataset]) -> Table:
     """Return how long each spike lasts, and its sum above the threshold, which depends on the threshold."""
     heads = (">time (s)", ">foot to foot (ms)", ">above (ms)")
     sums = f">sum above ({written_unit(str(data['spike_impulse'].attrs['units']))})"
-    rows = table("Contacts, and what is above the threshold", *heads, sums)
-    for place in range(min(int(data.sizes["spike"]), _MOST_ROWS)):
-        one = data.isel(spike=place)
-        rows.add_row(
+    rows = (
+        (
             f"{float(one['spike_time']):.6f}",
             f"{1e3 * float(one['spike_length']):.4g}",
             f"{1e3 * float(one['spike_duration']):.4g}",
             f"{float(one['spike_impulse_above']):.4g}",
         )
-    return rows
+        for one in shown
+    )
+    return table("Contacts, and what is above the threshold", *heads, sums, rows=rows)
 
 
 def _waveforms(data: xr.Dataset) -> Table:

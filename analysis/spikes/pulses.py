@@ -19,9 +19,9 @@ from vibroimpact.fmus.errors import UsageError
 
 Floats = NDArray[np.float64]
 
-#: The foot of a pulse: where it has fallen to this part of its peak.
+#: Foot of a pulse, relative to its peak.
 FOOT = 0.05
-#: Nothing smaller than so many standard deviations of the noise is followed down.
+#: Standard deviations of the noise below which no foot is looked for.
 _FOOT_NOISE = 3.0
 #: Samples on each side of a peak that its band-limited reading takes in, and points it gives between two samples.
 _SAMPLES_BESIDE = 32

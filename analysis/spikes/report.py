@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.dataset.results import Row, Rows, described
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.analysis.spikes.contact import Calibration, calibrate, contact_time_measure, impact_velocity
@@ -135,34 +136,27 @@ def impulse_unit(unit: str) -> str:
 
 
 def _dataset(
-    channel: Channel,
-    found: Identification,
-    pulses: Pulses,
-    known: Mechanics,
-    calibration: Calibration | None,
+    channel: Channel, found: Identification, pulses: Pulses, known: Mechanics, calibration: Calibration | None
 ) -> xr.Dataset:
     kept = pulses.complete
-    variables = {
-        name: ("spike", values[kept], {"units": units, "long_name": words})
-        for name, (values, units, words) in _columns(found, pulses, known).items()
-    }
-    variables |= _fits(found, pulses)
-    scalars = {
-        name: ((), float(value), {"units": units, "long_name": words})
-        for name, (value, units, words) in _scalars(found, pulses, calibration).items()
-    }
-    names = np.array(list(WAVEFORMS))
-    coordinate = ("waveform", names, {"units": "1", "long_name": "fitted curve"})
-    return xr.Dataset(
-        {**variables, **scalars}, {"waveform": coordinate}, _attributes(channel, found, pulses, known)
+    columns = _columns(found, pulses, known)
+    variables = described(
+        {
+            **{name: ("spike", values[kept], unit, words) for name, (values, unit, words) in columns.items()},
+            **_fits(found, pulses),
+            **_scalars(found, pulses, calibration),
+        }
     )
+    curves = described({"waveform": ("waveform", np.array(list(WAVEFORMS)), "1", "fitted curve")})
+    return xr.Dataset(variables, curves, _attributes(channel, found, pulses, known))
 
 
 def _columns(
     found: Identification, pulses: Pulses, known: Mechanics
 ) -> dict[str, tuple[NDArray[Any], str, str]]:
-    """Return name, values, unit and words of each variable of a spike."""
+    """Return values, unit and words of each variable of a spike."""
     unit, whole = found.unit, impulse_unit(found.unit)
+    short = "most that the largest sample can fall short of the peak"
     columns: dict[str, tuple[NDArray[Any], str, str]] = {
         "spike_time": (pulses.start, "s", "first upward crossing of the threshold"),
         "spike_end": (pulses.end, "s", "end of the spike and its ringing"),
@@ -172,11 +166,7 @@ def _columns(
         "spike_peak": (pulses.peak, unit, "peak, band-limited between the samples"),
         "spike_peak_error": (pulses.peak_error, unit, "error of the peak by noise and resampling"),
         "spike_peak_sampled": (pulses.sampled_peak, unit, "largest sample"),
-        "spike_peak_deficit": (
-            pulses.deficit,
-            unit,
-            "most that the largest sample can fall short of the peak",
-        ),
+        "spike_peak_deficit": (pulses.deficit, unit, short),
         "spike_impulse": (pulses.impulse, whole, "impulse down to the baseline"),
         "spike_impulse_error": (pulses.impulse_error, whole, "error of the impulse by noise and waveform"),
         "spike_impulse_above": (pulses.impulse_above, whole, "impulse while above the threshold"),
@@ -185,12 +175,9 @@ def _columns(
     }
     velocity = _velocity(found.unit, pulses, known)
     if velocity is not None:
-        columns["spike_velocity"] = (velocity[0], "m s-1", "velocity before impact")
-        columns["spike_velocity_error"] = (
-            velocity[1],
-            "m s-1",
-            "error of the velocity by that of the impulse",
-        )
+        values, errors = velocity
+        columns["spike_velocity"] = (values, "m s-1", "velocity before impact")
+        columns["spike_velocity_error"] = (errors, "m s-1", "error of the velocity by that of the impulse")
     return columns
 
 
@@ -217,66 +204,56 @@ def _velocity(unit: str, pulses: Pulses, known: Mechanics) -> tuple[Floats, Floa
     )
 
 
-def _fits(found: Identification, pulses: Pulses) -> dict[str, Any]:
+def _fits(found: Identification, pulses: Pulses) -> Rows:
     """Return what the fitted curves are, by curve and spike."""
     kept = pulses.complete
     wanted = {
-        "spike_fit_peak": ("peak", found.unit, "peak of the fitted curve"),
-        "spike_fit_length": ("length", "s", "length of the fitted curve; its standard deviation for a bell"),
-        "spike_fit_middle": ("middle", "s", "middle of the fitted curve"),
-        "spike_fit_goodness": (
-            "goodness",
-            "1",
-            "part of the variance within the pulse that the curve explains",
-        ),
+        "peak": (found.unit, "peak of the fitted curve"),
+        "length": ("s", "length of the fitted curve; its standard deviation for a bell"),
+        "middle": ("s", "middle of the fitted curve"),
+        "goodness": ("1", "part of the variance within the pulse that the curve explains"),
     }
     signs = np.where(pulses.peak[kept] < 0.0, -1.0, 1.0)
-    result = {}
-    for name, (field, units, words) in wanted.items():
-        rows = np.array([getattr(pulses.fits[each], field)[kept] for each in WAVEFORMS])
-        if field == "peak":
-            rows = rows * signs
-        result[name] = (("waveform", "spike"), rows, {"units": units, "long_name": words})
-    return result
+    rows: dict[str, Row] = {}
+    for field, (unit, words) in wanted.items():
+        values = np.array([getattr(pulses.fits[each], field)[kept] for each in WAVEFORMS])
+        values = values * signs if field == "peak" else values
+        rows[f"spike_fit_{field}"] = (("waveform", "spike"), values, unit, words)
+    return rows
 
 
-def _scalars(
-    found: Identification, pulses: Pulses, calibration: Calibration | None
-) -> dict[str, tuple[float, str, str]]:
-    """Return name, value, unit and words of what is said of the whole record."""
+def _scalars(found: Identification, pulses: Pulses, calibration: Calibration | None) -> Rows:
+    """Return what is said of the whole record."""
     unit = "1" if found.method == "cycle_median" else found.unit
-    scalars: dict[str, tuple[float, str, str]] = {
-        "threshold": (found.threshold, unit, "threshold"),
-        "lower_threshold": (found.lower_threshold, unit, "threshold at which a spike is over"),
-        "noise": (found.noise, found.unit, "standard deviation of the noise, robust"),
-        "noise_tail_shape": (found.tail.shape, "1", "shape of the tail of the noise, generalised Pareto"),
-        "false_alarms": (found.settings.false_alarms, "1", "noise peaks expected above the threshold"),
-        "baseline_window": (found.baseline_window * found.interval, "s", "window of the baseline"),
-        "spikes_cut_off": (
-            float(np.count_nonzero(~pulses.complete)),
-            "1",
-            "spikes cut off by an end of the record",
-        ),
-        "excursions_too_short": (found.short, "1", "excursions of too few samples"),
-        "settled": (found.settled, "s", "end of the start of a periodic motion"),
+    kept = pulses.complete
+    cut_off, window = float(np.count_nonzero(~kept)), found.baseline_window * found.interval
+    rows: dict[str, Row] = {
+        "threshold": ((), found.threshold, unit, "threshold"),
+        "lower_threshold": ((), found.lower_threshold, unit, "threshold at which a spike is over"),
+        "noise": ((), found.noise, found.unit, "standard deviation of the noise, robust"),
+        "noise_tail_shape": ((), found.tail.shape, "1", "shape of the tail of the noise, generalised Pareto"),
+        "false_alarms": ((), found.settings.false_alarms, "1", "noise peaks expected above the threshold"),
+        "baseline_window": ((), window, "s", "window of the baseline"),
+        "spikes_cut_off": ((), cut_off, "1", "spikes cut off by an end of the record"),
+        "excursions_too_short": ((), float(found.short), "1", "excursions of too few samples"),
+        "settled": ((), found.settled, "s", "end of the start of a periodic motion"),
     }
     if found.cycle.found:
         period = found.cycle.period * found.interval
-        scalars["excitation_period"] = (period, "s", "period of the excitation")
-    kept = pulses.complete
+        rows["excitation_period"] = ((), period, "s", "period of the excitation")
     if np.count_nonzero(kept) >= 2:
-        above = contact_time_measure(pulses.start[kept], pulses.duration[kept])
-        feet = contact_time_measure(pulses.start[kept], pulses.length[kept])
-        scalars |= {
-            "contact_time_measure": (above.measure, "1", "part of the time above the threshold"),
-            "contact_time_measure_error": (above.standard_error, "1", "its standard error"),
-            "contact_time_measure_feet": (feet.measure, "1", "part of the time between the feet of pulses"),
-            "contact_time_measure_feet_error": (feet.standard_error, "1", "its standard error"),
-        }
+        for name, contacts, words in (
+            ("contact_time_measure", pulses.duration, "part of the time above the threshold"),
+            ("contact_time_measure_feet", pulses.length, "part of the time between the feet of pulses"),
+        ):
+            share = contact_time_measure(pulses.start[kept], contacts[kept])
+            rows[name] = ((), share.measure, "1", words)
+            rows[f"{name}_error"] = ((), share.standard_error, "1", "its standard error")
     if calibration is not None:
-        scalars["sensitivity"] = (calibration.sensitivity, "V N-1", "sensitivity of the load cell, fitted")
-        scalars["sensitivity_error"] = (calibration.standard_error, "V N-1", "its standard error")
-    return scalars
+        fitted = "sensitivity of the load cell, fitted"
+        rows["sensitivity"] = ((), calibration.sensitivity, "V N-1", fitted)
+        rows["sensitivity_error"] = ((), calibration.standard_error, "V N-1", "its standard error")
+    return rows
 
 
 def _attributes(

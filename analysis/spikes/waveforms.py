@@ -29,7 +29,6 @@ class Waveform:
 
     Attributes
     ----------
-    name : str
     value : callable
         Of the time from its middle in units of its length.
     slope : callable
@@ -42,7 +41,6 @@ class Waveform:
         Whole impulse over peak times length.
     """
 
-    name: str
     value: Callable[[Floats], Floats]
     slope: Callable[[Floats], Floats]
     half_width: Callable[[Floats], Floats]
@@ -67,7 +65,6 @@ def _bell_part(level: Floats) -> Floats:
 
 WAVEFORMS = {
     "half_sine": Waveform(
-        "half_sine",
         lambda time: np.cos(np.pi * time) * _inside(time),
         lambda time: -np.pi * np.sin(np.pi * time) * _inside(time),
         lambda level: np.arccos(level) / np.pi,
@@ -75,7 +72,6 @@ WAVEFORMS = {
         2.0 / np.pi,
     ),
     "haversine": Waveform(
-        "haversine",
         lambda time: np.cos(np.pi * time) ** 2 * _inside(time),
         lambda time: -np.pi * np.sin(2.0 * np.pi * time) * _inside(time),
         lambda level: np.arccos(np.sqrt(level)) / np.pi,
@@ -83,7 +79,6 @@ WAVEFORMS = {
         0.5,
     ),
     "bell": Waveform(
-        "bell",
         lambda time: np.exp(-0.5 * time**2),
         lambda time: -time * np.exp(-0.5 * time**2),
         lambda level: np.sqrt(-2.0 * np.log(level)),
@@ -99,16 +94,14 @@ class WaveformFit:
 
     Attributes
     ----------
-    name : str
     peak, middle, length : ndarray of float, shape (spike,)
         SI unit, s, s; NaN for a pulse of fewer samples than its three unknowns ask for.
     goodness : ndarray of float, shape (spike,)
-        1 - (squares left) / (squares about the mean) within the pulse.
+        1 - (squares of the residual) / (squares about the mean) within the pulse.
     squares : ndarray of float, shape (spike,)
-        Mean square left, SI unit squared.
+        Mean square of the residual, SI unit squared.
     """
 
-    name: str
     peak: Floats
     middle: Floats
     length: Floats
@@ -131,7 +124,7 @@ def fit_waveforms(pulses: list[tuple[Floats, Floats]], levels: Floats) -> dict[s
     """
     if not pulses:
         empty = np.zeros(0)
-        return {name: WaveformFit(name, empty, empty, empty, empty, empty) for name in WAVEFORMS}
+        return {name: WaveformFit(empty, empty, empty, empty, empty) for name in WAVEFORMS}
     begin = np.array([time[0] for time, _ in pulses])
     width = np.array([time[-1] - time[0] for time, _ in pulses])
     place = np.linspace(-0.5, 0.5, _POINTS)
@@ -156,14 +149,14 @@ def fit_waveforms(pulses: list[tuple[Floats, Floats]], levels: Floats) -> dict[s
             goodness,
             squares * scale**2,
         )
-        fits[name] = WaveformFit(name, *(np.where(enough, row, np.nan) for row in rows))
+        fits[name] = WaveformFit(*(np.where(enough, row, np.nan) for row in rows))
     return fits
 
 
 def _fit(
     waveform: Waveform, place: Floats, values: Floats, levels: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return peak, middle, length and mean square left, in units of peak and width of each pulse."""
+    """Return peak, middle, length and mean squared residual, in units of peak and width of each pulse."""
     level = np.clip(levels, _SMALLEST_LEVEL, 0.9)
     state = np.stack([np.ones(len(values)), np.zeros(len(values)), 0.5 / waveform.half_width(level)], axis=1)
     best = _squares(waveform, place, values, state)
@@ -203,7 +196,7 @@ def _squares(waveform: Waveform, place: Floats, values: Floats, state: Floats) -
 
 
 def chosen_waveform(fits: dict[str, WaveformFit]) -> str:
-    """Return the curve that leaves least of all pulses together; all contacts of a record are of one kind.
+    """Return the curve with the smallest residual over all pulses; all contacts of a record are of one kind.
 
     Each has three unknowns, so that the smallest sum of squares is the choice of any information criterion too.
     """

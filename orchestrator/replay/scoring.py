@@ -10,8 +10,7 @@ from typing import Literal
 import numpy as np
 
 from vibroimpact.analysis.recording.channels import Floats
-from vibroimpact.analysis.replay.baseline import naive_variance
-from vibroimpact.analysis.replay.comparison import Comparison, compare
+from vibroimpact.analysis.replay.comparison import Comparison, compare, naive_variance
 from vibroimpact.analysis.replay.event import find_event
 from vibroimpact.analysis.replay.held import Held
 from vibroimpact.fmus.errors import EstimationError

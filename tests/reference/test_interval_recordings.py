@@ -39,7 +39,7 @@ def test_a_neuron_has_its_rate_its_variation_and_its_fano_factor(
     assert found.value == pytest.approx(fano, abs=6e-5)
     # it moves by a few percent with the offset of the bins, and the report says how far
     assert found.lowest < found.value < found.highest < 1.1 * found.value
-    assert rate(train).value == pytest.approx(hertz, abs=1e-9)
+    assert rate(train)[0] == pytest.approx(hertz, abs=1e-9)
     assert coefficient_of_variation(train) == pytest.approx(variation, abs=6e-5)
 
 

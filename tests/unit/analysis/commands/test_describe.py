@@ -9,11 +9,14 @@ import pytest
 import xarray as xr
 from support.command_line import in_this_process
 from support.dataset_examples import dataset_of, record, up_down
+from support.replay_signals import HIT, clock, ring
+from support.replay_signals import channel as replay_channel
 
 from vibroimpact.analysis.dataset import write_dataset
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.files.estimate_table import estimate_table
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
+from vibroimpact.analysis.replay import compare, comparison_dataset
 from vibroimpact.analysis.spikes import spike_report
 
 
@@ -61,6 +64,15 @@ def test_estimates_are_told_with_their_standard_errors_and_units(tmp_path: Path)
     assert "noise noise N 0.100 ± 0.020" in lines
     assert not any(line.startswith(("noise_error", "interval_low")) for line in lines)
     assert lines[-1] == "- the signal is short."
+
+
+def test_a_replay_is_told_with_the_samples_that_were_not_scored(tmp_path: Path) -> None:
+    time = clock()
+    board = replay_channel(ring(time - HIT), limit=0.9)
+    compared = compare(time, ring(time - HIT), board, lag=0.0, polarity=1)
+    write_results(comparison_dataset([compared]), tmp_path / "replay.nc", kind="replay")
+    (line,) = [line for line in described(tmp_path / "replay.nc") if line.startswith("board_quality")]
+    assert line.endswith(f" {compared.counts['clipped']} clipped")
 
 
 def test_spikes_are_told_with_the_range_of_their_errors(tmp_path: Path) -> None:
