@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.figures.page import COLOURS, canvas, label, page_style
@@ -109,12 +109,23 @@ def work_precision(dataset: xr.Dataset) -> Figure:
                 )
             axis.set(xscale="log", yscale="log", ylabel=label(dataset[name]))
         axes[-1].set_xlabel(label(dataset["wall_time"]))
+        _label_seconds(axes[-1])
         if ways:
             figure.legend(
                 *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False
             )
         figure.suptitle(str(dataset.attrs.get("title", "")), fontsize=8)
     return figure
+
+
+def _label_seconds(axis: Axes) -> None:
+    """Label few enough seconds of less than two decades that no label covers another; matplotlib labels more."""
+    first, last = axis.get_xlim()
+    if last < 100.0 * first:
+        few = MaxNLocator(MOST_LABELS) if last < 10.0 * first else LogLocator(subs=(1.0, 2.0, 5.0))
+        axis.xaxis.set_major_locator(few)
+        axis.xaxis.set_major_formatter("{x:.9g}")
+        axis.xaxis.set_minor_locator(NullLocator())
 
 
 def _ladder_of(dataset: xr.Dataset) -> tuple[str, str | None]:
