@@ -18,6 +18,7 @@ from vibroimpact.analysis.estimation.model_tests import (
 )
 from vibroimpact.analysis.estimation.physics import Forcing
 from vibroimpact.analysis.estimation.prepared import Prepared
+from vibroimpact.fmus.wording import option
 
 # What speaks against the model counts from so many standard errors on: chance gets there once in a thousand times.
 _CLEAR = 3.3
@@ -42,7 +43,7 @@ def doubts_of(
     record: Prepared, forcing: Forcing, values: Values, confidence: float = 0.95
 ) -> tuple[Doubt, ...]:
     """Return what makes the estimates of a record, with intervals of a confidence, doubtful: the gravest first."""
-    clocks = "" if forcing.clock_drifts else ", or clocks that differ (--clock-drifts)"
+    clocks = "" if forcing.clock_drifts else f", or clocks that differ ({option('clock_drifts')})"
     signal = record.segmentation.signal
     # without noise there is no chance to judge by: what is left is rounding
     noisy = record.fit.noise > _ROUNDING * float(np.ptp(signal.values[signal.good]))

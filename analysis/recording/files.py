@@ -28,6 +28,7 @@ from vibroimpact.analysis.recording.channels import (
 from vibroimpact.analysis.recording.rules import EVENT_ENDING, QUALITY_ENDING, problems_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 
 MOST_VALUES = 10**8
 """Values of a recording that are read: some bytes of a damaged file can promise any number."""
@@ -303,7 +304,7 @@ def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Record
     if is_recording(path):
         if run is not None:
             raise DatasetError(
-                f"{os.fspath(path)}: --run: expected none of a recording, got {run}. Leave it out."
+                f"{os.fspath(path)}: {option('run')}: expected none of a recording, got {run}. Leave it out."
             )
         return open_recording(path)
     try:
@@ -316,7 +317,7 @@ def open_signals(path: str | os.PathLike[str], run: int | None = None) -> Record
         if run is None and len(indices) > 1:
             raise DatasetError(
                 f"{os.fspath(path)}: expected one run to be named, got {len(indices)} (run_index {indices[0]} to "
-                f"{indices[-1]}). Choose one with --run."
+                f"{indices[-1]}). Choose one with {option('run')}."
             )
         if run is not None and run not in indices:
             raise DatasetError(

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Flags, Floats, Table
 from vibroimpact.hardware.recordings.gaps import AGREEMENT, EVEN, Gaps, are_whole, gaps_in
 from vibroimpact.hardware.recordings.printed_grid import digits_of
@@ -94,7 +95,7 @@ def place(table: Table, column: Column, rate: float | None = None, start: float 
         return _moved(_even(column.start, column.interval, length, source, 0.0, remarks), start)
     raise DatasetError(
         f"{column.label}: expected a column of instants or a sampling interval, got neither. "
-        "Give --rate (samples per second), or --time-column."
+        f"Give {option('rate')} (samples per second), or {option('time_column')}."
     )
 
 
@@ -319,7 +320,9 @@ def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
         else []
     )
     if not len(known):
-        raise DatasetError("column of instants: expected numbers, got none. Give --rate, or --time-column.")
+        raise DatasetError(
+            f"column of instants: expected numbers, got none. Give {option('rate')}, or {option('time_column')}."
+        )
     order = known[np.argsort(instants[known], kind="stable")]
     back = int(np.sum(np.diff(instants[known]) < 0.0))
     moved = order != known
@@ -327,7 +330,7 @@ def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
     if back + int(again.sum()) > _MOST_DOUBTFUL * len(known):
         raise DatasetError(
             f"column of instants: expected them to ascend, got {back} steps back and {int(again.sum())} repeated "
-            f"in {len(known)} rows. Give --rate, or name another --time-column."
+            f"in {len(known)} rows. Give {option('rate')}, or name another {option('time_column')}."
         )
     if back:
         remarks.append(

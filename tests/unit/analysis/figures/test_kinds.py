@@ -23,6 +23,7 @@ from vibroimpact.analysis.intervals import interval_report
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
 from vibroimpact.analysis.replay import compare, comparison_dataset
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.wording import command_line
 
 
 def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
@@ -255,7 +256,8 @@ def plotted(*arguments: str) -> str:
     app = typer.Typer()
     app.callback()(lambda: None)
     commands.register(app)
-    done = CliRunner().invoke(app, ["plot", *arguments])
+    with command_line():
+        done = CliRunner().invoke(app, ["plot", *arguments])
     if done.exception is not None:
         assert isinstance(done.exception, DatasetError | UsageError), done.exception
         return str(done.exception)
