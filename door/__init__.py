@@ -60,40 +60,29 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
 
     __version__: str
 
-_HOMES = {
-    "Channel": "analysis.recording",
-    "Forcing": "analysis.estimation",
-    "ImportSettings": "hardware.recordings",
-    "Known": "analysis.estimation",
-    "Mechanics": "analysis.spikes",
-    "Recording": "analysis.recording",
-    "Scene": "orchestrator.scene",
-    "SpikeSettings": "analysis.spikes",
-    "VibroimpactError": "fmus.errors",
-    "array_of": "analysis.recording",
-    "campaign": "simulation",
-    "cost_of": "simulation",
-    "curve_of": "analysis.decay",
-    "decay_samples": "analysis.decay",
-    "draw": "analysis.figures",
-    "estimate_bounces": "analysis.estimation",
-    "estimate_decay": "analysis.decay",
-    "estimate_impacts": "analysis.estimation",
-    "estimate_modes": "analysis.estimation",
-    "fit_resonance": "analysis.decay",
-    "frequency_response": "analysis.decay",
-    "import_recording": "hardware.recordings",
-    "interval_report": "analysis.intervals",
-    "open_dataset": "analysis.dataset",
-    "open_measured": "analysis.dataset.reading",
-    "open_recording": "analysis.recording",
-    "open_signals": "analysis.recording",
-    "replay": "simulation",
-    "run": "simulation",
-    "spike_report": "analysis.spikes",
-    "write_recording": "analysis.recording",
-    "write_results": "analysis.dataset.results",
+_NAMES = {
+    "analysis.dataset": ("open_dataset",),
+    "analysis.dataset.reading": ("open_measured",),
+    "analysis.dataset.results": ("write_results",),
+    "analysis.decay": ("curve_of", "decay_samples", "estimate_decay", "fit_resonance", "frequency_response"),
+    "analysis.estimation": ("Forcing", "Known", "estimate_bounces", "estimate_impacts", "estimate_modes"),
+    "analysis.figures": ("draw",),
+    "analysis.intervals": ("interval_report",),
+    "analysis.recording": (
+        "Channel",
+        "Recording",
+        "array_of",
+        "open_recording",
+        "open_signals",
+        "write_recording",
+    ),
+    "analysis.spikes": ("Mechanics", "SpikeSettings", "spike_report"),
+    "fmus.errors": ("VibroimpactError",),
+    "hardware.recordings": ("ImportSettings", "import_recording"),
+    "orchestrator.scene": ("Scene",),
+    "simulation": ("campaign", "cost_of", "replay", "run"),
 }
+_HOMES = {name: home for home, names in _NAMES.items() for name in names}
 _ROOMS = {"figures": "analysis.figures", "fmus": "fmus"}
 __all__ = [*_HOMES, *_ROOMS, "__version__"]
 

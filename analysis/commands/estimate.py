@@ -9,10 +9,11 @@ from pathlib import Path
 
 import xarray as xr
 
-from vibroimpact.analysis.commands.estimate_scene import ImpactOptions, cut, forcing_and_known, scene_of
+from vibroimpact.analysis.commands.estimate_scene import ImpactOptions, cut, forcing_and_known
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.dataset.schema import scene_of
 from vibroimpact.analysis.decay.estimate import print_estimates, print_remarks
 from vibroimpact.analysis.decay.free_decay import estimate_decay, print_decay
 from vibroimpact.analysis.decay.frequency_response import frequency_response

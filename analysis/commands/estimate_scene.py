@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.analysis.dataset.reading import read_flat
-from vibroimpact.analysis.dataset.schema import file_name_of, swept_names
+from vibroimpact.analysis.dataset.schema import file_name_of, scene_of, swept_names
 from vibroimpact.analysis.estimation.physics import Forcing, Known
 from vibroimpact.analysis.recording import Channel, Recording, is_recording
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.safe_toml import parse_toml
 
 #: A table among several: `stop[1]`.
 _NUMBERED = re.compile(r"(\w+)\[(\d+)\]")
@@ -96,14 +95,6 @@ def kind_of(data: Path, *, one_run: bool) -> str:
     if not one_run and flat.sizes["run"] > 1 and {"angular_frequency", "frequency"} & set(swept_names(flat)):
         return "response"
     return "impacts" if "impact_count" in flat and np.any(flat.impact_count.values > 0) else "decay"
-
-
-def scene_of(attrs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the tables of the scene of a simulated dataset; empty where there is none."""
-    try:
-        return parse_toml(str(attrs.get("scene", "")))
-    except ValueError:
-        return {}
 
 
 def run_scene(data: Path, run: int | None, recording: Recording) -> dict[str, Any]:

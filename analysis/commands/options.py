@@ -14,6 +14,9 @@ from vibroimpact.analysis.commands.estimate_options import estimate
 from vibroimpact.analysis.commands.shared_options import DatasetFile, FigureFile, Force
 from vibroimpact.fmus.commands import commands as fmu_commands
 
+AnyFile = Annotated[
+    Path, typer.Argument(help="Dataset, recording or results (.nc), or the folder of a campaign.")
+]
 #: Of the correlation dimension: `intervals.dimension` has the same, and takes long to load.
 EMBEDDING, THEILER = 6, 1
 _KINDS_HELP = (
@@ -33,9 +36,7 @@ def register(app: typer.Typer) -> None:
 
 
 def plot(
-    file: Annotated[
-        Path, typer.Argument(help="Dataset, recording or results (.nc), or the folder of a campaign.")
-    ],
+    file: AnyFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Figure to write: .png, .pdf or .svg.")],
     kind: Annotated[str, typer.Option(help=_KINDS_HELP)] = "auto",
     run: Annotated[
@@ -144,11 +145,7 @@ def spikes(
     find_spikes(data, output, figure, channel, events, run, settings, mechanics, intervals, force)
 
 
-def describe(
-    file: Annotated[
-        Path, typer.Argument(help="Dataset, recording or results (.nc), or the folder of a campaign.")
-    ],
-) -> None:
+def describe(file: AnyFile) -> None:
     """Say what a file holds: what made it, its dimensions, each variable with its meaning, unit and values.
 
     Example: vibroimpact describe run.nc

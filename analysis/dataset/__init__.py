@@ -19,8 +19,6 @@ from vibroimpact.analysis.dataset.reading import (
     read_part,
 )
 from vibroimpact.analysis.dataset.schema import (
-    CONVENTIONS,
-    EVENT_COLUMNS,
     IMPACT_COLUMNS,
     PERIOD_COLUMNS,
     RESERVED_NAMES,
@@ -29,19 +27,13 @@ from vibroimpact.analysis.dataset.schema import (
     Direction,
     Outcome,
     RunRecord,
-    UnitSystem,
-    VariableRule,
     constant_names,
     file_name_of,
     file_names,
-    swept_names,
 )
 from vibroimpact.analysis.dataset.writing import build_dataset, with_constants, write_dataset
-from vibroimpact.analysis.files.opening import unreadable
 
 __all__ = [
-    "CONVENTIONS",
-    "EVENT_COLUMNS",
     "IMPACT_COLUMNS",
     "PERIOD_COLUMNS",
     "RESERVED_NAMES",
@@ -51,8 +43,6 @@ __all__ = [
     "Outcome",
     "Part",
     "RunRecord",
-    "UnitSystem",
-    "VariableRule",
     "VibroimpactAccessor",
     "build_dataset",
     "check",
@@ -67,9 +57,7 @@ __all__ = [
     "read_flat",
     "read_part",
     "refuse_unlike",
-    "swept_names",
     "take_runs",
-    "unreadable",
     "with_constants",
     "write_dataset",
 ]

@@ -19,8 +19,7 @@ _RECORD_KEYS = {
     "event": "events = true",
 }
 
-
-# Of a parameter with one value only, how far another may be from it and still mean it.
+# Relative distance within which a value means the only one that a parameter has.
 _SAME = 1e-6
 
 

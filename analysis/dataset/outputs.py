@@ -10,6 +10,7 @@ from typing import Any
 
 from vibroimpact.analysis.dataset.results import file_attributes
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import typed_or_called
 
 FIGURE_ENDINGS = (".png", ".pdf", ".svg")
 DATASET_ENDING = ".nc"
@@ -89,7 +90,8 @@ def refuse_folder(folder: Path) -> None:
     """
     if folder.suffix.lower() in FILE_ENDINGS and not folder.is_dir():
         raise UsageError(
-            f"{folder}: expected the name of a folder, got that of a file ({folder.suffix}). Choose another with -o."
+            f"{folder}: expected the name of a folder, got that of a file ({folder.suffix}). "
+            f"Choose another{typed_or_called(' with -o')}."
         )
 
 

@@ -53,17 +53,12 @@ class Part:
 def _opened(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
     """Open a file that vibroimpact wrote; whatever is wrong with it is one DatasetError."""
     with opened_netcdf(path) as file:
-        _refuse_foreign(path, file.ncattrs(), file.variables)
+        if "dataset_schema" not in file.ncattrs() or not {"run_index", "outcome"} <= file.variables.keys():
+            raise DatasetError(
+                f"{os.fspath(path)}: expected a dataset written by vibroimpact, got other NetCDF contents. "
+                "Use the dataset.nc of a campaign or the file of a run."
+            )
         yield file
-
-
-def _refuse_foreign(path: str | os.PathLike[str], attributes: Any, variables: Any) -> None:
-    """Refuse a NetCDF file that vibroimpact did not write."""
-    if "dataset_schema" not in attributes or "run_index" not in variables or "outcome" not in variables:
-        raise DatasetError(
-            f"{os.fspath(path)}: expected a dataset written by vibroimpact, got other NetCDF contents. "
-            "Use the dataset.nc of a campaign or the file of a run."
-        )
 
 
 def read_part(path: str | os.PathLike[str]) -> Part:
@@ -102,9 +97,8 @@ def read_flat(path: str | os.PathLike[str]) -> xr.Dataset:
         links = " ".join(getattr(variable, "coordinates", "") for variable in file.variables.values())
         linked = dict.fromkeys(links.split())
         attrs = {name: file.getncattr(name) for name in file.ncattrs()}
-        flat = xr.Dataset(data, coords={name: data.pop(name) for name in linked}, attrs=attrs)
-        _refuse_misfits(path, flat)
-        return flat
+        coords = {name: data.pop(name) for name in linked}
+        return _fitting(path, xr.Dataset(data, coords=coords, attrs=attrs))
 
 
 def _attributes(variable: netCDF4.Variable[Any]) -> dict[str, Any]:
@@ -221,17 +215,12 @@ def _saved_again(opened: xr.Dataset) -> xr.Dataset:
 
 
 def _fitting(file: str | os.PathLike[str], flat: xr.Dataset) -> xr.Dataset:
-    """Return a dataset whose variables are those of the schema."""
-    _refuse_misfits(file, flat)
-    return flat
-
-
-def _refuse_misfits(file: str | os.PathLike[str], flat: xr.Dataset) -> None:
-    """Refuse variables of other types and dimensions than the schema says: everything else relies on them."""
+    """Return a dataset, but not one of other types and dimensions than the schema says: all else relies on them."""
     problems = structure_problems(flat)
     if problems:
         more = f" And {len(problems) - 1} more problems." if len(problems) > 1 else ""
         raise DatasetError(f"{os.fspath(file)}: {problems[0]}{more} The file is damaged; write it again.")
+    return flat
 
 
 class _RunArray(BackendArray):

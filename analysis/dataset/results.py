@@ -34,12 +34,6 @@ def described(rows: Rows) -> dict[str, Any]:
     }
 
 
-def results_kind(path: str | os.PathLike[str]) -> str | None:
-    """Return what kind of analysis wrote a file; None for any other file, also one that cannot be read."""
-    kind = file_attributes(path).get("results_kind")
-    return None if kind is None else str(kind)
-
-
 def file_attributes(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Return the global attributes of a NetCDF file; none of a file that cannot be read."""
     try:

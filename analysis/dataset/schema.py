@@ -17,6 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.safe_toml import parse_toml
 
 CONVENTIONS = "CF-1.11"
 SCHEMA_VERSION = "1"
@@ -105,9 +106,9 @@ class VariableRule:
 
     name: str
     dims: tuple[str, ...]
-    dtype: Any
     unit: str
     long_name: str
+    dtype: Any = np.float64
     extra: Mapping[str, Any] = field(default_factory=dict)
 
 
@@ -119,113 +120,74 @@ def _flags(kind: type[IntEnum]) -> dict[str, Any]:
     }
 
 
+def _count(dimension: str, words: str) -> VariableRule:
+    """Return the rule of the number of rows that a run has in a ragged dimension."""
+    extra = {"sample_dimension": dimension}
+    return VariableRule(f"{dimension}_count", ("run",), "1", f"number of {words} of the run", np.int32, extra)
+
+
 _RULES = (
-    VariableRule("run_index", ("run",), np.int32, "1", "index of the run in its campaign"),
-    VariableRule("direction", ("run",), np.int8, "1", "direction of the sweep", _flags(Direction)),
-    VariableRule("outcome", ("run",), np.int8, "1", "outcome of the run", _flags(Outcome)),
-    VariableRule("message", ("run",), object, "1", "why the run ended as it did, or what its body warned of"),
-    VariableRule("point_seconds", ("run",), np.float64, "s", "wall time of the run"),
-    VariableRule("final_displacement", ("run",), np.float64, "m", "displacement at the end of the run"),
-    VariableRule("final_velocity", ("run",), np.float64, "m s-1", "velocity at the end of the run"),
-    VariableRule("final_phase", ("run",), np.float64, "rad", "forcing phase at the end of the run"),
+    VariableRule("run_index", ("run",), "1", "index of the run in its campaign", np.int32),
+    VariableRule("direction", ("run",), "1", "direction of the sweep", np.int8, _flags(Direction)),
+    VariableRule("outcome", ("run",), "1", "outcome of the run", np.int8, _flags(Outcome)),
+    VariableRule("message", ("run",), "1", "why the run ended as it did, or what its body warned of", object),
+    VariableRule("point_seconds", ("run",), "s", "wall time of the run"),
+    VariableRule("final_displacement", ("run",), "m", "displacement at the end of the run"),
+    VariableRule("final_velocity", ("run",), "m s-1", "velocity at the end of the run"),
+    VariableRule("final_phase", ("run",), "rad", "forcing phase at the end of the run"),
     VariableRule(
         "final_state",
         ("run", "state"),
-        np.float64,
         "1",
         "displacements (m), then velocities (m s-1), of all masses or modes at the end of the run",
     ),
-    VariableRule("displacement_max", ("run", "period"), np.float64, "m", "largest displacement in a period"),
-    VariableRule("displacement_min", ("run", "period"), np.float64, "m", "smallest displacement in a period"),
+    VariableRule("displacement_max", ("run", "period"), "m", "largest displacement in a period"),
+    VariableRule("displacement_min", ("run", "period"), "m", "smallest displacement in a period"),
+    VariableRule("strobe_displacement", ("run", "period"), "m", "displacement at forcing phase zero"),
+    VariableRule("strobe_velocity", ("run", "period"), "m s-1", "velocity at forcing phase zero"),
+    VariableRule("impacts_per_period", ("run", "period"), "1", "number of impacts in a period"),
+    _count("impact", "impacts"),
+    VariableRule("impact_time", ("impact",), "s", "time of impact from the start of the scene"),
+    VariableRule("impact_phase", ("impact",), "rad", "forcing phase at impact"),
+    VariableRule("impact_velocity", ("impact",), "m s-1", "velocity of approach just before impact"),
+    VariableRule("impact_impulse", ("impact",), "N s", "impulse of the stop on the body"),
+    VariableRule("impact_contact", ("impact",), "1", "number of the stop that was hit, from 1", np.int8),
+    VariableRule("impact_restitution", ("impact",), "1", "speed of separation over speed of approach"),
+    VariableRule("impact_duration", ("impact",), "s", "duration of the contact, 0 for a rigid stop"),
+    _count("stick", "sticking phases"),
+    VariableRule("stick_start", ("stick",), "s", "time at which sticking starts"),
+    VariableRule("stick_end", ("stick",), "s", "time at which sticking ends, missing if it does not"),
+    VariableRule("stick_contact", ("stick",), "1", "number of the stop the body sticks to, from 1", np.int8),
+    _count("sample", "samples"),
+    VariableRule("time", ("sample",), "s", "time of the sample from the start of the scene"),
+    _count("event", "events"),
+    VariableRule("event_time", ("event",), "s", "time of the event from the start of the scene"),
+    VariableRule("event_index", ("event",), "1", "index of the event among those at the same time", np.int32),
+    VariableRule("event_component", ("event",), "1", "component that had the event", np.int16),
     VariableRule(
-        "strobe_displacement", ("run", "period"), np.float64, "m", "displacement at forcing phase zero"
+        "connection", ("interface",), "1", "force-displacement connection between components", object
     ),
-    VariableRule("strobe_velocity", ("run", "period"), np.float64, "m s-1", "velocity at forcing phase zero"),
-    VariableRule("impacts_per_period", ("run", "period"), np.float64, "1", "number of impacts in a period"),
+    VariableRule("energy_residual", ("run", "interface"), "J", "energy that a connection made or lost"),
     VariableRule(
-        "impact_count",
-        ("run",),
-        np.int32,
-        "1",
-        "number of impacts of the run",
-        {"sample_dimension": "impact"},
-    ),
-    VariableRule("impact_time", ("impact",), np.float64, "s", "time of impact from the start of the scene"),
-    VariableRule("impact_phase", ("impact",), np.float64, "rad", "forcing phase at impact"),
-    VariableRule(
-        "impact_velocity", ("impact",), np.float64, "m s-1", "velocity of approach just before impact"
-    ),
-    VariableRule("impact_impulse", ("impact",), np.float64, "N s", "impulse of the stop on the body"),
-    VariableRule("impact_contact", ("impact",), np.int8, "1", "number of the stop that was hit, from 1"),
-    VariableRule(
-        "impact_restitution", ("impact",), np.float64, "1", "speed of separation over speed of approach"
-    ),
-    VariableRule(
-        "impact_duration", ("impact",), np.float64, "s", "duration of the contact, 0 for a rigid stop"
-    ),
-    VariableRule(
-        "stick_count",
-        ("run",),
-        np.int32,
-        "1",
-        "number of sticking phases of the run",
-        {"sample_dimension": "stick"},
-    ),
-    VariableRule("stick_start", ("stick",), np.float64, "s", "time at which sticking starts"),
-    VariableRule(
-        "stick_end", ("stick",), np.float64, "s", "time at which sticking ends, missing if it does not"
-    ),
-    VariableRule("stick_contact", ("stick",), np.int8, "1", "number of the stop the body sticks to, from 1"),
-    VariableRule(
-        "sample_count",
-        ("run",),
-        np.int32,
-        "1",
-        "number of samples of the run",
-        {"sample_dimension": "sample"},
-    ),
-    VariableRule("time", ("sample",), np.float64, "s", "time of the sample from the start of the scene"),
-    VariableRule(
-        "event_count",
-        ("run",),
-        np.int32,
-        "1",
-        "number of events of the run",
-        {"sample_dimension": "event"},
-    ),
-    VariableRule("event_time", ("event",), np.float64, "s", "time of the event from the start of the scene"),
-    VariableRule("event_index", ("event",), np.int32, "1", "index of the event among those at the same time"),
-    VariableRule("event_component", ("event",), np.int16, "1", "component that had the event"),
-    VariableRule(
-        "connection", ("interface",), object, "1", "force-displacement connection between components"
-    ),
-    VariableRule(
-        "energy_residual", ("run", "interface"), np.float64, "J", "energy that a connection made or lost"
-    ),
-    VariableRule(
-        "compared", ("comparison",), object, "1", "simulated variable and the channel it is compared with"
+        "compared", ("comparison",), "1", "simulated variable and the channel it is compared with", object
     ),
     VariableRule(
         "variance_accounted_for",
         ("run", "comparison"),
-        np.float64,
         "%",
         "share of the measured variance that the simulation accounts for",
     ),
-    VariableRule(
-        "best_gain", ("run", "comparison"), np.float64, "1", "factor that would bring the simulation nearest"
-    ),
-    VariableRule("lag", ("run", "comparison"), np.float64, "s", "measured clock less simulated clock"),
-    VariableRule("lag_error", ("run", "comparison"), np.float64, "s", "standard error of the lag"),
-    VariableRule("polarity", ("run", "comparison"), np.float64, "1", "-1 where the channel is inverted"),
+    VariableRule("best_gain", ("run", "comparison"), "1", "factor that would bring the simulation nearest"),
+    VariableRule("lag", ("run", "comparison"), "s", "measured clock less simulated clock"),
+    VariableRule("lag_error", ("run", "comparison"), "s", "standard error of the lag"),
+    VariableRule("polarity", ("run", "comparison"), "1", "-1 where the channel is inverted"),
     VariableRule(
         "frequency_difference",
         ("run", "comparison"),
-        np.float64,
         "Hz",
         "dominant frequency of the simulation less that of the measurement",
     ),
-    VariableRule("loop_residual", ("run",), np.float64, "1", "largest relative residual of algebraic loops"),
+    VariableRule("loop_residual", ("run",), "1", "largest relative residual of algebraic loops"),
 )
 RULES: Mapping[str, VariableRule] = {rule.name: rule for rule in _RULES}
 
@@ -242,12 +204,7 @@ NEEDED_IMPACT_COLUMNS = IMPACT_COLUMNS[:5]
 STICK_COLUMNS = _columns(("stick",))
 EVENT_COLUMNS = _columns(("event",))
 SCORE_COLUMNS = _columns(("run", "comparison"))
-RAGGED = {
-    "impact": "impact_count",
-    "stick": "stick_count",
-    "sample": "sample_count",
-    "event": "event_count",
-}
+RAGGED = {rule.extra["sample_dimension"]: rule.name for rule in _RULES if "sample_dimension" in rule.extra}
 # What every file has; the other per-run variables are there where they were recorded.
 RUN_COLUMNS = tuple(name for name in _columns(("run",)) if name not in (*RAGGED.values(), "loop_residual"))
 RESERVED_NAMES = frozenset(
@@ -410,6 +367,14 @@ def attributes_of(name: str, system: UnitSystem) -> dict[str, Any]:
     # Wall time is measured in seconds in every system of units.
     unit = rule.unit if name == "point_seconds" else unit_in(system, rule.unit)
     return {"long_name": rule.long_name, "units": unit, **rule.extra}
+
+
+def scene_of(attrs: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return the tables of the scene in the attributes of a dataset; none where there is none that can be read."""
+    try:
+        return parse_toml(str(attrs.get("scene", "")))
+    except ValueError:
+        return {}
 
 
 def swept_names(dataset: xr.Dataset) -> tuple[str, ...]:

@@ -201,19 +201,29 @@ def _run_variables(
     units: UnitSystem,
 ) -> _Variables:
     """Return the variables that every run has."""
-    message = np.empty(len(runs), dtype=object)
-    message[:] = [run.message for run in runs]
-    values: dict[str, NDArray[Any]] = {
-        "run_index": np.asarray(run_index, dtype=np.int32),
-        "direction": np.array(direction, dtype=np.int8),
-        "outcome": np.array([run.outcome for run in runs], dtype=np.int8),
-        "message": message,
-        "point_seconds": np.array([run.seconds for run in runs], dtype=np.float64),
-        "final_displacement": np.array([run.final_displacement for run in runs], dtype=np.float64),
-        "final_velocity": np.array([run.final_velocity for run in runs], dtype=np.float64),
-        "final_phase": np.array([run.final_phase for run in runs], dtype=np.float64),
+    values = {
+        "run_index": run_index,
+        "direction": direction,
+        "outcome": [run.outcome for run in runs],
+        "message": [run.message for run in runs],
+        "point_seconds": [run.seconds for run in runs],
+        "final_displacement": [run.final_displacement for run in runs],
+        "final_velocity": [run.final_velocity for run in runs],
+        "final_phase": [run.final_phase for run in runs],
     }
-    return {name: (("run",), array, attributes_of(name, units)) for name, array in values.items()}
+    return _described(values, units)
+
+
+def _described(values: Mapping[str, Any], units: UnitSystem) -> _Variables:
+    """Return values as variables of the schema: with its dimensions, types and attributes."""
+    return {
+        name: (
+            RULES[name].dims,
+            np.ascontiguousarray(column, dtype=RULES[name].dtype),
+            attributes_of(name, units),
+        )
+        for name, column in values.items()
+    }
 
 
 def _state_variables(runs: Sequence[RunRecord], units: UnitSystem) -> _Variables:
@@ -227,8 +237,7 @@ def _state_variables(runs: Sequence[RunRecord], units: UnitSystem) -> _Variables
             f"dataset: final_state: expected states of one size, got {', '.join(map(str, sorted(sizes)))}."
         )
     missing = np.full(sizes.pop(), np.nan)
-    values = np.array([missing if state is None else state for state in states], dtype=np.float64)
-    return {"final_state": (("run", "state"), values, attributes_of("final_state", units))}
+    return _described({"final_state": [missing if state is None else state for state in states]}, units)
 
 
 def _period_variables(runs: Sequence[RunRecord], units: UnitSystem, omit: Collection[str]) -> _Variables:
@@ -241,11 +250,8 @@ def _period_variables(runs: Sequence[RunRecord], units: UnitSystem, omit: Collec
     for row, table in enumerate(tables):
         if table is not None:
             values[row, : len(table)] = table
-    return {
-        name: (("run", "period"), np.ascontiguousarray(values[:, :, column]), attributes_of(name, units))
-        for column, name in enumerate(PERIOD_COLUMNS)
-        if name not in omit
-    }
+    columns = dict(zip(PERIOD_COLUMNS, np.moveaxis(values, -1, 0), strict=True))
+    return _described({name: columns[name] for name in PERIOD_COLUMNS if name not in omit}, units)
 
 
 def _ragged_variables(
@@ -254,13 +260,9 @@ def _ragged_variables(
     """Return a contiguous ragged array (CF-1.11 section 9.3.3): the count of each run, then all rows."""
     if all(table is None for table in tables):
         return {}
-    count = np.array([0 if table is None else len(table) for table in tables], dtype=np.int32)
+    count = [0 if table is None else len(table) for table in tables]
     rows = np.concatenate([_with_columns(table, len(columns)) for table in tables if table is not None])
-    variables: _Variables = {RAGGED[dimension]: (("run",), count, attributes_of(RAGGED[dimension], units))}
-    for column, name in enumerate(columns):
-        values = rows[:, column].astype(RULES[name].dtype)
-        variables[name] = ((dimension,), values, attributes_of(name, units))
-    return variables
+    return _described({RAGGED[dimension]: count} | dict(zip(columns, rows.T, strict=True)), units)
 
 
 @dataclass(frozen=True, slots=True)
@@ -343,17 +345,11 @@ def _coupling_variables(
         missing = np.full(len(connections), np.nan)
         rows = [missing if run.energy_residual is None else run.energy_residual for run in runs]
         values = np.array(rows, dtype=np.float64).reshape(len(runs), len(connections))
-        names = np.array(connections, dtype=object)
         # CF wants numbers in a variable with the name of its dimension, so the dimension has another one.
-        variables["connection"] = (("interface",), names, attributes_of("connection", units))
-        variables["energy_residual"] = (
-            ("run", "interface"),
-            values,
-            attributes_of("energy_residual", units),
-        )
+        variables = _described({"connection": connections, "energy_residual": values}, units)
     if any(run.loop_residual is not None for run in runs):
         loops = [np.nan if run.loop_residual is None else run.loop_residual for run in runs]
-        variables["loop_residual"] = (("run",), np.array(loops), attributes_of("loop_residual", units))
+        variables |= _described({"loop_residual": loops}, units)
     return variables
 
 
@@ -364,16 +360,8 @@ def _score_variables(runs: Sequence[RunRecord], compared: Sequence[str], units: 
     missing = np.full((len(compared), len(SCORE_COLUMNS)), np.nan)
     rows = [missing if run.scores is None else run.scores for run in runs]
     values = np.array(rows, dtype=np.float64).reshape(len(runs), *missing.shape)
-    variables: _Variables = {
-        "compared": (("comparison",), np.array(compared, dtype=object), attributes_of("compared", units))
-    }
-    for column, name in enumerate(SCORE_COLUMNS):
-        variables[name] = (
-            ("run", "comparison"),
-            np.ascontiguousarray(values[:, :, column]),
-            attributes_of(name, units),
-        )
-    return variables
+    columns = dict(zip(SCORE_COLUMNS, np.moveaxis(values, -1, 0), strict=True))
+    return _described({"compared": compared} | columns, units)
 
 
 def _quantity_attributes(name: str, units: UnitSystem, unit_of: Mapping[str, str]) -> dict[str, Any]:

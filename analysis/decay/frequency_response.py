@@ -13,6 +13,7 @@ from vibroimpact.analysis.decay.samples import Floats, clock_remark
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import option
 
 Complexes = NDArray[np.complex128]
 
@@ -104,7 +105,7 @@ def frequency_response(
         Unknown window, uneven sampling, or too few samples.
     """
     if window not in WINDOWS:
-        raise UsageError(f'--window: expected one of {", ".join(WINDOWS)}, got "{window}".')
+        raise UsageError(f'{option("window")}: expected one of {", ".join(WINDOWS)}, got "{window}".')
     drive, response = channel_of(drive), channel_of(response)
     x, y, interval, remarks = _pair(drive, response, start, stop)
     count = len(x)
@@ -113,7 +114,7 @@ def frequency_response(
     segment = min(segment, count)
     if segment < _SHORTEST:
         raise UsageError(
-            f"--segment: expected {_SHORTEST} samples or more, got {segment}. Take longer segments."
+            f"{option('segment')}: expected {_SHORTEST} samples or more, got {segment}. Take longer segments."
         )
     shape = get_window(window, segment, fftbins=True)
     options = {"fs": 1.0 / interval, "window": shape, "noverlap": segment // 2, "detrend": False}
@@ -168,7 +169,7 @@ def _pair(
     if len(time) < 2 * _SHORTEST:
         raise UsageError(
             f"{drive.name} and {response.name}: expected {2 * _SHORTEST} samples or more in common, got {len(time)}. "
-            "Widen --from and --to."
+            f"Widen {option('start')} and {option('stop')}."
         )
     signals = []
     for channel in (drive, response):

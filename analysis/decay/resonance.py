@@ -14,6 +14,7 @@ from vibroimpact.analysis.decay.residuals import coloured_covariance
 from vibroimpact.analysis.decay.samples import Floats
 from vibroimpact.analysis.files.estimate_table import described
 from vibroimpact.fmus.errors import EstimationError, UsageError
+from vibroimpact.fmus.wording import option
 
 FORMS = ("displacement", "velocity", "acceleration", "transmissibility")
 """What responds to what: the first three to a force, the last an absolute acceleration to that of the base."""
@@ -115,7 +116,7 @@ def curve_of(
         Unknown form, or too few lines in the band.
     """
     if form not in ("auto", *FORMS):
-        raise UsageError(f'--form: expected auto or one of {", ".join(FORMS)}, got "{form}".')
+        raise UsageError(f'{option("form")}: expected auto or one of {", ".join(FORMS)}, got "{form}".')
     if form == "auto":
         form = _form_of(found.units)
     response = found.h2 if estimator == "h2" else found.h1
@@ -130,7 +131,7 @@ def curve_of(
         lines &= np.abs(omega - peak) <= _BAND * max(width, finest)
     if np.count_nonzero(lines) < _FEWEST_LINES:
         raise UsageError(
-            f"--band: expected {_FEWEST_LINES} lines or more, got {np.count_nonzero(lines)}; they are "
+            f"{option('band')}: expected {_FEWEST_LINES} lines or more, got {np.count_nonzero(lines)}; they are "
             f"{found.frequency[1] - found.frequency[0]:.4g} Hz apart. Widen the band, or take longer segments."
         )
     magnitude = np.abs(response)
@@ -313,7 +314,7 @@ def resolution_remark(found: FrequencyResponse, resonance: Resonance) -> tuple[s
         return ()
     return (
         f"a line is {found.resolution:.3g} Hz wide and the resonance {width:.3g} Hz: the damping ratio may be too "
-        "large by leakage. Take longer segments (--segment), or fit the decay.",
+        f"large by leakage. Take longer segments ({option('segment')}), or fit the decay.",
     )
 
 

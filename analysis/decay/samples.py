@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import option
 
 Floats = NDArray[np.float64]
 
@@ -72,7 +73,9 @@ def decay_samples(
     remarks = []
     if start is None:
         start, cut = _largest_excursion(time[good], channel.values[good])
-        remarks += [f"the decay is taken from the largest excursion, at {start:.6g} s; --from sets it."] * cut
+        remarks += [
+            f"the decay is taken from the largest excursion, at {start:.6g} s; {option('start')} sets it."
+        ] * cut
     remarks += clock_remark(channel)
     stop = float(time[-1]) if stop is None else stop
     chosen = (time >= start) & (time <= stop)
@@ -83,7 +86,8 @@ def decay_samples(
     if np.count_nonzero(chosen) < FEWEST_SAMPLES:
         raise UsageError(
             f"{channel.name}: expected {FEWEST_SAMPLES} good samples or more from {start:g} to {stop:g} s, got "
-            f"{np.count_nonzero(chosen)}; the channel runs from {time[0]:g} to {time[-1]:g} s. Widen --from and --to."
+            f"{np.count_nonzero(chosen)}; the channel runs from {time[0]:g} to {time[-1]:g} s. "
+            f"Widen {option('start')} and {option('stop')}."
         )
     return DecaySamples(
         time[chosen], channel.values[chosen], channel.unit, channel.name, float(start), tuple(remarks)

@@ -20,6 +20,7 @@ from vibroimpact.analysis.estimation.model_tests import (
 )
 from vibroimpact.analysis.estimation.prepared import Prepared
 from vibroimpact.analysis.estimation.trajectory import MOST_IMPACTS
+from vibroimpact.fmus.wording import option
 
 # Standard errors from which evidence against the model counts: chance gets there once in a thousand times.
 _CLEAR = 3.3
@@ -122,7 +123,7 @@ def remarks_of(record: Prepared, values: Values) -> Iterator[str]:
 
 def doubts_of(record: Prepared, values: Values, confidence: float) -> tuple[Doubt, ...]:
     """Return what makes the estimates of a record, with intervals of a confidence, doubtful: the gravest first."""
-    clocks = "" if record.forcing.clock_drifts else ", or clocks that differ (--clock-drifts)"
+    clocks = "" if record.forcing.clock_drifts else f", or clocks that differ ({option('clock_drifts')})"
     # without noise the residual is rounding, and standard errors of it say nothing
     noisy = record.fit.noise > _ROUNDING * record.signal.range
     return (

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.impact_estimate import draw_impact_estimate, limit
-from vibroimpact.analysis.figures.page import LINE, MARK, STOP, canvas, page_style, unit_symbol
+from vibroimpact.analysis.figures.page import LINE, MARK, STOP, canvas, legend_above, page_style, unit_symbol
 from vibroimpact.fmus.errors import DatasetError
 
 _PANEL_MM = 32
@@ -56,14 +56,11 @@ def _draw_decay(dataset: xr.Dataset) -> Figure:
 
 def _draw_motion(axis: Axes, dataset: xr.Dataset) -> None:
     axis.plot(dataset.time, dataset.measured, color=LINE, linewidth=0.5, rasterized=True, label="measured")
-    best = _best_fit(dataset)
+    best = dataset["law_fit" if "law_fit" in dataset else "exponential_fit"]
     axis.plot(dataset.time, best, color=MARK, linewidth=0.4, linestyle="--", rasterized=True, label="fitted")
     axis.set_ylabel(f"{dataset.attrs['channel'].replace('_', ' ')} ({unit_symbol(dataset.measured)})")
-    _name_above(axis)
-
-
-def _best_fit(dataset: xr.Dataset) -> xr.DataArray:
-    return dataset["law_fit" if "law_fit" in dataset else "exponential_fit"]
+    # the power of ten of an axis stands on the left
+    legend_above(axis, "right")
 
 
 def _draw_residuals(axis: Axes, dataset: xr.Dataset) -> None:
@@ -75,21 +72,7 @@ def _draw_residuals(axis: Axes, dataset: xr.Dataset) -> None:
         axis.plot(dataset.time, residual, color=MARK, linewidth=0.4, rasterized=True, label="best law")
     axis.axhline(0.0, color="k", linewidth=0.3)
     axis.set_ylabel(f"residual ({unit_symbol(dataset.measured)})")
-    _name_above(axis)
-
-
-def _name_above(axis: Axes) -> None:
-    """Name the lines in a row above their panel, where no data can be."""
-    axis.legend(
-        frameon=False,
-        ncols=3,
-        # On the right: the power of ten of an axis stands on the left.
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.1,
-        columnspacing=1.0,
-        handlelength=1.5,
-    )
+    legend_above(axis, "right")
 
 
 def _draw_peaks(axis: Axes, dataset: xr.Dataset) -> None:
@@ -115,29 +98,20 @@ def _draw_peaks(axis: Axes, dataset: xr.Dataset) -> None:
 
 
 def _draw_frequency(axis: Axes, dataset: xr.Dataset) -> None:
-    turn = 2.0 * np.pi
-    _errorbars(
-        axis,
-        dataset.window_amplitude.values,
-        dataset.window_frequency.values / turn,
-        dataset.window_frequency_error.values / turn,
-    )
+    _draw_backbone(axis, dataset, "window_frequency", 2.0 * np.pi)
     axis.set_ylabel("frequency (Hz)")
-    axis.ticklabel_format(axis="y", useOffset=False)
 
 
 def _draw_damping(axis: Axes, dataset: xr.Dataset) -> None:
-    _errorbars(
-        axis,
-        dataset.window_amplitude.values,
-        dataset.window_damping.values,
-        dataset.window_damping_error.values,
-    )
+    _draw_backbone(axis, dataset, "window_damping", 1.0)
     axis.set_ylabel("damping ratio (-)")
+
+
+def _draw_backbone(axis: Axes, dataset: xr.Dataset, name: str, unit: float) -> None:
+    """Draw a variable of the windows over their amplitude, with its intervals."""
+    x, y, error = (dataset[n].values for n in ("window_amplitude", name, f"{name}_error"))
+    y, error = y / unit, error / unit
     axis.ticklabel_format(axis="y", useOffset=False)
-
-
-def _errorbars(axis: Axes, x: np.ndarray, y: np.ndarray, error: np.ndarray) -> None:
     axis.errorbar(x, y, yerr=1.96 * error, fmt="o", markersize=2, color=LINE, elinewidth=0.6, capsize=1.5)
     # One bad window must not press all others flat.
     middle = np.median(y)

@@ -9,17 +9,26 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.page import COLOURS, COLUMN_WIDTH, LINE, MARK, STOP, canvas, unit_symbol
+from vibroimpact.analysis.figures.page import (
+    COLOURS,
+    COLUMN_WIDTH,
+    LINE,
+    MARK,
+    STOP,
+    canvas,
+    legend_above,
+    unit_symbol,
+)
 from vibroimpact.fmus.units import written_unit
 
 _SIGNAL_MM, _RESIDUAL_MM = 42, 26
 _COLUMNS = 2
 _WIDTH = 174 / 85 * COLUMN_WIDTH
-"""Of two columns."""
+"""Width of two columns."""
 _MOST_FLIGHTS = 10
-"""That are drawn: more are not told apart."""
+"""Flights drawn at most: more cannot be told apart."""
 _NARROWEST = 1e-4
-"""Of the values: differences below are not worth a panel."""
+"""Difference, over the values themselves, below which a panel shows no finer."""
 
 
 def draw_impact_estimate(dataset: xr.Dataset) -> Figure:
@@ -69,14 +78,7 @@ def _draw_motion(axes: np.ndarray, dataset: xr.Dataset) -> None:
             )
     name = str(dataset.attrs.get("channel", "displacement")).replace("_", " ")
     upper.set_ylabel(f"{name} ({unit_symbol(dataset.measured)})")
-    upper.legend(
-        frameon=False,
-        ncols=3,
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        borderaxespad=0.1,
-        handlelength=1.5,
-    )
+    legend_above(upper, "right", columnspacing=2.0)
     upper.set_title(said, loc="left", fontsize=7.5)
     lower.plot(part.time, part.measured - part.fitted, ".", color=LINE, markersize=1.2, rasterized=True)
     noise = float(dataset.attrs.get("noise", np.nan))

@@ -10,10 +10,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, STOP, canvas, page_style
+from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, STOP, canvas, legend_above, page_style
 
 _HEIGHT_MM, _WIDE = 120, 2 * COLUMN_WIDTH
-# Delay points are drawn up to this part of all intervals, the rest at the edge; and the most of them.
+# Quantile of the intervals at which the delay plot ends, with longer ones at its edge; and its points at most.
 _SHOWN, _MOST_POINTS = 0.999, 20_000
 # Shades of the embeddings, from light to dark.
 _LIGHTEST, _DARKEST = 0.75, 0.0
@@ -124,21 +124,12 @@ def _draw_slopes(axis: Axes, report: xr.Dataset, scale: str) -> None:
     for place, drawn in enumerate(ends):
         _name_embedding(axis, radii, np.where(radii >= first / 1.8, drawn, np.nan), place + 1)
     axis.set_ylim(0.0, report.sizes["embedding"] + 0.5)
-    axis.legend(
-        handles=[
-            Line2D([], [], color="0.0", linewidth=1.2, label=f"C from {low:g} to {high:g}"),
-            Line2D([], [], color=MARK, linestyle="--", linewidth=0.7, label="shuffled"),
-            Line2D([], [], color=STOP, linewidth=0.4, label="other C"),
-        ],
-        frameon=False,
-        ncols=3,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderaxespad=0.1,
-        columnspacing=1.0,
-        handlelength=1.5,
-        fontsize=7,
-    )
+    entries = [
+        Line2D([], [], color="0.0", linewidth=1.2, label=f"C from {low:g} to {high:g}"),
+        Line2D([], [], color=MARK, linestyle="--", linewidth=0.7, label="shuffled"),
+        Line2D([], [], color=STOP, linewidth=0.4, label="other C"),
+    ]
+    legend_above(axis, handles=entries, fontsize=7)
 
 
 def _name_embedding(axis: Axes, radii: np.ndarray, slopes: np.ndarray, embedding: int) -> None:

@@ -36,6 +36,7 @@ from vibroimpact.analysis.figures.sweeps import (
 from vibroimpact.analysis.figures.window import Window
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.wording import option
 
 Data = xr.Dataset | Recording
 Family = Literal["runs", "recording", "replay", "estimates", "spikes", "ladder"]
@@ -257,17 +258,17 @@ def _refuse_options(data: Data, kind: str, family: Family, view: View) -> None:
         "window": view.window.given,
     }
     foreign = {"run": family != "runs", "recording": family != "replay", "window": False}
-    for option, is_given in given.items():
-        if not is_given or (option in KINDS[kind].takes and not foreign[option]):
+    for name, is_given in given.items():
+        if not is_given or (name in KINDS[kind].takes and not foreign[name]):
             continue
-        takers = [name for name, one in KINDS.items() if option in one.takes and family in one.families]
+        takers = [taker for taker, one in KINDS.items() if name in one.takes and family in one.families]
         advice = "Leave it out."
-        if option == "run" and family == "replay" and isinstance(data, xr.Dataset):
-            advice = f"Name a recording (--recording): {recordings_of(data)}."
-        elif takers and not foreign[option]:
+        if name == "run" and family == "replay" and isinstance(data, xr.Dataset):
+            advice = f"Name a recording ({option('recording')}): {recordings_of(data)}."
+        elif takers and not foreign[name]:
             advice = f"It goes with {', '.join(takers)}."
         raise UsageError(
-            f"figure: {option}: expected none for {_WORDS[family]} drawn as {kind}, got one. {advice}"
+            f"figure: {name}: expected none for {_WORDS[family]} drawn as {kind}, got one. {advice}"
         )
 
 
@@ -292,5 +293,5 @@ def _refuse_run(dataset: xr.Dataset, kind: str, run: int | None) -> None:
         )
     if is_single and run is None and there.size > 1:
         raise DatasetError(
-            f"figure: run: expected one run, got {there.size}. Name one by its run_index (--run): {listed}."
+            f"figure: run: expected one run, got {there.size}. Name one by its run_index ({option('run')}): {listed}."
         )

@@ -6,10 +6,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.figures.page import COLOURS, canvas, label, page_style
+from vibroimpact.analysis.figures.page import COLOURS, canvas, label, legend_above, page_style
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.fmus.errors import DatasetError
 
@@ -98,23 +98,26 @@ def work_precision(dataset: xr.Dataset) -> Figure:
                 line = (dataset.sel({ways: way}) if ways else dataset).sortby(along)
                 values, seconds = line[name].values, line["wall_time"].values
                 shown = (values != 0.0) & np.isfinite(values) & (seconds > 0.0)
-                axis.plot(
-                    seconds[shown],
-                    np.abs(values[shown]),
-                    color=COLOURS[place % len(COLOURS)],
-                    marker=_MARKERS[place % len(_MARKERS)],
-                    markersize=3,
-                    fillstyle="none",
-                    label=_way(str(way)),
-                )
+                _draw_line(axis, seconds[shown], np.abs(values[shown]), place, _way(str(way)))
             axis.set(xscale="log", yscale="log", ylabel=label(dataset[name]))
         axes[-1].set_xlabel(label(dataset["wall_time"]))
+        _label_seconds(axes[-1])
         if ways:
             figure.legend(
                 *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False
             )
         figure.suptitle(str(dataset.attrs.get("title", "")), fontsize=8)
     return figure
+
+
+def _label_seconds(axis: Axes) -> None:
+    """Label few enough seconds of less than two decades that no label covers another; matplotlib labels more."""
+    first, last = axis.get_xlim()
+    if last < 100.0 * first:
+        few = MaxNLocator(MOST_LABELS) if last < 10.0 * first else LogLocator(subs=(1.0, 2.0, 5.0))
+        axis.xaxis.set_major_locator(few)
+        axis.xaxis.set_major_formatter("{x:.9g}")
+        axis.xaxis.set_minor_locator(NullLocator())
 
 
 def _ladder_of(dataset: xr.Dataset) -> tuple[str, str | None]:
@@ -157,30 +160,33 @@ def _draw_ladder(axis: Axes, quantity: xr.DataArray) -> None:
         values = quantity.values[place]
         # A logarithm shows no zero: what is exact leaves a gap.
         shown = np.where(values == 0.0, np.nan, np.abs(values))
-        axis.plot(
-            step[order],
-            shown[order],
-            color=COLOURS[place % len(COLOURS)],
-            marker=_MARKERS[place % len(_MARKERS)],
-            markersize=3,
-            fillstyle="none",
-            label=_entry(str(exchange), observed_order(step, values)),
-        )
+        words = _entry(str(exchange), observed_order(step, values))
+        _draw_line(axis, step[order], shown[order], place, words)
     axis.set_xscale("log")
     axis.set_yscale("log")
     _mark_steps(axis, step[order])
     axis.set_ylabel(label(quantity))
-    axis.legend(
+    legend_above(
+        axis,
+        "center",
         title="observed order",
         title_fontsize=7.5,
-        frameon=False,
-        ncols=3,
-        loc="lower center",
-        bbox_to_anchor=(0.5, 1.0),
-        borderaxespad=0.1,
         columnspacing=0.8,
         handletextpad=0.4,
         handlelength=1.4,
+    )
+
+
+def _draw_line(axis: Axes, x: NDArray[np.float64], y: NDArray[np.float64], place: int, words: str) -> None:
+    """Draw one way to compute, by its colour and its marker."""
+    axis.plot(
+        x,
+        y,
+        color=COLOURS[place % len(COLOURS)],
+        marker=_MARKERS[place % len(_MARKERS)],
+        markersize=3,
+        fillstyle="none",
+        label=words,
     )
 
 

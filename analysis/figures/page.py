@@ -126,6 +126,18 @@ def unit_symbol(variable: xr.DataArray) -> str:
     return written_unit(str(variable.attrs.get("units", "1")))
 
 
+def legend_above(axis: Axes, side: str = "left", *, ncols: int = 3, **options: Any) -> None:
+    """Name the lines of a panel in rows above it, where no data can be: on the left, in the center or on the right."""
+    usual: dict[str, Any] = {"loc": f"lower {side}", "columnspacing": 1.0, "handlelength": 1.5}
+    axis.legend(
+        bbox_to_anchor=({"left": 0.0, "center": 0.5, "right": 1.0}[side], 1.0),
+        borderaxespad=0.1,
+        ncols=ncols,
+        frameon=False,
+        **(usual | options),
+    )
+
+
 _GIVEN: ContextVar[list[Axes] | None] = ContextVar("axes that were given", default=None)
 """Where `canvas` draws, in place of a figure of its own."""
 

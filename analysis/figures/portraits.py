@@ -7,9 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from vibroimpact.analysis.dataset.schema import scene_of
 from vibroimpact.analysis.figures.page import (
     COLOURS,
     LINE,
@@ -18,10 +20,11 @@ from vibroimpact.analysis.figures.page import (
     Floats,
     canvas,
     label,
+    legend_above,
     title,
     unit_symbol,
 )
-from vibroimpact.analysis.figures.scene_text import limits, scene_of, swept_keys, table
+from vibroimpact.analysis.figures.scene_text import limits, swept_keys, table
 from vibroimpact.analysis.figures.series import impacts_within, within
 from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.fmus.errors import DatasetError
@@ -29,6 +32,8 @@ from vibroimpact.fmus.errors import DatasetError
 _PANEL_MM = 62
 # Small enough that ten thousand impacts do not run into one blot.
 _DOT = 1.1
+# Impacts on one stop above which they are as small.
+_MANY = 200
 # Samples of one motion: about a hundred periods.
 _LONG = 20_000
 _QUARTERS = ("0", "π/2", "π", "3π/2", "2π")
@@ -78,9 +83,7 @@ def draw_portrait(dataset: xr.Dataset, run: int | None = None, window: Window = 
         axis.set_xlabel(f"{words} ({length})")
         axis.set_ylabel(f"{words.replace('displacement', 'velocity')} ({speed})")
         if len(lines) > 1:
-            axis.legend(
-                frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1
-            )
+            legend_above(axis, "center", columnspacing=2.0, handlelength=2.0)
     for position in sorted({place for orbit in orbits for place in limits(dataset, orbit.name)}):
         axes[0].axvline(position, color=STOP, linestyle="--", linewidth=0.6, zorder=0)
     return figure
@@ -114,7 +117,7 @@ def _sampled_orbits(samples: xr.Dataset) -> list[_Orbit]:
 
 def _modal_orbits(dataset: xr.Dataset, orbits: list[_Orbit]) -> list[_Orbit]:
     """Return the modal coordinates q = Psi' M y of a chain all of whose masses were sampled (equations.md 5.2)."""
-    scene = scene_of(dataset)
+    scene = scene_of(dataset.attrs)
     body = {} if any(key.startswith("body.") for key in swept_keys(scene)) else table(scene, "body")
     masses = np.atleast_1d(np.asarray(body.get("masses", []), dtype=float))
     by_name = {orbit.name: orbit for orbit in orbits}
@@ -142,7 +145,7 @@ def draw_impact_map(dataset: xr.Dataset, run: int | None = None, window: Window 
         If the run has no impacts, or no forcing that gives them a phase.
     """
     hits = impacts_within(dataset, run, window)
-    phase = hits["impact_phase"].values
+    phase, velocity = hits["impact_phase"].values, hits["impact_velocity"].values
     if not np.isfinite(phase).any():
         raise DatasetError(
             "figure: expected impacts with a forcing phase, got none. "
@@ -153,17 +156,8 @@ def draw_impact_map(dataset: xr.Dataset, run: int | None = None, window: Window 
     contacts = np.unique(hits["impact_contact"].values)
     for place, contact in enumerate(contacts):
         own = hits["impact_contact"].values == contact
-        axis.plot(
-            phase[own],
-            hits["impact_velocity"].values[own],
-            linestyle="none",
-            marker="o",
-            markersize=_DOT if own.sum() > 200 else 3.0,
-            markeredgewidth=0.0,
-            color=COLOURS[place % len(COLOURS)] if len(contacts) > 1 else MARK,
-            label=f"stop {contact}",
-            rasterized=True,
-        )
+        colour = COLOURS[place % len(COLOURS)] if len(contacts) > 1 else MARK
+        _draw_dots(axis, (phase[own], velocity[own]), own.sum(), colour, f"stop {contact}")
     axis.set_xlim(0.0, 2.0 * math.pi)
     axis.set_xticks(np.linspace(0.0, 2.0 * math.pi, 5), _QUARTERS)
     axis.set_ylim(bottom=0.0)
@@ -172,6 +166,20 @@ def draw_impact_map(dataset: xr.Dataset, run: int | None = None, window: Window 
     if len(contacts) > 1:
         figure.legend(loc="outside upper center", ncols=4, markerscale=2.0, frameon=False)
     return figure
+
+
+def _draw_dots(axis: Axes, points: tuple[Floats, Floats], impacts: int, colour: str, words: str) -> None:
+    """Draw points of the impacts on one stop; many are small."""
+    axis.plot(
+        *points,
+        linestyle="none",
+        marker="o",
+        markersize=_DOT if impacts > _MANY else 3.0,
+        markeredgewidth=0.0,
+        color=colour,
+        label=words,
+        rasterized=True,
+    )
 
 
 def draw_return_map(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
@@ -196,17 +204,8 @@ def draw_return_map(dataset: xr.Dataset, run: int | None = None, window: Window 
     figure = canvas(82)
     axis = figure.subplots()
     for place, (number, values) in enumerate(chains.items()):
-        axis.plot(
-            values[:-1],
-            values[1:],
-            linestyle="none",
-            marker="o",
-            markersize=_DOT if values.size > 200 else 3.0,
-            markeredgewidth=0.0,
-            color=COLOURS[place % len(COLOURS)] if len(chains) > 1 else MARK,
-            label=f"stop {number}",
-            rasterized=True,
-        )
+        colour = COLOURS[place % len(COLOURS)] if len(chains) > 1 else MARK
+        _draw_dots(axis, (values[:-1], values[1:]), values.size, colour, f"stop {number}")
     limit = 1.05 * max(float(values.max()) for values in chains.values())
     axis.plot([0.0, limit], [0.0, limit], color=STOP, linewidth=0.4, zorder=0)
     unit = unit_symbol(hits["impact_velocity"])

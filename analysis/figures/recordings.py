@@ -139,9 +139,9 @@ def _titled(name: str, entries: Sequence[str]) -> str:
     return short_name(name) + (f": {', '.join(entries)}" if entries else "")
 
 
-def short_name(name: str) -> str:
-    """Return a name that fits above a panel."""
-    return name if len(name) <= _LONGEST_NAME else name[: _LONGEST_NAME - 1] + "…"
+def short_name(name: str, longest: int = _LONGEST_NAME) -> str:
+    """Return a name that fits above a panel, or beside one."""
+    return name if len(name) <= longest else name[: longest - 1] + "…"
 
 
 def _outline(time: Floats, values: Floats) -> tuple[Floats, Floats]:

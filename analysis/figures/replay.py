@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,6 +17,7 @@ from vibroimpact.analysis.figures.page import (
     STOP,
     Floats,
     canvas,
+    legend_above,
     page_style,
     unit_symbol,
 )
@@ -32,8 +34,8 @@ _BEFORE = 1.0 / 6.0
 _LONGEST_NAME = 14
 _MEASURED = "#8FBBDB"
 _NEARLY_ALL = 0.6
-"""Without a second look where the first part is more than this share of the record."""
-# Values beyond these are read more easily with a power of ten beside the unit.
+"""Share of the record above which its first part is not drawn once more."""
+# Range of the largest value outside which a power of ten stands beside the unit.
 _SMALL, _LARGE = 1e-2, 1e4
 
 
@@ -61,7 +63,7 @@ def draw_replay(dataset: xr.Dataset, recording: str | None = None, window: Windo
     scores = dataset.isel(comparison=[str(one) for one in dataset["comparison"].values].index(name))
     measured = dataset[f"{name}_measured"]
     time = measured[str(measured.dims[0])].values
-    scale, unit = _time_unit(time)
+    scale, unit = (1e3, "ms") if float(time[-1] - time[0]) < 2.0 else (1.0, "s")
     parts = [np.array(window.part(time))] if window.given else _parts(scores, time)
     with page_style():
         figure = canvas(_HEIGHT_MM if len(parts) == 2 else 0.72 * _HEIGHT_MM)
@@ -71,18 +73,9 @@ def draw_replay(dataset: xr.Dataset, recording: str | None = None, window: Windo
         for axis, part in zip(axes, parts, strict=False):
             _draw_both(axis, dataset, name, (scale * time, scale * part), size)
             _draw_events(axis, dataset, name, scale, scale * part)
-            axis.set_ylabel(f"{_short(name)} ({prefix}{unit_symbol(measured)})")
+            axis.set_ylabel(f"{short_name(name, _LONGEST_NAME)} ({prefix}{unit_symbol(measured)})")
         _say_scores(axes[0], scores, words)
-        axes[0].legend(
-            frameon=False,
-            ncols=3,
-            loc="lower right",
-            bbox_to_anchor=(1.0, 1.0),
-            borderaxespad=0.1,
-            handlelength=1.5,
-            columnspacing=1.0,
-            handletextpad=0.5,
-        )
+        legend_above(axes[0], "right", handletextpad=0.5)
         _draw_residual(axes[-1], dataset, name, (scale * time, scale * parts[0]), size)
         _draw_running(axes[-1], scores, scale)
         axes[-1].set_ylabel(f"residual\n({prefix}{unit_symbol(measured)})")
@@ -132,15 +125,6 @@ def _column(dataset: xr.Dataset, name: str) -> list[str]:
     return [str(text) for text in dataset[name].values]
 
 
-def _short(name: str) -> str:
-    """Return a name that fits beside a panel."""
-    return name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME - 1]}…"
-
-
-def _time_unit(time: Floats) -> tuple[float, str]:
-    return (1e3, "ms") if float(time[-1] - time[0]) < 2.0 else (1.0, "s")
-
-
 def _factor(values: Floats) -> tuple[float, str]:
     """Return what values are multiplied with, and how the label says so."""
     largest = float(np.nanmax(np.abs(values)))
@@ -167,15 +151,9 @@ def _draw_both(axis: Axes, dataset: xr.Dataset, name: str, times: tuple[Floats, 
     measured = size * dataset[f"{name}_measured"].values
     clipped = rows & ((dataset[f"{name}_quality"].values & int(Quality.clipped)) != 0)
     # wide and light below narrow and dark: where they agree, both are seen
+    simulated = size * dataset[f"{name}_simulated"].values
     axis.plot(time[rows], measured[rows], color=_MEASURED, linewidth=1.8, label="measured", rasterized=True)
-    axis.plot(
-        time[rows],
-        size * dataset[f"{name}_simulated"].values[rows],
-        color=MARK,
-        linewidth=0.5,
-        label="simulated",
-        rasterized=True,
-    )
+    axis.plot(time[rows], simulated[rows], color=MARK, linewidth=0.5, label="simulated", rasterized=True)
     if np.any(clipped):
         axis.plot(
             time[clipped], measured[clipped], ".", color="k", markersize=2.5, label="clipped", rasterized=True
@@ -207,18 +185,11 @@ def _say_scores(axis: Axes, scores: xr.Dataset, words: str) -> None:
     # one digit more than the error begins with
     digits = 3 if error <= 0.0 or not np.isfinite(error) else max(0, 1 - int(np.floor(np.log10(error))))
     doubt, given = (f" ± {error:.{digits}f}", "") if error > 0.0 else ("", " (given)")
+    score = f"VAF {float(scores['variance_accounted_for']):.2f} %"
     box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
-    axis.text(0.98, 0.05, words, transform=axis.transAxes, ha="right", va="bottom", fontsize=7, bbox=box)
-    axis.text(
-        0.98,
-        0.95,
-        f"VAF {float(scores['variance_accounted_for']):.2f} %\nlag {lag:.{digits}f}{doubt} ms{given}{inverted}",
-        transform=axis.transAxes,
-        ha="right",
-        va="top",
-        fontsize=7,
-        bbox=box,
-    )
+    style: dict[str, Any] = {"transform": axis.transAxes, "ha": "right", "fontsize": 7, "bbox": box}
+    axis.text(0.98, 0.05, words, va="bottom", **style)
+    axis.text(0.98, 0.95, f"{score}\nlag {lag:.{digits}f}{doubt} ms{given}{inverted}", va="top", **style)
 
 
 def _draw_residual(

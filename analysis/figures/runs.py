@@ -10,12 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, label
+from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, label, legend_above
 from vibroimpact.analysis.figures.scene_text import observed_stops, stops
 from vibroimpact.analysis.figures.series import draw_series, sampled_variables, time_part
 from vibroimpact.analysis.figures.strobe import draw_section
 from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.wording import option
 
 #: More impacts than this have small marks.
 _MOST_LARGE_MARKS = 100
@@ -124,7 +125,7 @@ def _draw_periods(dataset: xr.Dataset, selection: dict[str, int]) -> Figure:
     if chosen.sizes["run"] != 1:
         raise DatasetError(
             f"figure: expected one run, got {chosen.sizes['run']}. "
-            f"Name one of {runs.sizes['run']} by its run_index (--run)."
+            f"Name one of {runs.sizes['run']} by its run_index ({option('run')})."
         )
     run = chosen.isel(run=0)
     has = set(map(str, dataset.variables))
@@ -153,7 +154,7 @@ def _extremes_panel(axis: Axes, dataset: xr.Dataset, run: xr.Dataset, selection:
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.set_xlabel("recorded forcing period (-)")
     axis.set_ylabel(label(run["final_displacement"].rename("displacement")))
-    axis.legend(frameon=False, ncols=3, loc="lower center", bbox_to_anchor=(0.5, 1.0), borderaxespad=0.1)
+    legend_above(axis, "center", columnspacing=2.0, handlelength=2.0)
 
 
 def _impacts_panel(axis: Axes, dataset: xr.Dataset, run: xr.Dataset, selection: dict[str, int]) -> None:

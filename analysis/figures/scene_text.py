@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import xarray as xr
 
-from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.analysis.dataset.schema import scene_of
 
 _ELEMENT = re.compile(r"(contact_)?displacement_([0-9]+)")
 
@@ -23,14 +23,6 @@ class ShownStop(NamedTuple):
     position: float
     side: float
     point: float | None
-
-
-def scene_of(dataset: xr.Dataset) -> dict[str, Any]:
-    """Return the scene of a dataset, empty where there is none that can be read."""
-    try:
-        return parse_toml(str(dataset.attrs.get("scene", "")))
-    except ValueError:
-        return {}
 
 
 def table(scene: dict[str, Any], name: str) -> dict[str, Any]:
@@ -52,7 +44,7 @@ def column_of(key: str, names: Sequence[str]) -> str | None:
 
 def stops(dataset: xr.Dataset) -> list[ShownStop]:
     """Return the stops of the scene; none where their places were swept or are not known."""
-    scene = scene_of(dataset)
+    scene = scene_of(dataset.attrs)
     if any(key.endswith((".position", ".side", ".location", ".mass")) for key in swept_keys(scene)):
         return []
     try:
@@ -74,7 +66,7 @@ def _stop(written: dict[str, Any], body: dict[str, Any]) -> ShownStop:
 def observed_stops(dataset: xr.Dataset) -> list[ShownStop]:
     """Return the stops that limit the point whose displacement is recorded."""
     found = stops(dataset)
-    scene = scene_of(dataset)
+    scene = scene_of(dataset.attrs)
     body, first = table(scene, "body"), found[0].point if found else None
     if body.get("kind") == "chain":
         observed = body.get("observed_mass", first)
@@ -96,7 +88,7 @@ def limits(dataset: xr.Dataset, name: str) -> list[float]:
     number, found = int(element[2]), stops(dataset)
     if element[1]:
         return [stop.position for place, stop in enumerate(found, start=1) if place == number]
-    is_chain = table(scene_of(dataset), "body").get("kind") == "chain"
+    is_chain = table(scene_of(dataset.attrs), "body").get("kind") == "chain"
     return [stop.position for stop in found if is_chain and stop.point == number]
 
 
@@ -109,7 +101,7 @@ def forcing_rate(dataset: xr.Dataset, run: xr.Dataset) -> float | None:
     run : xarray.Dataset
         Rows of the run, with its swept values as coordinates.
     """
-    scene = scene_of(dataset)
+    scene = scene_of(dataset.attrs)
     for key, factor in (("angular_frequency", 1.0), ("frequency", 2.0 * math.pi)):
         value = table(scene, "forcing").get(key)
         if f"forcing.{key}" in swept_keys(scene):
@@ -122,7 +114,7 @@ def forcing_rate(dataset: xr.Dataset, run: xr.Dataset) -> float | None:
 
 def in_scene_order(dataset: xr.Dataset, names: Sequence[str]) -> list[str]:
     """Return sampled variables as the scene lists them; those that it does not name come last."""
-    record = table(scene_of(dataset), "record")
+    record = table(scene_of(dataset.attrs), "record")
     listed = (table(record, "time_series") or record).get("variables", ())
     written = [re.sub(r"\W+", "_", name).strip("_") for name in listed if isinstance(name, str)]
     return sorted(names, key=lambda name: written.index(name) if name in written else len(written))

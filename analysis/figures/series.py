@@ -14,7 +14,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from vibroimpact.analysis.dataset.schema import RULES
-from vibroimpact.analysis.figures.page import COLOURS, STOP, Floats, canvas, label, title, unit_symbol
+from vibroimpact.analysis.figures.page import (
+    COLOURS,
+    STOP,
+    Floats,
+    canvas,
+    label,
+    legend_above,
+    title,
+    unit_symbol,
+)
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order, limits
 from vibroimpact.analysis.figures.window import ANY, SHOWN_PERIODS, Window
 from vibroimpact.fmus.errors import DatasetError
@@ -27,7 +36,7 @@ _LONGEST_LABEL = 24
 _LONGEST_QUANTITY = 18
 _ROW_LETTERS = 52
 _LINE_LETTERS = 7
-# More instants than this would cover what is drawn: they are marked from this height of a panel on.
+# Instants above which marks of full height would cover the panel, and the height at which shorter ones begin.
 _MOST_LINES, _TICKS_FROM = 25, 0.94
 # What tells variables of one quantity apart: contact_displacement_1, displacement_2; energy_kinetic, energy_potential.
 _PARTICULARS = re.compile(r"^contact_|_[0-9]+$|(?<=^energy)_.*")
@@ -183,18 +192,8 @@ def _name_lines(axis: Axes, variables: list[xr.DataArray], lines: list[Artist], 
         axis_label = f"{_common(variables)} ({unit_symbol(variables[0])})".strip()
         entries = [*lines, *marks]
     axis.set_ylabel(axis_label)
-    if not entries:
-        return
-    axis.legend(
-        handles=entries,
-        frameon=False,
-        ncols=_columns(variables),
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderaxespad=0.1,
-        columnspacing=1.0,
-        handlelength=1.5,
-    )
+    if entries:
+        legend_above(axis, ncols=_columns(variables), handles=entries)
 
 
 def _common(variables: list[xr.DataArray]) -> str:

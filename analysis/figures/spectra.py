@@ -24,11 +24,11 @@ from vibroimpact.fmus.units import written_unit
 
 _PANEL_MM = 38
 _FEWEST = 16
-# Of the mean interval: samples that are farther from an even spacing have no spectrum.
+# Distance from an even spacing, over the mean interval, above which samples have no spectrum.
 _UNEVEN = 0.01
-# Frequencies are shown up to the last amplitude above this part of the largest, amplitudes down to the other.
+# Shares of the largest amplitude: frequencies end at the last one above the first, amplitudes begin at the second.
 _LAST, _FLOOR = 1e-2, 1e-5
-# Points of a line: of more the largest of each span is drawn.
+# Points of a line at most; of a longer one the largest of each span is drawn.
 _MOST_POINTS = 600
 _MULTIPLES = "multiples of the forcing frequency"
 _MULTIPLE_LINE: dict[str, Any] = {"color": STOP, "linestyle": ":", "linewidth": 0.5, "zorder": 0}

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, canvas, page_style
+from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, canvas, legend_above, page_style
 from vibroimpact.analysis.spikes.report import SpikeReport
 from vibroimpact.analysis.spikes.waveforms import WAVEFORMS
 
@@ -60,7 +60,7 @@ def _draw_signal(axis: Axes, report: SpikeReport) -> None:
     axis.plot(times, np.full(len(times), 0.97), "v", color=STOP, markersize=size, transform=height)
     axis.set_ylabel(f"{report.dataset.attrs['channel']} ({_unit(report)})")
     axis.set_xlim(float(found.time[0]), float(found.time[-1]))
-    _legend(axis)
+    legend_above(axis, ncols=2)
 
 
 def _draw_statistic(axis: Axes, report: SpikeReport) -> None:
@@ -75,7 +75,7 @@ def _draw_statistic(axis: Axes, report: SpikeReport) -> None:
     axis.set_ylabel("robust score (-)" if scores else f"from baseline ({_unit(report)})")
     axis.set_xlabel("time (s)")
     axis.set_xlim(float(found.time[0]), float(found.time[-1]))
-    _legend(axis)
+    legend_above(axis, ncols=2)
 
 
 def _draw_close_up(axis: Axes, report: SpikeReport) -> None:
@@ -111,7 +111,7 @@ def _draw_close_up(axis: Axes, report: SpikeReport) -> None:
         axis.axhline(sign * found.threshold, color=STOP, linewidth=0.4)
     axis.set_xlabel(f"time from the peak at {middle:.5g} s ({unit})")
     axis.margins(x=0.0)
-    _legend(axis)
+    legend_above(axis, ncols=2)
 
 
 def _line(axis: Axes, time: np.ndarray, values: np.ndarray, **style: Any) -> None:
@@ -123,15 +123,3 @@ def _line(axis: Axes, time: np.ndarray, values: np.ndarray, **style: Any) -> Non
         values = np.stack([lowest, highest], axis=1).ravel()
         time = np.repeat(time[starts], 2)
     axis.plot(time, values, rasterized=True, **style)
-
-
-def _legend(axis: Axes) -> None:
-    axis.legend(
-        frameon=False,
-        ncols=2,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        borderaxespad=0.1,
-        columnspacing=1.0,
-        handlelength=1.5,
-    )

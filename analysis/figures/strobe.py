@@ -15,7 +15,7 @@ from vibroimpact.analysis.figures.scene_text import observed_stops
 from vibroimpact.analysis.figures.sweeps import draw_diagram, one_value, varied
 from vibroimpact.fmus.errors import DatasetError
 
-# Points of a section: more are small, so that the layers of an attractor show.
+# Points of a section above which they are small, so that the layers of an attractor show.
 _MANY = 100
 
 
@@ -48,20 +48,11 @@ def draw_strobe(dataset: xr.Dataset, run: int | None = None) -> Figure:
 
 def draw_section(axis: Axes, run: xr.Dataset) -> None:
     """Draw displacement and velocity of one run at forcing phase 0."""
-    planes: tuple[tuple[Any, Any], ...] = (
-        (run["strobe_displacement"], axis.set_xlim),
-        (run["strobe_velocity"], axis.set_ylim),
-    )
-    (x, _), (y, _) = planes
-    few = np.isfinite(x.values).sum() <= _MANY
-    style: dict[str, Any] = {
-        "markersize": 2.5 if few else 1.0,
-        "markeredgewidth": 0.0,
-        "color": LINE,
-        "rasterized": True,
-    }
-    axis.plot(x.values, y.values, "o", **style)
-    for values, limit in planes:
+    x, y = run["strobe_displacement"], run["strobe_velocity"]
+    size = 2.5 if np.isfinite(x.values).sum() <= _MANY else 1.0
+    axis.plot(x.values, y.values, "o", markersize=size, markeredgewidth=0.0, color=LINE, rasterized=True)
+    limits: tuple[tuple[xr.DataArray, Any], ...] = ((x, axis.set_xlim), (y, axis.set_ylim))
+    for values, limit in limits:
         same = one_value(values.values)
         if same is not None:
             # a single point: numbers around it to nine digits say nothing

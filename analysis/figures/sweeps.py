@@ -13,12 +13,12 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from vibroimpact.analysis.dataset.schema import swept_names
+from vibroimpact.analysis.dataset.schema import scene_of, swept_names
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label
-from vibroimpact.analysis.figures.scene_text import column_of, scene_of, swept_keys
+from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.fmus.errors import DatasetError
 
-# Of their size, what runs on one orbit differ by: rounding, and what is left of their transients.
+# Relative difference of runs on one orbit: rounding, and what is left of their transients.
 _NOISE = 1e-9
 
 # Where both sweeps agree the small dark crosses lie inside the large light rings, and both stay visible.
@@ -28,18 +28,19 @@ _SWEEPS: dict[str, dict[str, Any]] = {
     "independent": {"marker": ".", "color": "#20567D", "markersize": 1.6, "markeredgewidth": 0.0},
 }
 
-
-# Of one column: more distinct values than this are a crowd, of which each point is small and faint, in points squared;
-# values closer than this part of the largest are one.
+# Distinct values above which a column is a crowd; area (points squared) and least opacity of a point in a crowd;
+# distance, over the largest value, below which two values are one.
 _CROWD, _DOT, _FAINTEST, _TOLD_APART = 20, 0.7, 0.3, 1e-3
-
-
-# Of the largest value of a map: where its median is below, a linear scale would leave half of it dark.
+# Median of a map, over its largest value, below which a linear scale would leave half of it dark.
 _DARK = 0.15
-# Of the values, on a logarithmic scale: the share that lies below it, so that one grazing impact does not stretch it.
+# Quantile of the values at which a logarithmic scale begins, so that one grazing impact does not stretch it.
 _LOWEST = 0.01
-# Ratio of the ends of a logarithmic scale at most.
-_MOST_DECADES = 1e6
+# Largest ratio of the ends of a logarithmic scale.
+_WIDEST = 1e6
+_NEITHER = (
+    "figure: expected extrema or impacts in the dataset, got neither. "
+    "Set extrema = true or impacts = true in [record]."
+)
 
 
 def varied(dataset: xr.Dataset) -> list[str]:
@@ -49,7 +50,7 @@ def varied(dataset: xr.Dataset) -> list[str]:
 
 def _in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
     """Return swept parameters as the scene lists them; a displacement before a velocity, as in any phase plane."""
-    listed = [column_of(key, names) for key in swept_keys(scene_of(dataset))]
+    listed = [column_of(key, names) for key in swept_keys(scene_of(dataset.attrs))]
     plane = ("displacement_start", "velocity_start")
 
     def rank(name: str) -> tuple[int, int]:
@@ -79,10 +80,7 @@ def draw_bifurcation(dataset: xr.Dataset) -> Figure:
     """Draw displacement range and impact velocity against the swept parameter, up and down told apart."""
     panels = [q for q in ("displacement_range", "impact_velocity") if q in dataset.variables]
     if not panels:
-        raise DatasetError(
-            "figure: expected extrema or impacts in the dataset, got neither. "
-            "Set extrema = true or impacts = true in [record]."
-        )
+        raise DatasetError(_NEITHER)
     return draw_diagram(dataset, panels)
 
 
@@ -111,7 +109,8 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
         )
         _fit_limits(axis, drawn)
         if drawn.size > 1 and one_value(drawn) is not None:
-            _note(axis, f"one value, to {_NOISE:g} of it: {one_value(drawn):.9g}")
+            said = f"one value, to {_NOISE:g} of it: {one_value(drawn):.9g}"
+            axis.set_title(said, fontsize=7, loc="left")
     axes[-1].set_xlabel(label(dataset[name]))
     axes[-1].margins(x=0.02)
     if len(directions) > 1:
@@ -136,7 +135,8 @@ def _draw_branch(axis: Axes, x: Any, y: Any, direction: str) -> None:
     single = crowd <= 1.0
     axis.plot(x[single], y[single], linestyle="none", rasterized=True, label=f"{direction} sweep", **style)
     if not single.all():
-        faded = {"color": style["color"], "alpha": _alpha(crowd[~single]), "linewidths": 0.0}
+        opacity = np.clip(1.0 / crowd[~single], _FAINTEST, 1.0)
+        faded = {"color": style["color"], "alpha": opacity, "linewidths": 0.0}
         axis.scatter(x[~single], y[~single], s=_DOT, rasterized=True, **faded)
 
 
@@ -187,16 +187,6 @@ def crowded(x: Any, y: Any) -> Any:
     return distinct[owner] / _CROWD
 
 
-def _alpha(crowd: Any) -> Any:
-    """Return how opaque each point of a crowd is."""
-    return np.clip(1.0 / crowd, _FAINTEST, 1.0)
-
-
-def _note(axis: Axes, text: str) -> None:
-    """Say above a panel what cannot be seen in it."""
-    axis.set_title(text, fontsize=7, loc="left")
-
-
 def draw_map(dataset: xr.Dataset) -> Figure:
     """Draw displacement range and largest impact velocity as colours over two swept parameters."""
     quantities = []
@@ -206,10 +196,7 @@ def draw_map(dataset: xr.Dataset) -> Figure:
         name = f"largest {label(dataset['impact_velocity'])}"
         quantities.append((largest_impact_velocity(dataset), name, "no impact"))
     if not quantities:
-        raise DatasetError(
-            "figure: expected extrema or impacts in the dataset, got neither. "
-            "Set extrema = true or impacts = true in [record]."
-        )
+        raise DatasetError(_NEITHER)
     return _draw_maps(dataset, quantities)
 
 
@@ -320,4 +307,4 @@ def _norm(of_all: Any) -> Normalize:
     positive = finite[finite > 0.0]
     if low < 0.0 or np.median(finite) > _DARK * high or positive.size < 2:
         return Normalize(low, high)
-    return LogNorm(max(float(np.quantile(positive, _LOWEST)), high / _MOST_DECADES), high)
+    return LogNorm(max(float(np.quantile(positive, _LOWEST)), high / _WIDEST), high)

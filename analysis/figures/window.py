@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from vibroimpact.analysis.figures.page import Floats
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import typed_or_called
 
-#: Of a longer record so many forcing periods are drawn: more would run together in one column.
+#: Forcing periods drawn of a longer record; more would run together in one column.
 SHOWN_PERIODS = 8
-# Of a period: what rounding may make of whole ones.
+# Share of a period by which rounding may lengthen whole ones.
 _SLACK = 1e-6
 
 
@@ -32,16 +33,19 @@ class Window:
 
     def __post_init__(self) -> None:
         """Refuse what is no window."""
-        for name, value in (("from", self.start), ("to", self.stop), ("periods", self.periods)):
+        first, last = _names()
+        for name, value in ((first, self.start), (last, self.stop), ("periods", self.periods)):
             if value is not None and not math.isfinite(value):
                 raise UsageError(f"figure: {name}: expected a number, got {value}.")
         if self.periods is not None and self.periods <= 0.0:
             raise UsageError(f"figure: periods: expected a number > 0, got {self.periods:g}.")
         if None not in (self.start, self.stop, self.periods):
-            raise UsageError("figure: window: expected two of from, to and periods at most, got all three.")
+            raise UsageError(
+                f"figure: window: expected two of {first}, {last} and periods at most, got all three."
+            )
         if self.start is not None and self.stop is not None and self.start >= self.stop:
             raise UsageError(
-                f"figure: window: expected from < to, got {self.start:g} and {self.stop:g}. Turn them round."
+                f"figure: window: expected {first} < {last}, got {self.start:g} and {self.stop:g}. Turn them round."
             )
 
     @property
@@ -73,7 +77,7 @@ class Window:
         if self.periods is not None and period is None:
             raise UsageError(
                 f"figure: periods: expected a scene with a forcing period, got none. "
-                f"Give a part of {first:.6g} to {last:.6g} s with from and to."
+                f"Give a part of {first:.6g} to {last:.6g} s with {' and '.join(_names())}."
             )
         start, stop = self._ends(first, last, period)
         if int(((time >= start) & (time <= stop)).sum()) < 2 < len(time):
@@ -96,6 +100,11 @@ class Window:
             return self.stop - length, self.stop
         start = first if self.start is None else self.start
         return start, start + length
+
+
+def _names() -> tuple[str, str]:
+    """Return what the ends of a window are called by who gives them."""
+    return typed_or_called("from", "start"), typed_or_called("to", "stop")
 
 
 #: Nothing was asked for.

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import typed_or_called
 
 if sys.platform == "win32":
     import msvcrt
@@ -71,5 +72,6 @@ def make_folder(folder: Path) -> None:
 def not_writable(folder: Path, error: OSError) -> UsageError:
     """Return the error for a folder that cannot be written."""
     return UsageError(
-        f"{folder}: expected a folder that can be written, got {error.strerror}. Choose another with -o."
+        f"{folder}: expected a folder that can be written, got {error.strerror}. "
+        f"Choose another{typed_or_called(' with -o')}."
     )

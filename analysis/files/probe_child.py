@@ -154,26 +154,21 @@ def read_feather(path: str, options: dict[str, Any]) -> None:
             file.get_batch(batch).validate(full=True)
 
 
-READERS: dict[str, Callable[[str, dict[str, Any]], None]] = {
-    "NetCDF": read_netcdf,
-    "MATLAB": read_matlab,
-    "HDF5": read_hdf5,
-    "Parquet": read_parquet,
-    "Feather": read_feather,
+READERS: dict[str, tuple[str, Callable[[str, dict[str, Any]], None]]] = {
+    "NetCDF": ("netCDF4", read_netcdf),
+    "MATLAB": ("scipy.io", read_matlab),
+    "HDF5": ("h5py", read_hdf5),
+    "Parquet": ("pyarrow.parquet", read_parquet),
+    "Feather": ("pyarrow.ipc", read_feather),
 }
-LIBRARIES = {
-    "NetCDF": "netCDF4",
-    "MATLAB": "scipy.io",
-    "HDF5": "h5py",
-    "Parquet": "pyarrow.parquet",
-    "Feather": "pyarrow.ipc",
-}
+"""The library that reads each kind of file, and what is done with it."""
 
 
 def read_here(order: dict[str, Any]) -> dict[str, str]:
     """Read the file of an order in this process."""
     try:
-        READERS[order["kind"]](order["path"], order["options"])
+        _, read = READERS[order["kind"]]
+        read(order["path"], order["options"])
     # whatever it is, it is what the file does to its reader
     except BaseException as error:
         return {"verdict": "raised", "error": type(error).__name__, "text": str(error)[:LONGEST_TEXT]}
@@ -232,7 +227,8 @@ def main() -> None:
         if not line:
             return
         order = json.loads(line)
-        importlib.import_module(LIBRARIES[order["kind"]])
+        library, _ = READERS[order["kind"]]
+        importlib.import_module(library)
         found = read_in_fork(order) if forks else read_here(order)
         os.write(answers, json.dumps(found).encode() + b"\n")
 

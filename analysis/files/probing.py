@@ -30,7 +30,7 @@ from vibroimpact.fmus.file_state import FileState, file_state, is_settled
 from vibroimpact.fmus.private_folder import UnsafeFolderError, private_folder
 from vibroimpact.fmus.python_child import python_command
 
-#: Time that reading a file may take: so much, s, and so much for its size, bytes/s.
+#: Limit of the time to read a file: a constant, s, and its size over a rate, bytes/s.
 PROBE_SECONDS = 10.0
 PROBE_RATE = 20e6
 #: Starting Python and importing the libraries, on a loaded machine, s.
@@ -41,7 +41,7 @@ STOP_SECONDS = 3.0
 #: whatever its size, since what a program never wrote takes no space.
 MOST_EXPANSION = 1100
 SPARSE_BYTES = 400_000_000
-#: Number of the way in which contents are looked at; what an older one found sound is looked at again.
+#: Version of the check; contents that an older one found sound are checked again.
 LOOK = 2
 #: Contents that are remembered as sound, at most.
 MOST_REMEMBERED = 4096

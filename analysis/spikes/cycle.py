@@ -16,6 +16,7 @@ from scipy.signal import get_window
 from vibroimpact.analysis.robust import MAD_TO_SIGMA, robust_sigma
 from vibroimpact.analysis.spikes.baseline import running_median
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import option
 
 Floats = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ def find_cycle(values: Floats, period: float | None = None) -> PeriodicPart:
         if not 2.0 <= period <= 0.5 * (len(values) - 1):
             raise UsageError(
                 f"period: expected two samples at least and half the record at most, got {period:g} samples of "
-                f"{len(values)}. Give another --period."
+                f"{len(values)}. Give another {option('period')}."
             )
         return _folded(values, period, f"a period of {period:g} samples was asked for")
     first = _strongest_line(level)

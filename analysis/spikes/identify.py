@@ -18,6 +18,7 @@ from vibroimpact.analysis.spikes.cycle import PeriodicPart, cycle_scores, find_c
 from vibroimpact.analysis.spikes.detection import Excursions, Group, find_excursions, group_excursions
 from vibroimpact.analysis.spikes.noise import Tail, samples_in_half_wave, tail_threshold
 from vibroimpact.fmus.errors import EstimationError, UsageError
+from vibroimpact.fmus.wording import option
 
 Floats = NDArray[np.float64]
 
@@ -266,7 +267,7 @@ def _method(channel: Channel, signal: Floats, settings: SpikeSettings) -> tuple[
         if settings.method.startswith("cycle"):
             raise EstimationError(
                 f"{channel.name}: {settings.method}: expected evenly spaced samples, got uneven ones. "
-                "Resample it at import, or use --method threshold."
+                f"Resample it at import, or use {option('method', 'threshold')}."
             )
         cycle = PeriodicPart(0.0, np.zeros(len(signal)), 0, 1.0, "the samples are not evenly spaced")
     else:
@@ -278,7 +279,7 @@ def _method(channel: Channel, signal: Floats, settings: SpikeSettings) -> tuple[
     if settings.method.startswith("cycle") and not cycle.found:
         raise EstimationError(
             f"{channel.name}: {settings.method}: expected a periodic excitation, got none: {cycle.reason}. "
-            "Give its period with --period, or use --method threshold."
+            f"Give its period with {option('period')}, or use {option('method', 'threshold')}."
         )
     return cycle, settings.method, "asked for"
 
@@ -356,7 +357,8 @@ def _unrest(residual: Floats, interval: float) -> list[str]:
         return []
     return [
         f"Between its spikes the signal is no noise but a motion at about {0.5 / (samples * interval):.3g} Hz: "
-        "the threshold is what this motion hardly passes. Consider --method, --threshold and --baseline."
+        "the threshold is what this motion hardly passes. "
+        f"Consider {option('method')}, {option('threshold')} and {option('baseline_window')}."
     ]
 
 

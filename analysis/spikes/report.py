@@ -17,6 +17,7 @@ from vibroimpact.analysis.spikes.identify import Identification, SpikeSettings, 
 from vibroimpact.analysis.spikes.pulses import FOOT, Pulses, measure_pulses
 from vibroimpact.analysis.spikes.waveforms import WAVEFORMS
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import option
 
 Floats = NDArray[np.float64]
 
@@ -185,18 +186,20 @@ def _velocity(unit: str, pulses: Pulses, known: Mechanics) -> tuple[Floats, Floa
     """Return velocities before impact and their errors, where mass and restitution say enough."""
     if known.restitution is None:
         if known.mass is not None:
-            raise UsageError("mass: expected a restitution with it, got none. Give --restitution too.")
+            raise UsageError(
+                f"mass: expected a restitution with it, got none. Give {option('restitution')} too."
+            )
         return None
     if unit == "m s-2":
         mass = None
     elif unit == "N":
         mass = known.mass
         if mass is None:
-            raise UsageError("restitution: expected a mass with it, got none. Give --mass too.")
+            raise UsageError(f"restitution: expected a mass with it, got none. Give {option('mass')} too.")
     else:
         raise UsageError(
             f"restitution: expected a force or an acceleration, got a channel in {unit}. "
-            "Give --sensitivity for a load cell in volts."
+            f"Give {option('sensitivity')} for a load cell in volts."
         )
     return (
         impact_velocity(pulses.impulse, known.restitution, mass),

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.cells import (
     has_thousands,
     is_date,
@@ -99,7 +100,7 @@ def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> Ra
     table = with_time(Table([column for column in columns if len(column.values)]))
     if table.time is not None and table.time.label == FIRST:
         told.append(
-            "the first column has no heading and ascends: it is taken as the instants (--time-column)"
+            f"the first column has no heading and ascends: it is taken as the instants ({option('time_column')})"
         )
     return RawFile(written + comma, [table], remarks + told)
 
@@ -128,11 +129,14 @@ def find_dialect(
             best, width = lax, more
     if best is None:
         raise DatasetError(
-            "expected rows of numbers, got none. Is it text? Give --delimiter and --decimal if it is."
+            "expected rows of numbers, got none. Is it text? "
+            f"Give {option('delimiter')} and {option('decimal')} if it is."
         )
     doubtful = best.delimiter == "," and width == 2 and not any("." in line for line in tried)
     if doubtful and not decimal and not delimiter:
-        return best, ["one comma in each row is read as between two columns; if it is decimal, --decimal ,"]
+        return best, [
+            f"one comma in each row is read as between two columns; if it is decimal, {option('decimal', ',')}"
+        ]
     return best, []
 
 
@@ -234,7 +238,11 @@ def _all_headings(
     labels, units = headings(header, narrow, delimiter)
     several = f"columns {narrow + 1} to {width} begin" if width > narrow + 1 else f"column {width} begins"
     verb = "have" if width > narrow + 1 else "has"
-    told = [f"{several} in row {begun} of the table, and {verb} no heading (--name)"] if any(labels) else []
+    told = (
+        [f"{several} in row {begun} of the table, and {verb} no heading ({option('name')})"]
+        if any(labels)
+        else []
+    )
     more = [""] * (width - narrow)
     return labels + more, units + more, told
 
@@ -287,7 +295,8 @@ def columns_of(
             if len(column.strange) > max(3, _MOST_STRANGE * len(column.values)):
                 raise DatasetError(
                     f"{name}: expected numbers, got {len(column.strange)} other cells, the first {text!r} in row "
-                    f"{row + 1}. Is the delimiter or the decimal sign another one (--delimiter, --decimal)?"
+                    f"{row + 1}. Is the delimiter or the decimal sign another one "
+                    f"({option('delimiter')}, {option('decimal')})?"
                 )
             told.append(
                 f"{name}: {len(column.strange)} cells are no numbers and count as missing, the first is "

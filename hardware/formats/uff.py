@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.labels import seconds_in
 from vibroimpact.hardware.formats.probe import missing_extra
@@ -101,7 +102,9 @@ def _sorted_out(
     ]
     in_si = not units or units.get("units_code") == 1
     if not in_si:
-        remarks.append(f"the units of the file are {units.get('units_description', '')!r}, not SI (--unit)")
+        remarks.append(
+            f"the units of the file are {units.get('units_description', '')!r}, not SI ({option('unit')})"
+        )
     repeated = Counter(_text(found.get("id1")) for found in functions)
     tables: list[Table] = []
     even: list[Column] = []

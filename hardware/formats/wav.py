@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.probe import one_refusal
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, RawFile, Table
@@ -55,7 +56,9 @@ def read_wav(content: bytes) -> RawFile:
     heard = sorted({str(one.message) for one in said if not str(one.message).startswith(_KNOWN_WORDS)})
     remarks = [f"scipy says: {line[:120]}" for line in heard]
     if table.dtype.kind != "f":
-        remarks.append("the samples are parts of full scale, which is 1 (--scale, --unit)")
+        remarks.append(
+            f"the samples are parts of full scale, which is 1 ({option('scale')}, {option('unit')})"
+        )
     kind = f"{data.bits} bit{' float' if table.dtype.kind == 'f' else ''}"
     columns = [
         _column(table[:, place], f"channel {place + 1}", 1.0 / rate, data) for place in range(table.shape[1])

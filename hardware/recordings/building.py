@@ -12,11 +12,12 @@ import numpy as np
 from vibroimpact.analysis.recording import Channel, EventTrain, SingleValue
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.labels import is_known_unit, seconds_in
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Table
 from vibroimpact.hardware.recordings.channel_of import channel_of
 from vibroimpact.hardware.recordings.events import (
-    AS_RASTER,
+    as_raster,
     event_train,
     is_raster,
     looks_like_events,
@@ -102,7 +103,7 @@ class Parts:
             self.events[name], more = event_train(name, instants, settings.window, settings.masked)
             if settings.events is None:
                 told.append(
-                    f"{name}: ascends unevenly, so it is taken as instants of events (--no-events if not)"
+                    f"{name}: ascends unevenly, so it is taken as instants of events ({option('events', False)} if not)"
                 )
             return told + more
         if len(column.values) == 1:
@@ -121,7 +122,7 @@ class Parts:
             if train is None:
                 return [*told, f"{name}: has no event, and is left out"]
             self.events[name] = train
-            return [*told, AS_RASTER]
+            return [*told, as_raster()]
         self.channels[name], more = channel_of(name, changed, placements[key], settings.masked)
         return told + more
 
@@ -158,7 +159,7 @@ def described(name: str, column: Column, settings: ImportSettings, number: int) 
     told: list[str] = []
     unit = _picked(settings.unit, number) or column.unit
     if not is_known_unit(unit):
-        told.append(f"{name}: the unit {unit[:40]!r} is not known: taken as a pure number (--unit)")
+        told.append(f"{name}: the unit {unit[:40]!r} is not known: taken as a pure number ({option('unit')})")
         unit = "1"
     attrs = dict(column.attrs)
     if column.unit and column.unit != unit:

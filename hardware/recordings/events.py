@@ -8,6 +8,7 @@ import numpy as np
 
 from vibroimpact.analysis.recording import EventTrain
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.labels import is_time_name, seconds_in
 from vibroimpact.hardware.formats.table import Column, Floats, Table
 from vibroimpact.hardware.recordings.printed_grid import common_step, decimal_step
@@ -16,9 +17,16 @@ from vibroimpact.hardware.recordings.time_axis import Placement
 _FEWEST = 3
 _FEW_ONES = 0.2
 """Share of ones up to which a column of 0 and 1 is one of events."""
-AS_RASTER = "the columns hold 0 and 1 only: an event train each, with an event where it becomes 1 (--no-events if not)"
 _UNEVEN = 0.01
 """Standard deviation of the steps, in mean steps, above which ascending numbers are no clock."""
+
+
+def as_raster() -> str:
+    """Return the remark on columns that are rasters of events."""
+    return (
+        "the columns hold 0 and 1 only: an event train each, with an event where it becomes 1 "
+        f"({option('events', False)} if not)"
+    )
 
 
 def looks_like_events(column: Column) -> bool:
@@ -140,8 +148,8 @@ def event_train(
         remarks.append(f"{name}: {len(masked)} parts of the observation are masked")
     if window is None:
         remarks.append(
-            f"{name}: when the observation began and ended is not known (--window); the first and the last event "
-            f"are at {times[0]:.6g} and {times[-1]:.6g} s"
+            f"{name}: when the observation began and ended is not known ({option('window')}); "
+            f"the first and the last event are at {times[0]:.6g} and {times[-1]:.6g} s"
         )
     return EventTrain(name, times, window, resolution, column.label, attrs), remarks
 

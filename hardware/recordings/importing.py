@@ -11,6 +11,7 @@ from typing import Any
 
 from vibroimpact.analysis.recording import Recording, open_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.choosing import check_file, holds_recording
 from vibroimpact.hardware.recordings.building import Parts
 from vibroimpact.hardware.recordings.gaps import AGREEMENT
@@ -90,7 +91,7 @@ def _of_the_whole(parts: Parts) -> list[str]:
     told = []
     plain = [name for name, channel in parts.channels.items() if channel.unit == "1"]
     if plain:
-        told.append(f"no unit is known for {', '.join(plain)}: pure numbers (--unit)")
+        told.append(f"no unit is known for {', '.join(plain)}: pure numbers ({option('unit')})")
     axes = {id(channel.axis): channel.axis for channel in parts.channels.values()}.values()
     triggers = list(dict.fromkeys(axis.trigger for axis in axes))
     if len(triggers) > 1:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import TimeAxis
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Flags, Floats, Table
 from vibroimpact.hardware.recordings.gaps import AGREEMENT, EVEN, Gaps, are_whole, gaps_in
 from vibroimpact.hardware.recordings.printed_grid import digits_of
@@ -98,7 +99,7 @@ def _placed(table: Table, column: Column, rate: float | None) -> Placement:
         return _even(column.start, column.interval, length, source, [late] if column.group else [])
     raise DatasetError(
         f"{column.label}: expected a column of instants or a sampling interval, got neither. "
-        "Give --rate (samples per second), or --time-column."
+        f"Give {option('rate')} (samples per second), or {option('time_column')}."
     )
 
 
@@ -312,7 +313,9 @@ def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
         else []
     )
     if not len(known):
-        raise DatasetError("column of instants: expected numbers, got none. Give --rate, or --time-column.")
+        raise DatasetError(
+            f"column of instants: expected numbers, got none. Give {option('rate')}, or {option('time_column')}."
+        )
     order = known[np.argsort(instants[known], kind="stable")]
     back = int(np.sum(np.diff(instants[known]) < 0.0))
     moved = order != known
@@ -320,7 +323,7 @@ def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
     if back + int(again.sum()) > _MOST_DOUBTFUL * len(known):
         raise DatasetError(
             f"column of instants: expected them to ascend, got {back} steps back and {int(again.sum())} repeated "
-            f"in {len(known)} rows. Give --rate, or name another --time-column."
+            f"in {len(known)} rows. Give {option('rate')}, or name another {option('time_column')}."
         )
     if back:
         remarks.append(

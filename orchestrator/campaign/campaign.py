@@ -22,6 +22,7 @@ from typing import Any
 from vibroimpact.analysis.dataset import read_flat, write_dataset
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
+from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.chunks import (
     DEFAULT_RUNNER,
     Chunk,
@@ -192,7 +193,7 @@ class _Campaign:
         if manifest is None and ((self._home / "dataset.nc").exists() or has_parts):
             raise UsageError(
                 f"{self._home}: expected an empty folder or one of a campaign, got data without "
-                "campaign.json. Choose another folder with -o."
+                f"campaign.json. Choose another folder{typed_or_called(' with -o')}."
             )
         return manifest
 
@@ -216,7 +217,8 @@ class _Campaign:
         except OSError as error:
             raise CampaignError(
                 f"{self._home}: the points of the earlier sweep could not be kept: {error.strerror or error}. "
-                "They are where they were. Make room or restore access; then the same command goes on."
+                f"They are where they were. "
+                f"Make room or restore access; then the same {typed_or_called('command', 'call')} goes on."
             ) from error
         if not handed_over:
             refuse_other_scene(self._manifest_path, different)
@@ -298,7 +300,7 @@ class _Campaign:
         done = self._report.resumed + self._report.outcomes.total()
         return (
             f"Interrupted: {done} of {self._report.runs} points are complete in {self._home}. "
-            "The same command resumes."
+            f"The same {typed_or_called('command', 'call')} resumes."
         )
 
     def _compute_on(
@@ -371,7 +373,7 @@ class _Campaign:
             raise CampaignError(
                 f"{self._report.dataset}: could not be written: {error.strerror or error}. "
                 f"All points are complete in {self._parts_folder}. "
-                "Make room or restore access; then the same command finishes."
+                f"Make room or restore access; then the same {typed_or_called('command', 'call')} finishes."
             ) from error
         remove_parts(self._parts_folder)
         self._report.compaction_seconds = time.perf_counter() - began

@@ -32,6 +32,7 @@ from distributed.security import Security
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.fmus.python_child import safe_module_path
+from vibroimpact.fmus.wording import option, typed_or_called
 from vibroimpact.orchestrator.campaign.dask_settings import QUIET
 from vibroimpact.orchestrator.campaign.lone_process import interrupts_blocked
 from vibroimpact.orchestrator.campaign.progress import Progress
@@ -161,7 +162,7 @@ class WorkerPool:
         elif self._looked - self._last_present > WORKERLESS_SECONDS:
             raise CampaignError(
                 f"{self._where}: expected at least one worker, got none for {WORKERLESS_SECONDS:.0f} s. "
-                "Start workers; then the same command resumes."
+                f"Start workers; then the same {typed_or_called('command', 'call')} resumes."
             )
         return tuple(sorted(present))
 
@@ -285,7 +286,7 @@ class WorkerPool:
         except (CancelledError, CommClosedError) as error:
             raise CampaignError(
                 f"{self._where}: expected a scheduler that stays up, got none any more. "
-                "The same command resumes."
+                f"The same {typed_or_called('command', 'call')} resumes."
             ) from error
         except Exception as error:
             # Whatever the work raised; who asked for the work knows what to make of it.
@@ -329,7 +330,7 @@ class WorkerPool:
         """Connect anew and send all work again; a chunk that is computed twice gives the same part."""
         stalled = CampaignError(
             f"{self._where}: expected workers that compute, got some that wait, or do not answer, while work is there. "
-            "Was a clock set back? The same command resumes."
+            f"Was a clock set back? The same {typed_or_called('command', 'call')} resumes."
         )
         if self._restarts == MOST_RESTARTS:
             raise stalled
@@ -426,7 +427,7 @@ def _reached_by(scheduler: str | Client) -> tuple[str, Security | None]:
 
 @contextmanager
 def _remote_cluster(address: str, security: Security | None) -> Iterator[_Cluster]:
-    expected = f"--scheduler {address}: expected a Dask scheduler that listens there"
+    expected = f"{option('scheduler')} {address}: expected a Dask scheduler that listens there"
     try:
         security = security or Security()
         certified = security.get_connection_args("client")["ssl_context"] is not None
@@ -489,7 +490,8 @@ def _started_workers(workers: int, scratch: Path) -> LocalCluster:
             failure = error
     raise CampaignError(
         f"this machine: expected {workers} workers that start, got a failure {MOST_STARTS} times: {failure}. "
-        "Is there memory for them? With --workers there are fewer; the same command tries again."
+        f"Is there memory for them? With {option('workers')} there are fewer; "
+        f"the same {typed_or_called('command', 'call')} tries again."
     ) from failure
 
 

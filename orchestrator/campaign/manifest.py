@@ -15,6 +15,7 @@ from typing import Any, NoReturn
 
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.provenance import git_commit, provenance, versions
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene, parse_scene
@@ -241,7 +242,7 @@ def refuse_other_scene(path: Path, different: Sequence[str]) -> NoReturn:
     more = f"; and {hidden} more" if hidden > 0 else ""
     raise UsageError(
         f"{path.parent}: expected the scene that this campaign was started with, got a changed one: "
-        f"{shown}{more}. Choose another folder with -o, or restore the scene to resume."
+        f"{shown}{more}. Choose another folder{typed_or_called(' with -o')}, or restore the scene to resume."
     )
 
 
@@ -281,6 +282,7 @@ def refuse_other_runner(path: Path, different: Sequence[str], reason: str = "") 
     """
     raise UsageError(
         f"{path.parent}: expected the components and machine that this campaign was started with: "
-        f"{'; '.join(different)}. {reason}Results of two kinds are never mixed: choose another folder with -o, "
+        f"{'; '.join(different)}. {reason}Results of two kinds are never mixed: choose another folder"
+        f"{typed_or_called(' with -o')}, "
         "or go on with what it was started with."
     )

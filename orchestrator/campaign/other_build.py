@@ -14,7 +14,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import Outcome, read_flat, refuse_unlike, swept_names, take_runs
+from vibroimpact.analysis.dataset import Outcome, read_flat, refuse_unlike, take_runs
+from vibroimpact.analysis.dataset.schema import swept_names
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, Work, compute_again
 from vibroimpact.orchestrator.campaign.cluster import WorkerPool

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import typed_or_called
 
 if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign.cluster import WorkerPool
@@ -51,5 +52,5 @@ def refuse_blind_workers(pool: WorkerPool, folder: Path) -> None:
     if blind:
         raise UsageError(
             f"{folder}: expected a folder that every worker reads and writes, got {len(blind)} that do not: "
-            f"{', '.join(sorted(blind)[:5])}. Choose a folder on a shared file system with -o."
+            f"{', '.join(sorted(blind)[:5])}. Choose a folder on a shared file system{typed_or_called(' with -o')}."
         )

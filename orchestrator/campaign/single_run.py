@@ -8,6 +8,7 @@ from pathlib import Path
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord, write_dataset
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.chunks import (
     DEFAULT_RUNNER,
     BranchPoint,
@@ -110,5 +111,5 @@ def _refuse_unwritable(target: Path) -> None:
 def _unwritable(target: Path, error: OSError) -> UsageError:
     return UsageError(
         f"{target}: expected a place where a dataset can be written, got {error.strerror or error}. "
-        "Choose another with -o."
+        f"Choose another{typed_or_called(' with -o')}."
     )

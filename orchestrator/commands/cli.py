@@ -10,7 +10,7 @@ import errno
 import functools
 import sys
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import metadata
 from typing import Annotated, Any
@@ -20,8 +20,16 @@ from typer.core import TyperGroup
 
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.fmus.terminal import all_was_written, printable, say
+from vibroimpact.fmus.wording import command_line
 
 COMMAND_GROUP = "vibroimpact.commands"
+PANELS = {
+    "Simulate": ("check", "run", "campaign", "demo"),
+    "Look": ("plot", "describe"),
+    "Measure and compare": ("import", "replay", "estimate", "spikes"),
+    "Exchange": ("fmu",),
+}
+"""The commands as `--help` shows them, in the order in which they are used; those of other packages come last."""
 DEBUG = "--debug"
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 
@@ -46,6 +54,14 @@ class _Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         with _printable_misuse():
             return super().invoke(ctx)
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of the commands; each is given its panel."""
+        commands: Mapping[str, Any] = self.commands
+        panel_of = {name: panel for panel, names in PANELS.items() for name in names}
+        for name in panel_of.keys() & commands.keys():
+            commands[name].rich_help_panel = panel_of[name]
+        return sorted(commands, key=[*panel_of, *commands].index)
 
 
 app = typer.Typer(
@@ -86,8 +102,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         load_commands()
-        # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
-        typer.main.get_command(app).main(args=given, prog_name="vibroimpact")
+        with command_line():
+            # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
+            typer.main.get_command(app).main(args=given, prog_name="vibroimpact")
     except SystemExit as end:
         sys.exit(end.code or (0 if all_was_written() else 1))
     except VibroimpactError as error:

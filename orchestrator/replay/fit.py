@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from vibroimpact.analysis.replay.alignment import Interpolated
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.fmus.errors import ComponentError, EstimationError, UsageError
+from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.replay.covariance import LagSlopes, covariance_of, lag_slopes
 from vibroimpact.orchestrator.replay.replayer import Replayer
 from vibroimpact.orchestrator.replay.scoring import compare_motion
@@ -95,7 +96,7 @@ def fit_keys(scene: Scene, text: str) -> tuple[str, ...]:
     keys = tuple(key.strip() for key in text.split(",") if key.strip())
     if not keys or len(set(keys)) < len(keys):
         raise UsageError(
-            f"--fit: expected keys such as body.damping_ratio,sensor.gain, each once, got {text!r}."
+            f"{option('fit')}: expected keys such as body.damping_ratio,sensor.gain, each once, got {text!r}."
         )
     for key in keys:
         scene.value(key)

@@ -10,6 +10,7 @@ import xarray as xr
 
 from vibroimpact.analysis.replay.trust import Verdict, trust
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import option, typed_or_called
 from vibroimpact.orchestrator.replay.fit import ReplayFit, fit_keys, fit_replay
 from vibroimpact.orchestrator.replay.output import Replayed, replay_dataset
 from vibroimpact.orchestrator.replay.replayer import (
@@ -85,13 +86,15 @@ def replay_scene(
     """
     if any(axis.key != "replay.recording" for axis in scene.sweep):
         raise UsageError(
-            f"{scene.source}: sweep: expected no sweep for one dataset. Give a folder with -o for a campaign."
+            f"{scene.source}: sweep: expected no sweep for one dataset. "
+            + typed_or_called("Give a folder with -o for a campaign.", "campaign(scene, folder) takes it.")
         )
     named = with_recordings(scene, recordings)
     paths = [recording_of(named, number) for number in range(1, len(replay_table(named).recordings) + 1)]
     if score and fit is None:
         raise UsageError(
-            "--score: expected --fit beside it: a recording is scored with numbers fitted on others."
+            f"{option('score')}: expected {option('fit')} beside it: "
+            "a recording is scored with numbers fitted on others."
         )
     _refuse_scoring_fitted(paths, score)
     keys = fit_keys(scene, fit) if fit is not None else ()
@@ -114,7 +117,8 @@ def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:
     there = replay_table(scene).recordings
     if there and recordings:
         raise UsageError(
-            f"{scene.source}: replay.recordings: expected recordings in the scene or on the command line, got both."
+            f"{scene.source}: replay.recordings: expected recordings in the scene or "
+            f"{typed_or_called('on the command line', 'in the call')}, got both."
         )
     if not recordings:
         if not there:
@@ -132,7 +136,7 @@ def _refuse_scoring_fitted(paths: Sequence[Path], scored: Sequence[Path]) -> Non
     for path in scored:
         if path.resolve() in fitted:
             raise UsageError(
-                f"--score: expected a recording that is not fitted, got {path}, which is. Score another one."
+                f"{option('score')}: expected a recording that is not fitted, got {path}, which is. Score another one."
             )
 
 

@@ -18,7 +18,7 @@ from support.places import EXAMPLES
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.fmus import fmu_path
-from vibroimpact.orchestrator.commands.cli import app, load_commands, main
+from vibroimpact.orchestrator.commands.cli import PANELS, app, load_commands, main
 
 HEAVY = (
     *("numpy", "xarray", "pandas", "scipy", "netCDF4", "pint", "matplotlib", "dask", "distributed", "fmpy"),
@@ -70,6 +70,13 @@ def test_every_command_has_help_with_an_example() -> None:
         done = in_this_process(*name.split(), "--help")
         assert done.returncode == 0
         assert f"Example: vibroimpact {name}" in done.stdout, name
+
+
+def test_commands_are_listed_in_the_order_of_their_use() -> None:
+    shown = in_this_process("--help").stdout
+    listed = [line.split()[1] for line in shown.splitlines() if line.startswith("│ ") and line[2].islower()]
+    assert listed == [name for names in PANELS.values() for name in names]
+    assert all(panel in shown for panel in PANELS)
 
 
 def test_the_help_of_no_command_loads_what_computes() -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
+from support.command_line import in_this_process
 from support.places import ROOT
 
 import vibroimpact as vi
@@ -154,6 +155,35 @@ def test_what_cannot_run_points_is_refused(tmp_path):
         vi.campaign(scene, tmp_path / "no", scheduler=3)
     with pytest.raises(vi.VibroimpactError, match="expected one of them, got both"):
         vi.campaign(scene, tmp_path / "no", workers=2, scheduler="tcp://127.0.0.1:1")
+
+
+def test_an_error_names_arguments_in_python_and_options_on_the_command_line(tmp_path):
+    def said(call, *arguments) -> str:
+        with pytest.raises(vi.VibroimpactError) as problem:
+            call(*arguments)
+        return str(problem.value)
+
+    table, folder, swept = tmp_path / "a.csv", tmp_path / "old", tmp_path / "swept.nc"
+    table.write_text("a\n" + "0.5\n0.25\n0.75\n" * 5)
+    folder.mkdir()
+    (folder / "dataset.nc").write_text("of something else")
+    scene = tmp_path / "scene.toml"
+    scene.write_text(vi.Scene.from_dict(FREE | {"sweep": {"body.mass": {"values": [1.0, 2.0]}}}).text)
+    found = vi.run(scene, swept, progress=False)
+
+    assert "Give rate (samples per second), or time_column." in said(vi.import_recording, [table])
+    assert "campaign.json. Choose another folder." in said(vi.campaign, scene, folder)
+    assert "Name one by its run_index (run): 0, 1." in said(vi.draw, found, "run")
+
+    for arguments, words in (
+        (("import", table, "-o", tmp_path / "a.nc"), "Give --rate (samples per second), or --time-column."),
+        (("campaign", scene, "-o", folder), "campaign.json. Choose another folder with -o."),
+        (
+            ("plot", swept, "--kind", "run", "-o", tmp_path / "a.png"),
+            "Name one by its run_index (--run): 0, 1.",
+        ),
+    ):
+        assert words in in_this_process(*arguments).stderr
 
 
 def test_figures_go_into_axes_that_are_there():

@@ -16,6 +16,7 @@ from vibroimpact.analysis.commands import options
 from vibroimpact.analysis.intervals import dimension
 from vibroimpact.analysis.recording import EventTrain, Recording, open_recording, write_recording
 from vibroimpact.fmus.errors import DatasetError, EstimationError, UsageError
+from vibroimpact.fmus.wording import command_line
 
 RATE = 20_000.0
 #: 40 half-sines of 1 ms and peak 2 N, .05 s apart.
@@ -37,7 +38,8 @@ def record(tmp_path: Path) -> Path:
 def spikes(*arguments: str | Path) -> str:
     app = typer.Typer()
     app.command("spikes")(options.spikes)
-    done = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    with command_line():
+        done = CliRunner().invoke(app, [str(argument) for argument in arguments])
     if done.exception and not isinstance(done.exception, SystemExit):
         raise done.exception
     assert done.exit_code == 0, done.output

@@ -323,7 +323,7 @@ def test_what_is_no_ladder_is_refused_by_name() -> None:
 @pytest.mark.parametrize(
     ("kind", "run", "message"),
     [
-        ("run", None, "expected one run, got 6. Name one by its run_index (--run): 0, 1, 2, 3, 4, 5."),
+        ("run", None, "expected one run, got 6. Name one by its run_index (run): 0, 1, 2, 3, 4, 5."),
         ("auto", 99, "expected one run of those there are (0, 1, 2, 3, 4, 5), got none of run_index 99."),
         ("bifurcation", 2, "run: expected none for a dataset of runs drawn as bifurcation, got one."),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import matplotlib.colors
@@ -22,6 +23,7 @@ from vibroimpact.analysis.intervals import interval_report
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
 from vibroimpact.analysis.replay import compare, comparison_dataset
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.wording import command_line
 
 
 def opened(dataset: xr.Dataset, folder: Path) -> xr.Dataset:
@@ -197,6 +199,21 @@ def test_work_precision_has_each_error_over_the_seconds_that_it_took() -> None:
     assert (axis.get_xscale(), axis.get_yscale(), axis.get_xlabel()) == ("log", "log", "wall time (s)")
 
 
+@pytest.mark.parametrize("last", [0.1001, 0.11, 0.15, 0.2, 0.35, 0.6, 0.8, 1.5, 5.0, 12.0, 20.0, 1e3])
+def test_no_second_of_a_work_precision_is_written_over_another(last: float) -> None:
+    seconds = xr.DataArray(np.geomspace(0.1, last, 8).reshape(2, 4), dims=("exchange", "macro_step"))
+    figure = figures.draw(ladder().assign(wall_time=seconds.assign_attrs(units="s")), "work-precision")
+    figure.draw_without_rendering()
+    (axis,) = figure.axes
+    low, high = axis.get_xlim()
+    labels = zip(axis.get_xticks(), axis.get_xticklabels(), strict=True)
+    labels = [*labels, *zip(axis.get_xticks(minor=True), axis.get_xticklabels(minor=True), strict=True)]
+    shown = sorted((at, label) for at, label in labels if low <= at <= high and label.get_text())
+    boxes = [label.get_window_extent() for _, label in shown]
+    assert len(boxes) >= 2
+    assert all(left.x1 < right.x0 for left, right in itertools.pairwise(boxes))
+
+
 @pytest.mark.parametrize("change", [lambda d: d.drop_vars("wall_time"), lambda d: d.drop_vars("macro_step")])
 def test_a_ladder_without_seconds_or_steps_has_no_work_precision(change: object) -> None:
     with pytest.raises(DatasetError, match=r"expected error and wall_time \(s\) on a ladder of steps"):
@@ -239,7 +256,8 @@ def plotted(*arguments: str) -> str:
     app = typer.Typer()
     app.callback()(lambda: None)
     commands.register(app)
-    done = CliRunner().invoke(app, ["plot", *arguments])
+    with command_line():
+        done = CliRunner().invoke(app, ["plot", *arguments])
     if done.exception is not None:
         assert isinstance(done.exception, DatasetError | UsageError), done.exception
         return str(done.exception)

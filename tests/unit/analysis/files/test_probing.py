@@ -18,7 +18,7 @@ from support.dataset_examples import up_down
 
 from vibroimpact.analysis import open_dataset, write_dataset
 from vibroimpact.analysis.dataset import open_measured, read_flat, read_part
-from vibroimpact.analysis.dataset.results import results_kind
+from vibroimpact.analysis.dataset.results import file_attributes
 from vibroimpact.analysis.files import probing
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 from vibroimpact.analysis.files.probing import UnsoundFileError, check_sound
@@ -42,7 +42,7 @@ specification.loader.exec_module(probe_child)
 def read(path, options):
     if b"damaged" in open(path, "rb").read():
         {what}
-probe_child.READERS["NetCDF"] = read
+probe_child.READERS["NetCDF"] = ("netCDF4", read)
 probe_child.main()
 """
 
@@ -111,7 +111,7 @@ def test_a_file_of_version_0_1_is_read_by_a_process_of_its_own_once_for_all_proc
     path = old_dataset(tmp_path / "runs.nc")
     for _ in range(3):
         read_flat(path)
-        assert results_kind(path) is None
+        assert file_attributes(path) == {}
     assert probes == ["runs.nc"]
     forget(monkeypatch)
     read_part(path.rename(tmp_path / "copy.nc"))

@@ -13,7 +13,7 @@ import xarray as xr
 from support.dataset_examples import dataset_of, record
 
 from vibroimpact.analysis.dataset import write_dataset
-from vibroimpact.analysis.dataset.results import results_kind, write_results
+from vibroimpact.analysis.dataset.results import file_attributes, write_results
 from vibroimpact.analysis.recording import (
     Channel,
     EventTrain,
@@ -202,7 +202,7 @@ def test_a_run_of_a_simulated_dataset_is_a_recording_too(tmp_path: Path) -> None
     np.testing.assert_array_equal(channel.values, runs[1].samples[:, 1])  # type: ignore[index]
     np.testing.assert_array_equal(second.event_train("impacts").times, runs[1].impacts[:, 0])  # type: ignore[index]
     write_recording(example(), tmp_path / "r.nc")
-    with pytest.raises(DatasetError, match=r"r\.nc: --run: expected none of a recording, got 7"):
+    with pytest.raises(DatasetError, match=r"r\.nc: run: expected none of a recording, got 7"):
         open_signals(tmp_path / "r.nc", 7)
     with pytest.raises(DatasetError, match="expected a run_index from 0 to 1, got 7"):
         open_signals(tmp_path / "runs.nc", 7)
@@ -224,8 +224,8 @@ def test_a_file_of_another_kind_or_a_damaged_one_is_one_clear_error(tmp_path: Pa
 def test_results_say_what_they_are_and_every_variable_has_a_unit(tmp_path: Path) -> None:
     good = xr.Dataset({"peak": ("spike", [1.0], {"units": "N", "long_name": "peak force"})})
     write_results(good, tmp_path / "r.nc", kind="spikes")
-    assert results_kind(tmp_path / "r.nc") == "spikes"
-    assert results_kind(tmp_path / "absent.nc") is None
+    assert file_attributes(tmp_path / "r.nc")["results_kind"] == "spikes"
+    assert file_attributes(tmp_path / "absent.nc") == {}
     with pytest.raises(DatasetError, match="spikes: peak: expected the attribute units, got none"):
         write_results(xr.Dataset({"peak": ("spike", [1.0])}), tmp_path / "x.nc", kind="spikes")
     assert not (tmp_path / "x.nc").exists()

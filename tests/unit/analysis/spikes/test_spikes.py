@@ -251,7 +251,7 @@ def test_velocity_needs_a_mass_for_a_force_and_none_for_an_acceleration() -> Non
     assert spike_report(shaken, None, Mechanics(restitution=0.6)).dataset[
         "spike_velocity"
     ].values == pytest.approx(0.0125, rel=2e-3)
-    with pytest.raises(UsageError, match="Give --mass too"):
+    with pytest.raises(UsageError, match="Give mass too"):
         spike_report(channel(signal, 1 / RATE), None, Mechanics(restitution=0.6))
     with pytest.raises(UsageError, match=r"0 <= r <= 1, got 1\.2"):
         spike_report(shaken, None, Mechanics(restitution=1.2))

@@ -152,5 +152,5 @@ def test_a_refusal_of_a_binary_file_that_was_cut_off_says_so(tmp_path: Path) -> 
     with TdmsWriter(path) as writer:
         writer.write_segment([ChannelObject("run", "base", BASE)])
     path.write_bytes(path.read_bytes()[:-9])
-    with pytest.raises(DatasetError, match=r"Give --rate .*Besides, the file is cut off"):
+    with pytest.raises(DatasetError, match=r"Give rate .*Besides, the file is cut off"):
         import_recording([path])

@@ -61,7 +61,7 @@ def test_a_table_of_text_with_a_rate_or_instants_is_a_raster_too(tmp_path: Path)
     for events in (by_rate, by_instants):
         assert [train.times.size for train in events.values()] == [4, 3, 2]
     path.write_text("a,b\n" + "".join(f"{a:.0f},{b:.0f}\n" for a, b, _ in raster))
-    with pytest.raises(DatasetError, match="Give --rate"):
+    with pytest.raises(DatasetError, match="Give rate "):
         import_recording([path])
 
 

@@ -97,7 +97,7 @@ def test_raw_integers_at_the_end_of_their_range_are_clipped(tmp_path: Path) -> N
 
 def test_without_an_interval_the_rate_is_asked_for(tmp_path: Path) -> None:
     path = written(tmp_path, [channel("base", np.sin(np.arange(30.0)), wf_increment=None)])
-    with pytest.raises(DatasetError, match="Give --rate"):
+    with pytest.raises(DatasetError, match="Give rate "):
         import_recording([path])
 
 

@@ -49,7 +49,7 @@ def test_delimiter_and_decimal_sign_are_found_from_the_rows(
 
 def test_a_comma_that_may_be_decimal_is_told() -> None:
     _, doubt = find_dialect(["1,25", "1,50", "1,75"])
-    assert "--decimal" in doubt[0]
+    assert "decimal=','" in doubt[0]
     assert find_dialect(["1,25", "1,50"], "", ",")[0].decimal == ","
 
 
@@ -194,7 +194,7 @@ def test_utf_16_and_byte_order_marks_are_understood(tmp_path: Path) -> None:
         ("time,force\n", "expected rows of numbers, got none"),
         ("just a letter\nto a friend\n", "expected rows of numbers, got none"),
         ("\n\n\n", "expected rows of numbers, got none"),
-        ("force\n1\n2\n4\n3\n", "Give --rate"),
+        ("force\n1\n2\n4\n3\n", "Give rate (samples per second), or time_column"),
         ("0.0,1\n", "expected channels of two samples or more"),
         ("time,a\n" + "0.1,2\nrubbish here\n" * 8, "expected a row of numbers as before, got 'rubbish here'"),
     ],
@@ -230,7 +230,7 @@ def test_columns_that_begin_later_leave_the_others_their_headings_and_units(tmp_
     assert (recording.channels["acc"].unit, recording.channels["force"].unit) == ("m s-2", "N")
     assert recording.channels["acc"].axis.rate == pytest.approx(100.0)
     assert np.isnan(recording.channels["column_5"].values[:20]).all()
-    assert "columns 4 to 5 begin in row 21 of the table, and have no heading (--name)" in recording.remarks
+    assert "columns 4 to 5 begin in row 21 of the table, and have no heading (name)" in recording.remarks
 
 
 @pytest.mark.parametrize(

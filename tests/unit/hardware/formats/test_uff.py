@@ -95,7 +95,7 @@ def test_units_come_from_the_label_then_from_the_units_of_the_file(tmp_path: Pat
     assert import_recording([written(tmp_path, units(1, "SI"), plain)]).channels["acc"].unit == "m s-2"
     recording = import_recording([written(tmp_path, units(5, "mm, N"), plain)])
     assert recording.channels["acc"].unit == "1"
-    assert "the units of the file are 'mm, N', not SI (--unit)" in recording.remarks
+    assert "the units of the file are 'mm, N', not SI (unit)" in recording.remarks
 
 
 def test_functions_of_one_name_are_told_apart_by_their_place(tmp_path: Path) -> None:

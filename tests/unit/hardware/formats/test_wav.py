@@ -17,7 +17,7 @@ from vibroimpact.hardware.recordings import ImportSettings, import_recording
 
 RATE = 5120
 SIGNAL = 0.5 * np.sin(np.arange(300) / 9.0)
-FULL_SCALE = "the samples are parts of full scale, which is 1 (--scale, --unit)"
+FULL_SCALE = "the samples are parts of full scale, which is 1 (scale, unit)"
 
 
 def by_scipy(folder: Path, samples: Any) -> Path:
