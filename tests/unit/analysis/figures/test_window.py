@@ -95,7 +95,7 @@ def test_what_is_asked_for_is_drawn_and_nothing_needs_to_be_said() -> None:
         ({"start": 22.0, "stop": 21.0}, "expected start < stop, got 22 and 21. Turn them round."),
         ({"start": 1.0, "stop": 2.0, "periods": 3}, "expected two of start, stop and periods at most"),
         ({"periods": 0}, "periods: expected a number > 0, got 0"),
-        ({"start": float("nan")}, "from: expected a number, got nan"),
+        ({"start": float("nan")}, "start: expected a number, got nan"),
     ],
 )
 def test_a_window_that_does_not_fit_is_one_line_with_what_there_is(
