@@ -28,7 +28,6 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
-from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, dataset_of_runs, identity_of, named_runner
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.scene import Scene
@@ -335,6 +334,6 @@ def write_part(
         raise CampaignError(
             f"{path.parent}: the results of {chunk.count} points could not be written: "
             f"{error.strerror or error}. "
-            f"Make room or restore access; then the same {typed_or_called('command', 'call')} resumes."
+            "Make room or restore access; then the same command or call resumes."
         ) from error
     return tally(dataset)

@@ -18,7 +18,7 @@ from support.dataset_examples import everything, up_down
 
 from vibroimpact.analysis import open_dataset, write_dataset
 from vibroimpact.analysis.dataset import open_measured, read_flat, read_part
-from vibroimpact.analysis.dataset.results import results_kind
+from vibroimpact.analysis.dataset.results import file_attributes
 from vibroimpact.analysis.dataset.schema import RULES
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 from vibroimpact.analysis.recording import (
@@ -52,7 +52,7 @@ def _measured(path: Path) -> None:
 
 
 DOORS: tuple[Door, ...] = (
-    *(_loaded, _measured, read_flat, read_part, open_recording, open_signals, results_kind),
+    *(_loaded, _measured, read_flat, read_part, open_recording, open_signals, file_attributes),
     lambda path: import_recording([path]),
 )
 

@@ -95,7 +95,7 @@ def test_disorder_repetition_and_holes_among_events_are_told() -> None:
     assert train.times.tolist() == [0.5, 1.125, 2.25, 2.25]
     said = "\n".join(told)
     assert all(
-        words in said for words in ("1 cells hold no instant", "go back 1 times", "1 events have", "--window")
+        words in said for words in ("1 cells hold no instant", "go back 1 times", "1 events have", "window")
     )
 
 

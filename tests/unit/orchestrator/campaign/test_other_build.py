@@ -154,7 +154,7 @@ def test_a_build_that_computes_other_values_is_refused_with_the_first_and_nothin
     message = str(refused.value)
     assert f"{told} {last} (angular_frequency = " in message
     assert f"is stored as {np.nextafter(stored, 10.0)}, computed again as {stored}" in message
-    assert "choose another folder with -o" in message
+    assert "choose another folder, or go on with" in message
     assert "\n" not in message
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 

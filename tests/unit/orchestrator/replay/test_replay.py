@@ -29,7 +29,6 @@ from vibroimpact.orchestrator.replay.covariance import covariance_of, drawn_nois
 from vibroimpact.orchestrator.replay.drive import drive_of, quiet_level, step_instants
 from vibroimpact.orchestrator.replay.fit import fit_keys
 from vibroimpact.orchestrator.replay.output import Replayed, replay_dataset
-from vibroimpact.orchestrator.replay.replayer import named
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 
 TIME = 2e-5 * np.arange(1500)
@@ -323,9 +322,12 @@ def test_a_channel_that_cannot_drive_is_told_with_its_file(tmp_path: Path) -> No
 
 def test_a_problem_with_its_file_is_a_new_error(tmp_path: Path) -> None:
     # raised from itself it would be its own cause, and a worker of a campaign would never get it packed
-    problem = DatasetError(f"{tmp_path}: expected")
-    assert str(named(problem, tmp_path)) == str(problem)
-    assert named(problem, tmp_path) is not problem
+    path = tmp_path / "absent.nc"
+    with pytest.raises(DatasetError) as raised, opened_replays(scene(), [path]):
+        pass
+    assert str(raised.value).startswith(f"{path}: expected")
+    assert raised.value.__cause__ is not None
+    assert raised.value.__cause__ is not raised.value
 
 
 @pytest.mark.slow
