@@ -216,11 +216,9 @@ def _fits(found: Identification, pulses: Pulses) -> Rows:
         "middle": ("s", "middle of the fitted curve"),
         "goodness": ("1", "part of the variance within the pulse that the curve explains"),
     }
-    signs = np.where(pulses.peak[kept] < 0.0, -1.0, 1.0)
     rows: dict[str, Row] = {}
     for field, (unit, words) in wanted.items():
         values = np.array([getattr(pulses.fits[each], field)[kept] for each in WAVEFORMS])
-        values = values * signs if field == "peak" else values
         rows[f"spike_fit_{field}"] = (("waveform", "spike"), values, unit, words)
     return rows
 

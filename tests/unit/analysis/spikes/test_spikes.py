@@ -215,6 +215,15 @@ def test_polarity_chooses_the_sign_of_the_spikes() -> None:
     assert peaks["negative"].tolist() == [-1.0]
 
 
+def test_the_curve_of_a_spike_below_the_baseline_lies_below_it() -> None:
+    time = np.arange(8000) / RATE
+    signal = pulses(time, np.array([0.05, 0.15]), np.array([PEAK, -PEAK]), LENGTH)
+    signal += 0.01 * np.random.default_rng(13).standard_normal(len(time))
+    data = spike_report(channel(signal, 1 / RATE)).dataset
+    fitted = data.spike_fit_peak.sel(waveform="half_sine").values
+    assert fitted == pytest.approx(data.spike_peak.values, rel=0.02)
+
+
 def test_clipped_and_cut_off_spikes_are_said_to_be_so() -> None:
     time = np.arange(8000) / RATE
     signal = pulses(time, np.array([-LENGTH / 2.0, 0.05, 0.15]), np.full(3, PEAK), LENGTH)
