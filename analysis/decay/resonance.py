@@ -243,7 +243,14 @@ def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
             np.column_stack([difference.real, difference.imag]).ravel() if curve.complex else difference.real
         )
 
-    start = _start(curve, peak, max(width, float(omega[1] - omega[0])))
+    # a sweep up and down has each frequency twice
+    spacing = float(omega[1] - omega[0]) or float(np.ptp(omega)) / (len(omega) - 1)
+    if not spacing > 0.0:
+        raise EstimationError(
+            f"resonance: expected lines at several frequencies, got {omega[0] / (2 * np.pi):.6g} Hz alone. "
+            "Choose another band."
+        )
+    start = _start(curve, peak, max(width, spacing))
     found = least_squares(residual, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=400)
     natural, damping = float(found.x[0]), float(found.x[1])
     if not (omega[0] <= natural <= omega[-1] and 0.0 < damping < 1.0):

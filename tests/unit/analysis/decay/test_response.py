@@ -206,3 +206,18 @@ impacts = true
 [sweep]
 "forcing.angular_frequency" = { start = 15.0, stop = 25.0, points = 41 }
 """
+
+
+def test_lines_that_come_twice_without_a_half_power_point_are_fitted() -> None:
+    # a sweep up and down that ends just past the peak: no width of it to begin with, no distance of two lines
+    omega = np.repeat(np.linspace(0.71, 1.02, 40), 2)
+    amplitude = 1.0 / np.abs(1.0 - omega**2 + 0.1j * omega)
+    found = fit_resonance(Curve(omega, amplitude, np.zeros(80), "displacement", "1"))
+    assert found.natural_angular_frequency.value == pytest.approx(1.0, rel=1e-9)
+    assert found.damping_ratio.value == pytest.approx(0.05, rel=1e-9)
+
+
+def test_lines_at_one_frequency_are_no_resonance() -> None:
+    curve = Curve(np.full(10, 0.7), np.ones(10), np.zeros(10), "displacement", "1")
+    with pytest.raises(EstimationError, match="expected lines at several frequencies, got 0.111408 Hz alone"):
+        fit_resonance(curve)
