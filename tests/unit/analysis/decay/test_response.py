@@ -219,5 +219,5 @@ def test_lines_that_come_twice_without_a_half_power_point_are_fitted() -> None:
 
 def test_lines_at_one_frequency_are_no_resonance() -> None:
     curve = Curve(np.full(10, 0.7), np.ones(10), np.zeros(10), "displacement", "1")
-    with pytest.raises(EstimationError, match="expected lines at several frequencies, got 0.111408 Hz alone"):
+    with pytest.raises(EstimationError, match="expected lines at several frequencies"):
         fit_resonance(curve)
