@@ -214,7 +214,9 @@ def _checked(content: dict[str, Any]) -> Manifest:
         content["scene_text"],
         int(content["runs"]),
         identity,
-        tuple(content.get("continued_with", ())),
+        tuple(
+            {**build, "fmu_hashes": dict(build["fmu_hashes"])} for build in content.get("continued_with", ())
+        ),
     )
 
 

@@ -100,6 +100,16 @@ def test_a_damaged_manifest_is_refused(tmp_path: Path, content: str) -> None:
         read_manifest(tmp_path / "campaign.json")
 
 
+@pytest.mark.parametrize("builds", ["x", [1], [{}], [{"fmu_hashes": 5}], {"a": 1}])
+def test_builds_of_another_shape_are_damage(tmp_path: Path, builds: object) -> None:
+    path = tmp_path / "campaign.json"
+    scene = scene_of(TEXT)
+    identity = RunnerIdentity("fused", "x86_64", {"body": "0"})
+    write_manifest(path, scene, identity, 1, builds)  # type: ignore[arg-type]  # as a stranger would write it
+    with pytest.raises(UsageError, match="got a damaged file"):
+        read_manifest(path)
+
+
 def test_a_manifest_of_a_later_format_is_refused(tmp_path: Path) -> None:
     written(tmp_path)
     content = json.loads((tmp_path / "campaign.json").read_text()) | {"format": 99}
