@@ -154,6 +154,20 @@ def _variable_problems(name: str, variable: xr.Variable) -> list[str]:
     ]
 
 
+def count_problems(dataset: xr.Dataset) -> list[str]:
+    """Return which counts of rows do not sum to the rows there are; no row is assigned to a run before they do."""
+    problems = []
+    for dimension, count_name in RAGGED.items():
+        if count_name in dataset.variables:
+            count = dataset.variables[count_name].values
+            rows, counted = dataset.sizes[dimension], count.sum(dtype=np.int64)
+            if (count < 0).any() or counted != rows:
+                problems.append(
+                    f"{count_name}: expected counts that sum to the {rows} rows of {dimension}, got {counted}."
+                )
+    return problems
+
+
 def _content_problems(dataset: xr.Dataset) -> list[str]:
     """Return what is wrong with the values that tell runs, rows and components apart."""
     problems = []
@@ -169,15 +183,7 @@ def _content_problems(dataset: xr.Dataset) -> list[str]:
     for name in (*swept_names(dataset), *constant_names(dataset)):
         if not np.isfinite(dataset.variables[name].values).all():
             problems.append(f"{name}: expected finite values of a parameter, got NaN or infinity.")
-    for dimension, count_name in RAGGED.items():
-        if count_name in dataset.variables:
-            count = dataset.variables[count_name].values
-            rows = dataset.sizes[dimension]
-            if (count < 0).any() or int(count.sum(dtype=np.int64)) != rows:
-                problems.append(
-                    f"{count_name}: expected counts that sum to the {rows} rows of {dimension}, got {count.sum()}."
-                )
-    return problems + _label_problems(dataset)
+    return problems + count_problems(dataset) + _label_problems(dataset)
 
 
 def _label_problems(dataset: xr.Dataset) -> list[str]:

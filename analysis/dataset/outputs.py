@@ -10,6 +10,7 @@ from typing import Any
 
 from vibroimpact.analysis.dataset.results import file_attributes
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.wording import typed_or_called
 
 FIGURE_ENDINGS = (".png", ".pdf", ".svg")
@@ -72,6 +73,7 @@ def refuse_outputs(
             raise UsageError(
                 f"{target}: expected a place where a file can be written, got {got}: {target.parent}."
             )
+        refuse_no_text(target.absolute())
     if output is not None and output.suffix != ending:
         got = output.suffix[:60] or "none"
         raise UsageError(f"{output}: expected a name ending in {ending}, got {got!r}.")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from xarray.backends import BackendArray
 from xarray.core import indexing
 
-from vibroimpact.analysis.dataset.checking import structure_problems
+from vibroimpact.analysis.dataset.checking import count_problems, structure_problems
 from vibroimpact.analysis.dataset.schema import (
     RAGGED,
     RULES,
@@ -215,8 +215,8 @@ def _saved_again(opened: xr.Dataset) -> xr.Dataset:
 
 
 def _fitting(file: str | os.PathLike[str], flat: xr.Dataset) -> xr.Dataset:
-    """Return a dataset, but not one of other types and dimensions than the schema says: all else relies on them."""
-    problems = structure_problems(flat)
+    """Return a dataset whose types, dimensions and counts are those of the schema; all else relies on them."""
+    problems = structure_problems(flat) or count_problems(flat)
     if problems:
         more = f" And {len(problems) - 1} more problems." if len(problems) > 1 else ""
         raise DatasetError(f"{os.fspath(file)}: {problems[0]}{more} The file is damaged; write it again.")

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.wording import typed_or_called
 
 if sys.platform == "win32":
@@ -60,6 +61,7 @@ def make_folder(folder: Path) -> None:
     UsageError
         When that cannot be done.
     """
+    refuse_no_text(folder.absolute())
     try:
         folder.mkdir(parents=True, exist_ok=True)
         trial = folder / f".writable-{os.getpid()}"

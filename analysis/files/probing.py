@@ -26,6 +26,7 @@ from typing import Any
 
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import matches_recorded_hash
+from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.file_state import FileState, file_state, is_settled
 from vibroimpact.fmus.private_folder import UnsafeFolderError, private_folder
 from vibroimpact.fmus.python_child import python_command
@@ -104,10 +105,13 @@ def check_sound(path: str | os.PathLike[str], reading: LibraryRead = NETCDF) -> 
         It is damaged, of another kind, no regular file, or changed meanwhile.
     DatasetError
         Its content is not the one whose hash it ends with.
+    UsageError
+        Its name is no text.
     OSError
         It is missing or cannot be read.
     """
     path = os.path.abspath(path)
+    refuse_no_text(path)
     status = os.stat(path)
     if not stat.S_ISREG(status.st_mode):
         raise UnsoundFileError("no regular file")

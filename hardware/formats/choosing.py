@@ -8,6 +8,7 @@ from pathlib import Path
 
 from vibroimpact.analysis.recording import is_recording
 from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.hardware.formats.arrow import SIGNATURES as ARROW
 from vibroimpact.hardware.formats.arrow import read_arrow
 from vibroimpact.hardware.formats.foreign_netcdf import check_netcdf4, read_foreign_netcdf
@@ -43,7 +44,10 @@ def check_file(path: Path) -> None:
     ------
     DatasetError
         There is no such file, or it cannot be read, is empty or too large.
+    UsageError
+        Its name is no text.
     """
+    refuse_no_text(path)
     try:
         status = path.stat()
     except (OSError, ValueError) as problem:

@@ -19,6 +19,7 @@ import typer
 from typer.core import TyperGroup
 
 from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.terminal import all_was_written, printable, say
 from vibroimpact.fmus.wording import command_line
 
@@ -101,6 +102,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code: 0 done, 1 failed, 2 misused, 130 interrupted."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
+        for word in given:
+            refuse_no_text(word)
         load_commands()
         with command_line():
             # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.

@@ -15,6 +15,7 @@ import tomli_w
 
 from vibroimpact.fmus import safe_toml
 from vibroimpact.fmus.errors import SceneError
+from vibroimpact.fmus.file_names import is_text, refuse_no_text
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted, syntax_problem
 
 LARGEST_FILE = 2**20  # bytes; a scene is some hundred lines, and more is most likely another kind of file
@@ -98,7 +99,7 @@ def _plain(value: Any, path: tuple[str | int, ...], problems: list[Problem]) -> 
         )
         return 0
     if isinstance(value, Mapping):
-        keys = [key for key in value if _is_text(key)]
+        keys = [key for key in value if is_text(key)]
         for key in value.keys() - set(keys):
             problems.append(Problem(key_path(path), "keys that are text", ascii(key)))
         return {key: _plain(value[key], (*path, key), problems) for key in keys}
@@ -107,18 +108,13 @@ def _plain(value: Any, path: tuple[str | int, ...], problems: list[Problem]) -> 
     if isinstance(value, PathLike):
         return fspath(value)
     if not isinstance(value, str | bool | int | float | date | time) or (
-        isinstance(value, str) and not _is_text(value)
+        isinstance(value, str) and not is_text(value)
     ):
         problems.append(
             Problem(key_path(path), _VALUE, ascii(value) if isinstance(value, str) else quoted(value))
         )
         return 0
     return value
-
-
-def _is_text(value: object) -> bool:
-    """Return whether a value is text that a file can hold: halves of surrogate pairs are none."""
-    return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
 
 
 def refuse_no_mapping(given: object, what: str, source: str) -> None:
@@ -128,6 +124,7 @@ def refuse_no_mapping(given: object, what: str, source: str) -> None:
 
 
 def _read_bytes(path: Path, source: str) -> bytes:
+    refuse_no_text(path)
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):

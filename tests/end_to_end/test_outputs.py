@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -80,6 +81,56 @@ def test_a_name_too_long_for_a_file_is_one_line_from_every_command(
     assert "x" * 50 in refused.stderr
     assert "defect" not in refused.stderr
     assert list(tmp_path.iterdir()) == []
+
+
+FOREIGN_NAME = os.fsdecode(b"caf\xe9")
+"""A name as a system with Latin-1 has written it."""
+
+
+@pytest.fixture
+def foreign_folder(tmp_path: Path) -> Path:
+    folder = tmp_path / FOREIGN_NAME
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("this file system takes names in UTF-8 only")
+    return folder
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("check", "FOLDER/scene.toml"),
+        ("run", "FOLDER/scene.toml", "-o", "x.nc"),
+        ("run", "scene.toml", "-o", "FOLDER/x.nc"),
+        ("campaign", "scene.toml", "-o", "FOLDER/campaign"),
+        ("plot", "FOLDER/x.nc", "-o", "x.png"),
+        ("describe", "FOLDER/x.nc"),
+        ("import", "FOLDER/x.csv", "-o", "x.nc"),
+        ("fmu", "export", "oscillator", "-o", "FOLDER/x.fmu"),
+    ],
+)
+def test_a_name_in_another_encoding_is_one_line_from_every_command_before_anything_is_written(
+    words: tuple[str, ...], scene: Path, foreign_folder: Path, tmp_path: Path
+) -> None:
+    for name in ("scene.toml", "x.csv"):
+        (foreign_folder / name).write_text(scene.read_text())
+    before = sorted(tmp_path.rglob("*"))
+    placed = [
+        str(tmp_path / word.replace("FOLDER", FOREIGN_NAME)) if "." in word or "/" in word else word
+        for word in words
+    ]
+    misuse(in_this_process(*placed), "expected a name in utf-8, the encoding of this system, got other bytes")
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_folder_in_another_encoding_is_told_of_where_names_are_relative_to_it(
+    scene: Path, foreign_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(foreign_folder)
+    for command, name in (("run", "x.nc"), ("campaign", "campaign")):
+        misuse(in_this_process(command, scene, "-o", name), "expected a name in utf-8")
+    assert list(foreign_folder.iterdir()) == []
 
 
 def test_a_run_may_be_repeated_but_another_scene_needs_force(scene: Path, tmp_path: Path) -> None:

@@ -43,6 +43,7 @@ from vibroimpact.analysis.dataset import (
 )
 from vibroimpact.analysis.figures import draw
 from vibroimpact.analysis.files import atomic
+from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 from vibroimpact.fmus.errors import DatasetError
 
 CF_CHECK = """
@@ -777,6 +778,19 @@ def test_files_that_are_missing_damaged_or_foreign_are_one_clear_error(read: obj
     xr.Dataset({"temperature": ("x", np.zeros(2))}).to_netcdf(tmp_path / "foreign.nc")
     with pytest.raises(DatasetError, match="expected a dataset written by vibroimpact"):
         read(tmp_path / "foreign.nc")
+
+
+@pytest.mark.parametrize("read", [open_dataset, read_flat])
+def test_damaged_counts_are_an_error_before_rows_are_made_of_them(read: object, tmp_path: Path) -> None:
+    assert callable(read)
+    path = written(up_down(), tmp_path)
+    content = path.read_bytes()[:-LINE_LENGTH]  # as a file of version 0.1, without its hash
+    counts = up_down()["impact_count"].values.tobytes()
+    assert content.count(counts) == 1
+    damaged = np.full(up_down().sizes["run"], 2_000_000_000, dtype=np.int32)
+    path.write_bytes(content.replace(counts, damaged.tobytes()))
+    with pytest.raises(DatasetError, match="impact_count: expected counts that sum to the 21 rows of impact"):
+        read(path)
 
 
 def test_a_dataset_of_a_newer_schema_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,33 @@
+"""Names of files that are text: scenes, manifests and datasets hold names, and the NetCDF library opens no others."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+from vibroimpact.fmus.errors import UsageError
+
+
+def is_text(value: object) -> bool:
+    """Return whether a value is text that a file can hold: halves of surrogate pairs are none.
+
+    >>> is_text("café"), is_text(os.fsdecode(b"caf" + bytes([0xE9])))
+    (True, False)
+    """
+    return isinstance(value, str) and not any("\ud800" <= letter <= "\udfff" for letter in value)
+
+
+def refuse_no_text(path: str | os.PathLike[str]) -> None:
+    """Refuse the name of a file or folder that is no text, as one from a system with another encoding.
+
+    Raises
+    ------
+    UsageError
+        With the name.
+    """
+    if not is_text(os.fspath(path)):
+        encoding = sys.getfilesystemencoding()
+        raise UsageError(
+            f"{os.fspath(path)}: expected a name in {encoding}, the encoding of this system, got other bytes. "
+            "Rename it."
+        )
