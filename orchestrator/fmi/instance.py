@@ -148,6 +148,24 @@ class Instance(ABC):
             with_value_count=self.fmi_version == "3.0",
         )
 
+    def set_text(self, reference: int, text: str) -> None:
+        """Set a variable of type String; the FMU keeps a copy.
+
+        Parameters
+        ----------
+        reference : int
+            Value reference.
+        text : str
+            Without null characters, at which it would end in C.
+        """
+        values = (ctypes.c_char_p * 1)(text.encode())
+        value_count = (ctypes.c_size_t(1),) if self.fmi_version == "3.0" else ()
+        call = self._function("SetString")
+        status = call(
+            self._pointer, ctypes.byref(ctypes.c_uint32(reference)), ctypes.c_size_t(1), values, *value_count
+        )
+        self.check(status, "SetString")
+
     # ---- life ----
 
     @abstractmethod

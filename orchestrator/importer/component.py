@@ -120,6 +120,9 @@ class Component:
 
     def _set_start(self, name: str, value: Value) -> None:
         variable = self.variables[name]
+        if kind_of(variable) == "String":
+            self.instance.set_text(variable.valueReference, str(value))
+            return
         group = self._start_groups.get(name)
         if group is None:
             group = self._start_groups[name] = self.group(kind_of(variable), [name])

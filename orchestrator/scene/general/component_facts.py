@@ -192,7 +192,9 @@ def typed_value(variable: VariableFacts, value: object) -> StartValue | Misfit:
     if variable.kind == "boolean":
         return value if isinstance(value, bool) else Misfit("true or false")
     if variable.kind == "text":
-        return value if isinstance(value, str) else Misfit("text")
+        if not isinstance(value, str):
+            return Misfit("text")
+        return Misfit("text without null characters") if "\0" in value else value
     if variable.kind == "enumeration":
         return _item(variable, value)
     return _real(variable, value) if variable.kind == "real" else _integer(variable, value)

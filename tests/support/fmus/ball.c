@@ -6,7 +6,7 @@
 
 #include "model.h"
 
-enum { H = 1, V, G, E, LANDING, BOUNCES };
+enum { H = 1, V, G, E, LANDING, BOUNCES, LABEL, LABEL_LENGTH };
 enum { LANDING_ZERO, LANDING_KEPT, LANDING_ABOVE };
 
 const bool model_has_state = true;
@@ -26,7 +26,7 @@ bool model_begin(model *m, void *instance)
 
 void model_calculate(model *m)
 {
-    (void)m;
+    m->value[LABEL_LENGTH] = m->value[LABEL];
 }
 
 static void bounce(double *x)

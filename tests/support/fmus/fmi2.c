@@ -195,6 +195,18 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference references[]
     return fmi2OK;
 }
 
+fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference references[], size_t count,
+                         const fmi2String values[])
+{
+    for (size_t k = 0; k < count; k++) {
+        const double length = (double)strlen(values[k]);
+        if (fmi2SetReal(c, &references[k], 1, &length) != fmi2OK) {
+            return fmi2Error;
+        }
+    }
+    return fmi2OK;
+}
+
 /* ---- states ---- */
 
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state)

@@ -201,6 +201,18 @@ fmi3Status fmi3SetInt64(fmi3Instance c, const fmi3ValueReference references[], s
     return fmi3OK;
 }
 
+fmi3Status fmi3SetString(fmi3Instance c, const fmi3ValueReference references[], size_t count, const fmi3String values[],
+                         size_t value_count)
+{
+    for (size_t k = 0; k < count; k++) {
+        const double length = value_count == count ? (double)strlen(values[k]) : 0.0;
+        if (value_count != count || fmi3SetFloat64(c, &references[k], 1, &length, 1) != fmi3OK) {
+            return fmi3Error;
+        }
+    }
+    return fmi3OK;
+}
+
 /* ---- states ---- */
 
 fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state)

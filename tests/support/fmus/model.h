@@ -24,7 +24,7 @@ typedef enum {
     PLACES
 } occasion;
 
-/* A state: copying it saves it. Integers and enumerations are kept as doubles too. */
+/* A state: copying it saves it. Integers and enumerations are kept as doubles too, and of texts the number of bytes. */
 typedef struct {
     double time;                /* s */
     double value[MODEL_VALUES]; /* by value reference; 0 is the time in FMI 3.0 and unused in FMI 2.0 */

@@ -295,3 +295,43 @@ def test_scheduled_execution_is_called_by_its_name(folder: Path, tmp_path: Path)
     text = '[scene]\nunits = "SI"\n[component.a]\nfmu = "clocks.fmu"\n[record]\nrecorded_time = 1.0\n'
     with pytest.raises(SceneError, match=r"clocks\.fmu for scheduled execution only"):
         parse_scene(text, str(tmp_path / "scene.toml"))
+
+
+# ---- texts ----
+
+LABELLED = """
+[scene]
+units = "SI"
+[component.ball]
+fmu = "BouncingBall.fmi{major}.fmu"
+parameters = {{ label = "{label}" }}
+[record]
+recorded_time = 0.2
+variables = ["ball.label_length"]
+rate = 10
+[execution]
+how = "coupled"
+macro_step = 0.1
+guard = {guard}
+"""
+
+
+@pytest.mark.parametrize("guard", ["true", "false"])
+@pytest.mark.parametrize("label", ["", "Grüße", "x" * 5000])
+@pytest.mark.parametrize("major", ["2", "3"])
+def test_a_component_gets_the_texts_of_its_scene(folder: Path, major: str, label: str, guard: str) -> None:
+    scene = parse_scene(LABELLED.format(major=major, label=label, guard=guard), str(folder / "scene.toml"))
+    runner = make_runner(scene)
+    try:
+        for _ in range(2):  # the second time after a reset
+            found = runner.run({})
+            assert found.samples is not None, found.message
+            np.testing.assert_array_equal(found.samples[:, 1], len(label.encode()))
+    finally:
+        runner.close()
+
+
+def test_a_text_ends_where_it_is_written_to_end(folder: Path) -> None:
+    text = LABELLED.format(major="3", label="a\\u0000b", guard="false")
+    with pytest.raises(SceneError, match=r"label: expected text without null characters, got"):
+        parse_scene(text, str(folder / "scene.toml"))
