@@ -20,6 +20,7 @@ def test_a_sample_of_each_kind_finds_no_problem(name: str, tmp_path: Path) -> No
         done = run([one], {name: one.sample}, BASE_SEED, journal, seconds=300.0, processes=1)
     finally:
         journal.close()
-    assert [f"{entry.seed}: {entry.problem}" for entry in journal.of(name) if entry.problem is not None] == []
+    problems = [f"{entry.seed}: {entry.problem}" for entry in journal.of(name) if entry.problem is not None]
+    assert not problems, "\n".join(problems)
     assert done
     assert len(journal.of(name)) == one.sample
