@@ -15,7 +15,7 @@ import queue
 import signal
 import time
 import warnings
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Callable, Iterable, Iterator, Set
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -208,7 +208,8 @@ class WorkerPool:
             answers |= self._new_answers(calls, calls.keys() - answers.keys())
             if calls and len(answers) == len(calls) and self._is_complete(began):
                 return answers
-            if len(answers) < len(calls) and self._is_stalled():
+            waiting = [call for address, call in calls.items() if address not in answers]
+            if waiting and self._is_stalled(partial(_any_is_done, waiting)):
                 self._restart()
                 calls, answers = {}, {}
 
@@ -221,6 +222,7 @@ class WorkerPool:
                 continue
             try:
                 answers[address] = calls[address].result(timeout=RESULT_SECONDS)
+                self._moved()
             except (TimeoutError, CancelledError, KilledWorker):
                 del calls[address]
         return answers
@@ -266,15 +268,20 @@ class WorkerPool:
             try:
                 ticket = self._ended.get(timeout=LOOK_SECONDS)
             except queue.Empty:
-                if self._is_stalled():
+                if self._is_stalled(lambda: not self._ended.empty()):
                     self._restart()
                 continue
             self._last_moved = time.monotonic()
             finished = self._finished_work(ticket, self._futures[ticket])
             if finished is not None:
                 del self._futures[ticket], self._calls[ticket]
-                self._restarts = 0
+                self._moved()
                 return finished
+
+    def _moved(self) -> None:
+        """Take note of a piece of work that ended: nothing stalls."""
+        self._last_moved = time.monotonic()
+        self._restarts = 0
 
     def _finished_work(self, ticket: int, future: Future[Any]) -> Finished | None:
         """Return what became of a piece of work; None when it is under way again."""
@@ -296,11 +303,12 @@ class WorkerPool:
         self._announce(ticket)
         return None
 
-    def _is_stalled(self) -> bool:
+    def _is_stalled(self, some_has_ended: Callable[[], bool]) -> bool:
         """Return whether no worker computes although work is out: messages about it were not sent, or one hangs.
 
         Dask sends a message when the wall clock has passed a deadline; where the clock was set back, that is
-        never.
+        never. A worker that loads may not answer for long and have ended its work when it does: `some_has_ended`
+        tells.
         """
         if time.monotonic() - self._last_moved < STALL_SECONDS or not self._present:
             return False
@@ -309,7 +317,7 @@ class WorkerPool:
                 self._last_moved = time.monotonic()
                 return False
             time.sleep(LOOK_SECONDS)
-        return self._ended.empty()
+        return not some_has_ended()
 
     def _is_idle(self) -> bool:
         """Return whether no worker computes, or one does not answer; asked on a way of its own.
@@ -395,6 +403,10 @@ def open_workers(
         stack.push(pool.connection)
         pool.wait_for_workers()
         yield pool
+
+
+def _any_is_done(calls: Iterable[Future[Any]]) -> bool:
+    return any(call.done() for call in calls)
 
 
 def processor_count() -> int:

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from distributed.comm import connect
 from distributed.security import Security
-from support.busy_runner import die_while, freeze_once, same
+from support.busy_runner import die_while, freeze_once, keep_the_interpreter, same
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign import cluster
@@ -78,6 +78,19 @@ def test_a_long_point_is_no_stall(monkeypatch: pytest.MonkeyPatch) -> None:
     with open_workers(workers=1, progress=said) as pool:
         pool.submit(time.sleep, 2.0)
         assert pool.next_finished().error is None
+    assert not said.notes
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sleep of the C library")
+def test_a_worker_that_loads_for_long_and_is_done_when_it_answers_is_no_stall(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # a machine with 15 processes on 2 cores: a campaign ended with the error of a clock that was set back
+    monkeypatch.setattr(cluster, "STALL_SECONDS", 0.5)
+    monkeypatch.setattr(cluster, "LOOK_SECONDS", 0.2)
+    said = Said()
+    with open_workers(workers=1, progress=said) as pool:
+        assert list(pool.call_everywhere(keep_the_interpreter, 3).values()) == [3]
     assert not said.notes
 
 
