@@ -55,6 +55,9 @@ ASK_SECONDS = 0.05
 RESULT_SECONDS = 10.0
 """How long the answer of a finished call may take to arrive; after that its worker counts as gone, s."""
 
+SUSPENDED_SECONDS = 10.0
+"""Time between two looks, which come every second or so, above which this process was suspended meanwhile, s."""
+
 DEAD_SECONDS = 5.0
 """How long one of our own workers may be dead before another one is started in its place, s."""
 
@@ -147,6 +150,7 @@ class WorkerPool:
         CampaignError
             When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
         """
+        self._leave_out_suspension()
         try:
             present = frozenset(self._client.scheduler_info(n_workers=-1)["workers"])
         except (OSError, TimeoutError):
@@ -165,6 +169,14 @@ class WorkerPool:
                 f"Start workers; then the same {typed_or_called('command', 'call')} resumes."
             )
         return tuple(sorted(present))
+
+    def _leave_out_suspension(self) -> None:
+        """Count as no waiting what passed while this process was stopped: Ctrl-Z, or a computer that slept."""
+        away = time.monotonic() - self._looked
+        if away > SUSPENDED_SECONDS:
+            self._last_present += away
+            self._last_complete += away
+            self._last_moved += away
 
     def _replace_dead(self) -> None:
         if len(self._present) >= self._cluster.size:

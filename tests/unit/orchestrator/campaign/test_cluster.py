@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -92,6 +93,24 @@ def test_a_worker_that_loads_for_long_and_is_done_when_it_answers_is_no_stall(
     with open_workers(workers=1, progress=said) as pool:
         assert list(pool.call_everywhere(keep_the_interpreter, 3).values()) == [3]
     assert not said.notes
+
+
+def test_the_time_in_which_a_campaign_was_suspended_is_not_waited_for_workers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # after minutes of Ctrl-Z Dask takes the workers for dead, and starts them again
+    monkeypatch.setattr(cluster, "WORKERLESS_SECONDS", 1.0)
+    with open_workers(workers=1) as pool:
+        (worker,) = pool.worker_addresses()
+        awake = time.monotonic() + 400.0
+        with monkeypatch.context() as asleep:
+            asleep.setattr(pool._client, "scheduler_info", lambda **_options: {"workers": {}})
+            asleep.setattr(cluster, "time", SimpleNamespace(monotonic=lambda: awake))
+            assert pool.worker_addresses() == ()
+            asleep.setattr(cluster, "time", SimpleNamespace(monotonic=lambda: awake + 2.0))
+            with pytest.raises(CampaignError, match="got none for 1 s"):
+                pool.worker_addresses()
+        assert pool.worker_addresses() == (worker,)
 
 
 @kills_itself
