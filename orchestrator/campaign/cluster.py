@@ -151,24 +151,36 @@ class WorkerPool:
             When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
         """
         self._leave_out_suspension()
-        try:
-            present = frozenset(self._client.scheduler_info(n_workers=-1)["workers"])
-        except (OSError, TimeoutError):
-            present = frozenset()
+        there = self._workers_there()
         self._looked = time.monotonic()
-        if lost := len(self._present - present):
-            self.lost_workers += lost
-            self._progress.lost_workers(self.lost_workers)
-        self._present = present
-        self._replace_dead()
-        if present:
+        if there is not None:
+            if lost := len(self._present - there):
+                self.lost_workers += lost
+                self._progress.lost_workers(self.lost_workers)
+            self._present = there
+            self._replace_dead()
+        if there:
             self._last_present = self._looked
         elif self._looked - self._last_present > WORKERLESS_SECONDS:
             raise CampaignError(
                 f"{self._where}: expected at least one worker, got none for {WORKERLESS_SECONDS:.0f} s. "
                 f"Start workers; then the same {typed_or_called('command', 'call')} resumes."
             )
-        return tuple(sorted(present))
+        return tuple(sorted(there or ()))
+
+    def _workers_there(self) -> frozenset[str] | None:
+        """Return the addresses of the workers that the scheduler has; None where it does not answer.
+
+        What `Client.scheduler_info` returns may be the answer to another call of the client, which has no workers.
+        """
+        if self._client.scheduler is None:
+            return None
+        identity = self._client.scheduler.identity
+        try:
+            answer = self._client.sync(identity, n_workers=-1, callback_timeout=RESULT_SECONDS)
+        except OSError:
+            return None
+        return frozenset(answer["workers"])
 
     def _leave_out_suspension(self) -> None:
         """Count as no waiting what passed while this process was stopped: Ctrl-Z, or a computer that slept."""
