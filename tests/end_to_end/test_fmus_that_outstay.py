@@ -250,7 +250,7 @@ def test_a_component_that_kills_the_supervisor_of_its_process_goes_with_it(
 LOADING = [
     ("LOAD", "segfault", "loading", "ended by SIGSEGV"),
     ("LOAD", "abort", "loading", "ended by SIGABRT"),
-    ("LOAD", "hang", "loading", "no answer within 5 s"),
+    ("LOAD", "hang", "loading", "no answer within 12 s"),
     ("INSTANTIATE", "segfault", "loading", "ended by SIGSEGV"),
 ]
 NUMBERS = {"hang": 4, "segfault": 7, "abort": 8}
@@ -267,7 +267,7 @@ def test_a_component_that_crashes_or_hangs_while_it_is_loaded_is_named_with_its_
     call: str,
     what: str,
 ) -> None:
-    monkeypatch.setattr(guard, "START_TIME", 5.0 if fault == "hang" else 60.0)
+    monkeypatch.setattr(guard, "START_TIME", 12.0 if fault == "hang" else 60.0)
     monkeypatch.setenv(f"VIBROIMPACT_FAULTY_{when}", str(NUMBERS[fault]))
     with pytest.raises(ComponentError) as failure:
         runner_of("none")

@@ -108,9 +108,6 @@ def test_an_impact_elsewhere_at_the_instant_of_release_keeps_a_body_on_its_stop(
         (99004727, "3000 impacts 1e-15 m within a dashpot's stop: each took energy from nowhere"),
         (66000033, "pressed by a stop that another, nearly parallel, cannot replace"),
         (66000641, "held by what the damping of other modes leaves of their speed"),
-        (32000100, "a jerk of rounding size, carried from a force that is 0: 1000 events"),
-        (32001340, "the same, on four stops"),
-        (32006655, "the same, in the corner of two"),
         (5000528, "let go by two stops at one instant: motions of 1e-19 m"),
     ],
 )

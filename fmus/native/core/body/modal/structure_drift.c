@@ -179,12 +179,9 @@ static void correct_start(const vi_structure *s, const situation *now, int k, do
 static bool divide_by_start(const vi_structure *s, const vi_drift *drift, int k, double clearance[VI_ORDER + 1])
 {
     int first = 2;
-    if (clearance[2] == 0.0) {
-        vi_series_noise noise;
-        vi_series_noise_begin(&noise, s, drift);
-        do {
-            ++first;
-        } while (first <= VI_ORDER && fabs(clearance[first]) <= vi_series_noise_next(&noise, k));
+    while (first <= VI_ORDER && (first == 2 ? clearance[2] == 0.0
+                                            : fabs(clearance[first]) <= vi_structure_series_noise(s, drift, k, first))) {
+        ++first;
     }
     divide(clearance, first);
     return first <= VI_ORDER;
@@ -247,8 +244,7 @@ static void releases(const vi_structure *s, const vi_drift *drift, const situati
     double force[VI_ORDER + 1], size = 0.0;
     memcpy(force, drift->force[k], sizeof force);
     const double thin = now->any_thin ? vi_thin_part(s, drift, now->thin, now->at, k, 0.0, &size) : 0.0;
-    const double scale = drift->force_scale[k] * s->model->compliance[k][k] / vi_structure_mobility_left(s, k);
-    const double noise = VI_ROUNDING * (scale + size);
+    const double noise = VI_ROUNDING * (drift->force_scale[k] + size);
     vi_fall fall = {true, 0.0, 1.0};
     if (fabs(force[0]) <= noise && fabs(thin) <= noise) {
         divide(force, vi_structure_first_of_force(s, drift, k));

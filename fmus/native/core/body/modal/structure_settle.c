@@ -70,8 +70,8 @@ static void decide(const vi_structure *s, int k, double gap, double push)
     const int32_t leaving = s->state->leaving[k];
     const double noise = compliant ? view.free_noise : view.noise;
     const double taken = compliant ? push : push * view.mobility;
+    const bool tie = fabs(gap) <= view.free_noise && taken <= noise;
     const bool nothing = fabs(gap) <= view.free_noise && taken <= LITTLE * noise;
-    const bool tie = nothing && (taken <= noise || view.lead < 0.0); /* a little push that is about to pull is none */
     const bool idle = (nothing || compliant) && vi_structure_is_kept(s, k);
     const bool neither = view.lead == 0.0 && (view.slope == 0.0 ? leaving < 2 : leaving == 0);
     const bool stays = view.lead > 0.0 || (neither && !compliant) || was_held;
