@@ -113,3 +113,24 @@ def test_an_impact_elsewhere_at_the_instant_of_release_keeps_a_body_on_its_stop(
 )
 def test_a_random_body_that_once_failed_does_no_more(seed: int, what: str) -> None:
     assert bodies.check(seed) is None, what
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_stop_beside_one_of_nearly_the_same_shape_changes_the_motion_by_as_little(seed: int) -> None:
+    # together they are as rigid as one, and what each of them takes is known the worse, the more they are alike
+    chance = np.random.default_rng(seed)
+    modes = Modes(
+        [chance.uniform(0.5, 2.0), chance.uniform(3.0, 12.0)],
+        chance.uniform(0.02, 0.3),
+        chance.normal(0.0, 2.0, 2),
+        chance.uniform(0.3, 3.0),
+    )
+    shape, aside = chance.normal(size=2), chance.normal(size=2)
+    with Structure(modes, [Stop(shape, 0.05, restitution=0.3)]) as body:
+        assert body.advance(12.0) == DONE
+        alone = body.displacement
+    for part in (1e-7, 1e-9, 1e-11, 1e-13):
+        stops = [Stop(shape + share * aside, 0.05, restitution=0.3) for share in (0.0, part)]
+        with Structure(modes, stops) as body:
+            assert body.advance(12.0) == DONE
+            assert body.displacement == pytest.approx(alone, rel=0.0, abs=100.0 * part + 1e-12)
