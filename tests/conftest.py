@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,11 @@ from typing import Any
 import hypothesis
 import pytest
 from hypothesis.errors import UnsatisfiedAssumption
+
+# Images of containers often forbid it: then each worker rewrites the assertions of every module of tests, and each
+# process that a test starts compiles the whole package.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 SEED = 4
 """Of every property test, so that a run can be repeated anywhere; `--hypothesis-seed=N` takes another."""
