@@ -30,24 +30,27 @@ OUTPUTS = (
     "contact[1].last_velocity",
     "contact[1].stick_start",
 )
+END = 40.0
 MEGABYTE = 1 << 20
 
-# the other process: the same components, put into the saved states, go on to the end
+# the other process: the same components, put into each of the saved states, go on to the end
 GO_ON = """
 import json, sys
-sys.path.insert(0, {tests!r})
+sys.path[:0] = [{tests!r}, {here!r}]
 from support.coupled_parts import values
 from support.saved_states import deserialize
-from test_saved_states import OUTPUTS, coupled, fused
-kind, version, time, end, *files = json.loads(sys.argv[1])
-importer = {{"fused": fused, "coupled": coupled}}[kind](version)
-importer.begin(time)
-for component, file in zip(importer.components.values(), files, strict=True):
-    slot = deserialize(component.instance, open(file, "rb").read())
-    component.instance.restore(slot)
-    component.instance.free_state(slot)
-importer.advance(end)
-print(json.dumps([v.hex() for v in values(importer, "b", *OUTPUTS)]))
+from test_saved_states import END, OUTPUTS, coupled, fused
+kind, version, *moments = json.loads(sys.argv[1])
+for time, files in moments:
+    importer = {{"fused": fused, "coupled": coupled}}[kind](version)
+    importer.begin(time)
+    for component, file in zip(importer.components.values(), files, strict=True):
+        slot = deserialize(component.instance, open(file, "rb").read())
+        component.instance.restore(slot)
+        component.instance.free_state(slot)
+    importer.advance(END)
+    print(json.dumps([v.hex() for v in values(importer, "b", *OUTPUTS)]))
+    importer.free()
 """
 
 
@@ -76,12 +79,8 @@ def saved(importer: Importer) -> list[bytes]:
 @pytest.mark.parametrize("kind", ["fused", "coupled"])
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_state_goes_on_in_another_process_as_in_its_own(tmp_path: Path, version: str, kind: str) -> None:
-    code = GO_ON.format(tests=str(TESTS)).replace(
-        "from test_saved_states",
-        f"sys.path.insert(0, {str(Path(__file__).parent)!r})\nfrom test_saved_states",
-    )
     importer = {"fused": fused, "coupled": coupled}[kind](version)
-    others, here = [], []
+    moments, here = [], []
     for name, time in MOMENTS.items():
         importer.begin()
         importer.advance(time)
@@ -89,17 +88,17 @@ def test_a_state_goes_on_in_another_process_as_in_its_own(tmp_path: Path, versio
         for i, state in enumerate(saved(importer)):
             files.append(tmp_path / f"{name}{i}")
             files[-1].write_bytes(state)
-        order = json.dumps([kind, version, importer.time, 40.0, *map(str, files)])
-        command = [sys.executable, "-c", code, order]
-        others.append(subprocess.Popen(command, stdout=subprocess.PIPE, text=True))
+        moments.append((importer.time, [*map(str, files)]))
         stuck = importer.components["b"].group("Boolean", ["contact[1].stuck"]).get()[0]
         assert bool(stuck) == (name == "sticking")
-        importer.advance(40.0)
+        importer.advance(END)
         here.append([v.hex() for v in values(importer, "b", *OUTPUTS)])
     importer.free()
-    for process, expected in zip(others, here, strict=True):
-        out, _ = process.communicate(timeout=60)
-        assert json.loads(out) == expected
+    code = GO_ON.format(tests=str(TESTS), here=str(Path(__file__).parent))
+    command = [sys.executable, "-c", code, json.dumps([kind, version, *moments])]
+    there = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert there.returncode == 0, there.stderr
+    assert [*map(json.loads, there.stdout.splitlines())] == here
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -114,7 +113,7 @@ def test_a_damaged_or_foreign_state_is_refused_and_the_instance_lives_on(version
     for wrong in (bytes(damaged), state[:-1], state + b"x", other, b"", b"x" * len(state)):
         with pytest.raises(ComponentError, match="b: fmi"):
             deserialize(owner, wrong)
-    importer.advance(40.0)
+    importer.advance(END)
     importer.free()
 
 
