@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
 from mpmath import mp, mpf
 
 DIGITS = 90  # so that 40 are left where the two exponents (almost) coincide
@@ -128,12 +129,9 @@ def _stays_below(
     wd, (c, s) = math.sqrt(1.0 - zeta * zeta), steady
     x = stop - c * math.cos(phase) - s * math.sin(phase)
     v = -r * velocity - w * (s * math.cos(phase) - c * math.sin(phase))
-    for i in range(1, 2000):
-        u = i / 2000 * 2.0 * math.pi / w
-        e_sin = math.exp(-zeta * u) * math.sin(wd * u) / wd
-        e_cos = math.exp(-zeta * u) * math.cos(wd * u)
-        now = (e_cos + zeta * e_sin) * x + e_sin * v
-        now += c * math.cos(phase + w * u) + s * math.sin(phase + w * u)
-        if now >= stop:
-            return False
-    return True
+    u = np.arange(1, 2000) / 2000 * 2.0 * math.pi / w
+    e_sin = np.exp(-zeta * u) * np.sin(wd * u) / wd
+    e_cos = np.exp(-zeta * u) * np.cos(wd * u)
+    now = (e_cos + zeta * e_sin) * x + e_sin * v
+    now += c * np.cos(phase + w * u) + s * np.sin(phase + w * u)
+    return bool((now < stop).all())
