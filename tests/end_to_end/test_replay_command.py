@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from support.command_line import in_this_process
 from support.replay_scenes import BOARD, channel, pulse, written
 
 from vibroimpact.analysis import open_dataset
@@ -16,11 +15,6 @@ from vibroimpact.orchestrator.replay import opened_replays
 from vibroimpact.orchestrator.scene import parse_scene
 
 TIME = 2e-5 * np.arange(900)
-
-
-def vibroimpact(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "vibroimpact.orchestrator.commands.cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +37,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_replay_fits_scores_draws_and_gives_its_verdict(folder: Path) -> None:
-    done = vibroimpact(
+    done = in_this_process(
         *("replay", folder / "board.toml", folder / "one.nc", "-o", folder / "fit.nc"),
         *(
             "--figure",
@@ -64,7 +58,7 @@ def test_replay_fits_scores_draws_and_gives_its_verdict(folder: Path) -> None:
         assert found.use.values.tolist() == ["fitted", "scored"]
         assert (found.variance_accounted_for.values > 99.9).all()
     assert (folder / "fit.png").read_bytes().startswith(b"\x89PNG")
-    drawn = vibroimpact("plot", folder / "fit.nc", "-o", folder / "again.png")
+    drawn = in_this_process("plot", folder / "fit.nc", "-o", folder / "again.png")
     assert drawn.returncode == 0, drawn.stderr
 
 
@@ -81,7 +75,7 @@ def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(fol
         "--workers",
         "1",
     )
-    done = vibroimpact(*command)
+    done = in_this_process(*command)
     assert done.returncode == 0, done.stderr
     with open_dataset(folder / "campaign") as found:
         scores = found.variance_accounted_for.sel(compared="beam.sensor.acceleration ~ board")
@@ -89,7 +83,7 @@ def test_a_campaign_of_replays_runs_over_recordings_and_the_grid_and_resumes(fol
         assert best.sel(recording=1).item() == best.sel(recording=2).item() == 812.0
         assert scores.sizes == {"frequency": 3, "recording": 2}
         assert (scores.sel(frequency=812.0) > 99.9).all()
-    again = vibroimpact(*command)
+    again = in_this_process(*command)
     assert "Nothing to do: all 6 points" in again.stdout
 
 
@@ -111,7 +105,7 @@ def test_misuse_is_one_line_exit_code_2_and_no_file(
     folder: Path, arguments: tuple[str, ...], told: str
 ) -> None:
     given = [folder / text if text.endswith(".nc") else text for text in arguments]
-    done = vibroimpact("replay", folder / "board.toml", *given)
+    done = in_this_process("replay", folder / "board.toml", *given)
     assert done.returncode == 2
     assert told in done.stderr
     assert "Traceback" not in done.stderr
@@ -119,6 +113,6 @@ def test_misuse_is_one_line_exit_code_2_and_no_file(
 
 
 def test_run_of_a_replay_scene_needs_recordings_in_it(folder: Path) -> None:
-    done = vibroimpact("run", folder / "board.toml", "-o", folder / "x.nc")
+    done = in_this_process("run", folder / "board.toml", "-o", folder / "x.nc")
     assert done.returncode == 2
     assert "replay.recordings: expected a recording, got none" in done.stderr
