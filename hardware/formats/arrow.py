@@ -110,7 +110,7 @@ def _column(name: str, values: Any) -> Column:
     if pa.types.is_timestamp(values.type):
         per_second = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[values.type.unit]
         stamps = values.cast(pa.int64())
-        first = next((one for one in stamps.drop_null()[:1].to_pylist()), 0)
+        first = next(iter(stamps.drop_null()[:1].to_pylist()), 0)
         later = pyarrow.compute.subtract(stamps, first).to_numpy()
         return Column(label or name, later / per_second, "s", dated=True)
     if pa.types.is_boolean(values.type):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import zip_longest
 from typing import Any
 
@@ -183,19 +182,16 @@ def _read_column(cells: Sequence[str], decimal: str) -> Column:
     if is_date(first):
         return _read_dates(cells)
     strange: list[tuple[int, str]] = []
-    marked = np.zeros(length, dtype=bool)
     values = np.full(length, np.nan)
     for row, cell in enumerate(cells):
         text = _with_point(cell.strip(), decimal)
         if _NUMBER.fullmatch(text):
             values[row] = float(text.replace("d", "e").replace("D", "e"))
         elif text.lower() in OVERRANGE_WORDS:
-            marked[row] = True
+            values[row] = np.inf
         elif not is_marker(cell):
             strange.append((row, cell.strip()[:_LONGEST_QUOTE]))
-    column = column_of("", values, strange=strange)
-    overrange = marked if column.overrange is None else marked | column.overrange
-    return replace(column, overrange=overrange if np.any(overrange) else None)
+    return column_of("", values, strange=strange)
 
 
 def _read_dates(cells: Sequence[str]) -> Column:

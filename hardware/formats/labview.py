@@ -158,8 +158,7 @@ def _is_row(line: str, separator: str, decimal: str) -> bool:
 
 
 def _earliest(header: Header) -> np.datetime64 | None:
-    stamps = [stamp for stamp in _stamps(header) if stamp is not None]
-    return min(stamps) if stamps else None
+    return min((stamp for stamp in _stamps(header) if stamp is not None), default=None)
 
 
 def _seconds_between(first: np.datetime64 | None, later: np.datetime64 | None) -> float:
@@ -218,11 +217,11 @@ def _later(time: Column, late: float) -> Column:
 
 def _without_false_units(columns: list[Column], told: list[str]) -> list[Column]:
     """Take away a unit of time that the header gives to every channel: it is that of the instants."""
-    units = {column.unit for column in columns}
-    if len(columns) < 2 or len(units) > 1 or seconds_in(units.copy().pop()) is None:
+    unit = columns[0].unit if columns else ""
+    if len(columns) < 2 or any(column.unit != unit for column in columns) or seconds_in(unit) is None:
         return columns
-    told.append(f"the header gives every channel the unit {units.pop()}, which is that of time: not believed")
-    return [replace(column, unit="") if not is_time_name(column.label) else column for column in columns]
+    told.append(f"the header gives every channel the unit {unit}, which is that of time: not believed")
+    return [column if is_time_name(column.label) else replace(column, unit="") for column in columns]
 
 
 def _paired_tables(columns: Sequence[Column], header: Header, late: float, title: str) -> list[Table]:

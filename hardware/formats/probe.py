@@ -19,7 +19,7 @@ class UnreadableError(DatasetError):
 
 
 def check_reads(path: os.PathLike[str] | str, reading: LibraryRead) -> None:
-    """Refuse a file that does not read; see `analysis.probing`.
+    """Refuse a file that does not read; see `analysis.files.probing`.
 
     Parameters
     ----------

@@ -25,20 +25,12 @@ from vibroimpact.hardware.formats.labels import is_known_unit, is_time_name, sec
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, Column, RawFile, Table
 
 _COMMENTS = ("#", "%", "//", "!")
-_DELIMITERS: tuple[str | None, ...] = ("\t", ";", ",", "|", None)
 _QUOTED = re.compile(r'"([^"]{1,60})"')
-FIRST = "column_1"
+_FIRST = "column_1"
 _LINES_TRIED = 60
 _LONGEST_HEADER = 1000
 _MOST_STRANGE = 0.01
-_NAMES = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", None: "blanks"}
-WORDS_FOR_DELIMITERS: dict[str, str | None] = {
-    "tab": "\t",
-    "semicolon": ";",
-    "comma": ",",
-    "bar": "|",
-    "blank": None,
-}
+DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "bar": "|", "blank": None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,15 +86,15 @@ def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> Ra
         raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got {len(cells)}. Is it turned over?")
     labels, units, late = _all_headings(lines[:first], rows, len(cells), dialect.delimiter)
     columns, told = columns_of(cells, labels, units)
-    told = late + told
-    written = f"text, cells between {_NAMES.get(dialect.delimiter, repr(dialect.delimiter))}"
+    names = {mark: f"{word}s" for word, mark in DELIMITERS.items()}
+    written = f"text, cells between {names.get(dialect.delimiter, repr(dialect.delimiter))}"
     comma = ", decimal comma" if dialect.decimal == "," else ""
     table = with_time(Table([column for column in columns if len(column.values)]))
-    if table.time is not None and table.time.label == FIRST:
+    if table.time is not None and table.time.label == _FIRST:
         told.append(
             f"the first column has no heading and ascends: it is taken as the instants ({option('time_column')})"
         )
-    return RawFile(written + comma, [table], remarks + told)
+    return RawFile(written + comma, [table], remarks + late + told)
 
 
 def _is_plain(line: str) -> bool:
@@ -119,7 +111,7 @@ def find_dialect(
     """
     tried = _tried_lines(lines)
     _refuse_thousands(tried)
-    delimiters = _DELIMITERS if delimiter == "" else (delimiter,)
+    delimiters = DELIMITERS.values() if delimiter == "" else (delimiter,)
     signs = (".", ",") if not decimal else (decimal,)
     tries = [Dialect(mark, sign) for sign in signs for mark in delimiters if mark != sign]
     best, (count, width) = _best_of(tries, tried)
@@ -320,7 +312,7 @@ def with_time(table: Table) -> Table:
     for place, column in enumerate(table.columns):
         if column.dated or is_time_name(column.label) or _is_time_by_unit(column, place):
             return _apart(table, place)
-    if len(table.columns) > 1 and table.columns[0].label == FIRST and _ascends(table.columns[0]):
+    if len(table.columns) > 1 and table.columns[0].label == _FIRST and _ascends(table.columns[0]):
         return _apart(table, 0)
     return table
 

@@ -13,7 +13,7 @@ import numpy as np
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.hardware.formats.choosing import read_raw
 from vibroimpact.hardware.formats.table import RawFile
-from vibroimpact.hardware.formats.text import WORDS_FOR_DELIMITERS
+from vibroimpact.hardware.formats.text import DELIMITERS
 from vibroimpact.hardware.recordings.columns import chosen_tables
 from vibroimpact.hardware.recordings.segments import joined, split_at_restarts
 from vibroimpact.hardware.recordings.settings import ImportSettings, settings_beside
@@ -65,7 +65,7 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     own = settings_beside(path) if common is None else common
     own = own.model_copy(update={key: getattr(given, key) for key in given.model_fields_set - _PER_COLUMN})
     with naming(path):
-        delimiter = "" if own.delimiter is None else WORDS_FOR_DELIMITERS[own.delimiter]
+        delimiter = "" if own.delimiter is None else DELIMITERS[own.delimiter]
         raw = read_raw(path, delimiter, own.decimal or "")
         chosen, counted, date = counted_from_start(chosen_tables(raw, own))
         tables, remarks = joined(chosen)
