@@ -52,7 +52,7 @@ def read_arrow(path: os.PathLike[str] | str) -> RawFile:
 
 
 def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
-    """Return the columns of numbers and dates, where they are not too many, and what is said of the others."""
+    """Return the columns of numbers and dates, where they are not too many, and remarks on the others."""
     import pyarrow.ipc
     import pyarrow.parquet
 
@@ -77,7 +77,7 @@ def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
 
 
 def _chosen(schema: Any) -> tuple[list[str], list[str]]:
-    """Return the columns of numbers and dates by name, and what is said of the others."""
+    """Return the columns of numbers and dates by name, and remarks on the others."""
     from pyarrow import types
 
     names, remarks = [], []

@@ -111,20 +111,9 @@ def split_line(line: str, delimiter: str | None) -> list[str]:
 
 
 def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str) -> list[Column]:
-    """Read lines of cells, column by column.
+    """Return the columns of rows of cells, without labels, each up to its last cell that is not empty.
 
-    Parameters
-    ----------
-    lines : sequence of str
-        Rows, without header.
-    delimiter : str or None
-        Between cells; None: blanks.
-    decimal : {".", ","}
-
-    Returns
-    -------
-    list of Column
-        Without labels, each up to its last cell that is not empty.
+    Cells are separated by the delimiter, by blanks where it is None.
     """
     quick = _read_regular(lines, delimiter, decimal)
     if quick is not None:
@@ -153,13 +142,7 @@ def _read_regular(lines: Sequence[str], delimiter: str | None, decimal: str) -> 
 def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Column:
     """Return a column of numbers in which those that stand for overrange, or for no sample, are NaN.
 
-    Parameters
-    ----------
-    label : str
-    values : ndarray of float, shape (row,)
-    unit : str
-    **facts
-        What else is known of the column, by the names of its attributes.
+    `facts` is what else is known of the column, by the names of its attributes.
 
     Examples
     --------

@@ -85,14 +85,7 @@ def holds_recording(path: Path) -> bool:
 
 
 def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFile:
-    """Read a file of any format known here.
-
-    Parameters
-    ----------
-    path : Path
-        One that `check_file` has passed.
-    delimiter, decimal : str
-        For tables of text, as `text.read_text` takes them.
+    """Read a file of any format known here, one that `check_file` has passed; the rest is for `text.read_text`.
 
     Raises
     ------
@@ -133,7 +126,7 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFi
 
 
 def _decoded(content: bytes) -> tuple[str, list[str]]:
-    """Return the text of a file, and what is to be said of its encoding."""
+    """Return the text of a file, and remarks on its encoding."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         try:
             return content.decode("utf-16"), []

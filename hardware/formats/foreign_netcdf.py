@@ -38,7 +38,7 @@ def read_foreign_netcdf(path: os.PathLike[str] | str) -> RawFile:
     return _sorted_out(variables)
 
 
-#: Name and dimension of a variable, its column where it is numeric and of one dimension, and what is to be said of it.
+#: Name and dimension of a variable, its column where it is numeric and of one dimension, and the remark on it.
 _Variable = tuple[str, str, Column | None, str]
 
 

@@ -52,11 +52,7 @@ def is_netcdf4(path: os.PathLike[str] | str) -> bool:
 def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
     """Read the numeric datasets of an HDF5 file by the dotted names of their groups.
 
-    Parameters
-    ----------
-    path : path
-    matlab : bool
-        It is a MATLAB file of version 7.3: dimensions are the other way round, groups are structures.
+    In a MATLAB file of version 7.3 the dimensions are the other way round, and groups are structures.
 
     Raises
     ------
@@ -73,8 +69,8 @@ def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
     scopes = [Scope()]
     with one_refusal(f"{what} that is whole"), h5py.File(path, "r") as file:
         _read_group(file, scopes[0], scopes, remarks, matlab)
-    tables, told = tables_of(scopes)
-    return RawFile("MATLAB 7.3" if matlab else "HDF5", tables, remarks + told)
+    tables, more = tables_of(scopes)
+    return RawFile("MATLAB 7.3" if matlab else "HDF5", tables, remarks + more)
 
 
 def _read_group(group: Any, scope: Scope, scopes: list[Scope], remarks: list[str], matlab: bool) -> None:
