@@ -6,7 +6,7 @@ import os
 import time
 
 FileState = tuple[int, ...]
-#: Age of a change from which on the next one cannot bear the same time, ns.
+#: Age of a change, ns, above which the next one bears another time: clocks of file systems are coarse.
 SETTLED = 2_000_000_000
 
 
@@ -16,5 +16,5 @@ def file_state(status: os.stat_result) -> FileState:
 
 
 def is_settled(state: FileState) -> bool:
-    """Return whether any later change shows in the state: clocks of file systems are coarse."""
+    """Return whether any later change shows in the state."""
     return time.time_ns() - max(state[3:]) > SETTLED

@@ -9,25 +9,20 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 _ROUNDING = 1e-9
-"""Relative errors below this are not of the data, but of the arithmetic."""
+"""Relative standard error below which it is rounding of the arithmetic, and says nothing of the data."""
 _MOST_PLACES = 12
-"""Behind the point; smaller errors are written with an exponent."""
+"""Places behind the point; smaller errors are written with an exponent."""
 _LARGE = 1e7
-"""Errors of this size and above are written with an exponent."""
+"""Standard error from which on it is written with an exponent."""
 _SMALL = 1e-4
-"""Values below this are written with an exponent."""
+"""Value below which it is written with an exponent."""
 
 
 def table(title: str, *headings: str, rows: Iterable[Iterable[str]] = ()) -> Table:
     """Return a table.
 
-    Parameters
-    ----------
-    title : str
-    *headings : str
-        Each behind `<` for words, which go on in the next line where the terminal is narrow, or `>` for numbers, which
-        do not.
-    rows : iterable of rows of cells, optional
+    A heading begins with `<` for words, which go on in the next line where the terminal is narrow, or with `>` for
+    numbers, which do not.
     """
     made = Table(title=title, box=SIMPLE_HEAD, title_justify="left")
     for heading in headings:
@@ -68,5 +63,6 @@ def with_error(value: float, error: float, unit: str = "") -> str:
     >>> with_error(0.87483, 0.0062), with_error(2.5, float("nan"), "Hz")
     ('0.8748 ± 0.0062', '2.5 Hz')
     """
-    shown, doubt = value_and_error(value, error)
-    return " ".join(part for part in (shown if doubt == "-" else f"{shown} ± {doubt}", unit) if part)
+    number, standard_error = value_and_error(value, error)
+    written = number if standard_error == "-" else f"{number} ± {standard_error}"
+    return f"{written} {unit}" if unit else written

@@ -20,14 +20,10 @@ class UnsafeFolderError(Exception):
     """Somebody else owns a folder or may write it; its text says who, and what to do."""
 
 
-def cache_folder() -> Path:
-    """Return where FMUs are unpacked: `$VIBROIMPACT_CACHE`, else the user's cache folder of the system."""
-    chosen = os.environ.get(CACHE_VARIABLE)
-    return Path(chosen) if chosen else platformdirs.user_cache_path("vibroimpact")
-
-
 def private_folder(name: str) -> Path:
     """Return a folder in the cache that only this user can write; it is made where it is not there.
+
+    The cache is `$VIBROIMPACT_CACHE`, else the user's cache folder of the system.
 
     Raises
     ------
@@ -36,7 +32,8 @@ def private_folder(name: str) -> Path:
     OSError
         It cannot be made.
     """
-    root, chosen = cache_folder(), bool(os.environ.get(CACHE_VARIABLE))
+    chosen = os.environ.get(CACHE_VARIABLE)
+    root = Path(chosen) if chosen else platformdirs.user_cache_path("vibroimpact")
     root.mkdir(mode=0o700, parents=True, exist_ok=True)
     folder = root / name
     folder.mkdir(mode=0o700, exist_ok=True)

@@ -10,16 +10,9 @@ from vibroimpact.fmus.errors import ComponentFileError
 
 
 def root_of(content: bytes, where: str) -> Element:
-    """Parse a document and return its root.
+    """Parse a document and return its root; messages begin with `where`.
 
     The parser itself reports declarations, so they are found in every encoding it reads.
-
-    Parameters
-    ----------
-    content : bytes
-        The document.
-    where : str
-        Its name, for messages.
 
     Raises
     ------

@@ -219,10 +219,12 @@ def _quotient(
 
 
 def _product(text: str) -> Unit | None:
-    product: Unit | None = Unit()
+    product = Unit()
     for written in text.split("."):
         factor = _factor(written)
-        product = None if product is None or factor is None else _combined(product, factor, 1)
+        if factor is None:
+            return None
+        product = _combined(product, factor, 1)
     return product
 
 

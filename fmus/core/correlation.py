@@ -100,7 +100,7 @@ def near_pairs(
 
 
 def _tables(values: Array, radii: Array, embedding: int, first: int, step: int) -> NDArray[np.uint64]:
-    """Return pairs by the classes of their distances in two successive embeddings, for every other lag or so."""
+    """Return pairs by the classes of their distances in two successive embeddings, for every `step`-th lag."""
     library = core_library()
     library.vi_door_correlation_padding.restype = ctypes.c_size_t
     library.vi_door_correlation_tables.restype = ctypes.c_size_t

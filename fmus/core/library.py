@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from functools import lru_cache
-from importlib.resources import files
-from pathlib import Path
+from functools import cache
 
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.fmus.shipped import package_folder
 
 
-@lru_cache(maxsize=1)
+@cache
 def core_library() -> ctypes.CDLL:
     """Return the shared library of the core.
 
@@ -21,12 +20,11 @@ def core_library() -> ctypes.CDLL:
         It is not built.
     """
     suffix = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-    path = Path(str(files("vibroimpact.fmus"))) / "built" / f"libvibroimpact_core{suffix}"
+    path = package_folder() / "built" / f"libvibroimpact_core{suffix}"
     try:
-        library = ctypes.CDLL(str(path))
+        return ctypes.CDLL(str(path))
     except OSError as error:
         raise ComponentError(
             f"{path.name}: expected the built core library, got: {error}. "
             "Run `python -m vibroimpact.fmus.packaging.build`."
         ) from error
-    return library

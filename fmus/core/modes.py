@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from typing import Literal, get_args
 
 import numpy as np
@@ -122,7 +122,7 @@ def beam_modes(boundary: Boundary, count: int) -> BeamModes:
     return BeamModes(boundary, eigenvalues, participation)
 
 
-@lru_cache(maxsize=1)
+@cache
 def _library() -> ctypes.CDLL:
     library = core_library()
     numbers = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,7 +57,7 @@ class Contact:
     velocity: float
 
 
-@lru_cache(maxsize=1)
+@cache
 def _library() -> ctypes.CDLL:
     library = core_library()
     pair, number = ctypes.POINTER(ctypes.c_double), ctypes.c_double
@@ -91,8 +91,6 @@ def flow(
 
     Parameters
     ----------
-    oscillator : Oscillator
-        The oscillator.
     state : tuple of float
         Displacement (m) and velocity (m/s) now.
     duration : float

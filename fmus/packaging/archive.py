@@ -58,7 +58,6 @@ DAMAGE = (
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError),
     *(ValueError, RuntimeError, MemoryError),
 )
-_DAMAGED = "expected an intact FMU, got a damaged one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,22 +104,11 @@ def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
     since: what is loaded is what `sha256` names. Safe with any number of processes at once: each unpacks into a
     folder of its own, and the first to rename it into place wins.
 
-    Parameters
-    ----------
-    path : Path
-        The FMU file.
-    limit : int
-        Most bytes that it may expand to.
-
-    Returns
-    -------
-    UnpackedFmu
-        Where it is and what its description's head says.
-
     Raises
     ------
     ComponentFileError
-        It is missing, no zip, unsafe, too large, or its description is not one of FMI 2.0 or 3.0.
+        It is missing, no zip, unsafe, of more than `limit` bytes when unpacked, or its description is not one of FMI
+        2.0 or 3.0.
     """
     path = Path(path)
     with _opened(path) as file, _archive(path, file) as archive:
@@ -229,8 +217,11 @@ def _shown(member: zipfile.ZipInfo) -> str:
 
 def _cut(text: object) -> str:
     """Return what stands in a file as messages show it."""
-    shown = repr(text)
-    return shown if len(shown) <= LONGEST_NAME else shown[:LONGEST_NAME] + "..."
+    return _shortened(repr(text), LONGEST_NAME)
+
+
+def _shortened(text: str, longest: int) -> str:
+    return text if len(text) <= longest else text[:longest] + "..."
 
 
 def _problems(member: zipfile.ZipInfo) -> Iterator[str]:
@@ -351,9 +342,8 @@ def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo
 
 def _damaged(path: Path, error: Exception) -> ComponentFileError:
     """Return the refusal of an archive that a library finds damaged; its reason may quote names of any length."""
-    reason = str(error)
-    shown = reason if len(reason) <= LONGEST_REASON else reason[:LONGEST_REASON] + "..."
-    return ComponentFileError(f"{path}: {_DAMAGED}: {shown}.")
+    reason = _shortened(str(error), LONGEST_REASON)
+    return ComponentFileError(f"{path}: expected an intact FMU, got a damaged one: {reason}.")
 
 
 def _check_xml(path: Path, folder: Path) -> None:

@@ -28,17 +28,9 @@ SYSTEM_OF_PREFIX = {prefix: system for system, prefix in FMI2_SYSTEMS.items()}
 
 
 def check_fmu(path: Path) -> tuple[str, ...]:
-    """Return everything that is wrong with an FMU; empty if nothing is.
+    """Return everything that is wrong with an FMU, one line each; empty if nothing is.
 
-    Parameters
-    ----------
-    path : Path
-        The FMU file. Its code is run, in a process of its own: a crash there is one more problem here.
-
-    Returns
-    -------
-    tuple of str
-        The problems, one line each.
+    Its code is run, in a process of its own: a crash there is one more problem here.
     """
     try:
         fmu = unpack(path)

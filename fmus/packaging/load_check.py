@@ -82,12 +82,11 @@ def required_functions(fmi_version: str, interface: str) -> list[str]:
 
 
 def _opens(library: CDLL, facts: dict[str, Any], token: str) -> bool:
-    instantiate = _instantiate3 if facts["fmi_version"].startswith("3") else _instantiate2
-    free_name = "fmi3FreeInstance" if facts["fmi_version"].startswith("3") else "fmi2FreeInstance"
-    instance = instantiate(library, facts, token.encode())
+    major = facts["fmi_version"][0]
+    instance = (_instantiate3 if major == "3" else _instantiate2)(library, facts, token.encode())
     if not instance:
         return False
-    free = library[free_name]
+    free = library[f"fmi{major}FreeInstance"]
     free.argtypes, free.restype = [c_void_p], None
     free(instance)
     return True

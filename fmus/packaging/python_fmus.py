@@ -188,20 +188,20 @@ def _add_units(root: ElementTree.Element, units: Mapping[str, Unit]) -> None:
 
 
 def _add_dependencies(root: ElementTree.Element) -> None:
-    variables = list(root.iter("ScalarVariable"))
-    inputs = [str(index) for index, v in enumerate(variables, 1) if v.get("causality") == "input"]
-    given = [
-        str(index) for index, v in enumerate(variables, 1) if v.get("causality") in ("input", "parameter")
-    ]
+    def indices(*causalities: str) -> str:
+        variables = enumerate(root.iter("ScalarVariable"), 1)
+        return " ".join(str(index) for index, v in variables if v.get("causality") in causalities)
+
+    inputs, given = indices("input"), indices("input", "parameter")
     structure = root.find("ModelStructure")
     outputs = root.find("ModelStructure/Outputs")
     if structure is None or outputs is None:
         raise ComponentFileError(f"{DESCRIPTION}: expected outputs, got none from pythonfmu.")
     initial = ElementTree.SubElement(structure, "InitialUnknowns")
     for unknown in outputs:
-        unknown.set("dependencies", " ".join(inputs))
+        unknown.set("dependencies", inputs)
         # at the start of a run they follow from the parameters too
-        ElementTree.SubElement(initial, "Unknown", {**unknown.attrib, "dependencies": " ".join(given)})
+        ElementTree.SubElement(initial, "Unknown", {**unknown.attrib, "dependencies": given})
 
 
 def _token(members: Mapping[str, bytes], root: ElementTree.Element) -> str:

@@ -28,7 +28,7 @@ TIME_SHIFT = "time_shift"
 MOST_CHANNELS = 256
 #: Most samples of all channels and time axes together: 512 MiB, half of what an FMU may unpack to.
 MOST_SAMPLES = 1 << 26
-#: Ascending times are taken for evenly spaced where none is off by more than this part of the interval.
+#: Largest deviation of evenly spaced times from their grid, in intervals.
 EVEN = 1e-6
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,99}", re.ASCII)
 

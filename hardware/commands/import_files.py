@@ -53,9 +53,8 @@ def span(text: str, option: str) -> list[float]:
     UsageError
         The text is not START:END.
     """
-    parts = text.split(":")
     try:
-        begin, end = (float(part) for part in parts)
+        begin, end = map(float, text.split(":"))
     except ValueError:
         raise UsageError(
             f"--{option}: expected START:END in s, got {text[:60]!r}. For example 0:30."

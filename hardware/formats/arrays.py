@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -46,11 +46,17 @@ class Scope:
 
     def within(self, name: str) -> Scope:
         """Return a structure of this name that lies in this one."""
-        return Scope(f"{self.path}.{name}" if self.path else name, around=self)
+        return Scope(self.dotted(name), around=self)
 
     def dotted(self, name: str) -> str:
         """Return the whole name of an array."""
         return f"{self.path}.{name}" if self.path else name
+
+    def outward(self) -> Iterator[Scope]:
+        """Yield this structure and those that it lies in, the nearest first."""
+        yield self
+        if self.around is not None:
+            yield from self.around.outward()
 
 
 def tables_of(scopes: Sequence[Scope]) -> tuple[list[Table], list[str]]:
@@ -76,8 +82,9 @@ def tables_of(scopes: Sequence[Scope]) -> tuple[list[Table], list[str]]:
         elif time is not None:
             clocks[scope.path] = time
         if columns:
-            clock = _inherited(scope, clocks)
-            tables.append(Table(columns, clock, vectors=True, rate=_rate_of(scope)))
+            clock = next((clocks[one.path] for one in scope.outward() if one.path in clocks), None)
+            rate = next((one.rate for one in scope.outward() if one.rate is not None), None)
+            tables.append(Table(columns, clock, vectors=True, rate=rate))
     if sum(len(table.columns) for table in tables) > MOST_COLUMNS:
         raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got more. Save fewer variables.")
     return tables, remarks
@@ -103,23 +110,6 @@ def _columns_of(scope: Scope, remarks: list[str]) -> tuple[list[Column], Column 
         else:
             columns += _columns(label, values, unit, remarks)
     return columns, time
-
-
-def _inherited(scope: Scope, clocks: Mapping[str, Column]) -> Column | None:
-    """Return the instants of a structure, or of the nearest one around it that has some."""
-    nearest: Scope | None = scope
-    while nearest is not None:
-        if nearest.path in clocks:
-            return clocks[nearest.path]
-        nearest = nearest.around
-    return None
-
-
-def _rate_of(scope: Scope) -> float | None:
-    nearest: Scope | None = scope
-    while nearest is not None and nearest.rate is None:
-        nearest = nearest.around
-    return None if nearest is None else nearest.rate
 
 
 def _columns(label: str, values: Any, unit: str, remarks: list[str]) -> list[Column]:

@@ -52,7 +52,7 @@ def read_arrow(path: os.PathLike[str] | str) -> RawFile:
 
 
 def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
-    """Return the columns of numbers and dates, where they are not too many, and what is said of the others."""
+    """Return the columns of numbers and dates, where they are not too many, and remarks on the others."""
     import pyarrow.ipc
     import pyarrow.parquet
 
@@ -77,7 +77,7 @@ def _table_of(path: os.PathLike[str] | str, kind: str) -> tuple[Any, list[str]]:
 
 
 def _chosen(schema: Any) -> tuple[list[str], list[str]]:
-    """Return the columns of numbers and dates by name, and what is said of the others."""
+    """Return the columns of numbers and dates by name, and remarks on the others."""
     from pyarrow import types
 
     names, remarks = [], []
@@ -110,7 +110,7 @@ def _column(name: str, values: Any) -> Column:
     if pa.types.is_timestamp(values.type):
         per_second = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}[values.type.unit]
         stamps = values.cast(pa.int64())
-        first = next((one for one in stamps.drop_null()[:1].to_pylist()), 0)
+        first = next(iter(stamps.drop_null()[:1].to_pylist()), 0)
         later = pyarrow.compute.subtract(stamps, first).to_numpy()
         return Column(label or name, later / per_second, "s", dated=True)
     if pa.types.is_boolean(values.type):

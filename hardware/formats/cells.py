@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import zip_longest
 from typing import Any
 
@@ -112,20 +111,9 @@ def split_line(line: str, delimiter: str | None) -> list[str]:
 
 
 def read_cells(lines: Sequence[str], delimiter: str | None, decimal: str) -> list[Column]:
-    """Read lines of cells, column by column.
+    """Return the columns of rows of cells, without labels, each up to its last cell that is not empty.
 
-    Parameters
-    ----------
-    lines : sequence of str
-        Rows, without header.
-    delimiter : str or None
-        Between cells; None: blanks.
-    decimal : {".", ","}
-
-    Returns
-    -------
-    list of Column
-        Without labels, each up to its last cell that is not empty.
+    Cells are separated by the delimiter, by blanks where it is None.
     """
     quick = _read_regular(lines, delimiter, decimal)
     if quick is not None:
@@ -154,13 +142,7 @@ def _read_regular(lines: Sequence[str], delimiter: str | None, decimal: str) -> 
 def column_of(label: str, values: Floats, unit: str = "", **facts: Any) -> Column:
     """Return a column of numbers in which those that stand for overrange, or for no sample, are NaN.
 
-    Parameters
-    ----------
-    label : str
-    values : ndarray of float, shape (row,)
-    unit : str
-    **facts
-        What else is known of the column, by the names of its attributes.
+    `facts` is what else is known of the column, by the names of its attributes.
 
     Examples
     --------
@@ -183,19 +165,16 @@ def _read_column(cells: Sequence[str], decimal: str) -> Column:
     if is_date(first):
         return _read_dates(cells)
     strange: list[tuple[int, str]] = []
-    marked = np.zeros(length, dtype=bool)
     values = np.full(length, np.nan)
     for row, cell in enumerate(cells):
         text = _with_point(cell.strip(), decimal)
         if _NUMBER.fullmatch(text):
             values[row] = float(text.replace("d", "e").replace("D", "e"))
         elif text.lower() in OVERRANGE_WORDS:
-            marked[row] = True
+            values[row] = np.inf
         elif not is_marker(cell):
             strange.append((row, cell.strip()[:_LONGEST_QUOTE]))
-    column = column_of("", values, strange=strange)
-    overrange = marked if column.overrange is None else marked | column.overrange
-    return replace(column, overrange=overrange if np.any(overrange) else None)
+    return column_of("", values, strange=strange)
 
 
 def _read_dates(cells: Sequence[str]) -> Column:

@@ -6,17 +6,18 @@ import stat
 from dataclasses import replace
 from pathlib import Path
 
+from vibroimpact.analysis.files.probing import NETCDF
 from vibroimpact.analysis.recording import is_recording
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.hardware.formats.arrow import SIGNATURES as ARROW
 from vibroimpact.hardware.formats.arrow import read_arrow
-from vibroimpact.hardware.formats.foreign_netcdf import check_netcdf4, read_foreign_netcdf
+from vibroimpact.hardware.formats.foreign_netcdf import read_foreign_netcdf
 from vibroimpact.hardware.formats.hdf5 import SIGNATURE as HDF5
 from vibroimpact.hardware.formats.hdf5 import is_h5py_there, is_netcdf4, read_hdf5
 from vibroimpact.hardware.formats.labview import SIGNATURE, read_labview
 from vibroimpact.hardware.formats.mat import read_mat
-from vibroimpact.hardware.formats.probe import UnreadableError, missing_extra
+from vibroimpact.hardware.formats.probe import UnreadableError, check_reads, missing_extra
 from vibroimpact.hardware.formats.table import LARGEST_FILE, RawFile
 from vibroimpact.hardware.formats.tdms import read_tdms
 from vibroimpact.hardware.formats.text import read_text
@@ -75,7 +76,7 @@ def holds_recording(path: Path) -> bool:
         if file.read(len(HDF5)) != HDF5:
             return False
     try:
-        check_netcdf4(path)
+        check_reads(path, NETCDF)
     except UnreadableError as problem:
         if problem.raised and is_h5py_there():
             return False  # HDF5 that is no NetCDF
@@ -84,14 +85,7 @@ def holds_recording(path: Path) -> bool:
 
 
 def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFile:
-    """Read a file of any format known here.
-
-    Parameters
-    ----------
-    path : Path
-        One that `check_file` has passed.
-    delimiter, decimal : str
-        For tables of text, as `text.read_text` takes them.
+    """Read a file of any format known here, one that `check_file` has passed; the rest is for `text.read_text`.
 
     Raises
     ------
@@ -132,7 +126,7 @@ def read_raw(path: Path, delimiter: str | None = "", decimal: str = "") -> RawFi
 
 
 def _decoded(content: bytes) -> tuple[str, list[str]]:
-    """Return the text of a file, and what is to be said of its encoding."""
+    """Return the text of a file, and remarks on its encoding."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         try:
             return content.decode("utf-16"), []

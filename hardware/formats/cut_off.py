@@ -23,21 +23,13 @@ _EXPONENT = re.compile(r"\d[eEdD][-+]?\d", re.ASCII)
 def without_cut_cells(
     rows: Sequence[str], content: str, delimiter: str | None, decimal: str
 ) -> tuple[list[str], list[str]]:
-    """Return the rows of a table without what was cut off, and what is to be said of it.
+    """Return the rows of a table without what was cut off, and remarks on it.
 
     Where the text has no final line break, its last cell counts as missing if it is not written as all cells
     above it, or, where those differ from each other, if it is shorter than all of them or in a row that lacks cells; so
     do the cells that the row has less than the one before. A row of which nothing else is left is dropped.
 
-    Parameters
-    ----------
-    rows : sequence of str
-        The last rows of the text.
-    content : str
-        The whole text.
-    delimiter : str or None
-        Between cells; None: blanks.
-    decimal : {".", ","}
+    The rows are the last ones of the text `content`; cells are separated by the delimiter, by blanks where it is None.
 
     Examples
     --------
@@ -51,18 +43,18 @@ def without_cut_cells(
     above = [split_line(row, delimiter) for row in kept[-1 - _ROWS_COMPARED : -1]]
     before = _filled(above[-1]) if above else cells
     column = [row[len(cells) - 1] for row in above if len(row) >= len(cells)]
-    alike, told = True, []
+    alike, remarks = True, []
     if not _ends_after_cell(kept[-1], delimiter):
         found = _like_all(cells[-1], column, decimal)
         alike = not _lacks_something(cells[-1], column) if found is None else found
         if found is None and len(cells) < len(before):  # certainly cut off, and maybe in this cell
             alike = False
         elif found is None:
-            told = [
+            remarks = [
                 f"the text ends without a line break: its last value, {_quote(cells[-1])}, may be cut off"
             ]
     if alike and len(cells) >= len(before):
-        return kept, told
+        return kept, remarks
     whole = cells if alike else cells[:-1]
     if not any(whole):
         return kept[:-1], [

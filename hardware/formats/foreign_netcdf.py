@@ -14,32 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from vibroimpact.analysis.files.probing import NETCDF
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.hardware.formats.cells import column_of
 from vibroimpact.hardware.formats.labels import is_time_name, seconds_in
-from vibroimpact.hardware.formats.probe import check_reads, one_refusal
-from vibroimpact.hardware.formats.table import (
-    MOST_COLUMNS,
-    MOST_SAMPLES,
-    Column,
-    Floats,
-    RawFile,
-    Table,
-)
+from vibroimpact.hardware.formats.probe import one_refusal
+from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, Floats, RawFile, Table
 
 _SINCE = re.compile(r"(?P<unit>\w+)\s+since\s+(?P<date>.+)")
-
-
-def check_netcdf4(path: os.PathLike[str] | str) -> None:
-    """Refuse a file of version 4 on which the NetCDF library crashes, or never ends.
-
-    Raises
-    ------
-    DatasetError
-        It does, or says that the file is damaged.
-    """
-    check_reads(path, NETCDF)
 
 
 def read_foreign_netcdf(path: os.PathLike[str] | str) -> RawFile:
@@ -57,7 +38,7 @@ def read_foreign_netcdf(path: os.PathLike[str] | str) -> RawFile:
     return _sorted_out(variables)
 
 
-#: Name and dimension of a variable, its column where it is numeric and of one dimension, and what is to be said of it.
+#: Name and dimension of a variable, its column where it is numeric and of one dimension, and the remark on it.
 _Variable = tuple[str, str, Column | None, str]
 
 
@@ -99,12 +80,8 @@ def _variable(name: str, variable: Any, values: Floats | None, remark: str = "")
         return name, "", None, remark or "is left out; numeric variables of one dimension are read"
     label = _text(variable, "long_name") or name
     attrs = {} if label == name else {"source_label": label}
-    return (
-        name,
-        variable.dimensions[0],
-        column_of(name, values, _text(variable, "units"), attrs=attrs),
-        remark,
-    )
+    column = column_of(name, values, _text(variable, "units"), attrs=attrs)
+    return name, variable.dimensions[0], column, remark
 
 
 def _text(variable: Any, key: str) -> str:

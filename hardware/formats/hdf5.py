@@ -45,18 +45,14 @@ def is_netcdf4(path: os.PathLike[str] | str) -> bool:
     check_reads(path, _READING)
     with one_refusal("an HDF5 file that is whole"), h5py.File(path, "r") as file:
         return "_NCProperties" in file.attrs or any(
-            _text(item.attrs.get("CLASS")) == "DIMENSION_SCALE" for _, item in _items(file, [])
+            _text(item.attrs.get("CLASS")) == "DIMENSION_SCALE" for _, item in _items(file, [], Scope())
         )
 
 
 def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
     """Read the numeric datasets of an HDF5 file by the dotted names of their groups.
 
-    Parameters
-    ----------
-    path : path
-    matlab : bool
-        It is a MATLAB file of version 7.3: dimensions are the other way round, groups are structures.
+    In a MATLAB file of version 7.3 the dimensions are the other way round, and groups are structures.
 
     Raises
     ------
@@ -73,8 +69,8 @@ def read_hdf5(path: os.PathLike[str] | str, matlab: bool = False) -> RawFile:
     scopes = [Scope()]
     with one_refusal(f"{what} that is whole"), h5py.File(path, "r") as file:
         _read_group(file, scopes[0], scopes, remarks, matlab)
-    tables, told = tables_of(scopes)
-    return RawFile("MATLAB 7.3" if matlab else "HDF5", tables, remarks + told)
+    tables, more = tables_of(scopes)
+    return RawFile("MATLAB 7.3" if matlab else "HDF5", tables, remarks + more)
 
 
 def _read_group(group: Any, scope: Scope, scopes: list[Scope], remarks: list[str], matlab: bool) -> None:
@@ -101,7 +97,7 @@ def _read_group(group: Any, scope: Scope, scopes: list[Scope], remarks: list[str
             remarks.append(f"{label}: is left out; datasets of numbers are read")
 
 
-def _items(group: Any, remarks: list[str], scope: Scope | None = None) -> Iterator[tuple[str, Any]]:
+def _items(group: Any, remarks: list[str], scope: Scope) -> Iterator[tuple[str, Any]]:
     """Yield what lies in a group; links that lead elsewhere are not followed."""
     import h5py
 
@@ -109,7 +105,7 @@ def _items(group: Any, remarks: list[str], scope: Scope | None = None) -> Iterat
         if isinstance(group.get(name, getlink=True), h5py.HardLink):
             yield name, group[name]
         else:
-            remarks.append(f"{(scope or Scope()).dotted(name)}: a link to elsewhere is left out")
+            remarks.append(f"{scope.dotted(name)}: a link to elsewhere is left out")
 
 
 def _is_around(item: Any, group: Any) -> bool:

@@ -59,9 +59,9 @@ def read_labview(content: str) -> RawFile:
         title = "" if number == 1 else f"segment {number}"
         # what began at the same instant has one trigger, whatever its segment
         own = "" if begins is not None and not late else title
-        found, told = _tables(replace(segment, rows=rows), header, separator, decimal, late, own)
+        found, more = _tables(replace(segment, rows=rows), header, separator, decimal, late, own)
         tables += found
-        remarks += [f"{title}: {line}" if title else line for line in (*told, *cut)]
+        remarks += [f"{title}: {line}" if title else line for line in (*more, *cut)]
     if not tables:
         raise DatasetError(
             "expected rows of numbers after the header, got none. The measurement holds no data."
@@ -158,8 +158,7 @@ def _is_row(line: str, separator: str, decimal: str) -> bool:
 
 
 def _earliest(header: Header) -> np.datetime64 | None:
-    stamps = [stamp for stamp in _stamps(header) if stamp is not None]
-    return min(stamps) if stamps else None
+    return min((stamp for stamp in _stamps(header) if stamp is not None), default=None)
 
 
 def _seconds_between(first: np.datetime64 | None, later: np.datetime64 | None) -> float:
@@ -190,24 +189,24 @@ def _tables(
     cells = read_cells(segment.rows, separator, decimal)
     cells += [Column("", np.empty(0))] * (width - len(cells))
     labels = [*segment.headings, *[""] * len(cells)][: len(cells)]
-    columns, told = columns_of(cells, labels, [""] * len(cells))
+    columns, remarks = columns_of(cells, labels, [""] * len(cells))
     if "Notes" in segment.header:
-        told.append(f"the file notes: {' '.join(cell for cell in segment.header['Notes'] if cell)}")
+        remarks.append(f"the file notes: {' '.join(cell for cell in segment.header['Notes'] if cell)}")
     if _first(header, "X_Columns", "One").lower() == "multi":
-        return _paired_tables(columns, segment.header, late, title), told
+        return _paired_tables(columns, segment.header, late, title), remarks
     declared = _declared(segment.header, len(columns))
     channels = [
         _declare(column, declared, number, late)
         for number, column in enumerate(columns[1:])
         if len(column.values)
     ]
-    channels = _without_false_units(channels, told)
-    told += _told_lengths(channels)
+    channels = _without_false_units(channels, remarks)
+    remarks += _length_remarks(channels)
     if not channels:
-        return [], told
+        return [], remarks
     if len(columns[0].values):
-        return [Table(channels, _later(columns[0], late), title)], told
-    return [with_time(Table(channels, None, title))], told
+        return [Table(channels, _later(columns[0], late), title)], remarks
+    return [with_time(Table(channels, None, title))], remarks
 
 
 def _later(time: Column, late: float) -> Column:
@@ -216,13 +215,13 @@ def _later(time: Column, late: float) -> Column:
     return time if runs_on or not late else replace(time, values=time.values + late)
 
 
-def _without_false_units(columns: list[Column], told: list[str]) -> list[Column]:
+def _without_false_units(columns: list[Column], remarks: list[str]) -> list[Column]:
     """Take away a unit of time that the header gives to every channel: it is that of the instants."""
-    units = {column.unit for column in columns}
-    if len(columns) < 2 or len(units) > 1 or seconds_in(units.copy().pop()) is None:
+    unit = columns[0].unit if columns else ""
+    if len(columns) < 2 or any(column.unit != unit for column in columns) or seconds_in(unit) is None:
         return columns
-    told.append(f"the header gives every channel the unit {units.pop()}, which is that of time: not believed")
-    return [replace(column, unit="") if not is_time_name(column.label) else column for column in columns]
+    remarks.append(f"the header gives every channel the unit {unit}, which is that of time: not believed")
+    return [column if is_time_name(column.label) else replace(column, unit="") for column in columns]
 
 
 def _paired_tables(columns: Sequence[Column], header: Header, late: float, title: str) -> list[Table]:
@@ -279,13 +278,11 @@ def _declare(column: Column, declared: Mapping[str, Sequence[str]], number: int,
     )
 
 
-def _told_lengths(columns: Sequence[Column]) -> list[str]:
+def _length_remarks(columns: Sequence[Column]) -> list[str]:
     """Say where the header and the rows do not agree."""
-    told = []
-    for column in columns:
-        declared = column.attrs.get("declared_samples")
-        if declared is not None and declared != len(column.values):
-            told.append(
-                f"{column.label}: the header says {declared} samples, the file has {len(column.values)}"
-            )
-    return told
+    samples = [(column, column.attrs.get("declared_samples"), len(column.values)) for column in columns]
+    return [
+        f"{column.label}: the header says {declared} samples, the file has {there}"
+        for column, declared, there in samples
+        if declared not in (None, there)
+    ]

@@ -55,12 +55,12 @@ def read_mat(path: os.PathLike[str] | str) -> RawFile:
     scopes = [Scope()]
     for name in chosen:
         _put(name, contents.get(name), scopes[0], scopes, remarks)
-    tables, told = tables_of(scopes)
+    tables, more = tables_of(scopes)
     attrs = {}
     created = _CREATED.search(contents.get("__header__", b"").decode("latin-1"))
     if created is not None:
         attrs["source_date"] = created["date"].strip()
-    return RawFile("MATLAB", tables, remarks + told, attrs)
+    return RawFile("MATLAB", tables, remarks + more, attrs)
 
 
 def _check_sizes(listed: list[tuple[str, tuple[int, ...], str]]) -> None:

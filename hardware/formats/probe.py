@@ -19,13 +19,7 @@ class UnreadableError(DatasetError):
 
 
 def check_reads(path: os.PathLike[str] | str, reading: LibraryRead) -> None:
-    """Refuse a file that does not read; see `analysis.probing`.
-
-    Parameters
-    ----------
-    path : path
-    reading : LibraryRead
-        What is about to be done with it.
+    """Refuse a file that the library cannot read as it is about to; see `analysis.files.probing`.
 
     Raises
     ------

@@ -107,15 +107,13 @@ def _without_copies(groups: list[Any]) -> tuple[list[Any], list[str]]:
     if not any(levels) or all(levels):
         return groups, []
     copies = [group.name for group, level in zip(groups, levels, strict=True) if level]
-    told = f"decimated copies of the samples are left out: {', '.join(copies)}"
-    return [group for group, level in zip(groups, levels, strict=True) if not level], [told]
+    remark = f"decimated copies of the samples are left out: {', '.join(copies)}"
+    return [group for group, level in zip(groups, levels, strict=True) if not level], [remark]
 
 
 def _start(channel: Any) -> np.datetime64 | None:
     stamp = channel.properties.get("wf_start_time")
-    if isinstance(stamp, np.datetime64) and stamp > _EPOCH_ENDS:
-        return stamp
-    return None
+    return stamp if isinstance(stamp, np.datetime64) and stamp > _EPOCH_ENDS else None
 
 
 def _table(group: Any, origin: np.datetime64 | None, remarks: list[str], titled: bool) -> Table:

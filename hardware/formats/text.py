@@ -25,20 +25,12 @@ from vibroimpact.hardware.formats.labels import is_known_unit, is_time_name, sec
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, Column, RawFile, Table
 
 _COMMENTS = ("#", "%", "//", "!")
-_DELIMITERS: tuple[str | None, ...] = ("\t", ";", ",", "|", None)
 _QUOTED = re.compile(r'"([^"]{1,60})"')
-FIRST = "column_1"
+_FIRST = "column_1"
 _LINES_TRIED = 60
 _LONGEST_HEADER = 1000
 _MOST_STRANGE = 0.01
-_NAMES = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": "bars", None: "blanks"}
-WORDS_FOR_DELIMITERS: dict[str, str | None] = {
-    "tab": "\t",
-    "semicolon": ";",
-    "comma": ",",
-    "bar": "|",
-    "blank": None,
-}
+DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "bar": "|", "blank": None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,16 +58,7 @@ class Dialect:
 
 
 def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> RawFile:
-    """Read a table of text.
-
-    Parameters
-    ----------
-    content : str
-        The whole file.
-    delimiter : str or None
-        Between cells; empty: find it; None: blanks.
-    decimal : {"", ".", ","}
-        Decimal sign; empty: find it.
+    """Read a table of text; delimiter (None: blanks) and decimal sign are found from the rows where they are empty.
 
     Raises
     ------
@@ -93,16 +76,16 @@ def read_text(content: str, delimiter: str | None = "", decimal: str = "") -> Ra
     if len(cells) > MOST_COLUMNS:
         raise DatasetError(f"expected at most {MOST_COLUMNS} columns, got {len(cells)}. Is it turned over?")
     labels, units, late = _all_headings(lines[:first], rows, len(cells), dialect.delimiter)
-    columns, told = columns_of(cells, labels, units)
-    told = late + told
-    written = f"text, cells between {_NAMES.get(dialect.delimiter, repr(dialect.delimiter))}"
+    columns, more = columns_of(cells, labels, units)
+    names = {mark: f"{word}s" for word, mark in DELIMITERS.items()}
+    written = f"text, cells between {names.get(dialect.delimiter, repr(dialect.delimiter))}"
     comma = ", decimal comma" if dialect.decimal == "," else ""
     table = with_time(Table([column for column in columns if len(column.values)]))
-    if table.time is not None and table.time.label == FIRST:
-        told.append(
+    if table.time is not None and table.time.label == _FIRST:
+        more.append(
             f"the first column has no heading and ascends: it is taken as the instants ({option('time_column')})"
         )
-    return RawFile(written + comma, [table], remarks + told)
+    return RawFile(written + comma, [table], remarks + late + more)
 
 
 def _is_plain(line: str) -> bool:
@@ -113,13 +96,13 @@ def _is_plain(line: str) -> bool:
 def find_dialect(
     lines: Sequence[str], delimiter: str | None = "", decimal: str = ""
 ) -> tuple[Dialect, list[str]]:
-    """Return how the rows are written, and what is doubtful about it.
+    """Return how the rows are written, and remarks on what is doubtful about it.
 
     That dialect is chosen in which most lines are rows of one width; of equals the one with more columns.
     """
     tried = _tried_lines(lines)
     _refuse_thousands(tried)
-    delimiters = _DELIMITERS if delimiter == "" else (delimiter,)
+    delimiters = DELIMITERS.values() if delimiter == "" else (delimiter,)
     signs = (".", ",") if not decimal else (decimal,)
     tries = [Dialect(mark, sign) for sign in signs for mark in delimiters if mark != sign]
     best, (count, width) = _best_of(tries, tried)
@@ -181,15 +164,13 @@ def _tried_lines(lines: Sequence[str]) -> list[str]:
 
 
 def _rows(body: Sequence[tuple[int, str]], dialect: Dialect) -> tuple[list[str], list[str]]:
-    """Return the rows; lines of words between them are left out and told, too many are refused."""
+    """Return the rows; lines of words between them are left out, with a remark; too many are refused."""
     words = [
         (place, line)
         for place, line in body
         if not any(is_number(cell, dialect.decimal) or is_date(cell) for cell in dialect.cells(line))
         and not all(is_marker(cell) for cell in dialect.cells(line))
     ]
-    if not words:
-        return [line for _, line in body], []
     if len(words) > max(1, _MOST_STRANGE * len(body)):
         place, line = words[0]
         raise DatasetError(
@@ -197,25 +178,18 @@ def _rows(body: Sequence[tuple[int, str]], dialect: Dialect) -> tuple[list[str],
             f"{len(words) - 1} more such lines. Cut the file where its table ends."
         )
     skipped = {place for place, _ in words}
-    told = [
+    remarks = [
         f"line {place + 1} holds no numbers and is left out: {line.strip()[:60]!r}" for place, line in words
     ]
-    return [line for place, line in body if place not in skipped], told[:5]
+    return [line for place, line in body if place not in skipped], remarks[:5]
 
 
 def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[list[str], list[str]]:
-    """Return names and units of the columns, as far as the lines before the first row give them.
+    """Return names and units of as many columns as `width`, as far as the lines before the first row give them.
 
-    Parameters
-    ----------
-    header : sequence of str
-        Lines before the first row; marks of comments are taken off.
-    width : int
-        Columns of the table.
-    delimiter : str or None
-        Between the cells of the rows; headings may use another.
+    Marks of comments are taken off. The delimiter is that of the rows; headings may use another.
     """
-    lines = [_uncommented(line) for line in header if _uncommented(line)][-8:]
+    lines = [text for line in header if (text := _uncommented(line))][-8:]
     found = [cells for cells in (_heading_cells(line, width, delimiter) for line in lines) if cells]
     units = [""] * width
     if found and _are_units(found[-1]):
@@ -229,7 +203,7 @@ def headings(header: Sequence[str], width: int, delimiter: str | None) -> tuple[
 def _all_headings(
     header: Sequence[str], rows: Sequence[str], width: int, delimiter: str | None
 ) -> tuple[list[str], list[str], list[str]]:
-    """Return names and units of all columns, also where some begin below the headings; and what to say of these."""
+    """Return names and units of all columns, also where some begin below the headings, and remarks on these."""
     labels, units = headings(header, width, delimiter)
     narrow = len(split_line(rows[0], delimiter)) if rows else width
     if any(labels) or narrow >= width:
@@ -238,13 +212,13 @@ def _all_headings(
     labels, units = headings(header, narrow, delimiter)
     several = f"columns {narrow + 1} to {width} begin" if width > narrow + 1 else f"column {width} begins"
     verb = "have" if width > narrow + 1 else "has"
-    told = (
+    remarks = (
         [f"{several} in row {begun} of the table, and {verb} no heading ({option('name')})"]
         if any(labels)
         else []
     )
     more = [""] * (width - narrow)
-    return labels + more, units + more, told
+    return labels + more, units + more, remarks
 
 
 def _uncommented(line: str) -> str:
@@ -279,8 +253,8 @@ def _are_units(cells: Sequence[str]) -> bool:
 def columns_of(
     cells: Sequence[Column], labels: Sequence[str], units: Sequence[str]
 ) -> tuple[list[Column], list[str]]:
-    """Return the columns of numbers; those of words are left out. And what is to be said of them."""
-    columns, told = [], []
+    """Return the columns of numbers, without those of words, and remarks on them."""
+    columns, remarks = [], []
     for place, (column, label, unit) in enumerate(zip(cells, labels, units, strict=True), 1):
         name = label or f"column_{place}"
         grouped = next((text for _, text in column.strange if has_thousands(text)), None)
@@ -288,7 +262,7 @@ def columns_of(
             raise _thousands(name, grouped)
         if len(column.values) and _is_text(column):
             words = [text for _, text in column.strange][:3]
-            told.append(f"{name}: a column of words is left out: {'; '.join(words)}")
+            remarks.append(f"{name}: a column of words is left out: {'; '.join(words)}")
             column = replace(column, values=column.values[:0])
         elif column.strange:
             row, text = column.strange[0]
@@ -298,12 +272,12 @@ def columns_of(
                     f"{row + 1}. Is the delimiter or the decimal sign another one "
                     f"({option('delimiter')}, {option('decimal')})?"
                 )
-            told.append(
+            remarks.append(
                 f"{name}: {len(column.strange)} cells are no numbers and count as missing, the first is "
                 f"{text!r} in row {row + 1}"
             )
         columns.append(replace(column, label=name, unit=unit or ("s" if column.dated else "")))
-    return columns, told
+    return columns, remarks
 
 
 def _is_text(column: Column) -> bool:
@@ -320,7 +294,7 @@ def with_time(table: Table) -> Table:
     for place, column in enumerate(table.columns):
         if column.dated or is_time_name(column.label) or _is_time_by_unit(column, place):
             return _apart(table, place)
-    if len(table.columns) > 1 and table.columns[0].label == FIRST and _ascends(table.columns[0]):
+    if len(table.columns) > 1 and table.columns[0].label == _FIRST and _ascends(table.columns[0]):
         return _apart(table, 0)
     return table
 

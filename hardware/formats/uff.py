@@ -20,9 +20,8 @@ from vibroimpact.hardware.formats.probe import missing_extra
 from vibroimpact.hardware.formats.table import MOST_COLUMNS, MOST_SAMPLES, Column, Floats, RawFile, Table
 
 SIGNATURE = re.compile(rb"(?:[ ]*\r?\n)*[ ]{4}-1[ ]*\r?\n[ ]{1,5}\d{1,5}(?:[bB][^\r\n]*)?[ ]*\r?\n")
-_EDGE = re.compile(
-    rb"[ ]{4}-1(?:[\r\n]|[ ]{74}|\Z)"
-)  # as pyuff looks for them; binary samples stand right before
+# The edges of datasets as pyuff looks for them: binary samples stand right before.
+_EDGE = re.compile(rb"[ ]{4}-1(?:[\r\n]|[ ]{74}|\Z)")
 _FUNCTION = 58
 _UNITS = 164
 _TIME = 17
@@ -167,8 +166,8 @@ def _column(name: str, found: Mapping[str, Any], in_si: bool) -> tuple[Column, F
     unit = _text(found.get("ordinate_axis_units_lab"))
     if not unit and in_si:
         unit = _SI_UNITS.get(int(found.get("ordinate_spec_data_type", 0)), "")
-    told = {key: _text(found.get(source)) for key, source in (("function", "id2"), ("date", "id3"))}
-    attrs = {f"source_{key}": text for key, text in told.items() if text}
+    texts = {key: _text(found.get(source)) for key, source in (("function", "id2"), ("date", "id3"))}
+    attrs = {f"source_{key}": text for key, text in texts.items() if text}
     second = seconds_in(_text(found.get("abscissa_axis_units_lab"))) or 1.0
     column = column_of(name, values, unit, attrs=attrs)
     if int(found.get("abscissa_spacing", 1)) == 0:

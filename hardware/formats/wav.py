@@ -24,12 +24,7 @@ _CUT_OFF = "the file is cut off: it holds less samples than it declares, and wha
 
 
 def read_wav(content: bytes) -> RawFile:
-    """Read a WAV file: a column for each of its channels.
-
-    Parameters
-    ----------
-    content : bytes
-        The whole file.
+    """Read the bytes of a WAV file: a column for each of its channels.
 
     Raises
     ------

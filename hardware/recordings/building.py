@@ -16,13 +16,7 @@ from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.labels import is_known_unit, seconds_in
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Table
 from vibroimpact.hardware.recordings.channel_of import channel_of
-from vibroimpact.hardware.recordings.events import (
-    as_raster,
-    event_train,
-    is_raster,
-    looks_like_events,
-    raster_train,
-)
+from vibroimpact.hardware.recordings.events import event_train, is_raster, looks_like_events, raster_train
 from vibroimpact.hardware.recordings.naming import channel_name
 from vibroimpact.hardware.recordings.settings import ImportSettings
 from vibroimpact.hardware.recordings.sources import Source, naming, shortened
@@ -49,13 +43,7 @@ class Parts:
     remarks: list[str] = field(default_factory=list)
 
     def add(self, source: Source, title: str) -> None:
-        """Add the columns of one file.
-
-        Parameters
-        ----------
-        source : Source
-        title : str
-            What its remarks begin with; empty for one file alone.
+        """Add the columns of one file, whose remarks begin with a title; empty for one file alone.
 
         Raises
         ------
@@ -64,7 +52,7 @@ class Parts:
         """
         tables = source.raw.tables
         self.remark(source.raw.remarks, title)
-        self.remark([line for table in tables for line in _told_lengths(table)], title)
+        self.remark([line for table in tables for line in _length_remarks(table)], title)
         placements: dict[Any, Placement] = {}
         rasters = [is_raster(table, source.settings.events) for table in tables]
         columns = [(at, column) for at, table in enumerate(tables) for column in table.columns]
@@ -77,9 +65,9 @@ class Parts:
     def remark(self, lines: Sequence[str], title: str = "") -> None:
         """Add what was noticed, each line once."""
         for line in lines:
-            told = shortened(f"{title}: {line}" if title else line)
-            if told not in self.remarks:
-                self.remarks.append(told)
+            remark = shortened(f"{title}: {line}" if title else line)
+            if remark not in self.remarks:
+                self.remarks.append(remark)
 
     def _add_column(
         self,
@@ -90,41 +78,45 @@ class Parts:
         placements: dict[Any, Placement],
         in_raster: bool,
     ) -> list[str]:
-        """Add one column as what it is; return what is to be said of it."""
+        """Add one column as what it is; return the remarks on it."""
         settings, table = source.settings, source.raw.tables[at]
         clocks = (settings.rate, table.rate, column.interval, table.clock_of(column))
         in_raster = in_raster and any(clock is not None for clock in clocks)
         as_events = not in_raster and _is_event_train(column, table, settings)
         name = self._name(column, number, settings, as_events)
-        changed, told = described(name, column, settings, number)
+        changed, remarks = _described(name, column, settings, number)
         if as_events:
             factor = seconds_in(changed.unit) or 1.0
             instants = replace(changed, values=changed.values * factor)
             self.events[name], more = event_train(name, instants, settings.window, settings.masked)
             if settings.events is None:
-                told.append(
+                remarks.append(
                     f"{name}: ascends unevenly, so it is taken as instants of events ({option('events', False)} if not)"
                 )
-            return told + more
+            return remarks + more
         if len(column.values) == 1:
             value = float(changed.values[0])
             beyond = column.overrange is not None and bool(column.overrange[0])
             self.scalars[name] = SingleValue(value, measured_unit(changed.unit).cf, column.label, beyond)
             said = "which the file marks as overrange" if beyond else f"{value:g}"
-            return [*told, f"{name}: one value only, {said}: kept beside the channels"]
+            return [*remarks, f"{name}: one value only, {said}: kept beside the channels"]
         key = (at, len(column.values), column.interval, column.start, column.group)
         if key not in placements:
             trigger = ", ".join(part for part in (source.path.name, table.title, column.group) if part)
             placements[key] = place(table, column, settings.rate, settings.start, trigger)
-            told += placements[key].remarks
+            remarks += placements[key].remarks
         if in_raster:
             train = raster_train(name, column, placements[key], settings.window, settings.masked)
             if train is None:
-                return [*told, f"{name}: has no event, and is left out"]
+                return [*remarks, f"{name}: has no event, and is left out"]
             self.events[name] = train
-            return [*told, as_raster()]
+            return [
+                *remarks,
+                "the columns hold 0 and 1 only: an event train each, with an event where it becomes 1 "
+                f"({option('events', False)} if not)",
+            ]
         self.channels[name], more = channel_of(name, changed, placements[key], settings.masked)
-        return told + more
+        return remarks + more
 
     def _name(self, column: Column, number: int, settings: ImportSettings, as_events: bool) -> str:
         label = settings.name[number] if number < len(settings.name) else column.label
@@ -133,7 +125,7 @@ class Parts:
         return channel_name(label, {*self.channels, *self.events, *self.scalars})
 
 
-def _told_lengths(table: Table) -> list[str]:
+def _length_remarks(table: Table) -> list[str]:
     """Say where columns that were written together end at different rows, as those of a file that was cut off do."""
     lengths = sorted({len(column.values) for column in table.columns})
     if table.vectors or len(lengths) < 2:
@@ -144,40 +136,31 @@ def _told_lengths(table: Table) -> list[str]:
     ]
 
 
-def described(name: str, column: Column, settings: ImportSettings, number: int) -> tuple[Column, list[str]]:
-    """Return a column with the unit, scale and offset that it gets, and what is to be said of it.
-
-    Parameters
-    ----------
-    name : str
-        In the recording.
-    column : Column
-    settings : ImportSettings
-    number : int
-        Place of the column in the lists of the settings, from 0.
-    """
-    told: list[str] = []
+def _described(name: str, column: Column, settings: ImportSettings, number: int) -> tuple[Column, list[str]]:
+    """Return a column with the unit, scale and offset that the settings give to column `number` (from 0); remarks."""
+    remarks: list[str] = []
     unit = _picked(settings.unit, number) or column.unit
     if not is_known_unit(unit):
-        told.append(f"{name}: the unit {unit[:40]!r} is not known: taken as a pure number ({option('unit')})")
+        remarks.append(
+            f"{name}: the unit {unit[:40]!r} is not known: taken as a pure number ({option('unit')})"
+        )
         unit = "1"
     attrs = dict(column.attrs)
     if column.unit and column.unit != unit:
         attrs["source_unit"] = column.unit
     scale, offset = _picked(settings.scale, number), _picked(settings.offset, number)
     if scale is None and offset is None:
-        return replace(column, unit=unit, attrs=attrs), told
+        return replace(column, unit=unit, attrs=attrs), remarks
     factor, shift = 1.0 if scale is None else scale, offset or 0.0
-    told.append(f"{name}: {factor:g} times the values of the file, plus {shift:g}")
+    remarks.append(f"{name}: {factor:g} times the values of the file, plus {shift:g}")
     with np.errstate(over="ignore"):
         values = column.values * factor + shift
+    attrs |= {"scale": factor, "offset": shift}
     rails = None
     if column.rails is not None:
         low, high = sorted(limit * factor + shift for limit in column.rails)
         rails = low, high
-    return replace(
-        column, values=values, unit=unit, attrs=attrs | {"scale": factor, "offset": shift}, rails=rails
-    ), told
+    return replace(column, values=values, unit=unit, attrs=attrs, rails=rails), remarks
 
 
 def _picked(values: Sequence[Any], number: int) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from vibroimpact.analysis.recording import Channel
@@ -15,22 +17,11 @@ _OFFSET_SHOWS = 3.0
 
 
 def channel_of(
-    name: str,
-    column: Column,
-    placement: Placement,
-    masked: tuple[tuple[float, float], ...] = (),
+    name: str, column: Column, placement: Placement, masked: Sequence[tuple[float, float]]
 ) -> tuple[Channel, list[str]]:
-    """Return the channel of a column, and what was noticed.
+    """Return the channel of a column, whose unit is known, and what was noticed.
 
-    Parameters
-    ----------
-    name : str
-    column : Column
-        Its unit is one that is known.
-    placement : Placement
-        Its axis is shared by all channels that have it.
-    masked : tuple of tuple of float
-        Spans of time, s, in which the samples are no measurement: they become missing.
+    Samples in the spans of time `masked` (s) are no measurement: they become missing.
     """
     # a row -1 reads the last one here, and is overwritten as missing
     values = np.where(placement.row < 0, np.nan, column.values[placement.row])
@@ -60,28 +51,26 @@ def _remarks(
     placement: Placement,
 ) -> list[str]:
     """Say what is odd about the samples."""
-    told = []
+    remarks = []
     if np.any(clipped):
         levels = sorted({float(level) for level in values[clipped]})
-        said = " and ".join(
-            f"{level:.6g}" for level in (levels[:1] + levels[-1:] if len(levels) > 1 else levels)
-        )
-        told.append(f"{name}: {int(clipped.sum())} samples are clipped, at {said} {column.unit}".rstrip())
+        said = " and ".join(f"{level:.6g}" for level in dict.fromkeys((levels[0], levels[-1])))
+        remarks.append(f"{name}: {int(clipped.sum())} samples are clipped, at {said} {column.unit}".rstrip())
     if np.any(overrange):
-        told.append(f"{name}: {int(overrange.sum())} samples are marked as overrange: NaN")
+        remarks.append(f"{name}: {int(overrange.sum())} samples are marked as overrange: NaN")
     if np.any(hidden):
-        told.append(f"{name}: {int(hidden.sum())} samples are masked: NaN")
+        remarks.append(f"{name}: {int(hidden.sum())} samples are masked: NaN")
     empty = int(np.sum(np.isnan(values) & ~overrange & ~hidden)) - placement.missing
     if empty > 0:
-        told.append(f"{name}: {empty} samples have no number in the file: NaN")
+        remarks.append(f"{name}: {empty} samples have no number in the file: NaN")
     finite = values[np.isfinite(values) & ~clipped]
     if len(finite) < 2:
-        return told
+        return remarks
     in_unit = f" {column.unit}" if column.unit else ""
     rest = float(np.median(finite))
     usual = float(np.median(np.abs(finite - rest)))
     if abs(rest) > _OFFSET_SHOWS * usual and np.ptp(finite) > 0.0:
-        told.append(f"{name}: rests at {rest:.4g}{in_unit}, not at zero: an offset, kept as it is")
+        remarks.append(f"{name}: rests at {rest:.4g}{in_unit}, not at zero: an offset, kept as it is")
     elif np.ptp(finite) == 0.0:
-        told.append(f"{name}: has the one value {rest:.6g} all the way")
-    return told
+        remarks.append(f"{name}: has the one value {rest:.6g} all the way")
+    return remarks

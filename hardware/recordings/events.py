@@ -21,14 +21,6 @@ _UNEVEN = 0.01
 """Standard deviation of the steps, in mean steps, above which ascending numbers are no clock."""
 
 
-def as_raster() -> str:
-    """Return the remark on columns that are rasters of events."""
-    return (
-        "the columns hold 0 and 1 only: an event train each, with an event where it becomes 1 "
-        f"({option('events', False)} if not)"
-    )
-
-
 def looks_like_events(column: Column) -> bool:
     """Whether a column is clearly one of instants: ascending from row to row, unevenly, and of no other unit."""
     values = column.values
@@ -45,17 +37,13 @@ def looks_like_events(column: Column) -> bool:
     return float(steps.std()) > max(_UNEVEN * float(steps.mean()), decimal_step(values))
 
 
-def is_raster(table: Table, asked: bool | None = None) -> bool:
+def is_raster(table: Table, wanted: bool | None = None) -> bool:
     """Whether the columns of a table hold only 0 and 1, as trials of a raster do, so that each 1 is an event.
 
-    Parameters
-    ----------
-    table : Table
-    asked : bool or None
-        The user says that the columns are events, or that none is. Otherwise the ones must be few and stand alone: what
-        stays at 1 is the level of a switch.
+    `wanted` is what the user says: that the columns are events, or that none is. Where the user says nothing, the ones
+    must be few and stand alone: what stays at 1 is the level of a switch.
     """
-    if asked is False or not table.columns:
+    if wanted is False or not table.columns:
         return False
     ones = [column.values == 1.0 for column in table.columns]
     known = all(
@@ -63,7 +51,7 @@ def is_raster(table: Table, asked: bool | None = None) -> bool:
     )
     if not known or not any(one.any() for one in ones):
         return False
-    return bool(asked) or all(
+    return bool(wanted) or all(
         float(np.mean(one)) <= _FEW_ONES and not np.any(one[1:] & one[:-1]) for one in ones if len(one)
     )
 
@@ -77,16 +65,7 @@ def raster_train(
 ) -> EventTrain | None:
     """Return the instants at which a column of 0 and 1 becomes 1; None where it never does.
 
-    Parameters
-    ----------
-    name : str
-    column : Column
-    placement : Placement
-        Without a window, the observation is as long as its axis.
-    window : tuple of float or None
-        Observed from, to, s.
-    masked : tuple of tuple of float
-        Parts of it in which nothing could be seen, s.
+    It was observed in the window (from, to, s), else as long as its axis, but for the parts that are masked, s.
     """
     axis = placement.axis
     on = (placement.row >= 0) & (column.values[placement.row] == 1.0)
@@ -113,17 +92,9 @@ def event_train(
     window: tuple[float, float] | None = None,
     masked: tuple[tuple[float, float], ...] = (),
 ) -> tuple[EventTrain, list[str]]:
-    """Make an event train of a column, and say what was noticed.
+    """Make an event train of a column of instants, s, and say what was noticed.
 
-    Parameters
-    ----------
-    name : str
-    column : Column
-        Instants, s.
-    window : tuple of float or None
-        Observed from, to, s.
-    masked : tuple of tuple of float
-        Parts of the window in which nothing could be seen, s.
+    It was observed in the window (from, to, s), but for the parts that are masked, s.
 
     Raises
     ------

@@ -50,16 +50,16 @@ class Gaps:
         total = np.append(0, np.cumsum(self.skipped))
         return np.asarray(total[np.searchsorted(self.row, row, side="right")], dtype=np.intp)
 
-    def said(self) -> str:
+    def text(self) -> str:
         """Return how many gaps there are, and which is the longest."""
         several = f"{len(self.row)} gaps, the longest" if len(self.row) > 1 else "1 gap"
         return f"{several} of {self.length:.6g} s at {self.at:.6g} s"
 
-    def told(self) -> str:
+    def remark(self) -> str:
         """Return the remark on gaps that are filled."""
         many = self.missing > 1
         return (
-            f"{self.missing} {'samples are' if many else 'sample is'} missing in {self.said()}: "
+            f"{self.missing} {'samples are' if many else 'sample is'} missing in {self.text()}: "
             f"{'they are' if many else 'it is'} there as NaN"
         )
 
@@ -93,7 +93,7 @@ def gaps_in(row: NDArray[np.intp], instants: Floats, interval: float | None = No
     is_gap = steps - rows * usual > _GAP * usual + coarse
     if not np.any(is_gap) or np.all(is_gap):
         return None
-    pace = _pace(steps[~is_gap], rows[~is_gap], digits, interval)
+    pace = pace_of(steps[~is_gap], rows[~is_gap], digits, interval)
     if pace <= 0.0:
         return None
     run = np.append(0, np.cumsum(is_gap))
@@ -105,11 +105,12 @@ def gaps_in(row: NDArray[np.intp], instants: Floats, interval: float | None = No
     return Gaps(row[1:][is_gap], skipped, float(instants[longest]), float(steps[longest]), on_grid)
 
 
-def _pace(steps: Floats, rows: NDArray[np.intp], digits: float, interval: float | None) -> float:
-    """Return the interval between rows without the gaps, s; that of the user where the steps allow it."""
+def pace_of(steps: Floats, rows: NDArray[np.intp], digits: float, interval: float | None) -> float:
+    """Return the mean step from row to row, s; the interval of the user where both agree up to the digits."""
     pace = float(steps.sum()) / int(rows.sum())
-    doubt = digits / int(rows.sum())
-    return interval if interval is not None and abs(pace - interval) <= AGREEMENT * interval + doubt else pace
+    if interval is None or abs(pace - interval) > AGREEMENT * interval + digits / int(rows.sum()):
+        return pace
+    return interval
 
 
 def are_whole(jumps: Floats) -> bool:

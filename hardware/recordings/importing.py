@@ -87,21 +87,21 @@ def _passed_on(files: Sequence[Path], given: ImportSettings) -> Recording:
 
 
 def _of_the_whole(parts: Parts) -> list[str]:
-    """Return what is to be said of all channels together."""
-    told = []
+    """Return remarks on all channels together."""
+    remarks = []
     plain = [name for name, channel in parts.channels.items() if channel.unit == "1"]
     if plain:
-        told.append(f"no unit is known for {', '.join(plain)}: pure numbers ({option('unit')})")
+        remarks.append(f"no unit is known for {', '.join(plain)}: pure numbers ({option('unit')})")
     axes = {id(channel.axis): channel.axis for channel in parts.channels.values()}.values()
     triggers = list(dict.fromkeys(axis.trigger for axis in axes))
     if len(triggers) > 1:
-        told.append(
+        remarks.append(
             f"{len(triggers)} triggers: the lag between their time axes is not known, and must be estimated"
         )
     rates = sorted(axis.rate for axis in axes if axis.interval is not None)
     if rates and rates[-1] - rates[0] > AGREEMENT * rates[0]:
-        told.append(f"the channels are sampled at different rates, {rates[0]:.7g} to {rates[-1]:.7g} Hz")
-    return told
+        remarks.append(f"the channels are sampled at different rates, {rates[0]:.7g} to {rates[-1]:.7g} Hz")
+    return remarks
 
 
 def _provenance(sources: Sequence[Source], parts: Parts) -> dict[str, Any]:

@@ -16,14 +16,7 @@ _DIGIT_LOST = 0.2
 def decimal_step(values: Floats) -> float:
     """Return the power of ten that nearly all values are multiples of: the weight of their last digit.
 
-    Parameters
-    ----------
-    values : ndarray of float
-
-    Returns
-    -------
-    float
-        0 where they have more digits than can be told from rounding in binary.
+    It is 0 where they have more digits than can be told from rounding in binary.
 
     Examples
     --------

@@ -19,13 +19,7 @@ _BACK_BY = 3.0
 
 
 def joined(tables: Sequence[Table]) -> tuple[list[Table], list[str]]:
-    """Join tables that continue each other in time; gaps between them are left to the time axis.
-
-    Returns
-    -------
-    tables : list of Table
-    remarks : list of str
-    """
+    """Join tables that continue each other in time, and say so; gaps between them are left to the time axis."""
     result: list[Table] = []
     remarks: list[str] = []
     for table in tables:
@@ -33,12 +27,12 @@ def joined(tables: Sequence[Table]) -> tuple[list[Table], list[str]]:
         if together is None:
             result.append(table)
             continue
-        remarks.append(_told(result[-1], together, table.title or "a later part"))
+        remarks.append(_joint_remark(result[-1], together, table.title or "a later part"))
         result[-1] = together
     return result, remarks
 
 
-def _told(before: Table, together: Table, title: str) -> str:
+def _joint_remark(before: Table, together: Table, title: str) -> str:
     """Say how the later of two parts goes on."""
     assert together.time is not None
     rows = len(before.columns[0].values)

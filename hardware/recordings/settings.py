@@ -120,14 +120,7 @@ class ImportSettings(BaseModel):
 
 
 def checked(values: Mapping[str, Any], source: str) -> ImportSettings:
-    """Return settings, or one error with all that is wrong with them.
-
-    Parameters
-    ----------
-    values : mapping
-        By key.
-    source : str
-        What messages begin with: the name of the file, or `command line`.
+    """Return the settings of these values; messages begin with their source, a file or `command line`.
 
     Raises
     ------

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.hardware.formats.choosing import read_raw
 from vibroimpact.hardware.formats.table import RawFile
-from vibroimpact.hardware.formats.text import WORDS_FOR_DELIMITERS
+from vibroimpact.hardware.formats.text import DELIMITERS
 from vibroimpact.hardware.recordings.columns import chosen_tables
 from vibroimpact.hardware.recordings.segments import joined, split_at_restarts
 from vibroimpact.hardware.recordings.settings import ImportSettings, settings_beside
@@ -49,13 +49,8 @@ class Source:
 def read_source(path: Path, given: ImportSettings, common: ImportSettings | None = None) -> Source:
     """Read one file and choose its columns.
 
-    Parameters
-    ----------
-    path : Path
-    given : ImportSettings
-        Of the command line; what it says of single columns is for `spread`.
-    common : ImportSettings or None
-        In place of the settings file beside the file.
+    `given` are the settings of the command line, of which those for single columns are left to `spread`; `common` those
+    in place of the settings file beside the file.
 
     Raises
     ------
@@ -65,20 +60,20 @@ def read_source(path: Path, given: ImportSettings, common: ImportSettings | None
     own = settings_beside(path) if common is None else common
     own = own.model_copy(update={key: getattr(given, key) for key in given.model_fields_set - _PER_COLUMN})
     with naming(path):
-        delimiter = "" if own.delimiter is None else WORDS_FOR_DELIMITERS[own.delimiter]
+        delimiter = "" if own.delimiter is None else DELIMITERS[own.delimiter]
         raw = read_raw(path, delimiter, own.decimal or "")
         chosen, counted, date = counted_from_start(chosen_tables(raw, own))
-        tables, remarks = joined(chosen)
+        tables, joints = joined(chosen)
         pieces = [split_at_restarts(table) for table in tables]
-    told = [
+    remarks = [
         *([raw.damage] if raw.damage else []),
         *raw.remarks,
         *counted,
-        *remarks,
+        *joints,
         *(line for _, lines in pieces for line in lines),
     ]
     found = [table for split, _ in pieces for table in split]
-    return Source(path, own, replace(raw, tables=found, remarks=told, attrs={**date, **raw.attrs}))
+    return Source(path, own, replace(raw, tables=found, remarks=remarks, attrs={**date, **raw.attrs}))
 
 
 def shortened(line: str) -> str:
@@ -118,19 +113,15 @@ def spread(sources: Sequence[Source], given: ImportSettings) -> None:
     """
     edges = np.cumsum([0, *(source.columns for source in sources)]).tolist()
     for key in sorted(_PER_COLUMN & given.model_fields_set):
-        _spread_one(sources, edges, key, getattr(given, key))
+        values = getattr(given, key)
+        _check_count(key, len(values), edges[-1], "command line: ")
+        for source, (begin, end) in zip(sources, pairwise(edges), strict=True):
+            part = values if len(values) == 1 and key != "name" else values[begin:end]
+            if part:
+                source.settings = source.settings.model_copy(update={key: tuple(part)})
     for source in sources:
         for key in sorted(_PER_COLUMN):
             _check_count(key, len(getattr(source.settings, key)), source.columns, f"{source.path}: ")
-
-
-def _spread_one(sources: Sequence[Source], edges: Sequence[int], key: str, values: Sequence[Any]) -> None:
-    _check_count(key, len(values), edges[-1], "command line: ")
-    alone = len(values) == 1 and key != "name"
-    for number, source in enumerate(sources):
-        part = values if alone else values[edges[number] : edges[number + 1]]
-        if part:
-            source.settings = source.settings.model_copy(update={key: tuple(part)})
 
 
 def _check_count(key: str, got: int, columns: int, where: str) -> None:

@@ -17,7 +17,7 @@ from vibroimpact.analysis.recording import TimeAxis
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.wording import option
 from vibroimpact.hardware.formats.table import MOST_SAMPLES, Column, Flags, Floats, Table
-from vibroimpact.hardware.recordings.gaps import AGREEMENT, EVEN, Gaps, are_whole, gaps_in
+from vibroimpact.hardware.recordings.gaps import AGREEMENT, EVEN, Gaps, are_whole, gaps_in, pace_of
 from vibroimpact.hardware.recordings.printed_grid import digits_of
 
 _ROUNDED = 0.7
@@ -123,30 +123,29 @@ def _by_rate(rate: float, column: Column, instants: Floats | None) -> Placement:
     if instants is not None and np.any(np.isfinite(instants)):
         known = np.flatnonzero(np.isfinite(instants))
         begin = float(instants[known[0]]) - interval * int(known[0])
-        remarks += _told_pace(known, instants[known], interval)
+        remarks += _pace_remarks(known, instants[known], interval)
         gaps = gaps_in(known, instants[known], interval)
     if column.interval is not None and abs(column.interval - interval) > AGREEMENT * interval:
         remarks.append(f"the header says {column.interval:.6g} s an interval; the rate given is used instead")
     if gaps is not None and gaps.on_grid and _is_bearable(length + gaps.missing, length):
         count = count + gaps.before(count)
-        remarks.append(gaps.told())
+        remarks.append(gaps.remark())
     elif gaps is not None:
         remarks.append(
-            f"the rate given counts the rows one after the other, and closes {gaps.said()} in the instants of the file"
+            f"the rate given counts the rows one after the other, and closes {gaps.text()} in the instants of the file"
         )
     return _on_grid(begin, interval, count, "the rate given by the user", remarks)
 
 
-def _told_pace(row: NDArray[np.intp], instants: Floats, interval: float) -> list[str]:
+def _pace_remarks(row: NDArray[np.intp], instants: Floats, interval: float) -> list[str]:
     """Say where the instants of rows contradict an interval by more than their digits."""
     steps, rows = np.diff(instants), np.diff(row)
     usual = float(np.median(steps)) if len(steps) else 0.0
     inner = steps <= 1.5 * usual if usual > 0.0 else np.ones(len(steps), dtype=bool)
     if not np.any(inner):
         return []
-    pace = float(steps[inner].sum()) / int(rows[inner].sum())
-    doubt = digits_of(instants) / int(rows[inner].sum())
-    if abs(pace - interval) <= AGREEMENT * interval + doubt:
+    pace = pace_of(steps[inner], rows[inner], digits_of(instants), interval)
+    if pace == interval:
         return []
     return [f"the instants of the file are {pace:.6g} s apart; the rate given is used instead"]
 
@@ -236,7 +235,7 @@ def _straight(count: NDArray[np.intp], instants: Floats) -> _Line | None:
 def _by_line(
     line: _Line, instants: Floats, column: Column, declared: Sequence[float], length: int
 ) -> Placement:
-    remarks = _told_line(line, instants, length)
+    remarks = _line_remarks(line, instants, length)
     # how far the printed digits can turn the line
     turn = line.digits / (line.interval * max(len(instants) - 1, 1))
     agreeing = [
@@ -244,13 +243,7 @@ def _by_line(
         for interval in declared
         if abs(interval - line.interval) <= (AGREEMENT + turn) * line.interval
     ]
-    if declared and len(agreeing) == len(declared):
-        own = column.interval if column.interval is not None else agreeing[0]
-        if line.is_rounded:
-            begin = float(instants[0]) if np.isfinite(instants[0]) else line.start
-            source = "the first instant, and the sampling interval of the header"
-            return _even(begin, own, length, source, remarks)
-    if declared and len(agreeing) < len(declared):
+    if len(agreeing) < len(declared):
         spread = [line.interval, *declared]
         uncertainty = (max(spread) - min(spread)) / line.interval
         said = ", ".join(f"{interval:.6g}" for interval in sorted(set(declared)))
@@ -261,24 +254,28 @@ def _by_line(
         )
         source = f"the column of instants ({line.interval:.6g} s); the header says {said} s"
         return _even(line.start, line.interval, length, source, remarks, uncertainty)
+    if declared and line.is_rounded:
+        own = column.interval if column.interval is not None else agreeing[0]
+        begin = float(instants[0]) if np.isfinite(instants[0]) else line.start
+        source = "the first instant, and the sampling interval of the header"
+        return _even(begin, own, length, source, remarks)
     placed = _even(line.start, line.interval, length, "the column of instants", remarks)
-    gone = ~np.isfinite(instants)
-    placed.suspect[: len(instants)][gone] = True
+    placed.suspect[: len(instants)] = ~np.isfinite(instants)
     return placed
 
 
-def _told_line(line: _Line, instants: Floats, length: int) -> list[str]:
-    told = []
+def _line_remarks(line: _Line, instants: Floats, length: int) -> list[str]:
+    remarks = []
     if line.is_rounded:
-        told.append(
+        remarks.append(
             f"the instants are rounded to {line.digits:.0e} s and {line.interval:.6g} s apart: they are taken as even"
         )
     gone = int(np.sum(~np.isfinite(instants)))
     if gone:
-        told.append(f"{gone} rows have no instant; they are counted on")
+        remarks.append(f"{gone} rows have no instant; they are counted on")
     if length > len(instants):
-        told.append(f"{length - len(instants)} rows after the last instant are counted on from it")
-    return told
+        remarks.append(f"{length - len(instants)} rows after the last instant are counted on from it")
+    return remarks
 
 
 def _uneven(instants: Floats) -> Placement:
@@ -299,7 +296,7 @@ def _uneven(instants: Floats) -> Placement:
     gaps, line = filled
     count = np.arange(len(row)) + gaps.before(np.arange(len(row)))
     source = "the column of instants, its gaps filled"
-    placed = _on_grid(line.start, line.interval, count, source, [*remarks, gaps.told()])
+    placed = _on_grid(line.start, line.interval, count, source, [*remarks, gaps.remark()])
     placed.suspect[count] = suspect
     return replace(placed, row=np.where(placed.row < 0, -1, row[placed.row]))
 
@@ -307,11 +304,9 @@ def _uneven(instants: Floats) -> Placement:
 def _in_order(instants: Floats) -> tuple[NDArray[np.intp], Flags, list[str]]:
     """Return rows in the order of their instants, each instant once; too much disorder is refused."""
     known = np.flatnonzero(np.isfinite(instants))
-    remarks = (
-        [f"{len(instants) - len(known)} rows without an instant are left out"]
-        if len(known) < len(instants)
-        else []
-    )
+    remarks = []
+    if len(known) < len(instants):
+        remarks.append(f"{len(instants) - len(known)} rows without an instant are left out")
     if not len(known):
         raise DatasetError(
             f"column of instants: expected numbers, got none. Give {option('rate')}, or {option('time_column')}."

@@ -16,19 +16,9 @@ _PARTS = {1.0: "seconds", 1e3: "milliseconds", 1e6: "microseconds", 1e9: "nanose
 
 
 def counted_from_start(tables: Sequence[Table]) -> tuple[list[Table], list[str], dict[str, str]]:
-    """Let instants that count from 1970 count from the first of them.
+    """Let instants that count from 1970 count from the first of them; return tables, remarks and `source_date`.
 
-    Parameters
-    ----------
-    tables : sequence of Table
-        With their instants in s, where a unit is known; without one, seconds and parts of them are told by their size.
-
-    Returns
-    -------
-    tables : list of Table
-    remarks : list of str
-    attrs : dict
-        `source_date` of the first instant.
+    Instants with a unit are in s; those without one are in the unit that their size tells.
     """
     counting = [
         (table.time, part)
