@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.core import beam_modes
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.models import BeamBody, ChainBody, RestitutionStop
+from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
+from vibroimpact.orchestrator.scene.models import RestitutionStop
 from vibroimpact.orchestrator.scene.places import stop_location, stop_mass
 
 Floats = NDArray[np.float64]

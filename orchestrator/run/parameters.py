@@ -9,14 +9,9 @@ from typing import TYPE_CHECKING, cast
 from pydantic import BaseModel
 
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.fields import fmu_variables_of
-from vibroimpact.orchestrator.scene.models import (
-    BeamBody,
-    ChainBody,
-    Forcing,
-    OscillatorBody,
-    RestitutionStop,
-)
+from vibroimpact.orchestrator.scene.models import Forcing, RestitutionStop
 from vibroimpact.orchestrator.scene.places import (
     forcing_location,
     observed_location,

@@ -34,7 +34,7 @@ from vibroimpact.orchestrator.run.record import (
 )
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.models import OscillatorBody
+from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 
 TWO_PI = 2.0 * math.pi
 

@@ -8,12 +8,11 @@ from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.keys import number_of, numeric_key
 from vibroimpact.orchestrator.scene.models import (
-    BODY_MODELS,
     STOP_MODELS,
-    Body,
     Execution,
     Forcing,
     Record,

@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
 from vibroimpact.orchestrator.scene.fields import field_name, numeric_keys
-from vibroimpact.orchestrator.scene.models import BODY_MODELS, STOP_MODELS, Forcing, Sensor
+from vibroimpact.orchestrator.scene.models import STOP_MODELS, Forcing, Sensor
 
 _MODELS: dict[str, tuple[type[BaseModel], ...]] = {
     "body": tuple(BODY_MODELS.values()),

@@ -6,7 +6,8 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import get_close_matches
 
-from vibroimpact.orchestrator.scene.models import BeamBody, Body, ChainBody, Forcing
+from vibroimpact.orchestrator.scene.body_models import BeamBody, Body, ChainBody
+from vibroimpact.orchestrator.scene.models import Forcing
 from vibroimpact.orchestrator.scene.problems import nearest
 
 CONSERVATIVE = ("energy.kinetic", "energy.potential")

@@ -19,6 +19,7 @@ from pydantic import BaseModel, Field, field_serializer
 from pydantic.fields import FieldInfo
 
 from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.orchestrator.scene.body_models import Body
 from vibroimpact.orchestrator.scene.changes import changed_document, changed_values
 from vibroimpact.orchestrator.scene.fields import field_of, known_keys
 from vibroimpact.orchestrator.scene.file import (
@@ -36,7 +37,7 @@ from vibroimpact.orchestrator.scene.keys import (
     numeric_key,
     replacement,
 )
-from vibroimpact.orchestrator.scene.models import Body, Execution, Forcing, Record, SceneTable, Sensor, Stop
+from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, SceneTable, Sensor, Stop
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
+from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.fields import rule_of
-from vibroimpact.orchestrator.scene.models import (
-    AMPLITUDE,
-    DAMPING,
-    FALLING_RESTITUTION,
-    ChainBody,
-    OscillatorBody,
-    RestitutionStop,
-)
+from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION, RestitutionStop
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene.sampled_names import follow_energies
 from vibroimpact.orchestrator.scene.scene import Scene

@@ -10,9 +10,10 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
 from vibroimpact.orchestrator.scene.fields import field_of, is_array_only, known_keys, listed, rule_of
 from vibroimpact.orchestrator.scene.keys import SWEEPABLE, numeric_key, parse_key
-from vibroimpact.orchestrator.scene.models import BODY_MODELS, STOP_MODELS, AxisTable, Forcing, Sensor
+from vibroimpact.orchestrator.scene.models import STOP_MODELS, AxisTable, Forcing, Sensor
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     key_path,

@@ -14,15 +14,9 @@ from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import parse_scene
+from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.scene.fields import known_keys
-from vibroimpact.orchestrator.scene.models import (
-    Execution,
-    Forcing,
-    OscillatorBody,
-    Record,
-    RestitutionStop,
-    SceneHeader,
-)
+from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, RestitutionStop, SceneHeader
 from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 MODELS: dict[str, type[BaseModel]] = {

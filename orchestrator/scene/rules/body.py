@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
+from vibroimpact.orchestrator.scene.body_models import BeamBody, Body, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.fields import field_of, fmu_variables_of, is_array_only
-from vibroimpact.orchestrator.scene.models import BeamBody, Body, ChainBody, Forcing, OscillatorBody
+from vibroimpact.orchestrator.scene.models import Forcing
 from vibroimpact.orchestrator.scene.places import moves
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 from vibroimpact.orchestrator.scene.sampled_names import sampled_names, variable_hint

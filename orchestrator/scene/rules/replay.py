@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from vibroimpact.orchestrator.scene.body_models import ChainBody
 from vibroimpact.orchestrator.scene.draft import Draft
-from vibroimpact.orchestrator.scene.models import ChainBody
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 from vibroimpact.orchestrator.scene.sampled_names import sampled_names, variable_hint
 

@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.scene.draft import FREQUENCY_KEYS, Draft
 from vibroimpact.orchestrator.scene.keys import START_STATE
-from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN, OscillatorBody
+from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.rules.body import BODY_RULES
 from vibroimpact.orchestrator.scene.rules.replay import REPLAY_RULES

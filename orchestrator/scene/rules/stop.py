@@ -5,17 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import combinations
 
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, BeamBody, Body, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.draft import Draft
-from vibroimpact.orchestrator.scene.models import (
-    BODY_MODELS,
-    BeamBody,
-    Body,
-    ChainBody,
-    KelvinVoigtStop,
-    OscillatorBody,
-    RestitutionStop,
-    Stop,
-)
+from vibroimpact.orchestrator.scene.models import KelvinVoigtStop, RestitutionStop, Stop
 from vibroimpact.orchestrator.scene.places import stop_location, stop_mass
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
 from vibroimpact.orchestrator.scene.rules.body import fixed_point_problems

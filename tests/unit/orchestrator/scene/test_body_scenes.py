@@ -14,7 +14,8 @@ from vibroimpact.orchestrator.run import dataset_of_runs
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.scene.models import BeamBody, ChainBody, KelvinVoigtStop
+from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
+from vibroimpact.orchestrator.scene.models import KelvinVoigtStop
 
 
 def scene_of(text: str) -> Scene:

@@ -12,16 +12,16 @@ from support.places import ROOT
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import agree, si_unit
-from vibroimpact.orchestrator.scene import Scene, models, parse_scene, replay_models
+from vibroimpact.orchestrator.scene import Scene, body_models, models, parse_scene, replay_models
+from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody, Rayleigh
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, known_keys, rule_of
 from vibroimpact.orchestrator.scene.general import models as general_models
 from vibroimpact.orchestrator.scene.general.component_facts import component_facts
-from vibroimpact.orchestrator.scene.models import BeamBody, ChainBody, OscillatorBody, Rayleigh
 
 REFERENCE = ROOT / "docs" / "scene.md"
 MODELS = {
     found
-    for module in (models, replay_models, general_models)
+    for module in (models, body_models, replay_models, general_models)
     for found in vars(module).values()
     if isinstance(found, type) and issubclass(found, BaseModel) and found.model_fields
 }
