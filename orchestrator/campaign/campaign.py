@@ -23,14 +23,8 @@ from vibroimpact.analysis.dataset import read_flat, write_dataset
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
 from vibroimpact.fmus.wording import typed_or_called
-from vibroimpact.orchestrator.campaign.chunks import (
-    DEFAULT_RUNNER,
-    Chunk,
-    ChunkResult,
-    Work,
-    get_ready,
-)
-from vibroimpact.orchestrator.campaign.cluster import Client, WorkerPool, open_workers
+from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, Chunk, ChunkResult, Work, get_ready
+from vibroimpact.orchestrator.campaign.cluster import Client, open_workers
 from vibroimpact.orchestrator.campaign.computation import Computation
 from vibroimpact.orchestrator.campaign.extension import (
     EarlierSweep,
@@ -65,6 +59,7 @@ from vibroimpact.orchestrator.campaign.parts import (
     remove_temporary_files,
     unfit_parts,
 )
+from vibroimpact.orchestrator.campaign.pool import WorkerPool
 from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers

@@ -18,14 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import (
-    Direction,
-    Outcome,
-    RunRecord,
-    marked,
-    read_part,
-    write_dataset,
-)
+from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, marked, read_part, write_dataset
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, dataset_of_runs, identity_of, named_runner

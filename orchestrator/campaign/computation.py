@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work, run_chunk, write_crashed
-from vibroimpact.orchestrator.campaign.cluster import WorkerPool
 from vibroimpact.orchestrator.campaign.lone_process import ProcessDied, call_alone
+from vibroimpact.orchestrator.campaign.pool import WorkerPool
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 
 CRASH_MESSAGE = "this point kills the process that runs it"

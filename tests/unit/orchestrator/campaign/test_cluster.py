@@ -19,7 +19,9 @@ from support.busy_runner import die_while, freeze_once, keep_the_interpreter, sa
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign import cluster
-from vibroimpact.orchestrator.campaign.cluster import MOST_DEATHS, MOST_STARTS, open_workers
+from vibroimpact.orchestrator.campaign import pool as pool_module
+from vibroimpact.orchestrator.campaign.cluster import MOST_STARTS, open_workers
+from vibroimpact.orchestrator.campaign.pool import MOST_DEATHS
 from vibroimpact.orchestrator.campaign.progress import Progress
 
 pytestmark = pytest.mark.slow
@@ -44,7 +46,7 @@ def test_a_worker_that_dies_before_the_first_chunk_is_replaced_and_the_new_one_i
 def test_a_call_that_kills_every_worker_is_one_clear_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cluster, "MOST_DEATHS", 1)
+    monkeypatch.setattr(pool_module, "MOST_DEATHS", 1)
     for wish in range(MOST_DEATHS):
         (tmp_path / f"{wish}").touch()
     with (
@@ -57,7 +59,7 @@ def test_a_call_that_kills_every_worker_is_one_clear_error(
 def test_work_whose_message_waits_for_a_clock_that_was_set_back_is_sent_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(cluster, "STALL_SECONDS", 1.0)
+    monkeypatch.setattr(pool_module, "STALL_SECONDS", 1.0)
     said = Said()
     with open_workers(workers=1, progress=said) as pool:
         pool.submit(same, 1)
@@ -72,8 +74,8 @@ def test_work_whose_message_waits_for_a_clock_that_was_set_back_is_sent_again(
 
 
 def test_a_long_point_is_no_stall(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "STALL_SECONDS", 0.1)
-    monkeypatch.setattr(cluster, "LOOK_SECONDS", 0.1)
+    monkeypatch.setattr(pool_module, "STALL_SECONDS", 0.1)
+    monkeypatch.setattr(pool_module, "LOOK_SECONDS", 0.1)
     said = Said()
     with open_workers(workers=1, progress=said) as pool:
         pool.submit(time.sleep, 2.0)
@@ -86,8 +88,8 @@ def test_a_worker_that_loads_for_long_and_is_done_when_it_answers_is_no_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # a machine with 15 processes on 2 cores: a campaign ended with the error of a clock that was set back
-    monkeypatch.setattr(cluster, "STALL_SECONDS", 0.5)
-    monkeypatch.setattr(cluster, "LOOK_SECONDS", 0.2)
+    monkeypatch.setattr(pool_module, "STALL_SECONDS", 0.5)
+    monkeypatch.setattr(pool_module, "LOOK_SECONDS", 0.2)
     said = Said()
     with open_workers(workers=1, progress=said) as pool:
         assert list(pool.call_everywhere(keep_the_interpreter, 3).values()) == [3]
@@ -99,7 +101,7 @@ def test_a_worker_that_does_not_answer_any_more_is_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, seconds in (("STALL_SECONDS", 0.5), ("LOOK_SECONDS", 0.2), ("RESULT_SECONDS", 1.0)):
-        monkeypatch.setattr(cluster, name, seconds)
+        monkeypatch.setattr(pool_module, name, seconds)
     said = Said()
     (tmp_path / "wish").touch()
     with open_workers(workers=1, progress=said) as pool:
