@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import Channel, Quality
+from vibroimpact.analysis.recording.channels import Floats
 from vibroimpact.analysis.recording.units import measured_unit, unit_label
 from vibroimpact.fmus.errors import DatasetError
 
-Floats = NDArray[np.float64]
-
-#: Parts that a channel is cut into to find its quietest.
+#: Parts of a channel among which its quietest is found.
 QUIET_PARTS = 20
-#: Steps of one replay: a minute or more of processor time.
+#: Most steps of one replay: a minute or more of processor time.
 MOST_STEPS = 10**7
 #: SI units of what can be driven.
 DRIVEN_UNITS = {"base_acceleration": "m s-2", "force": "N"}
@@ -74,11 +73,9 @@ def drive_of(channel: Channel, drive: str, offset: float | None = None) -> Drive
     if offset is None:
         # what was simulated has no offset to be taken off
         offset = 0.0 if channel.attrs.get("role") == "simulated" else quiet_level(channel.values[known])
-    level = offset
-    values = np.interp(channel.time, channel.time[known], channel.values[known]) - level
-    return DriveSignal(
-        channel.time, values * unit.factor, ~known, level, tuple(_remarks(channel, level, ~known))
-    )
+    values = np.interp(channel.time, channel.time[known], channel.values[known]) - offset
+    remarks = tuple(_remarks(channel, offset, ~known))
+    return DriveSignal(channel.time, values * unit.factor, ~known, offset, remarks)
 
 
 def _remarks(channel: Channel, level: float, bridged: NDArray[np.bool_]) -> list[str]:
