@@ -125,14 +125,7 @@ class _Child:
 
 
 class GuardedRunner:
-    """Runs points of a scene in a guarded child process; the interface of any runner.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    execution : str
-        Handed on to the runner in the child.
+    """Runs points of a scene in a guarded child process, whose runner gets `execution`; the interface of any runner.
 
     Raises
     ------
@@ -269,8 +262,7 @@ class GuardedRunner:
     def close(self) -> None:
         """End the child and remove its notes."""
         if self._child is not None:
-            self._child.end()
-            self._child = None
+            self._end_child()
         self._folder.cleanup()
 
 
