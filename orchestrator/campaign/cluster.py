@@ -102,6 +102,15 @@ def open_workers(
         yield pool
 
 
+def refuse_two_kinds_of_workers(workers: int | None, scheduler: object) -> None:
+    """Refuse workers of this machine beside those of a scheduler."""
+    if workers is not None and scheduler is not None:
+        raise UsageError(
+            f"{option('workers')} and {option('scheduler')}: expected one of them, got both. "
+            "A scheduler has its own workers."
+        )
+
+
 def processor_count() -> int:
     """Return how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
