@@ -19,18 +19,7 @@ CRASH_MESSAGE = "this point kills the process that runs it"
 
 
 class Computation:
-    """One pass over a schedule.
-
-    Parameters
-    ----------
-    pool : WorkerPool
-    work : Work
-        What all chunks have in common.
-    schedule : ChunkSchedule
-        What is left to do.
-    done : callable
-        Told of each chunk whose part is on the disk.
-    """
+    """One pass over a schedule; `done` is told of each chunk whose part is on the disk."""
 
     def __init__(
         self, pool: WorkerPool, work: Work, schedule: ChunkSchedule, done: Callable[[ChunkResult], None]

@@ -36,15 +36,7 @@ OF_THE_MACHINE = ("point_seconds",)
 def compare_with_stored(
     pool: WorkerPool, work: Work, scene: Scene, stored: Sequence[Path]
 ) -> tuple[int, str]:
-    """Compute a few stored points again.
-
-    Parameters
-    ----------
-    pool : WorkerPool
-    work : Work
-    scene : Scene
-    stored : sequence of Path
-        The files of rows that the campaign has.
+    """Compute a few points again, of those in the files of rows that a campaign has.
 
     Returns
     -------

@@ -73,14 +73,7 @@ class Cluster:
 class WorkerPool:
     """Workers of one Dask cluster, one piece of work at a time on each.
 
-    Parameters
-    ----------
-    connect : callable
-        Opens a connection to the workers.
-    where : str
-        Where the workers are, for messages.
-    progress : Progress
-        Told of workers that were lost.
+    Messages say `where` they are; `progress` is told of those that were lost.
 
     Attributes
     ----------
