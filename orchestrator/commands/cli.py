@@ -101,7 +101,6 @@ def load_commands() -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code: 0 done, 1 failed, 2 misused, 130 interrupted."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    debug = DEBUG in given
     try:
         for word in given:
             refuse_no_text(word)
@@ -112,18 +111,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except SystemExit as end:
         sys.exit(end.code or (0 if all_was_written() else 1))
     except VibroimpactError as error:
-        sys.exit(_report(str(error), error.exit_code, debug))
+        sys.exit(_report(str(error), error.exit_code, DEBUG in given))
     except KeyboardInterrupt:
         sys.exit(130)
     except Exception as error:
         if isinstance(error, OSError) and error.errno in _FULL:
             sys.exit(
-                _report(f"{error.filename or 'Output'}: cannot be written ({error.strerror}).", 1, debug)
+                _report(
+                    f"{error.filename or 'Output'}: cannot be written ({error.strerror}).", 1, DEBUG in given
+                )
             )
         # The last stop for what nobody foresaw: a person gets a line, a developer the place.
         text = f"Unexpected error: {type(error).__name__}: {error}\nThis is a defect of vibroimpact."
         hint = f" Repeat the command as `vibroimpact {DEBUG} ...` and report what it shows."
-        sys.exit(_report(text if debug else text + hint, 1, debug))
+        sys.exit(_report(text + ("" if DEBUG in given else hint), 1, DEBUG in given))
 
 
 def _report(text: str, exit_code: int, debug: bool) -> int:

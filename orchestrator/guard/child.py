@@ -56,6 +56,10 @@ def _answer(runner: Runner, point: PointTask) -> Any:
         return Failure(str(error))
 
 
+def _open(order: Order, notes: Breadcrumbs) -> Runner:
+    return open_runner(order.scene, order.execution, log=notes.log, wrap=notes.wrap if order.noting else None)
+
+
 def main() -> None:
     """Serve points until standard input ends."""
     # Ctrl-C reaches all processes of a terminal: a point must not count as crashed for it. The parent ends this one.
@@ -68,8 +72,7 @@ def main() -> None:
     notes = Breadcrumbs(Path(order.notes))
     _look_around(parent, notes)
     try:
-        wrap = notes.wrap if order.noting else None
-        runner = open_runner(order.scene, order.execution, log=notes.log, wrap=wrap)
+        runner = _open(order, notes)
     except VibroimpactError as error:
         send(answers, Failure(str(error), misuse=isinstance(error, ComponentFileError)))
         return

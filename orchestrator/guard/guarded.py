@@ -262,7 +262,8 @@ class GuardedRunner:
     def close(self) -> None:
         """End the child and remove its notes."""
         if self._child is not None:
-            self._end_child()
+            self._child.end()
+            self._child = None
         self._folder.cleanup()
 
 

@@ -11,16 +11,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from vibroimpact.analysis.recording import Channel
-from vibroimpact.analysis.recording.channels import Floats
 from vibroimpact.analysis.replay.alignment import Interpolated
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.analysis.replay.event import find_event
 from vibroimpact.fmus.errors import EstimationError
 
-#: Quiet samples below which no noise is learned.
+Floats = NDArray[np.float64]
+
+#: Samples from which noise is learned.
 FEWEST_QUIET = 100
 
 

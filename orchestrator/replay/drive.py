@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.recording import Channel, Quality
-from vibroimpact.analysis.recording.channels import Floats
 from vibroimpact.analysis.recording.units import measured_unit, unit_label
 from vibroimpact.fmus.errors import DatasetError
 
-#: Parts of a channel among which its quietest is found.
+Floats = NDArray[np.float64]
+
+#: Parts that a channel is cut into to find its quietest.
 QUIET_PARTS = 20
-#: Most steps of one replay: a minute or more of processor time.
+#: Steps of one replay: a minute or more of processor time.
 MOST_STEPS = 10**7
 #: SI units of what can be driven.
 DRIVEN_UNITS = {"base_acceleration": "m s-2", "force": "N"}
@@ -73,9 +74,11 @@ def drive_of(channel: Channel, drive: str, offset: float | None = None) -> Drive
     if offset is None:
         # what was simulated has no offset to be taken off
         offset = 0.0 if channel.attrs.get("role") == "simulated" else quiet_level(channel.values[known])
-    values = np.interp(channel.time, channel.time[known], channel.values[known]) - offset
-    remarks = tuple(_remarks(channel, offset, ~known))
-    return DriveSignal(channel.time, values * unit.factor, ~known, offset, remarks)
+    level = offset
+    values = np.interp(channel.time, channel.time[known], channel.values[known]) - level
+    return DriveSignal(
+        channel.time, values * unit.factor, ~known, level, tuple(_remarks(channel, level, ~known))
+    )
 
 
 def _remarks(channel: Channel, level: float, bridged: NDArray[np.bool_]) -> list[str]:

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from vibroimpact.analysis.recording.channels import Floats
 from vibroimpact.analysis.replay.alignment import Interpolated
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.fmus.errors import ComponentError, EstimationError, UsageError
@@ -26,22 +24,23 @@ from vibroimpact.orchestrator.replay.scoring import compare_motion
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.fields import bounds_of
 
+Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-#: Power of the natural frequency with which a number grows.
+#: How the natural frequency enters a number: frequencies as such, stiffnesses by their square.
 _FREQUENCY_POWER = {"frequency": 1.0, "stiffness": 2.0, "flexural_rigidity": 2.0, "youngs_modulus": 2.0}
 MOST_ALIGNMENTS = 6
-#: Condition of the scaled normal matrix above which two numbers count as one: their difference is derivative noise.
+#: Condition of the scaled normal matrix above which two numbers are one: their difference is derivative noise.
 MOST_CONDITION = 1e8
-#: Relative effect of doubling a number below which it counts as having none: rounding.
+#: A number that changes what is compared by less than this share, were it doubled, does not change it: rounding.
 LEAST_CHANGE = 1e-9
 #: Step beside a start without effect, relative to the larger of a number and its scale.
 BESIDE = 0.1
-#: Standard errors below which a square is not told from 0.
+#: A square less than so many of its errors is not told from 0.
 FLAT_ERRORS = 3.0
-#: Move of a lag, relative to its error, up to which it counts as settled.
+#: The lag stays where it moves by less than this share of its own error.
 LAG_STAYS = 0.1
-#: Draws of the noise of the drive: standard errors from them are good to about 1/sqrt(2 draws), a sixth.
+#: Draws of the noise of what drives: standard errors from it are good to about 1/sqrt(2 draws), a sixth.
 NOISE_DRAWS, NOISE_SEED = 20, 5
 #: Step of the numeric derivatives, relative to the larger of a number and its scale.
 DERIVATIVE_STEP = 1e-5
@@ -395,15 +394,19 @@ def _name(key: str) -> str:
 def _explained(comparisons: Sequence[Sequence[Comparison]]) -> float:
     """Return the mean squared correlation of simulated and measured signals, whatever their gains."""
     found = []
-    for comparison in chain.from_iterable(comparisons):
+    for comparison in (one for compared in comparisons for one in compared):
         pair = comparison.values[comparison.scored], comparison.simulated[comparison.scored]
         found.append(float(np.corrcoef(*pair)[0, 1]) ** 2 if np.ptp(pair[1]) > 0.0 else 0.0)
     return float(np.mean(found))
 
 
 def _have_settled(before: Sequence[Sequence[Comparison]], after: Sequence[Sequence[Comparison]]) -> bool:
-    old, new = ([one.alignment for one in chain.from_iterable(compared)] for compared in (before, after))
+    pairs = [
+        (old.alignment, new.alignment)
+        for earlier, later in zip(before, after, strict=True)
+        for old, new in zip(earlier, later, strict=True)
+    ]
     return all(
-        was.polarity == now.polarity and abs(now.lag - was.lag) <= LAG_STAYS * now.lag_error + 1e-12
-        for was, now in zip(old, new, strict=True)
+        old.polarity == new.polarity and abs(new.lag - old.lag) <= LAG_STAYS * new.lag_error + 1e-12
+        for old, new in pairs
     )

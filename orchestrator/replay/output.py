@@ -61,7 +61,13 @@ def replay_dataset(
 
     Signals and scores are those of `comparison_dataset`, of all recordings one after the other; `recording` and
     `use` say which. `drive_K` on `drive_time_K` and `simulated_impact_K` belong to recording K (from 1). Fitted
-    numbers are on `parameter`. There is at least one replay, each with something compared or a drive.
+    numbers are on `parameter`.
+
+    Parameters
+    ----------
+    replays : sequence of Replayed
+        At least one, each with something compared or a drive.
+    fit, verdict : optional
     """
     compared = [comparison for replay in replays for comparison in replay.comparisons]
     dataset = comparison_dataset(compared) if compared else xr.Dataset()
@@ -88,8 +94,15 @@ def replay_dataset(
 def fitted_scene_text(scene: Scene, fit: ReplayFit, recordings: Sequence[str], folder: Path) -> str:
     """Return the file of a scene with the numbers found, and above it what they were fitted to and their errors.
 
-    `recordings` are the files that it was fitted to. The text will lie in `folder`: recordings that the scene names
-    are named from there.
+    Parameters
+    ----------
+    scene : Scene
+        As it was loaded.
+    fit : ReplayFit
+    recordings : sequence of str
+        Files that it was fitted to.
+    folder : Path
+        Where the text will lie: recordings that the scene names are named from there.
     """
     here = Path(scene.source).parent
     named = replay_table(scene).recordings

@@ -7,18 +7,18 @@ body and its stops. `auto` takes the first.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.schema import file_name_of, known_unit, sample_rule
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.analysis.recording import Channel, Recording, open_signals
-from vibroimpact.analysis.recording.channels import Floats
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError, UsageError
 from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay
@@ -32,6 +32,8 @@ from vibroimpact.orchestrator.scene.fields import field_of, numeric_keys, rule_o
 from vibroimpact.orchestrator.scene.models import AMPLITUDE
 from vibroimpact.orchestrator.scene.replay_models import Compared, Replay
 from vibroimpact.orchestrator.scene.rules.replay import plain_variable
+
+Floats = NDArray[np.float64]
 
 #: Name of the component that replays, and of its one channel.
 REPLAY, DRIVE = "replay", "drive"
@@ -268,22 +270,28 @@ def is_linear(scene: Scene) -> bool:
     return not scene.stops and not any(np.any(getattr(scene.body, key)) for key in following)
 
 
-def recordings_of(scene: Scene) -> list[Path]:
-    """Return the files of the recordings that a scene names, at least one; paths count from the scene's folder."""
+def recording_of(scene: Scene, number: int) -> Path:
+    """Return the file of a recording (1-based) that a scene names; paths count from the scene's folder."""
     names = replay_table(scene).recordings
     if not names:
         raise UsageError(
             f"{scene.source}: replay.recordings: expected a recording, got none. "
             "Name it in the scene or on the command line."
         )
-    return [Path(scene.source).parent / name for name in names]
+    return Path(scene.source).parent / names[number - 1]
 
 
 @contextmanager
 def opened_replays(scene: Scene, paths: Sequence[Path], execution: str = "auto") -> Iterator[list[Replayer]]:
     """Open a replay of a scene for each recording, and close all of them at the end."""
-    with ExitStack() as stack:
-        yield [stack.enter_context(opened_replay(scene, path, execution)) for path in paths]
+    replayers: list[Replayer] = []
+    try:
+        for path in paths:
+            replayers.append(opened_replay(scene, path, execution))
+        yield replayers
+    finally:
+        for replayer in replayers:
+            replayer.close()
 
 
 def opened_replay(scene: Scene, path: Path, execution: str) -> Replayer:

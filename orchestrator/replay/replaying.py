@@ -17,7 +17,7 @@ from vibroimpact.orchestrator.replay.replayer import (
     Replayer,
     is_linear,
     opened_replays,
-    recordings_of,
+    recording_of,
     replay_table,
 )
 from vibroimpact.orchestrator.replay.scoring import compare_motion, scores_of
@@ -31,6 +31,8 @@ class WholeReplay:
 
     Attributes
     ----------
+    scene : Scene
+        With the recordings that were replayed.
     replays : tuple of Replayed
         Those to which numbers were fitted first, then those that were only scored.
     fit : ReplayFit or None
@@ -41,6 +43,7 @@ class WholeReplay:
         As `replay_dataset` makes it.
     """
 
+    scene: Scene
     replays: tuple[Replayed, ...]
     fit: ReplayFit | None
     verdict: Verdict | None
@@ -86,7 +89,8 @@ def replay_scene(
             f"{scene.source}: sweep: expected no sweep for one dataset. "
             + typed_or_called("Give a folder with -o for a campaign.", "campaign(scene, folder) takes it.")
         )
-    paths = recordings_of(with_recordings(scene, recordings))
+    named = with_recordings(scene, recordings)
+    paths = [recording_of(named, number) for number in range(1, len(replay_table(named).recordings) + 1)]
     if score and fit is None:
         raise UsageError(
             f"{option('score')}: expected {option('fit')} beside it: "
@@ -99,7 +103,7 @@ def replay_scene(
     with opened_replays(scene, [*paths, *score], execution or scene.execution.how) as replayers:
         found = fit_replay(replayers[: len(paths)], keys, told=told) if keys else None
         replays, verdict = _judged(scene, replayers, found, len(paths))
-        return WholeReplay(replays, found, verdict, replay_dataset(replays, found, verdict))
+        return WholeReplay(named, replays, found, verdict, replay_dataset(replays, found, verdict))
 
 
 def with_recordings(scene: Scene, recordings: Sequence[Path]) -> Scene:

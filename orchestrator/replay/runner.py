@@ -13,23 +13,42 @@ import numpy as np
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.analysis.replay.comparison import Comparison
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.replay.replayer import Motion, Replayer, opened_replay, recordings_of
+from vibroimpact.orchestrator.replay.replayer import (
+    Motion,
+    Replayer,
+    opened_replay,
+    recording_of,
+    replay_table,
+)
 from vibroimpact.orchestrator.replay.scoring import compare_motion
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 
 
 class ReplayRunner:
-    """Runs the replays of one scene, which names at least one recording; each is opened once in a process.
+    """Runs the replays of one scene; each recording is opened once in a process.
 
-    Its `fmu_hashes` are those of each component's FMU and of each recording: a campaign never mixes two versions.
+    Parameters
+    ----------
+    scene : Scene
+        With `[replay]` and at least one recording in it.
+    execution : str
+        `auto`, `fused` or `coupled`.
+
+    Attributes
+    ----------
+    execution, instruction_set
+        As of `runner.PointRunner`.
+    fmu_hashes : dict of str to str
+        SHA-256 of each component's FMU and of each recording: a campaign never mixes two versions of either.
     """
 
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         self.execution = "fused" if execution == "auto" else execution
         self.instruction_set = platform.machine()
         self._scene = scene
-        self._paths = recordings_of(scene)
+        count = max(1, len(replay_table(scene).recordings))
+        self._paths = [recording_of(scene, number) for number in range(1, count + 1)]
         recordings = {f"recording {path.name}": _sha256(path) for path in self._paths}
         self._replayers: dict[int, Replayer] = {}
         self.fmu_hashes = recordings | self._replayer(1).hashes
@@ -61,10 +80,11 @@ class ReplayRunner:
         displacement, velocity, state = replayer.final_state()
         # what was not scored is the same for all points; an alignment that is doubtful is not
         doubts = [f"{c.measured.name}: {text}" for c in comparisons for text in c.alignment.remarks]
+        told = [*motion.warnings, *doubts]
         impacts = self._scene.record.impacts
         return RunRecord(
             outcome=Outcome.ok,
-            message="; ".join([*motion.warnings, *doubts]),
+            message="; ".join(told),
             impacts=motion.impacts if impacts else None,
             sticks=motion.sticks if impacts else None,
             final_displacement=displacement,

@@ -159,7 +159,13 @@ def scores_of(
     """Return the score of each channel of each recording; a recording with several channels has several rows.
 
     A record in which nothing happened has nothing to be scored: beside the largest motion of the same channel in any
-    of them, it has less than `LEAST_MOTION` of the energy. The first `fitted` recordings are those that were fitted.
+    of them, it has less than `LEAST_MOTION` of the energy.
+
+    Parameters
+    ----------
+    replayers, comparisons : sequences, one for each recording
+    fitted : int
+        The first so many recordings were fitted.
     """
     motions = [[_motion(comparison) for comparison in compared] for compared in comparisons]
     own: dict[str, float] = {}
