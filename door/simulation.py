@@ -7,7 +7,7 @@ import threading
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
@@ -17,12 +17,10 @@ from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import SceneCost, run_campaign, run_scene
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
+from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
 from vibroimpact.orchestrator.replay.replaying import replay_scene
 from vibroimpact.orchestrator.scene import Scene
-
-if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.cluster import Client
 
 SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
 PathLike = str | os.PathLike[str]
@@ -115,7 +113,9 @@ def campaign(
     >>> found = campaign("examples/bifurcation.toml", "bifurcation", workers=2)        # doctest: +SKIP
     >>> found.displacement_range.sel(direction="up")                                   # doctest: +SKIP
     """
-    _refuse_workers(workers, scheduler)
+    if workers is not None and (not isinstance(workers, int) or workers < 1):
+        raise UsageError(f"workers: expected a whole number of 1 or more, got {workers!r}.")
+    refuse_two_kinds_of_workers(workers, scheduler)
     with _shown(progress) as shown:
         report = run_campaign(
             _scene(scene), _path(folder), workers=workers, scheduler=scheduler, progress=shown
@@ -225,15 +225,6 @@ def _path(given: object) -> Path:
 
 def _shown(progress: bool) -> AbstractContextManager[Progress]:
     return shown_progress() if progress else nullcontext(Progress())
-
-
-def _refuse_workers(workers: int | None, scheduler: object) -> None:
-    if workers is not None and (not isinstance(workers, int) or workers < 1):
-        raise UsageError(f"workers: expected a whole number of 1 or more, got {workers!r}.")
-    if workers is not None and scheduler is not None:
-        raise UsageError(
-            "workers and scheduler: expected one of them, got both. A scheduler has its own workers."
-        )
 
 
 def _in_memory(file: Path) -> xr.Dataset:

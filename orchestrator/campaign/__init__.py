@@ -10,14 +10,7 @@ if TYPE_CHECKING:
     from vibroimpact.orchestrator.campaign.check import SceneCost, cost_of
     from vibroimpact.orchestrator.campaign.single_run import run_scene
 
-__all__ = [
-    "CampaignInterrupted",
-    "CampaignReport",
-    "SceneCost",
-    "cost_of",
-    "run_campaign",
-    "run_scene",
-]
+__all__ = ["CampaignInterrupted", "CampaignReport", "SceneCost", "cost_of", "run_campaign", "run_scene"]
 _HOMES = {"run_scene": "single_run", "cost_of": "check", "SceneCost": "check"}
 
 

@@ -23,14 +23,8 @@ from vibroimpact.analysis.dataset import read_flat, write_dataset
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import CampaignError, DatasetError, UsageError
 from vibroimpact.fmus.wording import typed_or_called
-from vibroimpact.orchestrator.campaign.chunks import (
-    DEFAULT_RUNNER,
-    Chunk,
-    ChunkResult,
-    Work,
-    get_ready,
-)
-from vibroimpact.orchestrator.campaign.cluster import Client, WorkerPool, open_workers
+from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, Chunk, ChunkResult, Work, get_ready
+from vibroimpact.orchestrator.campaign.cluster import Client, open_workers
 from vibroimpact.orchestrator.campaign.computation import Computation
 from vibroimpact.orchestrator.campaign.extension import (
     EarlierSweep,
@@ -65,17 +59,17 @@ from vibroimpact.orchestrator.campaign.parts import (
     remove_temporary_files,
     unfit_parts,
 )
+from vibroimpact.orchestrator.campaign.pool import WorkerPool
 from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import expand
+from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 MOST_ROUNDS = 3
 """How often parts that turn out unfit are computed again by one command."""
 MOST_NAMED = 5
-
 
 OpenedWorkers = Callable[[], AbstractContextManager[WorkerPool]]
 
@@ -173,9 +167,7 @@ class _Campaign:
         self._manifest = self._checked_manifest()
         # A worker may live in another folder, and files that a scene names lie beside it.
         source = str(Path(scene.source).absolute())
-        self._branches = expand(scene)
-        runs = sum(len(branch.points) for branch in self._branches)
-        self._report = CampaignReport(home / "dataset.nc", runs)
+        self._report = CampaignReport(home / "dataset.nc", run_count(scene.sweep))
         self._go_on_with_this_sweep()
         hashed = self._manifest.scene_hash if self._manifest is not None else scene_hash(scene)
         self._kept_path = kept_path(self._parts_folder, hashed)
@@ -319,7 +311,7 @@ class _Campaign:
 
     def _compute_with(self, pool: WorkerPool, work: Work, parts: Sequence[StoredPart]) -> None:
         self._report.workers = len(pool.worker_addresses())
-        schedule = ChunkSchedule(self._branches, parts, self._report.workers)
+        schedule = ChunkSchedule(expand(self._scene), parts, self._report.workers)
         began = time.perf_counter()
         self._progress.begin(self._report.runs, self._report.resumed)
         try:

@@ -18,14 +18,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from vibroimpact.analysis.dataset import (
-    Direction,
-    Outcome,
-    RunRecord,
-    marked,
-    read_part,
-    write_dataset,
-)
+from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, marked, read_part, write_dataset
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, dataset_of_runs, identity_of, named_runner
@@ -113,39 +106,29 @@ class ChunkResult:
         The state (m, m/s) that the next run of the branch starts from.
     outcomes : mapping of str to int
         How many runs ended in each way.
-    compute_seconds, write_seconds : float
-        Wall time of the runs, and of building and writing the part, s.
+    compute_seconds : float
+        Wall time of the runs, s.
     """
 
     chunk: Chunk
     carried: State | None
     outcomes: Mapping[str, int]
     compute_seconds: float
-    write_seconds: float
-
-
-@dataclass(slots=True)
-class _Opened:
-    """A scene with its components, ready to run in this process."""
-
-    branches: tuple[Branch, ...]
-    runner: Runner
 
 
 @lru_cache(maxsize=1)
-def _opened(scene: Scene, runner: str) -> _Opened:
-    return _Opened(expand(scene), named_runner(scene, runner))
+def _opened(scene: Scene, runner: str) -> tuple[tuple[Branch, ...], Runner]:
+    """Return the branches of a scene, and what runs their points in this process."""
+    return expand(scene), named_runner(scene, runner)
 
 
 def get_ready(work: Work) -> RunnerIdentity:
     """Load all that a worker needs before its first chunk, and return which runner it has."""
-    opened = _opened(work.scene, work.runner)
+    _, runner = _opened(work.scene, work.runner)
     # The first dataset of a process takes long, because libraries load what they need when they need it.
-    first_point = points_of(opened.branches[:1], Chunk(0, 0, 1))
-    record = empty_record(work.scene, Outcome.error, "rehearsal", 0.0)
     with ScratchFolder("rehearsal") as folder:
-        write_dataset(dataset_of(work.scene, first_point, [record], {}), Path(folder.name, "rehearsal.nc"))
-    return identity_of(opened.runner)
+        write_dataset(empty_part(work.scene), Path(folder.name, "rehearsal.nc"))
+    return identity_of(runner)
 
 
 def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
@@ -156,37 +139,35 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     CampaignError
         When this worker's runner is not the one the campaign began with, or the part cannot be written.
     """
-    opened = _opened(work.scene, work.runner)
-    _refuse_other_runner(work, opened.runner)
+    branches, runner = _opened(work.scene, work.runner)
+    _refuse_other_runner(work, runner)
     began = time.perf_counter()
-    points = _points_left(work, opened.branches, chunk)
+    points = _points_left(work, branches, chunk)
     if not points:
-        return ChunkResult(chunk, chunk.start, {}, 0.0, 0.0)
-    deadline = began + chunk.most_seconds
-    records, carried = run_points(work.scene, opened.runner, points, chunk.start, deadline)
-    computed = time.perf_counter()
+        return ChunkResult(chunk, chunk.start, {}, 0.0)
+    records, carried = run_points(work.scene, runner, points, chunk.start, began + chunk.most_seconds)
+    seconds = time.perf_counter() - began
     left = points[len(records) :]
     done = replace(chunk, stop=left[0].point.index if left else chunk.stop)
-    outcomes = write_part(work, done, points[: len(records)], records, carried)
-    return ChunkResult(done, carried, outcomes, computed - began, time.perf_counter() - computed)
+    return ChunkResult(
+        done, carried, write_part(work, done, points[: len(records)], records, carried), seconds
+    )
 
 
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
     """Run the points of a chunk, kept ones too, and return their rows; nothing is written."""
-    opened = _opened(work.scene, work.runner)
-    _refuse_other_runner(work, opened.runner)
-    points = points_of(opened.branches, chunk)
-    records, _ = run_points(work.scene, opened.runner, points, chunk.start)
+    branches, runner = _opened(work.scene, work.runner)
+    _refuse_other_runner(work, runner)
+    points = points_of(branches, chunk)
+    records, _ = run_points(work.scene, runner, points, chunk.start)
     return dataset_of(work.scene, points, records, {})
 
 
 def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     """Write the part of points that kill the process that runs them; nothing of the points is run."""
-    began = time.perf_counter()
     points = _points_left(work, expand(work.scene), chunk)
     records = [empty_record(work.scene, Outcome.crash, message, 0.0) for _ in points]
-    outcomes = write_part(work, chunk, points, records, chunk.start)
-    return ChunkResult(chunk, chunk.start, outcomes, 0.0, time.perf_counter() - began)
+    return ChunkResult(chunk, chunk.start, write_part(work, chunk, points, records, chunk.start), 0.0)
 
 
 def _refuse_other_runner(work: Work, runner: Runner) -> None:
@@ -297,6 +278,12 @@ def dataset_of(
         attrs,
     )
     return marked(dataset)
+
+
+def empty_part(scene: Scene) -> xr.Dataset:
+    """Return the dataset of one run of a scene that has no results: its names, dimensions and attributes."""
+    point = points_of(expand(scene), Chunk(0, 0, 1))
+    return dataset_of(scene, point, [empty_record(scene, Outcome.error, "", 0.0)], {})
 
 
 def carried_attributes(state: State) -> dict[str, Any]:

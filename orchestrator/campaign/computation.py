@@ -11,26 +11,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from vibroimpact.orchestrator.campaign.chunks import Chunk, ChunkResult, Work, run_chunk, write_crashed
-from vibroimpact.orchestrator.campaign.cluster import WorkerPool
 from vibroimpact.orchestrator.campaign.lone_process import ProcessDied, call_alone
+from vibroimpact.orchestrator.campaign.pool import WorkerPool
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 
 CRASH_MESSAGE = "this point kills the process that runs it"
 
 
 class Computation:
-    """One pass over a schedule.
-
-    Parameters
-    ----------
-    pool : WorkerPool
-    work : Work
-        What all chunks have in common.
-    schedule : ChunkSchedule
-        What is left to do.
-    done : callable
-        Told of each chunk whose part is on the disk.
-    """
+    """One pass over a schedule; `done` is told of each chunk whose part is on the disk."""
 
     def __init__(
         self, pool: WorkerPool, work: Work, schedule: ChunkSchedule, done: Callable[[ChunkResult], None]

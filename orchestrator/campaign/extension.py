@@ -29,7 +29,7 @@ from vibroimpact.analysis.dataset import (
     write_dataset,
 )
 from vibroimpact.fmus.errors import DatasetError, UsageError, VibroimpactError
-from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, State
+from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, State, empty_part
 from vibroimpact.orchestrator.campaign.manifest import (
     Manifest,
     differences,
@@ -37,14 +37,7 @@ from vibroimpact.orchestrator.campaign.manifest import (
     scene_hash,
     write_manifest,
 )
-from vibroimpact.orchestrator.campaign.parts import (
-    NO_RUNS,
-    Note,
-    StoredPart,
-    empty_part,
-    list_parts,
-    own_files,
-)
+from vibroimpact.orchestrator.campaign.parts import NO_RUNS, Note, StoredPart, list_parts, own_files
 from vibroimpact.orchestrator.run.dataset import coordinate_names, stored_samples, with_constants_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, SweepAxis, run_count
@@ -316,26 +309,18 @@ def final_states(rows: xr.Dataset, part: slice) -> NDArray[np.float64]:
     return np.stack([rows.final_displacement.values[part], rows.final_velocity.values[part]], axis=1)
 
 
+@dataclass(frozen=True, slots=True)
 class EarlierSweep:
-    """A campaign that was started with another sweep of the same scene.
+    """A campaign in the folder `home`, started with another sweep; `note` is told in words what is kept."""
 
-    Parameters
-    ----------
-    scene : Scene
-        The one it was started with.
-    manifest : Manifest
-    home : Path
-        Its folder.
-    note : callable
-        Told in words what is kept.
-    """
+    scene: Scene
+    manifest: Manifest
+    home: Path
+    note: Note
 
-    def __init__(self, scene: Scene, manifest: Manifest, home: Path, note: Note) -> None:
-        self._scene = scene
-        self._manifest = manifest
-        self._home = home
-        self._folder = home / "parts"
-        self._note = note
+    @property
+    def _folder(self) -> Path:
+        return self.home / "parts"
 
     def hand_over(self, new: Scene, runs: int) -> bool:
         """Make the folder one of a new sweep; returns False where nothing of the old one is in it.
@@ -344,7 +329,7 @@ class EarlierSweep:
         """
         rows = self._rows()
         if rows is not None:
-            kept = kept_rows(self._scene, new, rows)
+            kept = kept_rows(self.scene, new, rows)
             count, left = kept.sizes["run"], rows.sizes["run"] - kept.sizes["run"]
             if not count:
                 return False
@@ -352,10 +337,10 @@ class EarlierSweep:
                 self._store(rows, left)
             hashed = scene_hash(new)
             write_dataset(kept.assign_attrs(scene_hash=hashed), kept_path(self._folder, hashed))
-            self._note(f"{count} of {runs} points are kept from the earlier sweep.")
+            self.note(f"{count} of {runs} points are kept from the earlier sweep.")
         outdated = own_files(self._folder)
-        begun = self._manifest
-        write_manifest(self._home / "campaign.json", new, begun.identity, runs, begun.continued_with)
+        begun = self.manifest
+        write_manifest(self.home / "campaign.json", new, begun.identity, runs, begun.continued_with)
         for path in outdated:
             if path != kept_path(self._folder, scene_hash(new)):
                 path.unlink(missing_ok=True)
@@ -363,22 +348,22 @@ class EarlierSweep:
 
     def _rows(self) -> xr.Dataset | None:
         """Return what was computed, one-dimensional; None where nothing was."""
-        target = self._home / "dataset.nc"
-        if target.exists() and is_of(read_finished(target).attrs, self._manifest, self._scene):
+        target = self.home / "dataset.nc"
+        if target.exists() and is_of(read_finished(target).attrs, self.manifest, self.scene):
             return read_flat(target)
-        path = kept_path(self._folder, self._manifest.scene_hash)
+        path = kept_path(self._folder, self.manifest.scene_hash)
         kept = [path] if path.exists() else []
-        runs = read_kept(path, self._scene).runs if kept else NO_RUNS
-        parts = list_parts(self._folder, self._manifest.scene_hash, self._note, runs)
+        runs = read_kept(path, self.scene).runs if kept else NO_RUNS
+        parts = list_parts(self._folder, self.manifest.scene_hash, self.note, runs)
         paths = kept + [part.path for part in parts]
         return merge_datasets(paths) if paths else None
 
     def _store(self, rows: xr.Dataset, left: int) -> None:
         """Keep the points that the new sweep does not have where they can be opened."""
-        path = self._home / f"earlier-{self._manifest.scene_hash[:8]}.nc"
-        attributed = rows.assign_attrs(self._manifest.attributes(self._scene))
-        write_dataset(with_constants_of(attributed, self._scene), path)
-        self._note(f"{left} points of the earlier sweep are not in this one; they stay in {path.name}.")
+        path = self.home / f"earlier-{self.manifest.scene_hash[:8]}.nc"
+        attributed = rows.assign_attrs(self.manifest.attributes(self.scene))
+        write_dataset(with_constants_of(attributed, self.scene), path)
+        self.note(f"{left} points of the earlier sweep are not in this one; they stay in {path.name}.")
 
 
 def scene_of_manifest(manifest: Manifest, like: Scene) -> Scene | None:

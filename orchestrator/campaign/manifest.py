@@ -96,8 +96,7 @@ def _flat(key: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 def scene_hash(scene: Scene) -> str:
     """Return the SHA-256 of a scene: the same for two files that differ in comments, layout and title only."""
-    counting = {key: value for key, value in flat_scene(scene).items() if key not in NO_EFFECT}
-    return _hash_of(counting)
+    return _hash_of({key: value for key, value in flat_scene(scene).items() if key not in NO_EFFECT})
 
 
 def _hash_of(content: Mapping[str, Any]) -> str:
@@ -127,9 +126,7 @@ def write_manifest(
         "format": FORMAT,
         "scene_hash": scene_hash(scene),
         "runs": runs,
-        "execution": identity.execution,
-        "instruction_set": identity.instruction_set,
-        "fmu_hashes": dict(identity.fmu_hashes),
+        **asdict(identity),
         "versions": versions(),
         "git_commit": git_commit(),
         "scene": flat_scene(scene),
@@ -141,16 +138,7 @@ def write_manifest(
 
 
 def add_build(path: Path, identity: RunnerIdentity, compared: int) -> None:
-    """Note in a manifest that a campaign goes on with other builds of its components.
-
-    Parameters
-    ----------
-    path : Path
-    identity : RunnerIdentity
-        What runs now.
-    compared : int
-        How many points, computed again, were equal bit for bit.
-    """
+    """Note in a manifest that a campaign goes on with other builds; `compared` points, computed again, were equal."""
     content = json.loads(path.read_bytes())
     build = {
         "fmu_hashes": dict(identity.fmu_hashes),
@@ -268,19 +256,10 @@ def runner_differences(manifest: Manifest, identity: RunnerIdentity) -> list[str
 def refuse_other_runner(path: Path, different: Sequence[str], reason: str = "") -> NoReturn:
     """Refuse to mix results of different components, ways of running or instruction sets.
 
-    Parameters
-    ----------
-    path : Path
-        The manifest.
-    different : sequence of str
-        As `runner_differences` returns it.
-    reason : str
-        Why the points do not show that the results are the same all the same.
-
     Raises
     ------
     UsageError
-        With what differs.
+        With what differs, and the reason why the stored points do not show that results are the same all the same.
     """
     raise UsageError(
         f"{path.parent}: expected the components and machine that this campaign was started with: "

@@ -18,8 +18,8 @@ from vibroimpact.analysis.dataset import Outcome, read_flat, refuse_unlike, take
 from vibroimpact.analysis.dataset.schema import swept_names
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, Work, compute_again
-from vibroimpact.orchestrator.campaign.cluster import WorkerPool
 from vibroimpact.orchestrator.campaign.extension import final_states, without_empty_periods
+from vibroimpact.orchestrator.campaign.pool import WorkerPool
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import expand
 
@@ -36,15 +36,7 @@ OF_THE_MACHINE = ("point_seconds",)
 def compare_with_stored(
     pool: WorkerPool, work: Work, scene: Scene, stored: Sequence[Path]
 ) -> tuple[int, str]:
-    """Compute a few stored points again.
-
-    Parameters
-    ----------
-    pool : WorkerPool
-    work : Work
-    scene : Scene
-    stored : sequence of Path
-        The files of rows that the campaign has.
+    """Compute a few points again, of those in the files of rows that a campaign has.
 
     Returns
     -------

@@ -19,7 +19,6 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import (
-    Outcome,
     check,
     merge_datasets,
     read_flat,
@@ -35,13 +34,10 @@ from vibroimpact.orchestrator.campaign.chunks import (
     Chunk,
     State,
     carried_state,
-    dataset_of,
-    points_of,
+    empty_part,
 )
 from vibroimpact.orchestrator.run.dataset import with_constants_of
-from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import expand
 
 _PART = r"branch-(\d{6,})_runs-(\d{10,})-(\d{10,})\.nc"
 _KEPT = r"kept-[0-9a-f]{16}\.nc"
@@ -71,17 +67,8 @@ def list_parts(
 ) -> list[StoredPart]:
     """Return the sound parts in a folder, in run order; what is of no use is removed.
 
-    A part of version 0.1 has no hash: it is read and checked as a whole.
-
-    Parameters
-    ----------
-    folder : Path
-    scene_hash : str
-        Hash of the scene the parts must come from.
-    note : callable
-        Told in words of each part that has to be computed again.
-    kept : ndarray of int, shape (run,)
-        Runs that no part holds, because they are kept elsewhere; see `extension`.
+    A part of version 0.1 has no hash: it is read and checked as a whole. `note` is told of each part that has to be
+    computed again; the runs `kept`, shape (run,), are in no part (see `extension`).
     """
     sound: list[StoredPart] = []
     for path, chunk in _named_parts(folder):
@@ -177,9 +164,3 @@ def unfit_parts(parts: Iterable[Path], scene: Scene) -> Iterator[tuple[Path, str
             refuse_unlike(str(path), part, "this scene", like)
         except DatasetError as error:
             yield path, str(error)
-
-
-def empty_part(scene: Scene) -> xr.Dataset:
-    """Return the dataset of one run of a scene that has no results: its names, dimensions and attributes."""
-    point = points_of(expand(scene), Chunk(0, 0, 1))
-    return dataset_of(scene, point, [empty_record(scene, Outcome.error, "", 0.0)], {})

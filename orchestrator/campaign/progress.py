@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -58,18 +59,13 @@ class Lines(Progress):
     def __init__(self, stream: TextIO) -> None:
         super().__init__()
         self._stream = stream
-        self._last_line = self._began
-
-    def begin(self, total: int, done: int) -> None:
-        """Start the clock, of the lines too."""
-        super().begin(total, done)
-        self._last_line = self._began
+        self._last_line = -math.inf
 
     def advance(self, points: int) -> None:
         """Write a line when the last one is old, and at the end."""
         super().advance(points)
         now = time.monotonic()
-        if now - self._last_line >= LINE_SECONDS or self._done == self._total:
+        if now - max(self._last_line, self._began) >= LINE_SECONDS or self._done == self._total:
             self._last_line = now
             rate, remaining = self._pace()
             self.note(f"{self._done} of {self._total} points, {rate}, {remaining} remaining{self._lost}")
@@ -166,8 +162,8 @@ def clock(seconds: float) -> str:
     >>> clock(59.6), clock(3725.0)
     ('1:00', '1:02:05')
     """
-    whole = round(seconds)
-    hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 

@@ -69,17 +69,7 @@ class _Strand:
 
 
 class ChunkSchedule:
-    """Cuts what is left of a campaign into chunks.
-
-    Parameters
-    ----------
-    branches : sequence of Branch
-        All branches of the sweep, in run order.
-    parts : sequence of StoredPart
-        What is there already, in run order.
-    workers : int
-        Number of workers that share the runs.
-    """
+    """Cuts what is left of a campaign into chunks for a number of workers; branches and parts are in run order."""
 
     def __init__(self, branches: Sequence[Branch], parts: Sequence[StoredPart], workers: int) -> None:
         self._workers = workers
@@ -219,15 +209,7 @@ def _points_in(seconds: float, pace: float | None) -> int:
 
 
 def gaps_between(parts: Sequence[StoredPart], runs: int) -> Iterator[Gap]:
-    """Yield the runs that no part holds, each gap with the state that the part before it hands on.
-
-    Parameters
-    ----------
-    parts : sequence of StoredPart
-        In run order, without overlaps.
-    runs : int
-        Number of runs of the campaign.
-    """
+    """Yield the gaps between parts in run order, each with the state that the part before it hands on."""
     reached, carried = 0, None
     for part in parts:
         if part.chunk.first > reached:

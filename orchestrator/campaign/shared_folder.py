@@ -10,7 +10,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import typed_or_called
 
 if TYPE_CHECKING:
-    from vibroimpact.orchestrator.campaign.cluster import WorkerPool
+    from vibroimpact.orchestrator.campaign.pool import WorkerPool
 
 
 def answer_question(folder: str, name: str) -> str:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from vibroimpact.analysis.dataset import Outcome, RunRecord, write_dataset
+from vibroimpact.analysis.dataset import RunRecord, write_dataset
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.chunks import (
@@ -14,6 +14,7 @@ from vibroimpact.orchestrator.campaign.chunks import (
     BranchPoint,
     Chunk,
     dataset_of,
+    empty_part,
     points_of,
     run_points,
     tally,
@@ -22,10 +23,9 @@ from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.campaign.provenance import provenance
 from vibroimpact.orchestrator.run import Runner, identity_of, named_runner
 from vibroimpact.orchestrator.run.dataset import with_constants_of
-from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import expand
+from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 
 def run_scene(
@@ -62,10 +62,9 @@ def run_scene(
     _refuse_unwritable(target)
     opened = named_runner(scene, runner)
     try:
-        points = _all_points(scene)
         # A dataset that cannot be made is found out before an hour of work, not after it.
-        rehearsal = [empty_record(scene, Outcome.error, "rehearsal", 0.0)]
-        with_constants_of(dataset_of(scene, points[:1], rehearsal, {}), scene)
+        with_constants_of(empty_part(scene), scene)
+        points = points_of(expand(scene), Chunk(0, 0, run_count(scene.sweep)))
         records = _run_all(scene, opened, points, progress or Progress())
         dataset = dataset_of(scene, points, records, provenance(scene, identity_of(opened)))
         dataset = with_constants_of(dataset, scene)
@@ -76,11 +75,6 @@ def run_scene(
     except OSError as error:
         raise _unwritable(target, error) from error
     return tally(dataset)
-
-
-def _all_points(scene: Scene) -> list[BranchPoint]:
-    branches = expand(scene)
-    return points_of(branches, Chunk(0, 0, sum(len(branch.points) for branch in branches)))
 
 
 def _run_all(scene: Scene, runner: Runner, points: list[BranchPoint], progress: Progress) -> list[RunRecord]:

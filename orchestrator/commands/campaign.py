@@ -8,9 +8,9 @@ from pathlib import Path
 import typer
 
 from vibroimpact.analysis.dataset.outputs import refuse_folder
-from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
+from vibroimpact.orchestrator.campaign.cluster import refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.failures import counted, outcome_lines
 from vibroimpact.orchestrator.scene import Scene, load_scene
@@ -24,19 +24,6 @@ def run_to_folder(
     loaded = load_scene(scene, changes)
     refuse_folder(output)
     compute(loaded, output, workers, scheduler)
-
-
-def refuse_two_kinds_of_workers(workers: int | None, scheduler: str | None) -> None:
-    """Refuse workers of this machine beside those of a scheduler.
-
-    Raises
-    ------
-    UsageError
-    """
-    if workers is not None and scheduler is not None:
-        raise UsageError(
-            "--workers and --scheduler: expected one of them, got both. A scheduler has its own workers."
-        )
 
 
 def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:

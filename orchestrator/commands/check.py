@@ -18,7 +18,7 @@ from vibroimpact.orchestrator.campaign.check import (
     Trial,
 )
 from vibroimpact.orchestrator.campaign.cluster import processor_count
-from vibroimpact.orchestrator.commands.failures import FAILED
+from vibroimpact.orchestrator.commands.failures import FAILED, counted
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.scene.summary import effects, engine, laws
@@ -77,7 +77,7 @@ def _what_it_costs(scene: Scene, cost: SceneCost) -> Iterator[tuple[str, str]]:
         return
     if cost.points > 1:
         workers = min(processor_count(), cost.branches)
-        on = f" on {workers} worker{'s' if workers > 1 else ''} and some seconds to start"
+        on = f" on {counted(workers, 'worker')} and some seconds to start"
         yield "campaign", _time(cost, workers) + on + _memory(cost, COPIES_IN_CAMPAIGN)
     if not cost.trial.given_up:
         yield "dataset", f"about {size(cost.trial.size * cost.points + BYTES_BESIDE)}"
@@ -99,9 +99,8 @@ def _trial(trial: Trial) -> str:
     if trial.message:
         said = " ".join(trial.message.split())
         return f"{where}outcome {trial.outcome.name} after {duration(trial.seconds)}, {said}"
-    found = "1 impact" if trial.impacts == 1 else f"{trial.impacts} impacts"
     alike = "; what follows takes all points to be like it" if at else ""
-    return f"{where}{duration(trial.seconds)}, {found}, {size(trial.size)} of results{alike}"
+    return f"{where}{duration(trial.seconds)}, {counted(trial.impacts, 'impact')}, {size(trial.size)} of results{alike}"
 
 
 def _refused(scene: Scene) -> str:

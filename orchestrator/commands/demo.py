@@ -24,12 +24,7 @@ STEPS_ALLOWED = 2.0
 
 
 def run_demo(output: Path) -> None:
-    """Run the packaged bifurcation scene into a folder and say what was done and read.
-
-    Parameters
-    ----------
-    output : Path
-        Folder for the campaign and the figure.
+    """Run the packaged bifurcation scene into a folder, draw its figure there, and say what was done and read.
 
     Raises
     ------

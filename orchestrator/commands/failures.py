@@ -22,15 +22,7 @@ LONGEST_MESSAGE = 400
 
 
 def outcome_lines(path: Path, runs: int) -> Iterator[str]:
-    """Yield what is to be said of the points of a dataset: those that failed, and warnings of those that went well.
-
-    Parameters
-    ----------
-    path : Path
-        Dataset that was written.
-    runs : int
-        Its number of points.
-    """
+    """Yield what is to be said of a dataset's points: those that failed, and warnings of those that went well."""
     with open_dataset(path) as dataset:
         yield from failure_lines(dataset)
         if runs <= MOST_RUNS_READ:
@@ -40,19 +32,15 @@ def outcome_lines(path: Path, runs: int) -> Iterator[str]:
 def failure_lines(dataset: xr.Dataset) -> Iterator[str]:
     """Yield one line for each outcome that failed points have, then one for each of the first points.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As `open_dataset` returns it. Messages are read only when a point failed.
+    Messages are read only when a point failed.
     """
     outcome = dataset.outcome.values
     failed = np.argwhere(np.isin(outcome, FAILED))
     if len(failed) == 0:
         return
     for kind in FAILED:
-        count = int((outcome == kind).sum())
-        if count:
-            yield f"{count} {'point' if count == 1 else 'points'} ended with the outcome {kind.name}:"
+        if count := int((outcome == kind).sum()):
+            yield f"{counted(count, 'point')} ended with the outcome {kind.name}:"
     run = np.atleast_1d(dataset.run_id.values[tuple(failed.T)])
     message = dataset.message.values
     for place in failed[np.argsort(run)][:MOST_LISTED]:

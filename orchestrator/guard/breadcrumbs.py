@@ -54,13 +54,7 @@ SIZE = ctypes.sizeof(_Notes) + MOST_COMPONENTS * RING_SIZE
 
 
 class Breadcrumbs:
-    """The notes of one process, mapped from a file of `SIZE` bytes.
-
-    Parameters
-    ----------
-    path : Path
-        The file; made with `create`.
-    """
+    """The notes of one process, mapped from a file that `create` has made."""
 
     def __init__(self, path: Path) -> None:
         with path.open("r+b") as file:
@@ -72,7 +66,7 @@ class Breadcrumbs:
 
     @staticmethod
     def create(path: Path) -> None:
-        """Make an empty file of notes."""
+        """Make an empty file of notes, of `SIZE` bytes."""
         path.write_bytes(bytes(SIZE))
 
     # ---- written by the process that runs FMUs ----
@@ -99,11 +93,8 @@ class Breadcrumbs:
 
         def wrapper(name: str, function: Function) -> Function:
             number = self._register(component, name)
-            return (
-                self._noting_step(number, function)
-                if name.endswith("DoStep")
-                else self._noting(number, function)
-            )
+            noting = self._noting_step if name.endswith("DoStep") else self._noting
+            return noting(number, function)
 
         return wrapper
 

@@ -125,14 +125,7 @@ class _Child:
 
 
 class GuardedRunner:
-    """Runs points of a scene in a guarded child process; the interface of any runner.
-
-    Parameters
-    ----------
-    scene : Scene
-        The scene.
-    execution : str
-        Handed on to the runner in the child.
+    """Runs points of a scene in a guarded child process, whose runner gets `execution`; the interface of any runner.
 
     Raises
     ------

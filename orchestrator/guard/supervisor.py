@@ -88,9 +88,8 @@ def _wait_for_end(fork: int, guard: int, wakeup: int) -> int | None:
     """Wait until the fork has ended (returns its status) or must be ended (None)."""
     poll = select.poll()
     poll.register(wakeup, select.POLLIN)
-    poll.register(
-        0, 0
-    )  # the guard's closing of the pipe (or its death) only: the orders are the fork's to read
+    # Of the guard's pipe only that it is closed (or the guard dead): the orders are the fork's to read.
+    poll.register(0, 0)
     end = float("inf")
     while (left := end - time.monotonic()) > 0.0:
         ready = dict(poll.poll(1e3 * min(LOOK, left)))

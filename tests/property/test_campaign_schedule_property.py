@@ -76,7 +76,7 @@ def test_every_run_is_computed_once_and_starts_where_the_one_before_ended(
         done = replace(chunk, stop=chunk.first + count)
         covered += range(done.first, done.stop)
         carried = state_after(branches, done.stop - 1)
-        schedule.finished(chunk, ChunkResult(done, carried, {}, seconds * count, 0.0))
+        schedule.finished(chunk, ChunkResult(done, carried, {}, seconds * count))
     assert sorted(covered) == list(range(runs))
     assert schedule.left == 0
 
@@ -88,7 +88,7 @@ def test_no_chunk_is_longer_than_was_asked_for_once_the_pace_is_known(
     schedule = ChunkSchedule(sweep(points, "independent", 1), [], workers)
     first = schedule.next_chunk()
     assert first is not None
-    schedule.finished(first, ChunkResult(first, None, {}, seconds * first.count, 0.0))
+    schedule.finished(first, ChunkResult(first, None, {}, seconds * first.count))
     second = schedule.next_chunk()
     assert second is None or second.count <= max(1, CHUNK_SECONDS / seconds * 1.001)
     assert second is None or second.count <= MOST_POINTS

@@ -20,7 +20,9 @@ from support.busy_runner import die_while, freeze_once, keep_the_interpreter, sa
 
 from vibroimpact.fmus.errors import CampaignError, UsageError
 from vibroimpact.orchestrator.campaign import cluster
-from vibroimpact.orchestrator.campaign.cluster import MOST_DEATHS, MOST_STARTS, open_workers
+from vibroimpact.orchestrator.campaign import pool as pool_module
+from vibroimpact.orchestrator.campaign.cluster import MOST_STARTS, open_workers
+from vibroimpact.orchestrator.campaign.pool import MOST_DEATHS
 from vibroimpact.orchestrator.campaign.progress import Progress
 
 pytestmark = pytest.mark.slow
@@ -45,7 +47,7 @@ def test_a_worker_that_dies_before_the_first_chunk_is_replaced_and_the_new_one_i
 def test_a_call_that_kills_every_worker_is_one_clear_error(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cluster, "MOST_DEATHS", 1)
+    monkeypatch.setattr(pool_module, "MOST_DEATHS", 1)
     for wish in range(MOST_DEATHS):
         (tmp_path / f"{wish}").touch()
     with (
@@ -58,7 +60,7 @@ def test_a_call_that_kills_every_worker_is_one_clear_error(
 def test_work_whose_message_waits_for_a_clock_that_was_set_back_is_sent_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(cluster, "STALL_SECONDS", 1.0)
+    monkeypatch.setattr(pool_module, "STALL_SECONDS", 1.0)
     said = Said()
     with open_workers(workers=1, progress=said) as pool:
         pool.submit(same, 1)
@@ -73,8 +75,8 @@ def test_work_whose_message_waits_for_a_clock_that_was_set_back_is_sent_again(
 
 
 def test_a_long_point_is_no_stall(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "STALL_SECONDS", 0.1)
-    monkeypatch.setattr(cluster, "LOOK_SECONDS", 0.1)
+    monkeypatch.setattr(pool_module, "STALL_SECONDS", 0.1)
+    monkeypatch.setattr(pool_module, "LOOK_SECONDS", 0.1)
     said = Said()
     with open_workers(workers=1, progress=said) as pool:
         pool.submit(time.sleep, 2.0)
@@ -87,8 +89,8 @@ def test_a_worker_that_loads_for_long_and_is_done_when_it_answers_is_no_stall(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # a machine with 15 processes on 2 cores: a campaign ended with the error of a clock that was set back
-    monkeypatch.setattr(cluster, "STALL_SECONDS", 0.5)
-    monkeypatch.setattr(cluster, "LOOK_SECONDS", 0.2)
+    monkeypatch.setattr(pool_module, "STALL_SECONDS", 0.5)
+    monkeypatch.setattr(pool_module, "LOOK_SECONDS", 0.2)
     said = Said()
     with open_workers(workers=1, progress=said) as pool:
         assert list(pool.call_everywhere(keep_the_interpreter, 3).values()) == [3]
@@ -110,15 +112,15 @@ def test_the_time_in_which_a_campaign_was_suspended_is_not_waited_for_workers(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # after minutes of Ctrl-Z Dask takes the workers for dead, and starts them again
-    monkeypatch.setattr(cluster, "WORKERLESS_SECONDS", 1.0)
+    monkeypatch.setattr(pool_module, "WORKERLESS_SECONDS", 1.0)
     with open_workers(workers=1) as pool:
         (worker,) = pool.worker_addresses()
         awake = time.monotonic() + 400.0
         with monkeypatch.context() as asleep:
             asleep.setattr(pool, "_workers_there", frozenset)
-            asleep.setattr(cluster, "time", SimpleNamespace(monotonic=lambda: awake))
+            asleep.setattr(pool_module, "time", SimpleNamespace(monotonic=lambda: awake))
             assert pool.worker_addresses() == ()
-            asleep.setattr(cluster, "time", SimpleNamespace(monotonic=lambda: awake + 2.0))
+            asleep.setattr(pool_module, "time", SimpleNamespace(monotonic=lambda: awake + 2.0))
             with pytest.raises(CampaignError, match="got none for 1 s"):
                 pool.worker_addresses()
         assert pool.worker_addresses() == (worker,)
@@ -129,7 +131,7 @@ def test_a_worker_that_does_not_answer_any_more_is_replaced(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name, seconds in (("STALL_SECONDS", 0.5), ("LOOK_SECONDS", 0.2), ("RESULT_SECONDS", 1.0)):
-        monkeypatch.setattr(cluster, name, seconds)
+        monkeypatch.setattr(pool_module, name, seconds)
     said = Said()
     (tmp_path / "wish").touch()
     with open_workers(workers=1, progress=said) as pool:

@@ -23,7 +23,7 @@ def branches(points: int, path: SweepPath = "independent", others: int = 1) -> t
 
 
 def ended(chunk: Chunk, seconds_per_point: float) -> ChunkResult:
-    return ChunkResult(chunk, (1.0, 2.0), {}, seconds_per_point * chunk.count, 0.0)
+    return ChunkResult(chunk, (1.0, 2.0), {}, seconds_per_point * chunk.count)
 
 
 def next_chunk(schedule: ChunkSchedule) -> Chunk:

@@ -1,0 +1,353 @@
+"""Workers that take pieces of work and hand back what became of them, wherever they live (`cluster`).
+
+A campaign submits work, takes finished work, and is told when a worker was lost.
+"""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable, Set
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+from distributed import CancelledError, Client, Future
+from distributed.comm.core import CommClosedError
+from distributed.scheduler import KilledWorker
+
+from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.orchestrator.campaign.progress import Progress
+
+WORKERLESS_SECONDS = 30.0
+"""How long a campaign waits for a first or a new worker before it gives up, s."""
+
+LOOK_SECONDS = 1.0
+"""How often the pool looks which workers are there, s."""
+
+ASK_SECONDS = 0.05
+"""How often the pool looks for workers and answers while they get ready, s."""
+
+RESULT_SECONDS = 10.0
+"""Time after which a worker counts as gone when the answer of a finished call has not arrived, s."""
+
+SUSPENDED_SECONDS = 10.0
+"""Time between two looks, which come every second or so, above which this process was suspended meanwhile, s."""
+
+DEAD_SECONDS = 5.0
+"""Time after which another worker is started in place of a dead one of this machine, s."""
+
+STALL_SECONDS = 10.0
+"""Time without a piece of work that ended after which the pool asks whether any is being computed, s."""
+
+IDLE_LOOKS = 3
+"""Answers of no in a row at which the connections count as stalled."""
+
+MOST_RESTARTS = 3
+"""Stalls in a row, without a piece of work that ended, that end the campaign."""
+
+MOST_REPLACEMENTS = 50
+"""Replacements of dead workers in a campaign, after which the others go on alone."""
+
+MOST_DEATHS = 5
+"""Deaths per worker, while all get ready, above which the scene counts as what kills them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """A piece of work that ended: its ticket, and its result or its error."""
+
+    ticket: int
+    result: Any = None
+    error: BaseException | None = None
+    worker_lost: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Cluster:
+    """A client and, where the workers are our own, their number and what replaces those that stay dead."""
+
+    client: Client
+    size: int = 0
+    replace_dead: Callable[[], None] = lambda: None
+
+
+class WorkerPool:
+    """Workers of one Dask cluster, one piece of work at a time on each.
+
+    Messages say `where` they are; `progress` is told of those that were lost.
+
+    Attributes
+    ----------
+    lost_workers : int
+        How many died so far.
+    is_local : bool
+        Whether the workers are processes of this command.
+    connection : ExitStack
+        What closes the connection; a pool that connects anew goes on with it.
+    """
+
+    def __init__(
+        self, connect: Callable[[], AbstractContextManager[Cluster]], where: str, progress: Progress
+    ) -> None:
+        self._connect = connect
+        self._where = where
+        self._progress = progress
+        self._calls: dict[int, tuple[Any, ...]] = {}
+        self._futures: dict[int, Future[Any]] = {}
+        self._tickets = self._replacements = self._restarts = 0
+        self.lost_workers = 0
+        self.is_local = False
+        self.connection = ExitStack()
+        self._open()
+
+    def _open(self) -> None:
+        self._cluster = self.connection.enter_context(self._connect())
+        self._client, self.is_local = self._cluster.client, self._cluster.size > 0
+        self._ended: queue.SimpleQueue[int] = queue.SimpleQueue()
+        self._present: frozenset[str] = frozenset()
+        self._looked = self._last_present = self._last_complete = self._last_moved = time.monotonic()
+
+    def worker_addresses(self) -> tuple[str, ...]:
+        """Return the addresses of the workers that are there now; take note of those that are not any more.
+
+        Raises
+        ------
+        CampaignError
+            When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
+        """
+        self._leave_out_suspension()
+        there = self._workers_there()
+        self._looked = time.monotonic()
+        if there is not None:
+            if lost := len(self._present - there):
+                self.lost_workers += lost
+                self._progress.lost_workers(self.lost_workers)
+            self._present = there
+            self._replace_dead()
+        if there:
+            self._last_present = self._looked
+        elif self._looked - self._last_present > WORKERLESS_SECONDS:
+            raise CampaignError(
+                f"{self._where}: expected at least one worker, got none for {WORKERLESS_SECONDS:.0f} s. "
+                f"Start workers; then the same {typed_or_called('command', 'call')} resumes."
+            )
+        return tuple(sorted(there or ()))
+
+    def _workers_there(self) -> frozenset[str] | None:
+        """Return the addresses of the workers that the scheduler has; None where it does not answer.
+
+        What `Client.scheduler_info` returns may be the answer to another call of the client, which has no workers.
+        """
+        if self._client.scheduler is None:
+            return None
+        identity = self._client.scheduler.identity
+        try:
+            answer = self._client.sync(identity, n_workers=-1, callback_timeout=RESULT_SECONDS)
+        except OSError:
+            return None
+        return frozenset(answer["workers"])
+
+    def _leave_out_suspension(self) -> None:
+        """Count as no waiting what passed while this process was stopped: Ctrl-Z, or a computer that slept."""
+        away = time.monotonic() - self._looked
+        if away > SUSPENDED_SECONDS:
+            self._last_present += away
+            self._last_complete += away
+            self._last_moved += away
+
+    def _replace_dead(self) -> None:
+        if len(self._present) >= self._cluster.size:
+            self._last_complete = self._looked
+        elif self._looked - self._last_complete > DEAD_SECONDS and self._replacements < MOST_REPLACEMENTS:
+            self._last_complete = self._looked
+            self._replacements += 1
+            self._cluster.replace_dead()
+
+    def wait_for_workers(self) -> None:
+        """Wait until a worker is there."""
+        while not self.worker_addresses():
+            time.sleep(ASK_SECONDS)
+
+    def call_everywhere(self, function: Callable[..., Any], *arguments: Any) -> dict[str, Any]:
+        """Call a function once on each worker, in the thread that will also do the work.
+
+        A worker that dies meanwhile is not waited for; the one that comes in its place is asked too.
+
+        Returns
+        -------
+        dict of str to object
+            What each worker, named by its address, returned.
+
+        Raises
+        ------
+        CampaignError
+            When workers die again and again.
+        """
+        calls: dict[str, Future[Any]] = {}
+        answers: dict[str, Any] = {}
+        began, lost_before = time.monotonic(), self.lost_workers
+        while True:
+            present = self.worker_addresses()
+            self._refuse_deadly_start(self.lost_workers - lost_before)
+            gone = [calls.pop(address) for address in calls.keys() - set(present)]
+            self._client.cancel(gone, force=True)
+            for address in set(present) - calls.keys():
+                calls[address] = self._client.submit(function, *arguments, workers=[address], pure=False)
+            answers = {address: answer for address, answer in answers.items() if address in calls}
+            answers |= self._new_answers(calls, calls.keys() - answers.keys())
+            if calls and len(answers) == len(calls) and self._is_complete(began):
+                return answers
+            waiting = [call for address, call in calls.items() if address not in answers]
+            if waiting and self._is_stalled() and not any(call.done() for call in waiting):
+                self._restart()
+                calls, answers = {}, {}
+
+    def _new_answers(self, calls: dict[str, Future[Any]], waiting: Set[str]) -> dict[str, Any]:
+        """Return the answers that are there after a while; a call that was lost is taken out of `calls`."""
+        answers = {}
+        time.sleep(ASK_SECONDS)
+        for address in waiting:
+            if not calls[address].done():
+                continue
+            try:
+                answers[address] = calls[address].result(timeout=RESULT_SECONDS)
+                self._moved()
+            except (TimeoutError, CancelledError, KilledWorker):
+                del calls[address]
+        return answers
+
+    def _is_complete(self, began: float) -> bool:
+        """Return whether all workers are there, or those that are missing have been waited for."""
+        return len(self._present) >= self._cluster.size or time.monotonic() - began > WORKERLESS_SECONDS
+
+    def _refuse_deadly_start(self, deaths: int) -> None:
+        if deaths > MOST_DEATHS * max(self._cluster.size, len(self._present), 1):
+            raise CampaignError(
+                f"{self._where}: expected workers that live until the first point, got {deaths} that died while "
+                "they loaded the components. `vibroimpact run` shows whether a component of the scene ends its "
+                "process; a lack of memory does it too."
+            )
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> int:
+        """Queue a call on whichever worker is free first; return the ticket of its `Finished`."""
+        self._tickets += 1
+        self._calls[self._tickets] = (function, *arguments)
+        self._send(self._tickets)
+        return self._tickets
+
+    def _send(self, ticket: int) -> None:
+        self._futures[ticket] = self._client.submit(*self._calls[ticket], pure=False)
+        self._announce(ticket)
+
+    def _announce(self, ticket: int) -> None:
+        ended = self._ended
+        self._futures[ticket].add_done_callback(lambda _future: ended.put(ticket))
+
+    def next_finished(self) -> Finished:
+        """Wait for the next piece of work to end.
+
+        Raises
+        ------
+        CampaignError
+            When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
+        """
+        while True:
+            if time.monotonic() - self._looked > LOOK_SECONDS:
+                self.worker_addresses()
+            try:
+                ticket = self._ended.get(timeout=LOOK_SECONDS)
+            except queue.Empty:
+                if self._is_stalled() and self._ended.empty():
+                    self._restart()
+                continue
+            self._last_moved = time.monotonic()
+            finished = self._finished_work(ticket, self._futures[ticket])
+            if finished is not None:
+                del self._futures[ticket], self._calls[ticket]
+                self._moved()
+                return finished
+
+    def _moved(self) -> None:
+        """Take note of a piece of work that ended: nothing stalls."""
+        self._last_moved = time.monotonic()
+        self._restarts = 0
+
+    def _finished_work(self, ticket: int, future: Future[Any]) -> Finished | None:
+        """Return what became of a piece of work; None when it is under way again."""
+        try:
+            if future.status != "lost":
+                return Finished(ticket, result=future.result(timeout=RESULT_SECONDS))
+        except KilledWorker as error:
+            return Finished(ticket, error=error, worker_lost=True)
+        except (CancelledError, CommClosedError) as error:
+            raise CampaignError(
+                f"{self._where}: expected a scheduler that stays up, got none any more. "
+                f"The same {typed_or_called('command', 'call')} resumes."
+            ) from error
+        except Exception as error:
+            # Whatever the work raised; who asked for the work knows what to make of it.
+            if future.status == "error" or not isinstance(error, TimeoutError):
+                return Finished(ticket, error=error)
+        # Its worker died with the result in its memory; another one works on it already.
+        self._announce(ticket)
+        return None
+
+    def _is_stalled(self) -> bool:
+        """Return whether no worker computes although work is out: messages about it were not sent, or one hangs.
+
+        Dask sends a message when the wall clock has passed a deadline; where the clock was set back, that is
+        never. A worker that loads may not answer for long and have ended its work when it does: so the caller looks
+        for ended work afterwards.
+        """
+        if time.monotonic() - self._last_moved < STALL_SECONDS or not self._present:
+            return False
+        for _ in range(IDLE_LOOKS):
+            if not self._is_idle():
+                self._last_moved = time.monotonic()
+                return False
+            time.sleep(LOOK_SECONDS)
+        return True
+
+    def _is_idle(self) -> bool:
+        """Return whether no worker computes, or one does not answer; asked on a way of its own.
+
+        A worker answers while it computes: what it calls for a point leaves its other threads free.
+        """
+        scheduler = self._client.scheduler
+        if scheduler is None:
+            return False
+        try:
+            return not self._client.sync(scheduler.call_stack, keys=None, callback_timeout=RESULT_SECONDS)
+        except TimeoutError:
+            return True
+        except OSError:
+            return False
+
+    def _restart(self) -> None:
+        """Connect anew and send all work again; a chunk that is computed twice gives the same part."""
+        stalled = CampaignError(
+            f"{self._where}: expected workers that compute, got some that wait, or do not answer, while work is there. "
+            f"Was a clock set back? The same {typed_or_called('command', 'call')} resumes."
+        )
+        if self._restarts == MOST_RESTARTS:
+            raise stalled
+        self._restarts += 1
+        self._progress.note(
+            f"{self._where}: nothing moves although work is there, as after a clock that was set back; "
+            "connecting to the workers anew."
+        )
+        self.connection.__exit__(CampaignError, stalled, None)
+        self._open()
+        self.wait_for_workers()
+        for ticket in self._calls:
+            self._send(ticket)
+
+    def cancel_all(self) -> None:
+        """Withdraw all work that has not begun."""
+        futures = list(self._futures.values())
+        self._futures.clear()
+        self._calls.clear()
+        if futures:
+            self._client.cancel(futures, force=True)
