@@ -244,7 +244,8 @@ static void releases(const vi_structure *s, const vi_drift *drift, const situati
     double force[VI_ORDER + 1], size = 0.0;
     memcpy(force, drift->force[k], sizeof force);
     const double thin = now->any_thin ? vi_thin_part(s, drift, now->thin, now->at, k, 0.0, &size) : 0.0;
-    const double noise = VI_ROUNDING * (drift->force_scale[k] + size);
+    const double scale = drift->force_scale[k] * s->model->compliance[k][k] / vi_structure_mobility_left(s, k);
+    const double noise = VI_ROUNDING * (scale + size);
     vi_fall fall = {true, 0.0, 1.0};
     if (fabs(force[0]) <= noise && fabs(thin) <= noise) {
         divide(force, vi_structure_first_of_force(s, drift, k));

@@ -47,8 +47,7 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     view->pressure = drift.force[k][0] * view->mobility;
     view->slope = drift.force[k][1] * view->mobility;
     view->bend = 2.0 * drift.force[k][2] * view->mobility;
-    view->noise = VI_ROUNDING * drift.force_scale[k] * view->mobility;
-    view->free_noise = VI_ROUNDING * drift.force_scale[k] * fabs(model->mobility[k][k]);
+    view->noise = VI_ROUNDING * drift.force_scale[k] * fabs(model->mobility[k][k]);
     view->first = vi_structure_first_of_force(s, &drift, k);
     view->lead = view->first <= VI_ORDER ? drift.force[k][view->first] : 0.0;
 }
@@ -104,12 +103,12 @@ static bool others_hold(const vi_structure *s, int k)
     return false;
 }
 
-bool vi_structure_is_kept(const vi_structure *s, int k)
+double vi_structure_mobility_left(const vi_structure *s, int k)
 {
-    if (!others_hold(s, k)) {
-        return false;
-    }
     double g[VI_PORTS][VI_PORTS];
+    if (!others_hold(s, k)) {
+        return s->model->compliance[k][k];
+    }
     vi_structure_signed(s, s->model->compliance, g);
     double column[VI_PORTS], share[VI_PORTS], left = g[k][k];
     int held[VI_PORTS] = {0};
@@ -121,7 +120,12 @@ bool vi_structure_is_kept(const vi_structure *s, int k)
     for (int l = 0; l < s->model->contacts; ++l) {
         left -= g[k][l] * share[l];
     }
-    return left <= KEPT * g[k][k];
+    return vi_max(left, KEPT * g[k][k]);
+}
+
+bool vi_structure_is_kept(const vi_structure *s, int k)
+{
+    return others_hold(s, k) && vi_structure_mobility_left(s, k) <= KEPT * s->model->compliance[k][k];
 }
 
 bool vi_structure_only_touches(const vi_structure *s, int k)

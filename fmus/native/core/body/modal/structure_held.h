@@ -12,13 +12,15 @@ typedef struct {
     double p[VI_MODES];
     double mobility;         /* of the contact with those held beside it, 1/kg */
     double pressure, slope, bend; /* acceleration towards the stop if it were free, and its rates, m/s^2, .. m/s^4 */
-    double noise;            /* of the pressure */
-    double free_noise;       /* of its acceleration with no contact held beside it, m/s^2 */
+    double noise;            /* of the pressure, and of the acceleration with no contact held beside it, m/s^2 */
     int first;               /* the first Taylor coefficient, from the slope (1) on, that is more than rounding */
     double lead;             /* that one; 0: none */
 } vi_held_view;
 
 void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view);
+
+/* What the contacts that are held beside contact k leave of its mobility, at least a little, 1/kg. */
+double vi_structure_mobility_left(const vi_structure *s, int k);
 
 /* Is the point of contact k kept in place by the contacts that are held beside it? */
 bool vi_structure_is_kept(const vi_structure *s, int k);

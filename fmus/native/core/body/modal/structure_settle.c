@@ -68,14 +68,13 @@ static void decide(const vi_structure *s, int k, double gap, double push)
     vi_structure_look_at_held(s, k, &view);
     const bool compliant = gives_way(s, k), was_held = s->state->status[k] == VI_CONTACT_HELD;
     const int32_t leaving = s->state->leaving[k];
-    const double noise = compliant ? view.free_noise : view.noise;
     const double taken = compliant ? push : push * view.mobility;
-    const bool tie = fabs(gap) <= view.free_noise && taken <= noise;
-    const bool nothing = fabs(gap) <= view.free_noise && taken <= LITTLE * noise;
+    const bool tie = fabs(gap) <= view.noise && taken <= view.noise;
+    const bool nothing = fabs(gap) <= view.noise && taken <= LITTLE * view.noise;
     const bool idle = (nothing || compliant) && vi_structure_is_kept(s, k);
     const bool neither = view.lead == 0.0 && (view.slope == 0.0 ? leaving < 2 : leaving == 0);
     const bool stays = view.lead > 0.0 || (neither && !compliant) || was_held;
-    const bool presses = !idle && (tie ? stays : taken > noise);
+    const bool presses = !idle && (tie ? stays : taken > view.noise);
     if (presses && compliant) {
         vi_structure_touch_down(s, k);
     } else if (presses && !was_held) {
