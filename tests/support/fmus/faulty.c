@@ -48,7 +48,8 @@ enum {
     FAULT_CORRUPT_HEAP,
     FAULT_STOP_PROCESS,
     FAULT_CLOSE_FILES,
-    FAULT_KILL_PARENT
+    FAULT_KILL_PARENT,
+    FAULT_ENDLESS_LOG
 };
 /* s; a lie that lies beyond every run */
 #define BEYOND 360000.0
@@ -96,6 +97,14 @@ static void flood_log(double time, void *instance)
 {
     for (int line = 1; line <= LOGGED_LINES; line++) {
         say(instance, "line", line, time);
+    }
+}
+
+static void log_endlessly(double time, void *instance)
+{
+    volatile bool forever = true;
+    while (forever) {
+        flood_log(time, instance);
     }
 }
 
@@ -197,6 +206,9 @@ static bool misbehave_anywhere(int fault, double time, void *instance)
         return true;
     case FAULT_KILL_PARENT:
         kill(getppid(), SIGKILL);
+        return true;
+    case FAULT_ENDLESS_LOG:
+        log_endlessly(time, instance);
         return true;
     default:
         return false;
