@@ -7,31 +7,35 @@ is importable from here.
 
 from __future__ import annotations
 
-from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor
-from vibroimpact.analysis.dataset.checking import check, marked
-from vibroimpact.analysis.dataset.merging import merge_datasets, refuse_unlike, take_runs
-from vibroimpact.analysis.dataset.reading import (
-    Part,
-    dataset_file,
-    open_dataset,
-    open_measured,
-    read_flat,
-    read_part,
-)
-from vibroimpact.analysis.dataset.schema import (
-    IMPACT_COLUMNS,
-    PERIOD_COLUMNS,
-    RESERVED_NAMES,
-    RULES,
-    STICK_COLUMNS,
-    Direction,
-    Outcome,
-    RunRecord,
-    constant_names,
-    file_name_of,
-    file_names,
-)
-from vibroimpact.analysis.dataset.writing import build_dataset, with_constants, write_dataset
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor
+    from vibroimpact.analysis.dataset.checking import check, marked
+    from vibroimpact.analysis.dataset.merging import merge_datasets, refuse_unlike, take_runs
+    from vibroimpact.analysis.dataset.reading import (
+        Part,
+        dataset_file,
+        open_dataset,
+        open_measured,
+        read_flat,
+        read_part,
+    )
+    from vibroimpact.analysis.dataset.schema import (
+        IMPACT_COLUMNS,
+        PERIOD_COLUMNS,
+        RESERVED_NAMES,
+        RULES,
+        STICK_COLUMNS,
+        Direction,
+        Outcome,
+        RunRecord,
+        constant_names,
+        file_name_of,
+        file_names,
+    )
+    from vibroimpact.analysis.dataset.writing import build_dataset, with_constants, write_dataset
 
 __all__ = [
     "IMPACT_COLUMNS",
@@ -61,3 +65,19 @@ __all__ = [
     "with_constants",
     "write_dataset",
 ]
+_HOMES = {
+    "VibroimpactAccessor": "accessor",
+    **dict.fromkeys(("check", "marked"), "checking"),
+    **dict.fromkeys(("merge_datasets", "refuse_unlike", "take_runs"), "merging"),
+    **dict.fromkeys(
+        ("Part", "dataset_file", "open_dataset", "open_measured", "read_flat", "read_part"), "reading"
+    ),
+    **dict.fromkeys(("build_dataset", "with_constants", "write_dataset"), "writing"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    # The process of a guarded point needs the records of runs alone, and xarray takes half a second to load.
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES.get(name, 'schema')}"), name)

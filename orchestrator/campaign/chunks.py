@@ -21,7 +21,8 @@ import xarray as xr
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, marked, read_part, write_dataset
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
-from vibroimpact.orchestrator.run import Runner, RunnerIdentity, dataset_of_runs, identity_of, named_runner
+from vibroimpact.orchestrator.run import Runner, RunnerIdentity, identity_of, named_runner
+from vibroimpact.orchestrator.run.dataset import dataset_of_runs
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Point, expand

@@ -1,8 +1,7 @@
-"""One point of a scene, simulated in this process, and the dataset of such runs."""
+"""One point of a scene, simulated in this process; `dataset` makes the dataset of such runs."""
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.run.dataset import dataset_of_runs
 from vibroimpact.orchestrator.run.general import GeneralRunner
 from vibroimpact.orchestrator.run.opening import (
     Runner,
@@ -20,7 +19,6 @@ __all__ = [
     "Runner",
     "RunnerIdentity",
     "Session",
-    "dataset_of_runs",
     "identity_of",
     "named_runner",
     "open_runner",

@@ -10,7 +10,7 @@ from vibroimpact.analysis.dataset import Direction, Outcome, check
 from vibroimpact.fmus.core import beam_modes
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.campaign.chunks import carried_attributes, carried_state
-from vibroimpact.orchestrator.run import dataset_of_runs
+from vibroimpact.orchestrator.run.dataset import dataset_of_runs
 from vibroimpact.orchestrator.run.empty_record import empty_record
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
 from vibroimpact.orchestrator.scene import Scene, parse_scene
