@@ -97,11 +97,32 @@ static void rounding_is_passed_over(uint64_t *seed)
     }
 }
 
+/* Coefficients of sizes that differ by 100 decades and more: the search comes to the end, or to the zero, all the same. */
+static void sizes_do_not_stop_it(uint64_t *seed)
+{
+    double c[VI_ORDER + 1];
+    for (int run = 0; run < 2000; ++run) {
+        memset(c, 0, sizeof c);
+        const double length = pow(10.0, uniform(seed, -7.0, 0.0)), sign = choice(seed, 2) == 0 ? 1.0 : -1.0;
+        const int high = 5 + (int)choice(seed, 8);
+        c[0] = pow(10.0, uniform(seed, -200.0, -180.0));
+        c[1] = pow(10.0, uniform(seed, -130.0, -100.0));
+        c[high] = sign * pow(10.0, uniform(seed, -40.0, 0.0));
+        const double zero = pow(c[1] / fabs(c[high]), 1.0 / (double)(high - 1)); /* c[0] does not move it */
+        const vi_fall fall = vi_polynomial_fall(c, 0.0, length, DBL_EPSILON * c[0]);
+        const bool falls = sign < 0.0 && zero < length;
+        CHECK(fall.found == falls && (falls || fall.time == length), "run %d: ended at %g of %g", run, fall.time,
+              length);
+        CHECK(!falls || fabs(fall.time - zero) <= 1e-12 * zero, "run %d: %.17g for %.17g", run, fall.time, zero);
+    }
+}
+
 int main(void)
 {
     uint64_t seed = 4;
     the_first_root_is_found(&seed);
     nothing_is_passed(&seed);
     rounding_is_passed_over(&seed);
+    sizes_do_not_stop_it(&seed);
     return 0;
 }

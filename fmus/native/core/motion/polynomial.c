@@ -8,6 +8,11 @@
  * rounding, each step would certify only the next few roundings. */
 static const int LONGEST_CRAWL = 64;
 
+/* After so many steps the fourth derivative's bound over all that is left is taken for too wide. The next step has one
+ * over this multiple of the last one's length. */
+static const int LONGEST_APPROACH = 256;
+static const double WIDER = 8.0;
+
 void vi_polynomial_at(const double c[VI_ORDER + 1], double u, double value[4])
 {
     double x = c[VI_ORDER], v = 0.0, a = 0.0, j = 0.0; /* value, and derivatives over 1, 2 and 6 */
@@ -59,8 +64,7 @@ static vi_fall land(const double c[VI_ORDER + 1], double u, const vi_approach *p
 
 vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double length, double noise)
 {
-    const double bound = largest_snap(c, length);
-    double u = from;
+    double u = from, reach = length, last = length, bound = largest_snap(c, length);
     int crawl = 0;
     for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
         double value[4];
@@ -69,20 +73,25 @@ vi_fall vi_polynomial_fall(const double c[VI_ORDER + 1], double from, double len
         if (p.velocity > 0.0 && p.clearance <= noise) {
             return land(c, u, &p, length, noise);
         }
-        double horizon = length - u;
+        if (evaluation >= LONGEST_APPROACH) {
+            reach = vi_min(length, u + WIDER * last);
+            bound = largest_snap(c, reach);
+            p.bound = bound;
+        }
+        double horizon = reach - u;
         crawl = p.clearance <= noise ? crawl + 1 : 0;
         if (crawl > LONGEST_CRAWL && bound > 0.0) {
             p.clearance += noise;
             horizon = vi_min(horizon, sqrt(sqrt(24.0 * noise / bound)));
         }
-        const double step = vi_certified_step(&p, horizon);
-        if (!(step < length - u)) {
+        last = vi_certified_step(&p, horizon);
+        if (!(last < length - u)) {
             return (vi_fall){false, length, 0.0};
         }
-        if (u + step == u) {
+        if (u + last == u) {
             return (vi_fall){true, u, vi_max(0.0, p.velocity)};
         }
-        u += step;
+        u += last;
     }
     return (vi_fall){false, u, 0.0};
 }

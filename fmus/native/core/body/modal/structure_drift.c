@@ -179,9 +179,12 @@ static void correct_start(const vi_structure *s, const situation *now, int k, do
 static bool divide_by_start(const vi_structure *s, const vi_drift *drift, int k, double clearance[VI_ORDER + 1])
 {
     int first = 2;
-    while (first <= VI_ORDER && (first == 2 ? clearance[2] == 0.0
-                                            : fabs(clearance[first]) <= vi_structure_series_noise(s, drift, k, first))) {
-        ++first;
+    if (clearance[2] == 0.0) {
+        vi_series_noise noise;
+        vi_series_noise_begin(&noise, s, drift);
+        do {
+            ++first;
+        } while (first <= VI_ORDER && fabs(clearance[first]) <= vi_series_noise_next(&noise, k));
     }
     divide(clearance, first);
     return first <= VI_ORDER;
@@ -291,6 +294,9 @@ static void separations(const vi_structure *s, const vi_drift *drift, const situ
 {
     double depth[VI_ORDER + 1];
     memcpy(depth, drift->penetration[k], sizeof depth);
+    if (now->thin[k] && stays(s, drift, k, depth, length)) {
+        return;
+    }
     if (s->state->leaving[k] == 2) { /* what begins to press without speed does not move out by rounding */
         depth[1] = vi_max(0.0, depth[1]);
         depth[2] = vi_max(0.0, depth[2]);

@@ -52,41 +52,101 @@ void vi_structure_look_at_held(const vi_structure *s, int k, vi_held_view *view)
     view->lead = view->first <= VI_ORDER ? drift.force[k][view->first] : 0.0;
 }
 
-double vi_structure_series_noise(const vi_structure *s, const vi_drift *drift, int k, int n)
+/* Size of what the modes' forcing and constant loads contribute to coefficient n of mode j. */
+static double load_size(const vi_series_noise *noise, int j)
 {
-    const vi_structure_model *model = s->model;
-    double terms = 0.0, drive = 1.0, turn = 1.0;
-    for (int i = 1; i <= n - 2; ++i) {
-        drive *= model->clock.angular_frequency / (double)i;
-        turn *= (i == 1 ? 1.0 : model->fastest) / (double)i;
+    const vi_mode *mode = &noise->s->model->mode[j];
+    double size = fabs(mode->force) * noise->drive;
+    if (noise->n == 2) {
+        size += fabs(noise->held[j]) + mode->stiffness * fabs(noise->s->state->q[j]);
+    } else if (noise->n == 3) {
+        size += fabs(noise->s->state->held_rate[j]);
+    }
+    return size;
+}
+
+/* Rounding of coefficient n - 2 of the force of contact l; a stop that yields turns that of the motion into force. */
+static double force_noise(const vi_series_noise *noise, int l)
+{
+    const vi_structure *s = noise->s;
+    const double own = VI_ROUNDING * fabs(noise->drift->force[l][noise->n - 2]);
+    if (s->state->status[l] != VI_CONTACT_YIELDING) {
+        return own;
+    }
+    const vi_contact_force slopes = vi_structure_yield(s, l);
+    double displacement = 0.0, rate = 0.0;
+    for (int j = 0; j < s->model->modes; ++j) {
+        displacement += fabs(s->model->shape[l][j]) * noise->before[j];
+        rate += fabs(s->model->shape[l][j]) * noise->last[j];
+    }
+    return own + slopes.stiffness * displacement + slopes.damping * (double)(noise->n - 1) * rate;
+}
+
+/* From the rounding of coefficients n - 2 and n - 1 to that of coefficient n: theirs, and that of the terms it adds up. */
+static void carry(vi_series_noise *noise)
+{
+    const vi_structure_model *model = noise->s->model;
+    double forces[VI_PORTS], next[VI_MODES];
+    const int n = noise->n;
+    for (int l = 0; l < model->contacts; ++l) {
+        forces[l] = force_noise(noise, l);
     }
     for (int j = 0; j < model->modes; ++j) {
-        const vi_mode *mode = &model->mode[j];
-        double size = fabs(mode->force) * drive + mode->stiffness * fabs(drift->modal[n - 2][j]);
-        size += n == 3 ? fabs(s->state->held_rate[j]) : 0.0;
+        const double stiffness = model->mode[j].stiffness;
+        double terms = load_size(noise, j) + stiffness * fabs(noise->drift->modal[n - 2][j]);
+        double carried = stiffness * noise->before[j];
         for (int i = 0; i < model->modes; ++i) {
-            const double damping = vi_structure_damping(model, j, i);
-            size += fabs(damping * drift->modal[n - 1][i]) * (double)(n - 1);
+            const double damping = fabs(vi_structure_damping(model, j, i)) * (double)(n - 1);
+            terms += damping * fabs(noise->drift->modal[n - 1][i]);
+            carried += damping * noise->last[i];
         }
-        terms += fabs(model->shape[k][j]) * size;
-    }
-    for (int l = 0; l < model->contacts; ++l) {
-        double force = fabs(drift->force[l][n - 2]);
-        if (s->state->status[l] == VI_CONTACT_YIELDING) { /* which turns the rounding of its rate into force */
-            const vi_contact_force slopes = vi_structure_yield(s, l);
-            const double stiffness = slopes.stiffness + slopes.damping * model->fastest;
-            force += stiffness * vi_structure_velocity_size(s, l) * turn;
+        for (int l = 0; l < model->contacts; ++l) {
+            carried += fabs(model->shape[l][j]) * forces[l];
         }
-        terms += vi_structure_push_size(model, k, l) * force;
+        next[j] = (VI_ROUNDING * terms + carried) / ((double)n * (double)(n - 1));
     }
-    return VI_ROUNDING * terms / ((double)n * (double)(n - 1));
+    memcpy(noise->before, noise->last, (size_t)model->modes * sizeof *next);
+    memcpy(noise->last, next, (size_t)model->modes * sizeof *next);
+    noise->drive *= model->clock.angular_frequency / (double)(n - 1);
+    ++noise->n;
+}
+
+void vi_series_noise_begin(vi_series_noise *noise, const vi_structure *s, const vi_drift *drift)
+{
+    const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 0.0;
+    noise->s = s;
+    noise->drift = drift;
+    noise->drive = 1.0;
+    noise->n = 2;
+    vi_structure_held_now(s, noise->held);
+    for (int j = 0; j < s->model->modes; ++j) {
+        const vi_mode *mode = &s->model->mode[j];
+        const double loads = fabs(mode->force) + fabs(noise->held[j]);
+        const double velocity = fabs(drift->modal[1][j]) + mode->natural * fabs(s->state->q[j]) + loads * radian;
+        noise->before[j] = 0.0; /* the series begins where the body is */
+        noise->last[j] = VI_ROUNDING * velocity;
+    }
+    carry(noise);
+}
+
+double vi_series_noise_next(vi_series_noise *noise, int k)
+{
+    const vi_structure_model *model = noise->s->model;
+    double sum = 0.0;
+    carry(noise);
+    for (int j = 0; j < model->modes; ++j) {
+        sum += fabs(model->shape[k][j]) * noise->last[j];
+    }
+    return sum;
 }
 
 int vi_structure_first_of_force(const vi_structure *s, const vi_drift *drift, int k)
 {
+    vi_series_noise noise;
+    vi_series_noise_begin(&noise, s, drift);
     for (int n = 1; n <= VI_ORDER - 2; ++n) {
         const double pressure = drift->force[k][n] * s->model->compliance[k][k] / (double)((n + 1) * (n + 2));
-        if (fabs(pressure) > vi_structure_series_noise(s, drift, k, n + 2)) {
+        if (fabs(pressure) > vi_series_noise_next(&noise, k)) {
             return n;
         }
     }

@@ -28,8 +28,20 @@ bool vi_structure_is_kept(const vi_structure *s, int k);
 /* Does contact k stand at its stop, neither pressed in nor going to be, since rigid stops hold its point there? */
 bool vi_structure_only_touches(const vi_structure *s, int k);
 
-/* Rounding of Taylor coefficient n >= 3 of contact k's motion, which is the sum of larger terms, m/s^n. */
-double vi_structure_series_noise(const vi_structure *s, const vi_drift *drift, int k, int n);
+/* Rounding of the modes' Taylor coefficients, each the sum of larger terms made of those before it. */
+typedef struct {
+    const vi_structure *s;
+    const vi_drift *drift;
+    int n;                                   /* the coefficient that comes next */
+    double drive;                            /* size of coefficient n - 2 of the forcing, of amplitude 1 */
+    double held[VI_MODES];                   /* constant loads */
+    double before[VI_MODES], last[VI_MODES]; /* rounding of coefficients n - 2 and n - 1 */
+} vi_series_noise;
+
+void vi_series_noise_begin(vi_series_noise *noise, const vi_structure *s, const vi_drift *drift);
+
+/* Rounding of the next coefficient of contact k's motion, from the third one on, m/s^n. */
+double vi_series_noise_next(vi_series_noise *noise, int k);
 
 /* The first coefficient, from the slope on, of the force of held contact k that is more than rounding; VI_ORDER + 1: none. */
 int vi_structure_first_of_force(const vi_structure *s, const vi_drift *drift, int k);

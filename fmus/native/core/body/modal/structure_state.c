@@ -112,11 +112,6 @@ static double size_at(const vi_structure_model *model, const double shape[], con
     return sum;
 }
 
-double vi_structure_push_size(const vi_structure_model *model, int k, int l)
-{
-    return size_at(model, model->shape[k], model->shape[l]);
-}
-
 double vi_structure_displacement_size(const vi_structure *s, int k)
 {
     return fabs(s->contacts[k].position) + size_at(s->model, s->model->shape[k], s->state->q);

@@ -141,9 +141,6 @@ double vi_structure_clearance(const vi_structure *s, int k);
 double vi_structure_displacement_size(const vi_structure *s, int k);
 double vi_structure_velocity_size(const vi_structure *s, int k);
 
-/* Size of the terms that the acceleration of contact k for a unit force at contact l is the sum of, 1/kg. */
-double vi_structure_push_size(const vi_structure_model *model, int k, int l);
-
 /* Is this contact looked for? */
 bool vi_structure_watched(const vi_structure *s, int k);
 
