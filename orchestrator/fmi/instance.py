@@ -212,6 +212,11 @@ class Instance(ABC):
     def step(self, time: float, size: float) -> int:
         """Advance from `time` by `size`, s; returns OK, WARNING or DISCARD and sets `self.time`."""
 
+    def step_undiscarded(self, time: float, size: float) -> None:
+        """Advance from `time` by `size`, s; a step that the FMU discards is an error."""
+        if self.step(time, size) == DISCARD:
+            self.check(DISCARD, "DoStep")
+
     def _refuse_end(self, rule: str, reached: float) -> NoReturn:
         """Raise the error of a step that says it has ended where none can."""
         self.time = self._step_time.value

@@ -12,7 +12,7 @@ from pathlib import Path
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, ModelVariable, read_description
-from vibroimpact.orchestrator.fmi.instance import DISCARD, Wrapper
+from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.log import LogTail
@@ -178,9 +178,7 @@ class Component:
         """
         self.revisit_start()
         instance = self.instance
-        status = instance.step(time, size)
-        if status == DISCARD:
-            instance.check(status, "DoStep")
+        instance.step_undiscarded(time, size)
         end = time + size
         if instance.time < end - SAME_INSTANT * (1.0 + abs(end)) - instance.internal_step:
             raise ComponentError(

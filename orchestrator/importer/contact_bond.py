@@ -19,7 +19,6 @@ from ctypes import c_void_p
 from dataclasses import dataclass
 
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.fmi.instance import DISCARD
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 from vibroimpact.orchestrator.importer.wiring import Transfer
@@ -381,8 +380,7 @@ class ContactBond:
         instance = self.stop.instance
         instance.restore(self._probe_state)
         self._write_inputs(penetration, rate)
-        if instance.step(time, size) == DISCARD:
-            instance.check(DISCARD, "DoStep")
+        instance.step_undiscarded(time, size)
         return self._gains[0] * float(self._asked.get()[0])
 
     def _write_inputs(self, penetration: float, rate: float) -> None:

@@ -387,8 +387,7 @@ class Importer:
 
     def _step_one(self, component: Component, time: float, target: float) -> float:
         """Step one component; returns the time of its first event, or `target`."""
-        if component.instance.step(time, target - time) == DISCARD:
-            component.instance.check(DISCARD, "DoStep")
+        component.instance.step_undiscarded(time, target - time)
         reached = self._after_step(component, time, target)
         if component.event_times is not None:
             reached = min(reached, self._reported(component, time, target))

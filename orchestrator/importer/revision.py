@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.fmi.instance import DISCARD
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import EventSpec
 
@@ -137,10 +136,7 @@ class Watch:
 
     def _value_at(self, time: float, u: float) -> float:
         self.component.revisit_start()
-        instance = self.component.instance
-        status = instance.step(time, u)
-        if status == DISCARD:
-            instance.check(status, "DoStep")
+        self.component.instance.step_undiscarded(time, u)
         return self.distance()
 
 

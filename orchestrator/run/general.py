@@ -23,13 +23,7 @@ from vibroimpact.orchestrator.run.record import (
     in_time_order,
 )
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene
-
-
-def component_variable(name: str) -> tuple[str, str]:
-    """Split `component.variable` at its first dot."""
-    component, _, variable = name.partition(".")
-    return component, variable
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
 
 
 class GeneralRunner:

@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.scene.general.component_facts import (
 )
 from vibroimpact.orchestrator.scene.general.components import components_of
 from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
-from vibroimpact.orchestrator.scene.general.scene import gain_place
+from vibroimpact.orchestrator.scene.general.scene import component_variable, gain_place
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
@@ -59,31 +59,19 @@ class GeneralDraft(DraftTables):
 
     def facts(self, reference: str) -> ComponentFacts | None:
         """Return the facts of the component that a reference names; None when they are not known."""
-        component = self.components.get(split(reference)[0])
+        component = self.components.get(component_variable(reference)[0])
         return component.facts if component else None
 
     def variable(self, reference: str) -> VariableFacts | None:
         """Return the variable that `COMPONENT.VARIABLE` names; None when it is not known."""
         facts = self.facts(reference)
-        return facts.variables.get(split(reference)[1]) if facts else None
+        return facts.variables.get(component_variable(reference)[1]) if facts else None
 
     def unit(self, key: str) -> str:
         """Return the unit of a variable or gain as its description or connection writes it; `1` where it has none."""
         variable, place = self.variable(key), gain_place(key)
         connection = self.connections[place] if place is not None and variable is None else None
         return (variable.unit_name if variable else connection and connection.gain_unit) or "1"
-
-
-def split(reference: str) -> tuple[str, str]:
-    """Take `COMPONENT.VARIABLE` apart at its first dot.
-
-    Examples
-    --------
-    >>> split("body.contact[1].velocity")
-    ('body', 'contact[1].velocity')
-    """
-    component, _, variable = reference.partition(".")
-    return component, variable
 
 
 def general_problems(draft: GeneralDraft) -> list[Problem]:
@@ -102,7 +90,7 @@ def general_problems(draft: GeneralDraft) -> list[Problem]:
 
 def reference_problem(draft: GeneralDraft, where: str, reference: str) -> Problem | None:
     """Return why `COMPONENT.VARIABLE` names nothing of this scene; None when it may."""
-    component, variable = split(reference)
+    component, variable = component_variable(reference)
     if not draft.components:
         return None  # a scene without components is told only that
     if not variable:
@@ -202,7 +190,7 @@ def _inputs_have_one_source(draft: GeneralDraft) -> Iterator[Problem]:
         if connection is None or variable is None or variable.causality != "input":
             continue
         # aliases are one input, whatever its name
-        other = first.setdefault((split(connection.target)[0], variable.reference), place)
+        other = first.setdefault((component_variable(connection.target)[0], variable.reference), place)
         if other != place:
             where = key_path(("connection", place, "to"))
             got = f"{quoted(connection.target)}, which connection[{other + 1}] feeds already"
@@ -227,7 +215,7 @@ def _events_watch_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
             hint = "A crossing is found by going back to the state before the step."
             got = f"{facts.file}, which does not have canGetAndSetFMUState"
             yield Problem(where, "an FMU whose state can be kept and restored", got, hint)
-        force = _contact_answer(draft, split(event.watch)[0])
+        force = _contact_answer(draft, component_variable(event.watch)[0])
         if facts.event_mode and force is not None:
             hint = (
                 "A watched component runs without event mode and early return, which a contact with another "
@@ -239,9 +227,9 @@ def _events_watch_what_there_is(draft: GeneralDraft) -> Iterator[Problem]:
 def _contact_answer(draft: GeneralDraft, component: str) -> str | None:
     """Return the output that answers a contact of this component; None where none does."""
     for connection in draft.connections:
-        if connection is None or split(connection.target)[0] != component:
+        if connection is None or component_variable(connection.target)[0] != component:
             continue
-        port, _, answer = split(connection.target)[1].rpartition(".")
+        port, _, answer = component_variable(connection.target)[1].rpartition(".")
         facts = draft.facts(connection.target)
         if answer in ANSWERS and facts is not None and f"{port}.law" in facts.variables:
             return connection.source

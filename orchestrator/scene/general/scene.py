@@ -12,6 +12,18 @@ from vibroimpact.orchestrator.importer.specification import ComponentSpec, Conne
 _GAIN_KEY = re.compile(r"connection\[([1-9][0-9]{0,8})\]\.gain")
 
 
+def component_variable(reference: str) -> tuple[str, str]:
+    """Take `COMPONENT.VARIABLE` apart at its first dot.
+
+    Examples
+    --------
+    >>> component_variable("body.contact[1].velocity")
+    ('body', 'contact[1].velocity')
+    """
+    component, _, variable = reference.partition(".")
+    return component, variable
+
+
 def gain_place(key: str) -> int | None:
     """Return the 0-based place of the connection whose gain a key names; None when it names none.
 

@@ -8,8 +8,8 @@ from typing import Any
 
 from vibroimpact.orchestrator.scene.general.component_facts import Misfit, swept_value
 from vibroimpact.orchestrator.scene.general.components import settable_names, start_problems
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, reference_problem, split
-from vibroimpact.orchestrator.scene.general.scene import gain_place
+from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, reference_problem
+from vibroimpact.orchestrator.scene.general.scene import component_variable, gain_place
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
@@ -47,7 +47,7 @@ def _key_problems(key: str, entry: object, draft: GeneralDraft) -> Iterator[Prob
 
 
 def _names_a_connection(key: str, draft: GeneralDraft) -> bool:
-    table = split(key)[0]
+    table = component_variable(key)[0]
     return table.partition("[")[0] == "connection" and table not in draft.components
 
 
@@ -80,7 +80,7 @@ def _start_value_problems(key: str, where: str, draft: GeneralDraft) -> Iterator
     problem = reference_problem(draft, where, key)
     facts, variable = draft.facts(key), draft.variable(key)
     if problem:
-        component, name = split(key)
+        component, name = component_variable(key)
         near = (
             partial(nearest, name, settable_names(facts), f"{component}.") if facts and name else problem.hint
         )

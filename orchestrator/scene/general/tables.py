@@ -11,8 +11,8 @@ from vibroimpact.orchestrator.importer.specification import ComponentSpec, Conne
 from vibroimpact.orchestrator.scene.general.component_facts import Misfit, StartValue, swept_value
 from vibroimpact.orchestrator.scene.general.components import DraftComponent
 from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
-from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems, split
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene
+from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
 from vibroimpact.orchestrator.scene.general.sweep import read_general_sweep
 from vibroimpact.orchestrator.scene.models import Execution, Record
 from vibroimpact.orchestrator.scene.problems import Problem
@@ -86,7 +86,7 @@ def _first_swept(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> dict
     assert component.facts is not None
     first: dict[str, StartValue] = {}
     for axis in axes:
-        owner, name = split(axis.key)
+        owner, name = component_variable(axis.key)
         if owner == component.name:
             value = swept_value(component.facts.variables[name], axis.values[0])
             assert not isinstance(value, Misfit)
@@ -95,8 +95,10 @@ def _first_swept(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> dict
 
 
 def _connection(table: ConnectionTable) -> ConnectionSpec:
-    return ConnectionSpec(split(table.source), split(table.target), table.gain, table.gain_unit)
+    return ConnectionSpec(
+        component_variable(table.source), component_variable(table.target), table.gain, table.gain_unit
+    )
 
 
 def _event(table: EventTable) -> EventSpec:
-    return EventSpec(*split(table.watch), table.direction, table.level)
+    return EventSpec(*component_variable(table.watch), table.direction, table.level)

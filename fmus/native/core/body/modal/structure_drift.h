@@ -2,16 +2,7 @@
 #ifndef VIBROIMPACT_STRUCTURE_DRIFT_H
 #define VIBROIMPACT_STRUCTURE_DRIFT_H
 
-#include "body/modal/structure_state.h"
-
-typedef enum {
-    VI_DRIFT_NO_EVENT,
-    VI_DRIFT_ARRIVAL,
-    VI_DRIFT_RELEASE,
-    VI_DRIFT_SEPARATION,
-    VI_DRIFT_RETURN, /* to a compliant surface that it had left */
-    VI_DRIFT_FREE    /* a receding contact is out, or its surface has relaxed */
-} vi_drift_event;
+#include "body/modal/structure_events.h"
 
 /* Follow the coupled motion to its next event, the end of a segment or `length`, whichever is first; returns the time
  * moved. *k is the contact of the event, or -1. The state (q, p) is moved, the instant is not. Arrivals up to `room`

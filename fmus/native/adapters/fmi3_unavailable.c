@@ -1,0 +1,147 @@
+/* What else FMI 3.0 declares: importers look all of it up, so that it is exported and says that it is not available. */
+#include "fmi3Functions.h"
+
+#include "instance.h"
+
+#define UNUSED(argument) (void)(argument)
+
+static fmi3Status unavailable(fmi3Instance instance, const char *function)
+{
+    if (instance != NULL) {
+        vi_instance_fail(instance, function, "not available in this component");
+    }
+    return fmi3Error;
+}
+
+/* ---- types that no variable of ours has: every reference is refused, asking for none is fine ---- */
+
+#define EMPTY_TYPE(NAME, CTYPE)                                                                                     \
+    fmi3Status fmi3Get##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
+                             size_t nValueReferences, CTYPE values[], size_t nValues)                                \
+    {                                                                                                                \
+        UNUSED(valueReferences);                                                                                     \
+        UNUSED(values);                                                                                              \
+        UNUSED(nValues);                                                                                             \
+        return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3Get" #NAME);                              \
+    }                                                                                                                \
+    fmi3Status fmi3Set##NAME(fmi3Instance instance, const fmi3ValueReference valueReferences[],                      \
+                             size_t nValueReferences, const CTYPE values[], size_t nValues)                          \
+    {                                                                                                                \
+        UNUSED(valueReferences);                                                                                     \
+        UNUSED(values);                                                                                              \
+        UNUSED(nValues);                                                                                             \
+        return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3Set" #NAME);                              \
+    }
+
+EMPTY_TYPE(Float32, fmi3Float32)
+EMPTY_TYPE(Int8, fmi3Int8)
+EMPTY_TYPE(UInt8, fmi3UInt8)
+EMPTY_TYPE(Int16, fmi3Int16)
+EMPTY_TYPE(UInt16, fmi3UInt16)
+EMPTY_TYPE(Int32, fmi3Int32)
+EMPTY_TYPE(UInt32, fmi3UInt32)
+EMPTY_TYPE(UInt64, fmi3UInt64)
+EMPTY_TYPE(String, fmi3String)
+
+fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                         size_t valueSizes[], fmi3Binary values[], size_t nValues)
+{
+    UNUSED(valueReferences);
+    UNUSED(valueSizes);
+    UNUSED(values);
+    UNUSED(nValues);
+    return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3GetBinary");
+}
+
+fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                         const size_t valueSizes[], const fmi3Binary values[], size_t nValues)
+{
+    UNUSED(valueReferences);
+    UNUSED(valueSizes);
+    UNUSED(values);
+    UNUSED(nValues);
+    return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetBinary");
+}
+
+fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        fmi3Clock values[])
+{
+    UNUSED(valueReferences);
+    UNUSED(values);
+    return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3GetClock");
+}
+
+fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
+                        const fmi3Clock values[])
+{
+    UNUSED(valueReferences);
+    UNUSED(values);
+    return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetClock");
+}
+
+/* ---- model exchange, scheduled execution, clocks, derivatives ---- */
+
+#define UNAVAILABLE(NAME, ...)               \
+    fmi3Status NAME(__VA_ARGS__)             \
+    {                                        \
+        return unavailable(instance, #NAME); \
+    }
+
+#if defined(__GNUC__) || defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+
+UNAVAILABLE(fmi3GetNumberOfVariableDependencies, fmi3Instance instance, fmi3ValueReference valueReference,
+            size_t *nDependencies)
+UNAVAILABLE(fmi3GetVariableDependencies, fmi3Instance instance, fmi3ValueReference dependent,
+            size_t elementIndicesOfDependent[], fmi3ValueReference independents[],
+            size_t elementIndicesOfIndependents[], fmi3DependencyKind dependencyKinds[], size_t nDependencies)
+UNAVAILABLE(fmi3GetDirectionalDerivative, fmi3Instance instance, const fmi3ValueReference unknowns[],
+            size_t nUnknowns, const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[],
+            size_t nSeed, fmi3Float64 sensitivity[], size_t nSensitivity)
+UNAVAILABLE(fmi3GetAdjointDerivative, fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+            const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
+            fmi3Float64 sensitivity[], size_t nSensitivity)
+UNAVAILABLE(fmi3EnterConfigurationMode, fmi3Instance instance)
+UNAVAILABLE(fmi3ExitConfigurationMode, fmi3Instance instance)
+UNAVAILABLE(fmi3GetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
+UNAVAILABLE(fmi3GetIntervalFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[],
+            fmi3IntervalQualifier qualifiers[])
+UNAVAILABLE(fmi3GetShiftDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3Float64 shifts[])
+UNAVAILABLE(fmi3GetShiftFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, fmi3UInt64 counters[], fmi3UInt64 resolutions[])
+UNAVAILABLE(fmi3SetIntervalDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3Float64 intervals[])
+UNAVAILABLE(fmi3SetIntervalFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+UNAVAILABLE(fmi3SetShiftDecimal, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3Float64 shifts[])
+UNAVAILABLE(fmi3SetShiftFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
+UNAVAILABLE(fmi3EnterContinuousTimeMode, fmi3Instance instance)
+UNAVAILABLE(fmi3CompletedIntegratorStep, fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+            fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
+UNAVAILABLE(fmi3SetTime, fmi3Instance instance, fmi3Float64 time)
+UNAVAILABLE(fmi3SetContinuousStates, fmi3Instance instance, const fmi3Float64 continuousStates[],
+            size_t nContinuousStates)
+UNAVAILABLE(fmi3GetContinuousStateDerivatives, fmi3Instance instance, fmi3Float64 derivatives[],
+            size_t nContinuousStates)
+UNAVAILABLE(fmi3GetEventIndicators, fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
+UNAVAILABLE(fmi3GetContinuousStates, fmi3Instance instance, fmi3Float64 continuousStates[],
+            size_t nContinuousStates)
+UNAVAILABLE(fmi3GetNominalsOfContinuousStates, fmi3Instance instance, fmi3Float64 nominals[],
+            size_t nContinuousStates)
+UNAVAILABLE(fmi3GetNumberOfEventIndicators, fmi3Instance instance, size_t *nEventIndicators)
+UNAVAILABLE(fmi3GetNumberOfContinuousStates, fmi3Instance instance, size_t *nContinuousStates)
+UNAVAILABLE(fmi3GetOutputDerivatives, fmi3Instance instance, const fmi3ValueReference valueReferences[],
+            size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
+UNAVAILABLE(fmi3ActivateModelPartition, fmi3Instance instance, fmi3ValueReference clockReference,
+            fmi3Float64 activationTime)
+
+#if defined(__GNUC__) || defined(__clang__)
+#pragma GCC diagnostic pop
+#endif
