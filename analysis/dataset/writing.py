@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import accessor  # noqa: F401  # what is opened or built knows its runs
+from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.checking import marked
 from vibroimpact.analysis.dataset.schema import (
     CONVENTIONS,
