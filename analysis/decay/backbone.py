@@ -77,12 +77,7 @@ def backbone(samples: DecaySamples, periods: float | None = None) -> Backbone:
 
     In each window a decaying cosine is fitted with its own frequency and decay rate; its amplitude is that of the
     middle. Nothing is filtered: a Hilbert transform would smear the start of the decay, where the amplitude is largest.
-
-    Parameters
-    ----------
-    samples : DecaySamples
-    periods : float, optional
-        Length of a window, in periods; by default a sixteenth of the decay, but four periods at least.
+    A window is `periods` long, by default a sixteenth of the decay, but four periods at least.
 
     Raises
     ------

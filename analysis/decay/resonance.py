@@ -43,7 +43,6 @@ class Resonance:
         C: 1/mass of a single oscillator, or the participation (1 of a single one) of a transmissibility.
     phase : Estimate or None
         Of C, rad: 0 or pi where model and polarity are right; None where only magnitudes were fitted.
-    form : str
     half_power_damping_ratio : float
         From the bandwidth at the peak over sqrt 2, as a check; NaN where the curve does not fall that far.
     angular_frequency, magnitude, fitted : ndarray of float, shape (line,)
@@ -103,7 +102,6 @@ def curve_of(
 
     Parameters
     ----------
-    found : FrequencyResponse
     form : str
         One of `FORMS`, or `auto`: by the units of the channels.
     band : tuple of float, optional
@@ -191,10 +189,7 @@ def _highest(magnitude: Floats, top: int) -> float:
 def half_power_damping_ratio(omega: Floats, magnitude: Floats) -> float:
     """Return `(omega_2^2 - omega_1^2) / (4 omega_peak^2)` of the half-power points; NaN where there are none.
 
-    Parameters
-    ----------
-    omega, magnitude : ndarray of float, shape (line,)
-        rad/s, and `|H|`.
+    `omega` is in rad/s, `magnitude` is `|H|`.
     """
     low, high = _half_power(omega, magnitude)
     return float((high**2 - low**2) / (4.0 * omega[int(np.argmax(magnitude))] ** 2))
@@ -212,12 +207,8 @@ def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
     """Fit one resonance to a frequency response by least squares, weighted by its errors where these are known.
 
     Standard errors are those of the scatter about the fit, neighbouring lines correlated or not, or those that the
-    coherence predicts, whichever are larger.
-
-    Parameters
-    ----------
-    curve : Curve or FrequencyResponse
-        A response: the part around its highest peak, see `curve_of`.
+    coherence predicts, whichever are larger. Of a frequency response the part around its highest peak is fitted, see
+    `curve_of`.
 
     Raises
     ------
@@ -329,15 +320,7 @@ def resolution_remark(found: FrequencyResponse, resonance: Resonance) -> tuple[s
 class ResponseEstimates:
     """A fitted resonance and where it is from.
 
-    Attributes
-    ----------
-    resonance : Resonance
-    response : FrequencyResponse or None
-        None where the curve is that of a simulated sweep.
-    title : str
-    unit : str
-        CF unit of the response.
-    remarks : tuple of str
+    `response` is None where the curve is that of a simulated sweep; `unit` is the CF unit of the response.
     """
 
     resonance: Resonance
@@ -401,7 +384,6 @@ class ResponseEstimates:
                     {"frequency": ("frequency", found.frequency, described("frequency", "Hz"))},
                 )
             )
-        merged = xr.merge(parts, combine_attrs="override")
-        return merged.assign_attrs(
+        return xr.merge(parts, combine_attrs="override").assign_attrs(
             estimates="response", title=self.title, form=fit.form, remarks="\n".join(self.words())
         )
