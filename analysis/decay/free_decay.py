@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset.results import Row, described
 from vibroimpact.analysis.decay.backbone import Backbone, backbone
 from vibroimpact.analysis.decay.decrement import Decrement, Peaks, logarithmic_decrement
 from vibroimpact.analysis.decay.estimate import (
@@ -22,7 +23,6 @@ from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponen
 from vibroimpact.analysis.decay.law_fit import CUBIC, LawChoice, LawFit, choose_law
 from vibroimpact.analysis.decay.laws import ALL_LAWS, TERMS, VISCOUS, DampingLaw, spoken
 from vibroimpact.analysis.decay.samples import DecaySamples, decay_samples
-from vibroimpact.analysis.files.estimate_table import described
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.analysis.recording.units import unit_label
 from vibroimpact.fmus.errors import EstimationError
@@ -165,25 +165,24 @@ def law_estimates(fit: LawFit) -> dict[str, Estimate]:
 
 def _motion(decay: FreeDecay) -> xr.Dataset:
     samples, unit = decay.samples, decay.samples.unit
-    data = {
-        "measured": ("time", samples.value, described(f"measured {samples.name}", unit)),
-        "exponential_fit": ("time", decay.exponential.fitted, described("fitted decaying cosine", unit)),
+    rows: dict[str, Row] = {
+        "measured": ("time", samples.value, unit, f"measured {samples.name}"),
+        "exponential_fit": ("time", decay.exponential.fitted, unit, "fitted decaying cosine"),
     }
     if decay.choice is not None:
-        words = f"motion under the fitted law: {spoken(decay.choice.best.law)}"
-        data["law_fit"] = ("time", decay.choice.best.fitted, described(words, unit))
-    return xr.Dataset(data, {"time": ("time", samples.time, described("time", "s"))})
+        best = decay.choice.best
+        rows["law_fit"] = ("time", best.fitted, unit, f"motion under the fitted law: {spoken(best.law)}")
+    return xr.Dataset(described(rows | {"time": ("time", samples.time, "s", "time")}))
 
 
 def _peaks(peaks: Peaks, unit: str) -> xr.Dataset:
-    return xr.Dataset(
-        {
-            "peak_height": ("peak", peaks.height, described("turning points from the equilibrium", unit)),
-            "peak_height_error": ("peak", peaks.error, described("standard error of the height", unit)),
-            "peak_number": ("peak", peaks.number, described("half periods from the first phase")),
-        },
-        {"peak_time": ("peak", peaks.time, described("instants of the turning points", "s"))},
-    )
+    rows = {
+        "peak_height": ("peak", peaks.height, unit, "turning points from the equilibrium"),
+        "peak_height_error": ("peak", peaks.error, unit, "standard error of the height"),
+        "peak_number": ("peak", peaks.number, "1", "half periods from the first phase"),
+    }
+    at = {"peak_time": ("peak", peaks.time, "s", "instants of the turning points")}
+    return xr.Dataset(described(rows), described(at))
 
 
 def _laws(choice: LawChoice, unit: str) -> xr.Dataset:
@@ -191,12 +190,10 @@ def _laws(choice: LawChoice, unit: str) -> xr.Dataset:
     tests, effective = [fit.test for fit in fits], [fit.effective_aic(samples) for fit in fits]
     probability = [test.portmanteau_probability for test in tests]
 
-    def column(
-        words: str, values: Sequence[float | bool], of: str = "1"
-    ) -> tuple[str, object, dict[str, str]]:
-        return "law", np.array(values, dtype=np.float64), described(words, of)
+    def column(words: str, values: Sequence[float | bool], of: str = "1") -> Row:
+        return "law", np.array(values, dtype=np.float64), of, words
 
-    data = {
+    rows = {
         "aic": column("Akaike's criterion, for white residuals", [fit.aic for fit in fits]),
         "aicc": column("Akaike's criterion, corrected for few samples", [fit.aicc for fit in fits]),
         "effective_aic": column("Akaike's criterion with the effective number of samples", effective),
@@ -213,26 +210,26 @@ def _laws(choice: LawChoice, unit: str) -> xr.Dataset:
         if of is not None:
             values = [np.nan if item is None else item.value for item in known]
             errors = [np.nan if item is None else item.standard_error for item in known]
-            data[f"law_{term}"] = column(f"{term} coefficient", values, of)
-            data[f"law_{term}_error"] = column(f"standard error of the {term} coefficient", errors, of)
-    names = ("law", [fit.law.name for fit in fits], described("damping law"))
-    return xr.Dataset(
-        data, {"law": names, "effective_samples": ((), samples, described("independent samples"))}
-    )
+            rows[f"law_{term}"] = column(f"{term} coefficient", values, of)
+            rows[f"law_{term}_error"] = column(f"standard error of the {term} coefficient", errors, of)
+    at: dict[str, Row] = {
+        "law": ("law", [fit.law.name for fit in fits], "1", "damping law"),
+        "effective_samples": ((), samples, "1", "independent samples"),
+    }
+    return xr.Dataset(described(rows), described(at))
 
 
 def _windows(found: Backbone, unit: str) -> xr.Dataset:
-    columns = {
-        "window_time": (found.time, "middle of the window", "s"),
-        "window_amplitude": (found.amplitude, "amplitude in the middle of the window", unit),
-        "window_frequency": (found.angular_frequency, "natural angular frequency in the window", "rad s-1"),
-        "window_frequency_error": (found.angular_frequency_error, "standard error of it", "rad s-1"),
-        "window_damping": (found.damping_ratio, "damping ratio in the window", "1"),
-        "window_damping_error": (found.damping_ratio_error, "standard error of it", "1"),
+    along, frequency = "window", "natural angular frequency in the window"
+    rows = {
+        "window_time": (along, found.time, "s", "middle of the window"),
+        "window_amplitude": (along, found.amplitude, unit, "amplitude in the middle of the window"),
+        "window_frequency": (along, found.angular_frequency, "rad s-1", frequency),
+        "window_frequency_error": (along, found.angular_frequency_error, "rad s-1", "standard error of it"),
+        "window_damping": (along, found.damping_ratio, "1", "damping ratio in the window"),
+        "window_damping_error": (along, found.damping_ratio_error, "1", "standard error of it"),
     }
-    return xr.Dataset(
-        {name: ("window", values, described(words, of)) for name, (values, words, of) in columns.items()}
-    )
+    return xr.Dataset(described(rows))
 
 
 def print_decay(console: Terminal, decay: FreeDecay) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares, nnls
@@ -86,8 +87,9 @@ class _Problem:
         self.offset = start.offset.value
         self._known: tuple[bytes, Floats, Floats] | None = None
 
+    @cached_property
     def scales(self) -> dict[str, tuple[float, float, str]]:
-        """Return what a scaled 0 of each parameter stands for, what one scaled unit is, and its CF unit."""
+        """What a scaled 0 of each parameter stands for, what one scaled unit is, and its CF unit."""
         unit = self.samples.unit
         return {
             "turning_time": (self.turning, 1.0 / self.omega, "s"),
@@ -102,8 +104,8 @@ class _Problem:
 
     def physical(self, parameters: Floats) -> dict[str, Floats]:
         """Return the physical values of scaled parameters, shape (parameter, column)."""
-        scales, rows = self.scales(), zip(self.names, parameters, strict=True)
-        return {name: scales[name][0] + scales[name][1] * row for name, row in rows}
+        rows = zip(self.names, parameters, strict=True)
+        return {name: self.scales[name][0] + self.scales[name][1] * row for name, row in rows}
 
     def motion(self, parameters: Floats) -> Floats:
         """Return the displacement of the samples, shape (sample, column)."""
@@ -219,7 +221,7 @@ def _described(problem: _Problem, law: DampingLaw, found: OptimizeResult) -> Law
     freedom = max(min(freedom, test.effective_samples - len(found.x)), 1.0)
     coefficients = {}
     for name, error in zip(problem.names, np.sqrt(np.diag(covariance)), strict=True):
-        _, scale, unit = problem.scales()[name]
+        _, scale, unit = problem.scales[name]
         coefficients[name] = Estimate(values[name], float(error) * scale, unit, freedom)
     return LawFit(law, coefficients, float(found.fun @ found.fun), fitted, test, bool(found.status > 0))
 

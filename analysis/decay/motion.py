@@ -20,8 +20,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from vibroimpact.analysis.decay.samples import Floats
 
 _ORDER = 16
 _MOST_SWEEPS = 60
@@ -117,7 +116,9 @@ def half_swings(start: Floats, amplitude: Floats, coefficients: Coefficients, un
     return Nodes(*(np.array(part) for part in zip(*swings, strict=True)))
 
 
-def _replaced(swing: tuple[Floats, ...], where: Flags, other: tuple[Floats, ...]) -> tuple[Floats, ...]:
+def _replaced(
+    swing: tuple[Floats, ...], where: NDArray[np.bool_], other: tuple[Floats, ...]
+) -> tuple[Floats, ...]:
     return tuple(np.where(where, b, a) for a, b in zip(swing, other, strict=True))
 
 

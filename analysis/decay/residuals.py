@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-Floats = NDArray[np.float64]
+from vibroimpact.analysis.decay.samples import Floats
 
 SIGNIFICANCE = 0.01
 """A law is called inadequate where noise alone would leave such a residual once in a hundred records."""

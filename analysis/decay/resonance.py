@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import least_squares
 
+from vibroimpact.analysis.dataset.results import described
 from vibroimpact.analysis.decay.estimate import Estimate, table_of
 from vibroimpact.analysis.decay.frequency_response import Complexes, FrequencyResponse
 from vibroimpact.analysis.decay.residuals import coloured_covariance
 from vibroimpact.analysis.decay.samples import Floats
-from vibroimpact.analysis.files.estimate_table import described
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.wording import option
 
@@ -228,11 +228,8 @@ def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
         return np.asarray(np.abs(p[2] * shape + p[3]))
 
     def residual(p: Floats) -> Floats:
-        difference = (model(p) - curve.response) * weight
-        # Line by line, so that neighbours in the residual are neighbours in frequency.
-        return (
-            np.column_stack([difference.real, difference.imag]).ravel() if curve.complex else difference.real
-        )
+        # Real and imaginary part of each line in turn: neighbours in the residual are neighbours in frequency.
+        return np.asarray((model(p) - curve.response) * weight).view(np.float64)
 
     # a sweep up and down has each frequency twice
     spacing = float(omega[1] - omega[0]) or float(np.ptp(omega)) / (len(omega) - 1)
@@ -360,30 +357,21 @@ class ResponseEstimates:
         """Return estimates (method, quantity), the fitted lines, and all lines of a measured response."""
         fit, found, unit = self.resonance, self.response, self.unit
         lines = {
-            "response": (fit.magnitude, "magnitude of the response"),
-            "response_error": (fit.error, "standard error of the magnitude"),
-            "fitted_response": (fit.fitted, "magnitude of the fitted response"),
+            "response": ("line", fit.magnitude, unit, "magnitude of the response"),
+            "response_error": ("line", fit.error, unit, "standard error of the magnitude"),
+            "fitted_response": ("line", fit.fitted, unit, "magnitude of the fitted response"),
         }
-        parts = [
-            table_of(self.estimates()),
-            xr.Dataset(
-                {name: ("line", values, described(words, unit)) for name, (values, words) in lines.items()},
-                {"angular_frequency": ("line", fit.angular_frequency, described("frequency", "rad s-1"))},
-            ),
-        ]
+        at = {"angular_frequency": ("line", fit.angular_frequency, "rad s-1", "frequency")}
+        parts = [table_of(self.estimates()), xr.Dataset(described(lines), described(at))]
         if found is not None:
             measured = {
-                "h1_magnitude": (np.abs(found.h1), "|H1|", unit),
-                "h1_phase": (np.angle(found.h1), "phase of H1", "rad"),
-                "h2_magnitude": (np.abs(found.h2), "|H2|", unit),
-                "coherence": (found.coherence, "coherence", "1"),
+                "h1_magnitude": ("frequency", np.abs(found.h1), unit, "|H1|"),
+                "h1_phase": ("frequency", np.angle(found.h1), "rad", "phase of H1"),
+                "h2_magnitude": ("frequency", np.abs(found.h2), unit, "|H2|"),
+                "coherence": ("frequency", found.coherence, "1", "coherence"),
+                "frequency": ("frequency", found.frequency, "Hz", "frequency"),
             }
-            parts.append(
-                xr.Dataset(
-                    {name: ("frequency", row, described(*words)) for name, (row, *words) in measured.items()},
-                    {"frequency": ("frequency", found.frequency, described("frequency", "Hz"))},
-                )
-            )
+            parts.append(xr.Dataset(described(measured)))
         return xr.merge(parts, combine_attrs="override").assign_attrs(
             estimates="response", title=self.title, form=fit.form, remarks="\n".join(self.words())
         )

@@ -35,8 +35,8 @@ MOSTLY_DISTINCT = 0.9
 ROUNDING = 2.0**-44
 # Share of the pairs equal in one interval that are equal in all, above which the motion repeats.
 REPEATS = 0.5
-# Growth of the slope per embedding below which it stands still; its top over the surrogate's, above which it keeps up
-# and runs ahead; the surrogate's over noise, below which that flattens.
+# Growth of the slope per embedding below which it stands still; its last value over the surrogate's above which it
+# keeps up, and above which it runs ahead; the surrogate's over that of noise below which the surrogate flattens.
 STILL, KEEPS_UP, AHEAD, FLATTENS = 0.15, 0.85, 1.3, 0.75
 # Distance from its last value within which a slope has saturated.
 REACHED = 0.2

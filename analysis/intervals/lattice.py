@@ -21,8 +21,8 @@ from vibroimpact.analysis.robust import robust_sigma
 FEWEST_EVENTS = 30
 # Events whose phases are averaged for the place of the lattice: it may drift, slowly.
 WINDOW = 41
-# Distance from its place, in standard deviations of the true events, within which an event is on the lattice; least and
-# most of it, relative to the interval: beyond the most the lattice is blurred.
+# Distance from its place within which an event is on the lattice, in standard deviations of the true events; the
+# least and the most that it may be, relative to the interval: a lattice that needs more is blurred.
 SIGMAS, NEAREST, FARTHEST = 5.0, 0.005, 0.2
 # Least share of all events on the lattice.
 MOSTLY = 0.7

@@ -77,24 +77,19 @@ def density_part(density: Density, cycle: Cycle) -> Rows:
     }
 
 
-def gap_part(train: IntervalTrain, gaps: MissedBeats) -> Rows:
-    """Return the gaps of a nearly periodic train."""
+def gap_part(train: IntervalTrain, gaps: MissedBeats) -> tuple[Rows, str]:
+    """Return the gaps of a nearly periodic train, and in words how many or why none were looked for."""
     starts, lengths = train.times[gaps.place], np.diff(train.times)[gaps.place]
     spread = "robust coefficient of variation of the intervals about their local median"
-    return {
+    words = f"{len(gaps.place)} found, {int(gaps.missing.sum())} missed beats"
+    rows: Rows = {
         "gap_start": ("gap", starts, "s", "last event before the gap"),
         "gap_length": ("gap", lengths, "s", "length of the gap"),
         "gap_missing": ("gap", gaps.missing, "1", "beats missing in the gap"),
         "interval_ratio": ("interval_number", gaps.ratio, "1", "interval over the median of its neighbours"),
         "local_spread": ((), gaps.spread, "1", spread),
     }
-
-
-def gap_words(gaps: MissedBeats) -> str:
-    """Return in words how many beats are missing, or why none were looked for."""
-    if gaps.reason:
-        return f"not looked for: {gaps.reason}"
-    return f"{len(gaps.place)} found, {int(gaps.missing.sum())} missed beats"
+    return rows, f"not looked for: {gaps.reason}" if gaps.reason else words
 
 
 def lattice_part(train: IntervalTrain, lattice: Lattice) -> tuple[Rows, str]:

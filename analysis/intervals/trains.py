@@ -94,12 +94,14 @@ def interval_train(
             f"intervals: expected events at different instants, got all at {instants[0]:g} s."
         )
     observed = _window(instants, window)
-    touched = _touched(instants, spans)
-    if not np.any(np.diff(instants)[~touched] > 0.0):
+    kept = np.ones(len(instants) - 1, dtype=np.bool_)
+    for start, end in spans:
+        kept &= (instants[:-1] > start) | (instants[1:] < end)
+    if not np.any(np.diff(instants)[kept] > 0.0):
         raise EstimationError(
             "intervals: expected one of more than 0 s without a masked instant in it, got none. Mask less."
         )
-    return IntervalTrain(instants, observed, window is not None, spans, ~touched, float(resolution))
+    return IntervalTrain(instants, observed, window is not None, spans, kept, float(resolution))
 
 
 MOST_SEAMS = 10_000
@@ -161,11 +163,3 @@ def _joined(masked: Sequence[Span]) -> tuple[Span, ...]:
         else:
             joined.append((start, end))
     return tuple(joined)
-
-
-def _touched(instants: Floats, spans: tuple[Span, ...]) -> NDArray[np.bool_]:
-    """Return which intervals have a masked instant between their ends."""
-    touched = np.zeros(len(instants) - 1, dtype=np.bool_)
-    for start, end in spans:
-        touched |= (instants[:-1] <= start) & (instants[1:] >= end)
-    return touched
