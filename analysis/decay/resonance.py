@@ -74,10 +74,8 @@ class Curve:
     response : ndarray of complex or float, shape (line,)
     error : ndarray of float, shape (line,)
         Standard error of each real part; zeros where not known.
-    form : str
-        One of `FORMS`.
-    unit : str
-        Of C.
+    form, unit : str
+        One of `FORMS`; CF unit of C.
     """
 
     angular_frequency: Floats
@@ -102,6 +100,7 @@ def curve_of(
 
     Parameters
     ----------
+    found : FrequencyResponse
     form : str
         One of `FORMS`, or `auto`: by the units of the channels.
     band : tuple of float, optional
@@ -155,9 +154,8 @@ def _constant_unit(form: str, units: tuple[str, str]) -> str:
 
 def _peak(omega: Floats, magnitude: Floats) -> tuple[float, float]:
     """Return the place of the highest value, and the width at which it has fallen by sqrt 2."""
-    top = int(np.argmax(magnitude))
-    edges = _half_power(omega, magnitude)
-    return float(omega[top]), edges[1] - edges[0] if np.all(np.isfinite(edges)) else 0.0
+    low, high = _half_power(omega, magnitude)
+    return float(omega[np.argmax(magnitude)]), high - low if np.isfinite(high - low) else 0.0
 
 
 def _half_power(omega: Floats, magnitude: Floats) -> tuple[float, float]:

@@ -134,8 +134,8 @@ def verdict(slopes: Floats, surrogate: Floats) -> str:
 
 def _longest_run(known: NDArray[np.bool_]) -> tuple[int, int]:
     """Return where the longest run of True begins and where it is over; the first of those as long."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
-    runs = [(int(first), int(stop)) for first, stop in zip(edges[::2], edges[1::2], strict=True)]
+    edges = np.flatnonzero(np.diff(known, prepend=False, append=False)).tolist()
+    runs = zip(edges[::2], edges[1::2], strict=True)
     return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
 
 
