@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,12 +77,7 @@ def backbone(samples: DecaySamples, periods: float | None = None) -> Backbone:
 
     In each window a decaying cosine is fitted with its own frequency and decay rate; its amplitude is that of the
     middle. Nothing is filtered: a Hilbert transform would smear the start of the decay, where the amplitude is largest.
-
-    Parameters
-    ----------
-    samples : DecaySamples
-    periods : float, optional
-        Length of a window, in periods; by default a sixteenth of the decay, but four periods at least.
+    A window is `periods` long, by default a sixteenth of the decay, but four periods at least.
 
     Raises
     ------
@@ -121,13 +116,12 @@ def _window(
     time = samples.time[part]
     if len(part) < FEWEST_SAMPLES or time[-1] - time[0] < shortest:
         return None
-    piece = DecaySamples(
-        time, samples.value[part], samples.unit, samples.name, float(0.5 * (time[0] + time[-1]))
-    )
+    middle = float(0.5 * (time[0] + time[-1]))
+    piece = replace(samples, time=time, value=samples.value[part], reference_time=middle)
     slope = np.diff(guess.envelope.phase) / np.diff(guess.envelope.time)
-    omega = float(np.interp(piece.reference_time, guess.envelope.time[1:], slope))
+    omega = float(np.interp(middle, guess.envelope.time[1:], slope))
     try:
-        fit = fit_exponential(piece, FirstGuess(omega, guess.decay_rate, guess.offset, guess.envelope))
+        fit = fit_exponential(piece, replace(guess, angular_frequency=omega))
     except EstimationError:
         return None
     # A frequency far from its neighbours' is that of noise, or of another mode.

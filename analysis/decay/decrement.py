@@ -27,14 +27,10 @@ class Peaks:
 
     Attributes
     ----------
-    number : ndarray of float, shape (peak,)
-        In half periods; one that is missing leaves its number out.
-    time : ndarray of float, shape (peak,)
-        s.
-    height : ndarray of float, shape (peak,)
-        Above the equilibrium, positive on both sides; unit of the samples.
-    error : ndarray of float, shape (peak,)
-        Standard error of the height.
+    number, time : ndarray of float, shape (peak,)
+        In half periods (one that is missing leaves its number out), and in s.
+    height, error : ndarray of float, shape (peak,)
+        Above the equilibrium, positive on both sides, and its standard error; unit of the samples.
     equilibrium : float
         Unit of the samples.
     """
@@ -79,10 +75,6 @@ def logarithmic_decrement(samples: DecaySamples) -> Decrement:
     all peaks of both sides, measured from the equilibrium and weighted by the square of a smooth height: that is the
     inverse variance of a logarithm. Standard errors come from the scatter about the line, neighbours correlated or not.
 
-    Parameters
-    ----------
-    samples : DecaySamples
-
     Raises
     ------
     EstimationError
@@ -99,13 +91,14 @@ def logarithmic_decrement(samples: DecaySamples) -> Decrement:
     """
     peaks = find_peaks(samples, first_guess(samples).envelope)
     number = peaks.number - peaks.number[0]
+    logarithm = np.log(peaks.height)
     weight = peaks.height / float(np.max(peaks.height))
     for _ in range(2):
-        curve, bends = _weighted(number, np.log(peaks.height), weight, 2)
+        curve, bends = _weighted(number, logarithm, weight, 2)
         # A peak's own noise must not weigh it: the smooth curve through all of them does.
-        weight = np.exp(np.polynomial.Polynomial(curve)(number) - np.log(peaks.height[0]))
-    line, errors = _weighted(number, np.log(peaks.height), weight, 1)
-    off_line = (np.log(peaks.height) - line[0] - line[1] * number) * weight
+        weight = np.exp(np.polynomial.Polynomial(curve)(number) - logarithm[0])
+    line, errors = _weighted(number, logarithm, weight, 1)
+    off_line = (logarithm - line[0] - line[1] * number) * weight
     turns, turn_errors = _weighted(number, peaks.time, weight, 1)
     freedom = max(len(number) - 2.0, 1.0)
     # n counts half periods, a decrement is that of a whole one.
@@ -135,13 +128,8 @@ def _weighted(number: Floats, value: Floats, weight: Floats, degree: int) -> tup
 def find_peaks(samples: DecaySamples, envelope: Envelope) -> Peaks:
     """Return the turning points, each from a cosine through the half period around it.
 
-    No sample is a peak by itself: sampling would miss it, and noise would raise it.
-
-    Parameters
-    ----------
-    samples : DecaySamples
-    envelope : Envelope
-        Of one-period windows: gives the phase, and the equilibrium as its mean offset.
+    No sample is a peak by itself: sampling would miss it, and noise would raise it. The envelope gives the phase, and
+    the equilibrium as its mean offset.
     """
     equilibrium = float(np.mean(envelope.offset))
     phase = _phase(samples.time, envelope)

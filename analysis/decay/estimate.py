@@ -76,17 +76,14 @@ def print_estimates(
     for quantity in quantities:
         for method, found in estimates.items():
             if quantity in found:
-                estimate = found[quantity]
-                value, error = value_and_error(estimate.value, estimate.standard_error)
-                interval = "-"
-                if error != "-":
-                    low, high = (
-                        value_and_error(end, estimate.standard_error)[0] for end in estimate.interval
-                    )
-                    interval = f"{low} .. {high}"
-                row = quantity.replace("_", " "), names.get(method, method), value, error, interval
-                rows.add_row(*row, unit_label(estimate.unit))
+                rows.add_row(quantity.replace("_", " "), names[method], *_cells(found[quantity]))
     console.print(rows)
+
+
+def _cells(estimate: Estimate) -> tuple[str, str, str, str]:
+    value, error = value_and_error(estimate.value, estimate.standard_error)
+    low, high = (value_and_error(end, estimate.standard_error)[0] for end in estimate.interval)
+    return value, error, "-" if error == "-" else f"{low} .. {high}", unit_label(estimate.unit)
 
 
 def print_remarks(console: Terminal, remarks: tuple[str, ...]) -> None:

@@ -27,10 +27,7 @@ _LEAST_EXPLAINED = 0.1
 class Envelope:
     """Amplitude and phase of an oscillation, window by window.
 
-    Attributes
-    ----------
-    time, amplitude, phase, offset : ndarray of float, shape (window,)
-        s (middle of the window), unit of the samples, rad (unwrapped, of `cos(phase)`), unit of the samples.
+    Of shape (window,): middle of the window in s, amplitude, phase of `cos(phase)` in rad (unwrapped), and offset.
     """
 
     time: Floats
@@ -101,22 +98,15 @@ def windowed_cosines(samples: DecaySamples, omega: float, decay_rate: float) -> 
     """Fit `offset + e^(-decay_rate t) (C cos(omega t) + S sin(omega t))` in windows of one period.
 
     The decay within a window matters: without it, it would show as an offset, the same in all windows.
-    Windows with fewer than six samples are left out.
-
-    Parameters
-    ----------
-    samples : DecaySamples
-    omega : float
-        rad/s.
-    decay_rate : float
-        1/s.
+    Windows with fewer than six samples are left out. `omega` is in rad/s, `decay_rate` in 1/s.
     """
     length = 2.0 * np.pi / omega
     window = np.floor((samples.time - samples.time[0]) / length).astype(int)
-    found = []
-    for part in stretches(window):
-        if len(part) >= 6 and np.ptp(samples.time[part]) > 0.7 * length:
-            found.append(_cosine(samples.time[part], samples.value[part], omega, decay_rate))
+    found = [
+        _cosine(samples.time[part], samples.value[part], omega, decay_rate)
+        for part in stretches(window)
+        if len(part) >= 6 and np.ptp(samples.time[part]) > 0.7 * length
+    ]
     if len(found) < 2:
         raise EstimationError(
             f"{samples.name}: expected two periods with six samples or more, got {len(found)}; the oscillation of "
@@ -149,15 +139,12 @@ class ExponentialDecay:
     Attributes
     ----------
     amplitude, phase, offset : Estimate
-        At `reference_time`: unit of the samples, rad, unit of the samples.
+        At `reference_time` (s): unit of the samples, rad, unit of the samples.
     angular_frequency, decay_rate : Estimate
         Damped angular frequency omega, rad/s, and lambda, 1/s.
     natural_angular_frequency, damping_ratio : Estimate
         `sqrt(omega^2 + lambda^2)`, rad/s, and lambda over it.
-    reference_time : float
-        s.
     fitted : ndarray of float, shape (sample,)
-    test : ResidualTest
     """
 
     amplitude: Estimate
@@ -176,11 +163,6 @@ def fit_exponential(samples: DecaySamples, guess: FirstGuess | None = None) -> E
     """Fit a decaying cosine by least squares.
 
     Standard errors allow for residuals that are correlated (`coloured_covariance`).
-
-    Parameters
-    ----------
-    samples : DecaySamples
-    guess : FirstGuess, optional
 
     Raises
     ------

@@ -9,8 +9,9 @@ from typing import TypeVar
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset.results import Row, described
 from vibroimpact.analysis.decay.backbone import Backbone, backbone
-from vibroimpact.analysis.decay.decrement import Decrement, logarithmic_decrement
+from vibroimpact.analysis.decay.decrement import Decrement, Peaks, logarithmic_decrement
 from vibroimpact.analysis.decay.estimate import (
     METHOD_WORDS,
     Estimate,
@@ -20,9 +21,8 @@ from vibroimpact.analysis.decay.estimate import (
 )
 from vibroimpact.analysis.decay.exponential import ExponentialDecay, fit_exponential
 from vibroimpact.analysis.decay.law_fit import CUBIC, LawChoice, LawFit, choose_law
-from vibroimpact.analysis.decay.laws import ALL_LAWS, COULOMB, QUADRATIC, VISCOUS, DampingLaw, spoken
+from vibroimpact.analysis.decay.laws import ALL_LAWS, TERMS, VISCOUS, DampingLaw, spoken
 from vibroimpact.analysis.decay.samples import DecaySamples, decay_samples
-from vibroimpact.analysis.files.estimate_table import described
 from vibroimpact.analysis.recording import Channel
 from vibroimpact.analysis.recording.units import unit_label
 from vibroimpact.fmus.errors import EstimationError
@@ -30,21 +30,14 @@ from vibroimpact.fmus.printing import table, value_and_error, with_error
 from vibroimpact.fmus.terminal import Terminal
 
 T = TypeVar("T")
+_TERMS = (*TERMS, CUBIC)
 
 
 @dataclass(frozen=True, slots=True)
 class FreeDecay:
     """What one free decay gave.
 
-    Attributes
-    ----------
-    samples : DecaySamples
-    exponential : ExponentialDecay
-    decrement : Decrement or None
-    choice : LawChoice or None
-    backbone : Backbone or None
-    refusals : mapping of str to str
-        Why a method gave nothing, by method.
+    What is None was not asked for, or has its reason in `refusals`, by method.
     """
 
     samples: DecaySamples
@@ -97,13 +90,12 @@ class FreeDecay:
         """Return estimates (method, quantity), the motion, laws, peaks and windows, each where there is one."""
         parts = [table_of(self.estimates()), _motion(self)]
         if self.decrement is not None:
-            parts.append(_peaks(self.decrement, self.samples.unit))
+            parts.append(_peaks(self.decrement.peaks, self.samples.unit))
         if self.choice is not None:
             parts.append(_laws(self.choice, self.samples.unit))
         if self.backbone is not None:
             parts.append(_windows(self.backbone, self.samples.unit))
-        merged = xr.merge(parts, combine_attrs="override")
-        return merged.assign_attrs(
+        return xr.merge(parts, combine_attrs="override").assign_attrs(
             estimates="decay",
             channel=self.samples.name,
             reference_time=self.samples.reference_time,
@@ -124,9 +116,9 @@ def estimate_decay(
     Parameters
     ----------
     samples : DecaySamples, Channel or xarray.DataArray
-        A signal: its samples from the largest excursion on, see `decay_samples`.
+        Of a signal the samples from the largest excursion on, see `decay_samples`.
     laws : sequence of DampingLaw
-        Tried; none: the choice of a law is left out.
+        Those tried; without any, the choice of a law is left out.
     cubic : bool
         Fit a cubic stiffness with every law.
     periods : float, optional
@@ -162,9 +154,7 @@ def law_estimates(fit: LawFit) -> dict[str, Estimate]:
     """Return the coefficients of a fitted law, and the damping ratio of its viscous term."""
     known = fit.coefficients
     found = {name: known[name] for name in ("natural_angular_frequency", "offset")}
-    for name in (VISCOUS, COULOMB, QUADRATIC, CUBIC):
-        if name in known:
-            found["decay_rate" if name == VISCOUS else name] = known[name]
+    found |= {"decay_rate" if name == VISCOUS else name: known[name] for name in _TERMS if name in known}
     if VISCOUS in known:
         omega, rate = known["natural_angular_frequency"], known[VISCOUS]
         # The relative error of the frequency is smaller than that of the rate by orders.
@@ -175,78 +165,71 @@ def law_estimates(fit: LawFit) -> dict[str, Estimate]:
 
 def _motion(decay: FreeDecay) -> xr.Dataset:
     samples, unit = decay.samples, decay.samples.unit
-    data = {
-        "measured": ("time", samples.value, described(f"measured {samples.name}", unit)),
-        "exponential_fit": ("time", decay.exponential.fitted, described("fitted decaying cosine", unit)),
+    rows: dict[str, Row] = {
+        "measured": ("time", samples.value, unit, f"measured {samples.name}"),
+        "exponential_fit": ("time", decay.exponential.fitted, unit, "fitted decaying cosine"),
     }
     if decay.choice is not None:
-        words = f"motion under the fitted law: {spoken(decay.choice.best.law)}"
-        data["law_fit"] = ("time", decay.choice.best.fitted, described(words, unit))
-    return xr.Dataset(data, {"time": ("time", samples.time, described("time", "s"))})
+        best = decay.choice.best
+        rows["law_fit"] = ("time", best.fitted, unit, f"motion under the fitted law: {spoken(best.law)}")
+    return xr.Dataset(described(rows | {"time": ("time", samples.time, "s", "time")}))
 
 
-def _peaks(found: Decrement, unit: str) -> xr.Dataset:
-    peaks = found.peaks
-    return xr.Dataset(
-        {
-            "peak_height": ("peak", peaks.height, described("turning points from the equilibrium", unit)),
-            "peak_height_error": ("peak", peaks.error, described("standard error of the height", unit)),
-            "peak_number": ("peak", peaks.number, described("half periods from the first phase")),
-        },
-        {"peak_time": ("peak", peaks.time, described("instants of the turning points", "s"))},
-    )
+def _peaks(peaks: Peaks, unit: str) -> xr.Dataset:
+    rows = {
+        "peak_height": ("peak", peaks.height, unit, "turning points from the equilibrium"),
+        "peak_height_error": ("peak", peaks.error, unit, "standard error of the height"),
+        "peak_number": ("peak", peaks.number, "1", "half periods from the first phase"),
+    }
+    at = {"peak_time": ("peak", peaks.time, "s", "instants of the turning points")}
+    return xr.Dataset(described(rows), described(at))
 
 
 def _laws(choice: LawChoice, unit: str) -> xr.Dataset:
     fits, samples = choice.fits, choice.effective_samples
+    tests, effective = [fit.test for fit in fits], [fit.effective_aic(samples) for fit in fits]
+    probability = [test.portmanteau_probability for test in tests]
 
-    def column(
-        words: str, values: Sequence[float | bool], of: str = "1"
-    ) -> tuple[str, object, dict[str, str]]:
-        return "law", np.array(values, dtype=np.float64), described(words, of)
+    def column(words: str, values: Sequence[float | bool], of: str = "1") -> Row:
+        return "law", np.array(values, dtype=np.float64), of, words
 
-    data = {
+    rows = {
         "aic": column("Akaike's criterion, for white residuals", [fit.aic for fit in fits]),
         "aicc": column("Akaike's criterion, corrected for few samples", [fit.aicc for fit in fits]),
-        "effective_aic": column(
-            "Akaike's criterion with the effective number of samples",
-            [fit.effective_aic(samples) for fit in fits],
-        ),
+        "effective_aic": column("Akaike's criterion with the effective number of samples", effective),
         "akaike_weight": column("weight by the effective criterion", choice.weights()),
-        "residual_rms": column("root mean square of the residual", [fit.test.rms for fit in fits], unit),
-        "noise_floor": column("its white part", [fit.test.noise_floor for fit in fits], unit),
-        "portmanteau_probability": column(
-            "Ljung-Box probability of white noise", [fit.test.portmanteau_probability for fit in fits]
-        ),
-        "adequate": column("1 where the residual passes for noise", [fit.test.adequate for fit in fits]),
+        "residual_rms": column("root mean square of the residual", [test.rms for test in tests], unit),
+        "noise_floor": column("its white part", [test.noise_floor for test in tests], unit),
+        "portmanteau_probability": column("Ljung-Box probability of white noise", probability),
+        "adequate": column("1 where the residual passes for noise", [test.adequate for test in tests]),
         "physical": column("1 where no coefficient is negative", [fit.physical for fit in fits]),
     }
-    for term in (VISCOUS, COULOMB, QUADRATIC, CUBIC):
+    for term in _TERMS:
         known = [fit.coefficients.get(term) for fit in fits]
         of = next((item.unit for item in known if item is not None), None)
         if of is not None:
             values = [np.nan if item is None else item.value for item in known]
             errors = [np.nan if item is None else item.standard_error for item in known]
-            data[f"law_{term}"] = column(f"{term} coefficient", values, of)
-            data[f"law_{term}_error"] = column(f"standard error of the {term} coefficient", errors, of)
-    names = ("law", [fit.law.name for fit in fits], described("damping law"))
-    return xr.Dataset(
-        data, {"law": names, "effective_samples": ((), samples, described("independent samples"))}
-    )
+            rows[f"law_{term}"] = column(f"{term} coefficient", values, of)
+            rows[f"law_{term}_error"] = column(f"standard error of the {term} coefficient", errors, of)
+    at: dict[str, Row] = {
+        "law": ("law", [fit.law.name for fit in fits], "1", "damping law"),
+        "effective_samples": ((), samples, "1", "independent samples"),
+    }
+    return xr.Dataset(described(rows), described(at))
 
 
 def _windows(found: Backbone, unit: str) -> xr.Dataset:
-    columns = {
-        "window_time": (found.time, "middle of the window", "s"),
-        "window_amplitude": (found.amplitude, "amplitude in the middle of the window", unit),
-        "window_frequency": (found.angular_frequency, "natural angular frequency in the window", "rad s-1"),
-        "window_frequency_error": (found.angular_frequency_error, "standard error of it", "rad s-1"),
-        "window_damping": (found.damping_ratio, "damping ratio in the window", "1"),
-        "window_damping_error": (found.damping_ratio_error, "standard error of it", "1"),
+    along, frequency = "window", "natural angular frequency in the window"
+    rows = {
+        "window_time": (along, found.time, "s", "middle of the window"),
+        "window_amplitude": (along, found.amplitude, unit, "amplitude in the middle of the window"),
+        "window_frequency": (along, found.angular_frequency, "rad s-1", frequency),
+        "window_frequency_error": (along, found.angular_frequency_error, "rad s-1", "standard error of it"),
+        "window_damping": (along, found.damping_ratio, "1", "damping ratio in the window"),
+        "window_damping_error": (along, found.damping_ratio_error, "1", "standard error of it"),
     }
-    return xr.Dataset(
-        {name: ("window", values, described(words, of)) for name, (values, words, of) in columns.items()}
-    )
+    return xr.Dataset(described(rows))
 
 
 def print_decay(console: Terminal, decay: FreeDecay) -> None:
@@ -273,11 +256,11 @@ def _print_laws(console: Terminal, choice: LawChoice, samples: int) -> None:
     lowest = choice.best.aic
     lowest_effective = choice.best.effective_aic(choice.effective_samples)
     for fit, weight in zip(choice.fits, choice.weights(), strict=True):
-        parts = []
-        for term in (*fit.law.terms, "cubic"):
-            if term in fit.coefficients:
-                known = fit.coefficients[term]
-                parts.append(f"{term} {with_error(known.value, known.standard_error)}")
+        known = (
+            f"{name} {with_error(one.value, one.standard_error)}"
+            for name, one in fit.coefficients.items()
+            if name in _TERMS
+        )
         verdict = "noise" if fit.test.adequate else "not noise"
         rows.add_row(
             spoken(fit.law),
@@ -286,7 +269,7 @@ def _print_laws(console: Terminal, choice: LawChoice, samples: int) -> None:
             f"{weight:.3f}",
             f"{fit.test.rms:.4g}",
             verdict if fit.physical else "negative term",
-            ", ".join(parts),
+            ", ".join(known),
         )
     console.print(rows)
 

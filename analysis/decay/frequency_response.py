@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.signal import csd, get_window, welch
 
-from vibroimpact.analysis.decay.samples import Floats, clock_remark
+from vibroimpact.analysis.decay.samples import Floats, clock_remark, unit_power
 from vibroimpact.analysis.recording import Channel, channel_of
 from vibroimpact.analysis.recording.units import measured_unit
 from vibroimpact.fmus.errors import UsageError
@@ -44,7 +44,6 @@ class FrequencyResponse:
         Whether both channels share a clock.
     units : tuple of str
         SI units of drive and response.
-    remarks : tuple of str
     """
 
     frequency: Floats
@@ -56,7 +55,7 @@ class FrequencyResponse:
     resolution: float
     phase_known: bool = True
     units: tuple[str, str] = ("1", "1")
-    remarks: tuple[str, ...] = field(default=())
+    remarks: tuple[str, ...] = ()
 
     @property
     def unit(self) -> str:
@@ -64,8 +63,7 @@ class FrequencyResponse:
         drive, response = self.units
         if drive == response:
             return "1"
-        inverse = f"({drive})-1" if " " in drive else f"{drive}-1"
-        return inverse if response == "1" else response if drive == "1" else f"{response} {inverse}"
+        return " ".join(unit for unit in (response, unit_power(drive, -1)) if unit != "1")
 
     @property
     def relative_error(self) -> Floats:
@@ -136,13 +134,9 @@ def frequency_response(
         _independent(shape, segments),
         float(np.sum(shape**2) / np.sum(shape) ** 2 / interval),
         drive.axis.trigger == response.axis.trigger,
-        (_si(drive), _si(response)),
+        (measured_unit(drive.unit).si, measured_unit(response.unit).si),
         tuple(remarks),
     )
-
-
-def _si(channel: Channel) -> str:
-    return measured_unit(channel.unit).si
 
 
 def _independent(shape: Floats, segments: int) -> float:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.optimize import least_squares, nnls
+from scipy.optimize import OptimizeResult, least_squares, nnls
 
 from vibroimpact.analysis.decay.estimate import Estimate
 from vibroimpact.analysis.decay.exponential import Envelope, ExponentialDecay, first_guess, fit_exponential
 from vibroimpact.analysis.decay.laws import ALL_LAWS, COULOMB, QUADRATIC, VISCOUS, DampingLaw, spoken
 from vibroimpact.analysis.decay.motion import Coefficients, decaying_motion
 from vibroimpact.analysis.decay.residuals import ResidualTest, coloured_covariance, residual_test
-from vibroimpact.analysis.decay.samples import DecaySamples, Floats
+from vibroimpact.analysis.decay.samples import DecaySamples, Floats, unit_power
 from vibroimpact.fmus.errors import EstimationError
 
 CUBIC = "cubic"
@@ -31,24 +32,16 @@ class LawFit:
     coefficients : mapping of str to Estimate
         By name: `natural_angular_frequency`, `offset`, `amplitude` (of the turning point before the window),
         `turning_time`, the terms of the law, and `cubic` where asked for.
-    aic, aicc : float
-        Akaike's criterion for white residuals, and with its correction for few samples.
     residual_sum : float
         Sum of squares, (unit of the samples)^2.
-    parameters : int
-        Number of fitted numbers, the variance of the residual included.
     fitted : ndarray of float, shape (sample,)
-    test : ResidualTest
     settled : bool
         Whether the fit ended before its limit of evaluations.
     """
 
     law: DampingLaw
     coefficients: Mapping[str, Estimate]
-    aic: float
-    aicc: float
     residual_sum: float
-    parameters: int
     fitted: Floats
     test: ResidualTest
     settled: bool
@@ -57,6 +50,22 @@ class LawFit:
     def physical(self) -> bool:
         """Whether every damping coefficient takes energy out: none is negative."""
         return all(self.coefficients[term].value >= 0.0 for term in self.law.terms)
+
+    @property
+    def parameters(self) -> int:
+        """Number of fitted numbers, the variance of the residual included."""
+        return len(self.coefficients) + 1
+
+    @property
+    def aic(self) -> float:
+        """Akaike's criterion for white residuals."""
+        return self.effective_aic(len(self.fitted))
+
+    @property
+    def aicc(self) -> float:
+        """Akaike's criterion with its correction for few samples."""
+        count, numbers = len(self.fitted), self.parameters
+        return self.aic + 2.0 * numbers * (numbers + 1.0) / max(count - numbers - 1.0, 1.0)
 
     def effective_aic(self, samples: float) -> float:
         """Return the criterion with the number of independent samples in place of all samples."""
@@ -78,34 +87,25 @@ class _Problem:
         self.offset = start.offset.value
         self._known: tuple[bytes, Floats, Floats] | None = None
 
-    def scales(self) -> dict[str, tuple[float, str]]:
-        """Return what one scaled unit of each parameter is, and its CF unit."""
+    @cached_property
+    def scales(self) -> dict[str, tuple[float, float, str]]:
+        """What a scaled 0 of each parameter stands for, what one scaled unit is, and its CF unit."""
         unit = self.samples.unit
-        length = f"({unit})" if " " in unit else unit
         return {
-            "turning_time": (1.0 / self.omega, "s"),
-            "amplitude": (self.size, unit),
-            "offset": (self.size, unit),
-            "natural_angular_frequency": (self.omega, "rad s-1"),
-            VISCOUS: (self.omega, "s-1"),
-            COULOMB: (self.omega**2 * self.size, "s-2" if unit == "1" else f"{unit} s-2"),
-            QUADRATIC: (1.0 / self.size, "1" if unit == "1" else f"{length}-1"),
-            CUBIC: (self.size**-2, "1" if unit == "1" else f"{length}-2"),
+            "turning_time": (self.turning, 1.0 / self.omega, "s"),
+            "amplitude": (0.0, self.size, unit),
+            "offset": (self.offset, self.size, unit),
+            "natural_angular_frequency": (self.omega, self.omega, "rad s-1"),
+            VISCOUS: (0.0, self.omega, "s-1"),
+            COULOMB: (0.0, self.omega**2 * self.size, "s-2" if unit == "1" else f"{unit} s-2"),
+            QUADRATIC: (0.0, 1.0 / self.size, unit_power(unit, -1)),
+            CUBIC: (0.0, self.size**-2, unit_power(unit, -2)),
         }
 
     def physical(self, parameters: Floats) -> dict[str, Floats]:
         """Return the physical values of scaled parameters, shape (parameter, column)."""
-        scales = self.scales()
-        # what scaled parameters of 0 stand for
-        origin = {
-            "turning_time": self.turning,
-            "offset": self.offset,
-            "natural_angular_frequency": self.omega,
-        }
-        return {
-            name: origin.get(name, 0.0) + scales[name][0] * row
-            for name, row in zip(self.names, parameters, strict=True)
-        }
+        rows = zip(self.names, parameters, strict=True)
+        return {name: self.scales[name][0] + self.scales[name][1] * row for name, row in rows}
 
     def motion(self, parameters: Floats) -> Floats:
         """Return the displacement of the samples, shape (sample, column)."""
@@ -118,21 +118,14 @@ class _Problem:
         moved = decaying_motion(values["turning_time"], values["amplitude"], coefficients, self.samples.time)
         return values["offset"] + self.side * moved
 
-    def _evaluated(self, parameters: Floats) -> tuple[Floats, Floats]:
+    def evaluated(self, parameters: Floats) -> tuple[Floats, Floats]:
+        """Return fitted minus measured, and its derivatives by the scaled parameters."""
         key = parameters.tobytes()
         if self._known is None or self._known[0] != key:
             columns = np.hstack([parameters[:, None], parameters[:, None] + _STEP * np.eye(len(parameters))])
             motion = self.motion(columns)
             self._known = key, motion[:, 0] - self.samples.value, (motion[:, 1:] - motion[:, :1]) / _STEP
         return self._known[1:]
-
-    def residual(self, parameters: Floats) -> Floats:
-        """Return fitted minus measured."""
-        return self._evaluated(parameters)[0]
-
-    def jacobian(self, parameters: Floats) -> Floats:
-        """Return the derivatives by the scaled parameters."""
-        return self._evaluated(parameters)[1]
 
 
 def _turning_point(samples: DecaySamples, start: ExponentialDecay) -> tuple[float, float, float]:
@@ -165,20 +158,9 @@ def fit_law(
     so that amplitude, waveform and phase all count. Coefficients are not held positive: a negative one says that
     the data do not want this term, and where they are uncertain their interval shows it.
 
-    Parameters
-    ----------
-    samples : DecaySamples
-    law : DampingLaw
-    start : ExponentialDecay
-        Gives frequency, phase and equilibrium to start from.
-    envelope : Envelope
-        Amplitudes of the windows, from which the coefficients are guessed.
-    cubic : bool
-        Whether a cubic stiffness (`omega0^2 mu x^3`) is fitted too: the frequency then depends on the amplitude.
-
-    Returns
-    -------
-    LawFit
+    `start` gives frequency, phase and equilibrium to start from, `envelope` the amplitudes from which the coefficients
+    are guessed. With `cubic` a cubic stiffness (`omega0^2 mu x^3`) is fitted too: the frequency then depends on the
+    amplitude.
 
     Raises
     ------
@@ -190,9 +172,9 @@ def fit_law(
     try:
         with np.errstate(all="ignore"):  # a trial step may damp beyond any swing; it is then shortened
             found = least_squares(
-                problem.residual,
+                lambda parameters: problem.evaluated(parameters)[0],
                 _first_values(problem, law, envelope),
-                jac=problem.jacobian,
+                jac=lambda parameters: problem.evaluated(parameters)[1],
                 x_scale="jac",
                 ftol=1e-9,
                 xtol=1e-9,
@@ -203,7 +185,7 @@ def fit_law(
         raise EstimationError(
             f"{samples.name}: {law.name}: expected an oscillation, got damping beyond any swing. Narrow the window."
         ) from problem_of_scipy
-    return _described(problem, law, found.x, found.fun, found.jac, found.status > 0)
+    return _described(problem, law, found)
 
 
 def _first_values(problem: _Problem, law: DampingLaw, envelope: Envelope) -> Floats:
@@ -230,27 +212,18 @@ def _first_values(problem: _Problem, law: DampingLaw, envelope: Envelope) -> Flo
     return np.array(values + [0.0] * (len(problem.names) - len(values)))
 
 
-def _described(
-    problem: _Problem, law: DampingLaw, found: Floats, residual: Floats, jacobian: Floats, settled: bool
-) -> LawFit:
+def _described(problem: _Problem, law: DampingLaw, found: OptimizeResult) -> LawFit:
     turn = problem.omega * problem.samples.mean_interval
-    fitted = problem.samples.value + residual
-    values = {name: float(row[0]) for name, row in problem.physical(found[:, None]).items()}
-    test = residual_test(-residual, float(np.max(np.abs(fitted - values["offset"]))), turn)
-    covariance, freedom = coloured_covariance(jacobian, residual, round(4.0 * np.pi / turn))
-    errors = np.sqrt(np.diag(covariance))
-    freedom = max(min(freedom, test.effective_samples - len(found)), 1.0)
-    coefficients = {
-        name: Estimate(values[name], float(error) * scale, unit, freedom)
-        for name, error in zip(problem.names, errors, strict=True)
-        for scale, unit in [problem.scales()[name]]
-    }
-    # Akaike counts what is fitted: the parameters and the variance of the residual.
-    count, numbers = len(residual), len(found) + 1
-    total = float(residual @ residual)
-    aic = count * float(np.log(max(total / count, 1e-300))) + 2.0 * numbers
-    aicc = aic + 2.0 * numbers * (numbers + 1.0) / max(count - numbers - 1.0, 1.0)
-    return LawFit(law, coefficients, aic, aicc, total, numbers, fitted, test, settled)
+    fitted = problem.samples.value + found.fun
+    values = {name: float(row[0]) for name, row in problem.physical(found.x[:, None]).items()}
+    test = residual_test(-found.fun, float(np.max(np.abs(fitted - values["offset"]))), turn)
+    covariance, freedom = coloured_covariance(found.jac, found.fun, round(4.0 * np.pi / turn))
+    freedom = max(min(freedom, test.effective_samples - len(found.x)), 1.0)
+    coefficients = {}
+    for name, error in zip(problem.names, np.sqrt(np.diag(covariance)), strict=True):
+        _, scale, unit = problem.scales[name]
+        coefficients[name] = Estimate(values[name], float(error) * scale, unit, freedom)
+    return LawFit(law, coefficients, float(found.fun @ found.fun), fitted, test, bool(found.status > 0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -306,28 +279,28 @@ class LawChoice:
             said.append(
                 "none of the laws is adequate: coefficients and errors describe the best of the wrong models."
                 if not good
-                else f"adequate by its residual: {', '.join(spoken(fit.law) for fit in good)}."
+                else f"adequate by its residual: {_named(good)}."
             )
         count = len(best.fitted)
         if len(self.fits) > 1 and self.effective_samples < 0.8 * count:
             said.append(
                 f"AIC assumes white residuals; these are correlated, and {count} samples are worth "
-                f"{self.effective_samples:.0f}: with that number "
-                + (
-                    f"{spoken(other.law)} wins."
-                    if other is not best
-                    else f"{spoken(best.law)} stays the first."
-                )
+                f"{self.effective_samples:.0f}: with that number {spoken(other.law)} "
+                f"{'stays the first' if other is best else 'wins'}."
             )
-        odd = [spoken(fit.law) for fit in self.fits if not fit.physical]
+        odd = [fit for fit in self.fits if not fit.physical]
         if odd and best.physical:
-            said.append(f"left out for a negative coefficient: {', '.join(odd)}.")
+            said.append(f"left out for a negative coefficient: {_named(odd)}.")
         if self.lost:
-            said.append(f"could not be fitted: {', '.join(spoken(law) for law in self.lost)}.")
-        unsettled = [spoken(fit.law) for fit in self.fits if not fit.settled]
+            said.append(f"could not be fitted: {', '.join(map(spoken, self.lost))}.")
+        unsettled = [fit for fit in self.fits if not fit.settled]
         if unsettled:
-            said.append(f"not settled within the limit of steps: {', '.join(unsettled)}.")
+            said.append(f"not settled within the limit of steps: {_named(unsettled)}.")
         return tuple(said)
+
+
+def _named(fits: Sequence[LawFit]) -> str:
+    return ", ".join(spoken(fit.law) for fit in fits)
 
 
 def choose_law(
@@ -337,17 +310,9 @@ def choose_law(
     cubic: bool = False,
     start: ExponentialDecay | None = None,
 ) -> LawChoice:
-    """Fit damping laws to a free decay and rank them by Akaike's criterion.
+    """Fit damping laws to a free decay, with `cubic` a cubic stiffness too, and rank them by Akaike's criterion.
 
-    Parameters
-    ----------
-    samples : DecaySamples
-    laws : sequence of DampingLaw
-        All seven, unless named.
-    cubic : bool
-        Fit a cubic stiffness with every law.
-    start : ExponentialDecay, optional
-        The decaying cosine of the same samples, where it is known already.
+    `start` is the decaying cosine of the same samples, where it is known already.
 
     Raises
     ------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 from dataclasses import dataclass
+from itertools import combinations
 
 from vibroimpact.fmus.errors import UsageError
 
@@ -28,15 +29,8 @@ class DampingLaw:
         """The terms joined by plus signs."""
         return "+".join(self.terms)
 
-    def contains(self, other: DampingLaw) -> bool:
-        """Tell whether every term of the other law is one of this law."""
-        return set(other.terms) <= set(self.terms)
 
-
-ALL_LAWS = tuple(
-    DampingLaw(tuple(term for place, term in enumerate(TERMS) if chosen >> place & 1))
-    for chosen in (1, 2, 4, 3, 5, 6, 7)
-)
+ALL_LAWS = tuple(DampingLaw(terms) for count in (1, 2, 3) for terms in combinations(TERMS, count))
 """Each term alone, each pair, and all three."""
 
 

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from vibroimpact.analysis.decay.samples import Floats
 
 _ORDER = 16
 _MOST_SWEEPS = 60
@@ -93,18 +92,9 @@ class _Terms:
 def half_swings(start: Floats, amplitude: Floats, coefficients: Coefficients, until: float) -> Nodes:
     """Follow the motion from a turning point at a positive displacement, half swing by half swing.
 
-    Parameters
-    ----------
-    start, amplitude : ndarray of float, shape (column,)
-        Instant (s) and displacement of the turning point.
-    coefficients : Coefficients
-    until : float
-        s; the motion is followed until all columns are past it or at rest.
-
-    Returns
-    -------
-    Nodes
-        NaN from where a column's motion ceased to be an oscillation (damped beyond any swing).
+    `start` (s) and `amplitude`, of shape (column,), are those of the turning point. The motion is followed until all
+    columns are past `until` (s) or at rest; it is NaN from where a column's motion ceased to be an oscillation (damped
+    beyond any swing).
     """
     terms = _Terms(coefficients)
     time, height = start.astype(float), amplitude.astype(float)
@@ -126,7 +116,9 @@ def half_swings(start: Floats, amplitude: Floats, coefficients: Coefficients, un
     return Nodes(*(np.array(part) for part in zip(*swings, strict=True)))
 
 
-def _replaced(swing: tuple[Floats, ...], where: Flags, other: tuple[Floats, ...]) -> tuple[Floats, ...]:
+def _replaced(
+    swing: tuple[Floats, ...], where: NDArray[np.bool_], other: tuple[Floats, ...]
+) -> tuple[Floats, ...]:
     return tuple(np.where(where, b, a) for a, b in zip(swing, other, strict=True))
 
 
@@ -181,10 +173,8 @@ def decaying_motion(start: Floats, amplitude: Floats, coefficients: Coefficients
 
     Parameters
     ----------
-    start, amplitude : ndarray of float, shape (column,)
-        Instant (s) and displacement (positive) of the turning point.
-    coefficients : Coefficients
-        Columns as above.
+    start, amplitude, coefficients : shape (column,)
+        Instant (s) and displacement (positive) of the turning point, and what moves the body after it.
     time : ndarray of float, shape (sample,)
         s, ascending; instants shortly before the start are extrapolated.
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-Floats = NDArray[np.float64]
+from vibroimpact.analysis.decay.samples import Floats
 
 SIGNIFICANCE = 0.01
 """A law is called inadequate where noise alone would leave such a residual once in a hundred records."""
@@ -95,10 +94,6 @@ def residual_test(residual: Floats, excursion: float, turn: float) -> ResidualTe
         Largest excursion of the motion from its equilibrium, in the same unit.
     turn : float
         Phase of the oscillation per sample, rad: the test looks over two periods of it.
-
-    Returns
-    -------
-    ResidualTest
     """
     count = len(residual)
     lags = int(np.clip(4.0 * np.pi / turn, _FEWEST_LAGS, min(_MOST_LAGS, count // 4)))
@@ -134,7 +129,7 @@ def _runs_probability(residual: Floats) -> float:
     above = residual > np.median(residual)
     plus, minus = float(np.count_nonzero(above)), float(np.count_nonzero(~above))
     total = plus + minus
-    runs = 1.0 + np.count_nonzero(np.diff(above.astype(np.int8)))
+    runs = 1.0 + np.count_nonzero(np.diff(above))
     mean = 1.0 + 2.0 * plus * minus / total
     variance = (mean - 1.0) * (mean - 2.0) / (total - 1.0)
     return 1.0 if variance <= 0.0 else float(2.0 * norm.sf(abs(runs - mean) / np.sqrt(variance)))
@@ -144,13 +139,8 @@ def effective_samples(residual: Floats, turn: float) -> float:
     """Return how many independent samples know as much about the oscillation as the correlated ones.
 
     `n / (1 + 2 sum_l rho_l cos(l turn))`: the density of the residual's spectrum at the oscillation's frequency,
-    against its mean. The sum is taken period by period and ends at the first period that adds nothing.
-
-    Parameters
-    ----------
-    residual : ndarray of float, shape (sample,)
-    turn : float
-        Phase of the oscillation per sample, rad.
+    against its mean. The sum is taken period by period and ends at the first period that adds nothing. `turn` is the
+    phase of the oscillation per sample, rad.
     """
     period = max(2, round(2.0 * np.pi / turn))
     blocks = min(len(residual) // 3, 4000) // period

@@ -8,11 +8,11 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import least_squares
 
+from vibroimpact.analysis.dataset.results import described
 from vibroimpact.analysis.decay.estimate import Estimate, table_of
 from vibroimpact.analysis.decay.frequency_response import Complexes, FrequencyResponse
 from vibroimpact.analysis.decay.residuals import coloured_covariance
 from vibroimpact.analysis.decay.samples import Floats
-from vibroimpact.analysis.files.estimate_table import described
 from vibroimpact.fmus.errors import EstimationError, UsageError
 from vibroimpact.fmus.wording import option
 
@@ -43,7 +43,6 @@ class Resonance:
         C: 1/mass of a single oscillator, or the participation (1 of a single one) of a transmissibility.
     phase : Estimate or None
         Of C, rad: 0 or pi where model and polarity are right; None where only magnitudes were fitted.
-    form : str
     half_power_damping_ratio : float
         From the bandwidth at the peak over sqrt 2, as a check; NaN where the curve does not fall that far.
     angular_frequency, magnitude, fitted : ndarray of float, shape (line,)
@@ -75,10 +74,8 @@ class Curve:
     response : ndarray of complex or float, shape (line,)
     error : ndarray of float, shape (line,)
         Standard error of each real part; zeros where not known.
-    form : str
-        One of `FORMS`.
-    unit : str
-        Of C.
+    form, unit : str
+        One of `FORMS`; CF unit of C.
     """
 
     angular_frequency: Floats
@@ -157,9 +154,8 @@ def _constant_unit(form: str, units: tuple[str, str]) -> str:
 
 def _peak(omega: Floats, magnitude: Floats) -> tuple[float, float]:
     """Return the place of the highest value, and the width at which it has fallen by sqrt 2."""
-    top = int(np.argmax(magnitude))
-    edges = _half_power(omega, magnitude)
-    return float(omega[top]), edges[1] - edges[0] if np.all(np.isfinite(edges)) else 0.0
+    low, high = _half_power(omega, magnitude)
+    return float(omega[np.argmax(magnitude)]), high - low if np.isfinite(high - low) else 0.0
 
 
 def _half_power(omega: Floats, magnitude: Floats) -> tuple[float, float]:
@@ -191,10 +187,7 @@ def _highest(magnitude: Floats, top: int) -> float:
 def half_power_damping_ratio(omega: Floats, magnitude: Floats) -> float:
     """Return `(omega_2^2 - omega_1^2) / (4 omega_peak^2)` of the half-power points; NaN where there are none.
 
-    Parameters
-    ----------
-    omega, magnitude : ndarray of float, shape (line,)
-        rad/s, and `|H|`.
+    `omega` is in rad/s, `magnitude` is `|H|`.
     """
     low, high = _half_power(omega, magnitude)
     return float((high**2 - low**2) / (4.0 * omega[int(np.argmax(magnitude))] ** 2))
@@ -212,12 +205,8 @@ def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
     """Fit one resonance to a frequency response by least squares, weighted by its errors where these are known.
 
     Standard errors are those of the scatter about the fit, neighbouring lines correlated or not, or those that the
-    coherence predicts, whichever are larger.
-
-    Parameters
-    ----------
-    curve : Curve or FrequencyResponse
-        A response: the part around its highest peak, see `curve_of`.
+    coherence predicts, whichever are larger. Of a frequency response the part around its highest peak is fitted, see
+    `curve_of`.
 
     Raises
     ------
@@ -237,11 +226,8 @@ def fit_resonance(curve: Curve | FrequencyResponse) -> Resonance:
         return np.asarray(np.abs(p[2] * shape + p[3]))
 
     def residual(p: Floats) -> Floats:
-        difference = (model(p) - curve.response) * weight
-        # Line by line, so that neighbours in the residual are neighbours in frequency.
-        return (
-            np.column_stack([difference.real, difference.imag]).ravel() if curve.complex else difference.real
-        )
+        # Real and imaginary part of each line in turn: neighbours in the residual are neighbours in frequency.
+        return np.asarray((model(p) - curve.response) * weight).view(np.float64)
 
     # a sweep up and down has each frequency twice
     spacing = float(omega[1] - omega[0]) or float(np.ptp(omega)) / (len(omega) - 1)
@@ -329,15 +315,7 @@ def resolution_remark(found: FrequencyResponse, resonance: Resonance) -> tuple[s
 class ResponseEstimates:
     """A fitted resonance and where it is from.
 
-    Attributes
-    ----------
-    resonance : Resonance
-    response : FrequencyResponse or None
-        None where the curve is that of a simulated sweep.
-    title : str
-    unit : str
-        CF unit of the response.
-    remarks : tuple of str
+    `response` is None where the curve is that of a simulated sweep; `unit` is the CF unit of the response.
     """
 
     resonance: Resonance
@@ -377,31 +355,21 @@ class ResponseEstimates:
         """Return estimates (method, quantity), the fitted lines, and all lines of a measured response."""
         fit, found, unit = self.resonance, self.response, self.unit
         lines = {
-            "response": (fit.magnitude, "magnitude of the response"),
-            "response_error": (fit.error, "standard error of the magnitude"),
-            "fitted_response": (fit.fitted, "magnitude of the fitted response"),
+            "response": ("line", fit.magnitude, unit, "magnitude of the response"),
+            "response_error": ("line", fit.error, unit, "standard error of the magnitude"),
+            "fitted_response": ("line", fit.fitted, unit, "magnitude of the fitted response"),
         }
-        parts = [
-            table_of(self.estimates()),
-            xr.Dataset(
-                {name: ("line", values, described(words, unit)) for name, (values, words) in lines.items()},
-                {"angular_frequency": ("line", fit.angular_frequency, described("frequency", "rad s-1"))},
-            ),
-        ]
+        at = {"angular_frequency": ("line", fit.angular_frequency, "rad s-1", "frequency")}
+        parts = [table_of(self.estimates()), xr.Dataset(described(lines), described(at))]
         if found is not None:
             measured = {
-                "h1_magnitude": (np.abs(found.h1), "|H1|", unit),
-                "h1_phase": (np.angle(found.h1), "phase of H1", "rad"),
-                "h2_magnitude": (np.abs(found.h2), "|H2|", unit),
-                "coherence": (found.coherence, "coherence", "1"),
+                "h1_magnitude": ("frequency", np.abs(found.h1), unit, "|H1|"),
+                "h1_phase": ("frequency", np.angle(found.h1), "rad", "phase of H1"),
+                "h2_magnitude": ("frequency", np.abs(found.h2), unit, "|H2|"),
+                "coherence": ("frequency", found.coherence, "1", "coherence"),
+                "frequency": ("frequency", found.frequency, "Hz", "frequency"),
             }
-            parts.append(
-                xr.Dataset(
-                    {name: ("frequency", row, described(*words)) for name, (row, *words) in measured.items()},
-                    {"frequency": ("frequency", found.frequency, described("frequency", "Hz"))},
-                )
-            )
-        merged = xr.merge(parts, combine_attrs="override")
-        return merged.assign_attrs(
+            parts.append(xr.Dataset(described(measured)))
+        return xr.merge(parts, combine_attrs="override").assign_attrs(
             estimates="response", title=self.title, form=fit.form, remarks="\n".join(self.words())
         )

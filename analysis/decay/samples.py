@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -41,7 +41,7 @@ class DecaySamples:
     unit: str = "1"
     name: str = "displacement"
     reference_time: float = 0.0
-    remarks: tuple[str, ...] = field(default=())
+    remarks: tuple[str, ...] = ()
 
     @property
     def mean_interval(self) -> float:
@@ -54,12 +54,8 @@ def decay_samples(
 ) -> DecaySamples:
     """Take the window of a channel in which the body decays.
 
-    Parameters
-    ----------
-    channel : Channel or xarray.DataArray
-    start, stop : float or None
-        s, both included. Without a start the decay begins at the largest excursion, unless that is within the
-        first twentieth of the record: then nothing is cut.
+    Both ends, in s, are included. Without a start the decay begins at the largest excursion, unless that is within
+    the first twentieth of the record: then nothing is cut.
 
     Raises
     ------
@@ -72,10 +68,11 @@ def decay_samples(
         raise UsageError(f"{channel.name}: expected good samples, got none: all are missing or clipped.")
     remarks = []
     if start is None:
-        start, cut = _largest_excursion(time[good], channel.values[good])
-        remarks += [
-            f"the decay is taken from the largest excursion, at {start:.6g} s; {option('start')} sets it."
-        ] * cut
+        start = _largest_excursion(time[good], channel.values[good])
+        if start > time[good][0]:
+            remarks.append(
+                f"the decay is taken from the largest excursion, at {start:.6g} s; {option('start')} sets it."
+            )
     remarks += clock_remark(channel)
     stop = float(time[-1]) if stop is None else stop
     chosen = (time >= start) & (time <= stop)
@@ -99,21 +96,25 @@ def stretches(number: NDArray[np.int64]) -> list[NDArray[np.int64]]:
     return np.split(np.arange(len(number)), np.flatnonzero(np.diff(number)) + 1)
 
 
+def unit_power(unit: str, power: int) -> str:
+    """Return the CF unit of a power of a quantity."""
+    if unit == "1":
+        return "1"
+    return f"({unit}){power}" if " " in unit else f"{unit}{power}"
+
+
 def clock_remark(channel: Channel) -> list[str]:
     """Return the warning that all frequencies share the doubt of the clock, where it has one."""
     doubt = channel.axis.interval_uncertainty
-    if doubt == 0.0:
-        return []
-    return [
+    words = (
         f"{channel.name}: the clock of this recording is uncertain by {100 * doubt:.2g} %, and with it every frequency "
         "and decay rate; the standard errors do not count that. Damping ratios do not change."
-    ]
+    )
+    return [words] if doubt else []
 
 
-def _largest_excursion(time: Floats, value: Floats) -> tuple[float, bool]:
-    """Return where the decay begins, and whether something before it is cut off."""
+def _largest_excursion(time: Floats, value: Floats) -> float:
+    """Return the instant of the largest excursion, or the first one where that is early."""
     excursion = np.abs(value - np.median(value[len(value) // 2 :]))
     peak = float(time[int(np.argmax(excursion))])
-    if peak <= time[0] + 0.05 * (time[-1] - time[0]):
-        return float(time[0]), False
-    return peak, True
+    return peak if peak > time[0] + 0.05 * (time[-1] - time[0]) else float(time[0])

@@ -50,30 +50,29 @@ def swept_response(
             f"{os.fspath(path)}: expected a sweep of the forcing frequency with extrema, got none. "
             "Sweep forcing.angular_frequency and record extrema."
         )
-    others = [key for key in swept if key != name]
     half = 0.5 * (flat.displacement_max.values - flat.displacement_min.values)
     free = flat.outcome.values == int(Outcome.ok)
     if "impact_count" in flat:
         free &= flat.impact_count.values == 0
     free &= np.all(np.isfinite(half), axis=1)
-    scale = 2.0 * np.pi if name == "frequency" else 1.0
+    omega = np.asarray(flat[name].values * (2.0 * np.pi if name == "frequency" else 1.0), dtype=np.float64)
     if band is not None:
-        hertz = flat[name].values * scale / (2.0 * np.pi)
+        hertz = omega / (2.0 * np.pi)
         free &= (hertz >= band[0]) & (hertz <= band[1])
     if np.count_nonzero(free) < _FEWEST_RUNS:
         raise DatasetError(
             f"{os.fspath(path)}: expected {_FEWEST_RUNS} runs or more that touch no stop, got {np.count_nonzero(free)} "
             f"of {len(free)}. Sweep a wider range, or with less forcing."
         )
-    omega = np.asarray(flat[name].values[free] * scale, dtype=np.float64)
-    amplitude = np.mean(half[free], axis=1) / drive_amplitude
+    omega, half = omega[free], half[free]
+    amplitude = np.mean(half, axis=1) / drive_amplitude
     order = np.argsort(omega, kind="stable")
-    remarks = _remarks(int(np.count_nonzero(~free)), others, half[free])
     unit = "kg-1" if drive_unit == "N" else "m s-2"
     if flat.attrs.get("units_system") == "nondimensional":
         unit = "1"
     curve = Curve(omega[order], amplitude[order], np.zeros(len(order)), "displacement", unit)
-    return curve, remarks
+    others = [key for key in swept if key != name]
+    return curve, _remarks(int(np.count_nonzero(~free)), others, half)
 
 
 def _remarks(left_out: int, others: list[str], half: Floats) -> tuple[str, ...]:

@@ -102,19 +102,10 @@ def correlation_sums(
 def fitted_slopes(sums: CorrelationSums, *, above: float = 0.0) -> Floats:
     """Return the slope of ln C against ln eps where C is in `WINDOW`, for every embedding.
 
-    Least squares over the radii whose C lies in the window, at which at least 30 pairs were counted.
-
-    Parameters
-    ----------
-    sums : CorrelationSums
-    above : float
-        Radii below this do not count, such as the grid of the values.
-
-    Returns
-    -------
-    ndarray of float, shape (embedding,)
-        0 where C is the same over the lowest octave and not below the window, as for a finite number of points;
-        NaN where fewer than three radii lie in the window, those between the same steps of a grid being one.
+    Least squares over the radii whose C lies in the window, at which at least 30 pairs were counted; those below
+    `above`, such as the grid of the values, do not count. The slope is 0 where C is the same over the lowest octave and
+    not below the window, as for a finite number of points; NaN where fewer than three radii lie in the window, those
+    between the same steps of a grid being one.
     """
     return np.array([_fitted_slope(sums, place, above) for place in range(len(sums.pairs))])
 

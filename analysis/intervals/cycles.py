@@ -46,13 +46,7 @@ class Cycle:
 
 
 def read_cycle(train: IntervalTrain, forcing_period: float | None) -> Cycle:
-    """Return the motion P(p,q) that the intervals show.
-
-    Parameters
-    ----------
-    train : IntervalTrain
-    forcing_period : float or None
-        s; without it q stays unknown.
+    """Return the motion P(p,q) that the intervals show; without a forcing period (s) q stays unknown.
 
     Examples
     --------

@@ -50,14 +50,7 @@ def expected_shares(missed: float, spurious: float) -> Floats:
 
 
 def observed_shares(train: IntervalTrain, lattice: Lattice) -> Floats:
-    """Return the shares of the delay points counted, in the order of `CELLS`.
-
-    Parameters
-    ----------
-    train : IntervalTrain
-    lattice : Lattice
-        Of this train; it must have one.
-    """
+    """Return the shares of the delay points counted, in the order of `CELLS`; the train must have that lattice."""
     whole = train.kept[:-1] & train.kept[1:]
     on = lattice.on_lattice
     first, middle, last = on[:-2], on[1:-1], on[2:]

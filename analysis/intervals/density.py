@@ -60,14 +60,8 @@ def interval_density(intervals: Floats, *, resolution: float = 0.0) -> Density:
     """Return the density of intervals.
 
     The bandwidth is Silverman's rule for the spread of the intervals within their densest cluster, so that narrow bands
-    far apart are not smeared into one; bins are as wide as one bandwidth, and whole multiples of the grid.
-
-    Parameters
-    ----------
-    intervals : ndarray of float, shape (interval,)
-        s.
-    resolution : float
-        Grid of the instants, s: no width is smaller.
+    far apart are not smeared into one; bins are as wide as one bandwidth, and whole multiples of the grid of the
+    instants. Intervals and grid (`resolution`) are in s; no width is smaller than the grid.
 
     Examples
     --------

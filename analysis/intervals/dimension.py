@@ -35,8 +35,8 @@ MOSTLY_DISTINCT = 0.9
 ROUNDING = 2.0**-44
 # Share of the pairs equal in one interval that are equal in all, above which the motion repeats.
 REPEATS = 0.5
-# Growth of the slope per embedding below which it stands still; its top over the surrogate's, above which it keeps up
-# and runs ahead; the surrogate's over noise, below which that flattens.
+# Growth of the slope per embedding below which it stands still; its last value over the surrogate's above which it
+# keeps up, and above which it runs ahead; the surrogate's over that of noise below which the surrogate flattens.
 STILL, KEEPS_UP, AHEAD, FLATTENS = 0.15, 0.85, 1.3, 0.75
 # Distance from its last value within which a slope has saturated.
 REACHED = 0.2
@@ -51,21 +51,9 @@ def interval_dimension(
 ) -> tuple[Rows, dict[str, Any]]:
     """Return the correlation sums of a train's intervals, their slopes, those of shuffled surrogates, and a verdict.
 
-    Parameters
-    ----------
-    train : IntervalTrain
-        At most its first 10,000 intervals are used.
-    scale : {"raw", "log"}
-        Heavy-tailed intervals flatten the raw slopes falsely; take their logarithms.
-    embedding, theiler
-        Largest m; pairs so near in order do not count.
-    seed : int
-        Of the shuffles.
-
-    Returns
-    -------
-    variables, attributes
-        With words for a reason, and no radii, where the intervals cannot tell.
+    Heavy-tailed intervals flatten the raw slopes falsely: take their logarithms. At most the first 10,000 are used;
+    `embedding` is the largest m, and pairs at most `theiler` places apart do not count. Where the intervals cannot
+    tell, the variables have no radii, and the attributes have the reason in words.
     """
     values = _values(train, scale)
     reason = _refusal(train, values, embedding)
@@ -146,8 +134,8 @@ def verdict(slopes: Floats, surrogate: Floats) -> str:
 
 def _longest_run(known: NDArray[np.bool_]) -> tuple[int, int]:
     """Return where the longest run of True begins and where it is over; the first of those as long."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], known, [False]))))
-    runs = [(int(first), int(stop)) for first, stop in zip(edges[::2], edges[1::2], strict=True)]
+    edges = np.flatnonzero(np.diff(known, prepend=False, append=False)).tolist()
+    runs = zip(edges[::2], edges[1::2], strict=True)
     return max(runs, key=lambda run: run[1] - run[0], default=(0, 0))
 
 
@@ -194,30 +182,25 @@ def _rounded(train: IntervalTrain) -> Floats:
     quantum = max(float(np.max(np.abs(train.times))) * ROUNDING, float(np.finfo(np.float64).tiny))
     steps: Floats = np.rint(train.separated / quantum)
     # two roundings may part what is the same: join steps that are neighbours
-    known = steps[np.isfinite(steps)]
-    order = np.unique(known)
-    group = np.cumsum(np.concatenate([[0], np.diff(order) > 2.0]))
-    first = order[np.searchsorted(group, group)]
-    joined = np.full(len(steps), np.nan)
-    joined[np.isfinite(steps)] = first[np.searchsorted(order, known)] * quantum
-    return joined
+    known = np.isfinite(steps)
+    order, place = np.unique(steps[known], return_inverse=True)
+    group = np.cumsum(np.diff(order, prepend=order[:1]) > 2.0)
+    steps[known] = order[np.searchsorted(group, group)][place] * quantum
+    return steps
 
 
 def _values(train: IntervalTrain, scale: Scale) -> Floats:
     values = _rounded(train)
     if scale == "raw":
         return values
-    with np.errstate(divide="ignore"):
-        logarithms: Floats = np.log(values)
     # events that coincide have no logarithm: vectors do not reach over them
-    return np.where(np.isfinite(logarithms), logarithms, np.nan)
+    return np.asarray(np.log(np.where(values > 0.0, values, np.nan)))
 
 
 def _refusal(train: IntervalTrain, values: Floats, embedding: int) -> str:
-    known = values[np.isfinite(values)]
-    distinct = len(np.unique(known))
-    if len(known) < FEWEST_INTERVALS:
-        return f"refused: expected at least {FEWEST_INTERVALS} intervals, got {len(known)}"
+    known, distinct = _counted(values)
+    if known < FEWEST_INTERVALS:
+        return f"refused: expected at least {FEWEST_INTERVALS} intervals, got {known}"
     if count_pairs(np.isfinite(values[:MOST_INTERVALS]), embedding, 0) < FEWEST_INTERVALS:
         return f"refused: too few successive intervals without a mask between them for vectors of {embedding}"
     if distinct == 1:
@@ -228,7 +211,7 @@ def _refusal(train: IntervalTrain, values: Floats, embedding: int) -> str:
         return f"slope 0: {distinct} distinct intervals in an order that repeats, a periodic motion"
     grid = f" (they lie on a grid of {train.resolution:.3g} s)" if train.resolution > 0.0 else ""
     return (
-        f"refused: only {distinct} distinct intervals among {len(known)}{grid}; expected at least "
+        f"refused: only {distinct} distinct intervals among {known}{grid}; expected at least "
         f"{FEWEST_DISTINCT}: below their spacing every slope is that of the grid"
     )
 
@@ -253,16 +236,21 @@ def _shuffled(values: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _warnings(train: IntervalTrain, values: Floats) -> list[str]:
-    known = values[np.isfinite(values)]
-    distinct = len(np.unique(known))
+    known, distinct = _counted(values)
     lines = [
-        f"with {len(known)} intervals no slope above about {2.0 * np.log10(len(known)):.1f} can be told "
+        f"with {known} intervals no slope above about {2.0 * np.log10(known):.1f} can be told "
         "(2 log10 of their number)"
     ]
     if len(train.separated) > len(values):
         lines.append(f"only the first {len(values)} of {len(train.separated)} intervals are used")
-    if distinct < MOSTLY_DISTINCT * len(known):
+    if distinct < MOSTLY_DISTINCT * known:
         lines.append(
-            f"ties: only {distinct} of {len(known)} intervals are distinct; small radii are not trustworthy"
+            f"ties: only {distinct} of {known} intervals are distinct; small radii are not trustworthy"
         )
     return lines
+
+
+def _counted(values: Floats) -> tuple[int, int]:
+    """Return how many values are known, and how many of them are distinct."""
+    known = values[np.isfinite(values)]
+    return len(known), len(np.unique(known))

@@ -70,9 +70,8 @@ def find_gaps(train: IntervalTrain) -> MissedBeats:
     typical = local_median(intervals)
     if not np.all(typical > 0.0):
         return MissedBeats(ratio, reason="most events of some neighbourhood coincide")
-    ratio[train.kept] = intervals / typical
-    centred = ratio[train.kept]
-    spread = robust_sigma(centred - np.median(centred))
+    ratio[train.kept] = relative = intervals / typical
+    spread = robust_sigma(relative - np.median(relative))
     if spread > NEARLY_PERIODIC:
         reason = (
             f"the train is not nearly periodic: its intervals scatter by {100 * spread:.0f} % about their local "

@@ -21,8 +21,8 @@ from vibroimpact.analysis.robust import robust_sigma
 FEWEST_EVENTS = 30
 # Events whose phases are averaged for the place of the lattice: it may drift, slowly.
 WINDOW = 41
-# Distance from its place, in standard deviations of the true events, within which an event is on the lattice; least and
-# most of it, relative to the interval: beyond the most the lattice is blurred.
+# Distance from its place within which an event is on the lattice, in standard deviations of the true events; the
+# least and the most that it may be, relative to the interval: a lattice that needs more is blurred.
 SIGMAS, NEAREST, FARTHEST = 5.0, 0.005, 0.2
 # Least share of all events on the lattice.
 MOSTLY = 0.7
@@ -75,17 +75,7 @@ def interval_lattice(train: IntervalTrain) -> Lattice:
 
     Valid where misses are independent of each other, spurious spikes come at any phase and at most one in an interval,
     and true spikes keep the phase of a clock (a forcing) that drifts slowly or not at all. Spurious spikes that fall
-    on the lattice cannot be seen; their number is made up for.
-
-    Parameters
-    ----------
-    train : IntervalTrain
-        Its most frequent interval is the first guess of I.
-
-    Returns
-    -------
-    Lattice
-        With a reason, and shares of NaN, where there is no such lattice.
+    on the lattice cannot be seen; their number is made up for. The most frequent interval is the first guess of I.
 
     Examples
     --------
@@ -108,7 +98,7 @@ def interval_lattice(train: IntervalTrain) -> Lattice:
     if width > FARTHEST:
         return Lattice(
             reason=f"no single lattice: events scatter by {100 * jitter:.0f} % of the most frequent interval "
-            f"({interval:.4g} s) about its multiples; expected at most {100 * FARTHEST / SIGMAS:.0f} %",
+            f"({interval:.4g} s) about its multiples; expected at most {100 * FARTHEST / SIGMAS:.0f} %"
         )
     if np.mean(on_lattice) < MOSTLY:
         return Lattice(

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.intervals.dimension import SCALES
 from vibroimpact.fmus.printing import table, with_error
 from vibroimpact.fmus.terminal import Terminal
 
@@ -76,20 +77,19 @@ def _print_gaps(console: Terminal, report: xr.Dataset) -> None:
 
 
 def _print_dimension(console: Terminal, report: xr.Dataset) -> None:
-    scales = ("raw", "log")
     low, high = report.attrs["slope_window"]
-    if any(np.isfinite(report[f"slope_{scale}"].values).any() for scale in scales):
+    if any(np.isfinite(report[f"slope_{scale}"].values).any() for scale in SCALES):
         console.print(f"Slope of the correlation sum, C from {low:g} to {high:g}")
         rows = table("", ">m", ">raw", ">shuffled", ">log", ">shuffled")
         for m in report["embedding"].values:
-            cells = (cell for scale in scales for cell in _slope_cells(report, scale, int(m)))
+            cells = (cell for scale in SCALES for cell in _slope_cells(report, scale, int(m)))
             rows.add_row(str(m), *cells)
         console.print(rows)
-    for scale, kind in zip(scales, ("raw intervals", "log intervals"), strict=True):
+    for scale in SCALES:
         words = report.attrs[f"dimension_{scale}"]
-        console.print(f"Dimension of {kind}: {words}.", soft_wrap=True)
+        console.print(f"Dimension of {scale} intervals: {words}.", soft_wrap=True)
     warnings = dict.fromkeys(
-        line for scale in scales for line in report.attrs[f"dimension_{scale}_warnings"].splitlines()
+        line for scale in SCALES for line in report.attrs[f"dimension_{scale}_warnings"].splitlines()
     )
     for line in warnings:
         console.print(f"Note: {line}.", soft_wrap=True)

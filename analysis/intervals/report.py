@@ -16,7 +16,6 @@ from vibroimpact.analysis.intervals.lattice import Lattice, interval_lattice
 from vibroimpact.analysis.intervals.report_parts import (
     density_part,
     gap_part,
-    gap_words,
     interval_part,
     lattice_part,
     variability_part,
@@ -93,16 +92,16 @@ def interval_report(
     train = interval_train(times, window=window, masked=masked, resolution=resolution)
     density = interval_density(train.intervals, resolution=resolution)
     cycle, lattice = read_motion(train, forcing_period)
-    gaps = find_gaps(train)
-    on_lattice, words = lattice_part(train, lattice)
+    gaps, gap_words = gap_part(train, find_gaps(train))
+    on_lattice, lattice_words = lattice_part(train, lattice)
     rows: dict[str, Row] = {
         **interval_part(train),
         **variability_part(train, count_bin),
         **density_part(density, cycle),
-        **gap_part(train, gaps),
+        **gaps,
         **on_lattice,
     }
-    attributes: dict[str, Any] = {"cycle": cycle.words, "gaps": gap_words(gaps), "lattice": words}
+    attributes: dict[str, Any] = {"cycle": cycle.words, "gaps": gap_words, "lattice": lattice_words}
     for scale in SCALES:
         slopes, said = interval_dimension(train, scale, embedding=embedding, theiler=theiler, seed=seed)
         rows |= slopes

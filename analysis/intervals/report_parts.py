@@ -16,7 +16,6 @@ from vibroimpact.analysis.intervals.variability import (
     fano_curve,
     fano_factor,
     rate,
-    usual_bin,
 )
 
 # Report it when the share of delay points at (I, I) differs by more than this from what independent misses leave.
@@ -35,9 +34,9 @@ def interval_part(train: IntervalTrain) -> Rows:
 def variability_part(train: IntervalTrain, count_bin: float | None) -> Rows:
     """Return rate, coefficient of variation and Fano factors."""
     value, error = rate(train)
-    intervals = train.intervals
+    mean, median = float(np.mean(train.intervals)), float(np.median(train.intervals))
     varies = coefficient_of_variation(train)
-    fano = fano_factor(train, count_bin if count_bin is not None else usual_bin(train))
+    fano = fano_factor(train, count_bin or float(f"{mean:.0e}"))
     curve = fano_curve(train)
     widths, factors = np.array([f.width for f in curve]), np.array([f.value for f in curve])
     doubt, of_error = fano.standard_error, "standard error of the"
@@ -48,8 +47,8 @@ def variability_part(train: IntervalTrain, count_bin: float | None) -> Rows:
         "duration": ((), train.duration, "s", "observed time, without masked spans"),
         "rate": ((), value, "Hz", "events per second"),
         "rate_standard_error": ((), error, "Hz", f"{of_error} rate, from the counts in 20 long bins"),
-        "mean_interval": ((), float(np.mean(intervals)), "s", "mean interval"),
-        "median_interval": ((), float(np.median(intervals)), "s", "median interval"),
+        "mean_interval": ((), mean, "s", "mean interval"),
+        "median_interval": ((), median, "s", "median interval"),
         "coefficient_of_variation": ((), varies, "1", relative),
         "fano_factor": ((), fano.value, "1", of_bins),
         "fano_standard_error": ((), doubt, "1", f"{of_error} Fano factor, of independent bins"),
@@ -78,24 +77,19 @@ def density_part(density: Density, cycle: Cycle) -> Rows:
     }
 
 
-def gap_part(train: IntervalTrain, gaps: MissedBeats) -> Rows:
-    """Return the gaps of a nearly periodic train."""
+def gap_part(train: IntervalTrain, gaps: MissedBeats) -> tuple[Rows, str]:
+    """Return the gaps of a nearly periodic train, and in words how many or why none were looked for."""
     starts, lengths = train.times[gaps.place], np.diff(train.times)[gaps.place]
     spread = "robust coefficient of variation of the intervals about their local median"
-    return {
+    words = f"{len(gaps.place)} found, {int(gaps.missing.sum())} missed beats"
+    rows: Rows = {
         "gap_start": ("gap", starts, "s", "last event before the gap"),
         "gap_length": ("gap", lengths, "s", "length of the gap"),
         "gap_missing": ("gap", gaps.missing, "1", "beats missing in the gap"),
         "interval_ratio": ("interval_number", gaps.ratio, "1", "interval over the median of its neighbours"),
         "local_spread": ((), gaps.spread, "1", spread),
     }
-
-
-def gap_words(gaps: MissedBeats) -> str:
-    """Return in words how many beats are missing, or why none were looked for."""
-    if gaps.reason:
-        return f"not looked for: {gaps.reason}"
-    return f"{len(gaps.place)} found, {int(gaps.missing.sum())} missed beats"
+    return rows, f"not looked for: {gaps.reason}" if gaps.reason else words
 
 
 def lattice_part(train: IntervalTrain, lattice: Lattice) -> tuple[Rows, str]:

@@ -67,25 +67,7 @@ def interval_train(
     masked: Sequence[Span] = (),
     resolution: float = 0.0,
 ) -> IntervalTrain:
-    """Return a checked train of events.
-
-    Parameters
-    ----------
-    times : ndarray of float, shape (event,)
-        s, ascending; two may coincide.
-    window : tuple of float, optional
-        Start and end of the observation, s.
-    masked : sequence of (float, float)
-        Spans (start, end) of no observation, s; see `seams`.
-    resolution : float
-        Grid on which the instants were written, s; 0 where none shows.
-
-    Raises
-    ------
-    EstimationError
-        There are fewer than three events, all are at one instant, or every interval is masked.
-    UsageError
-        An argument is out of its range.
+    """Return a checked train of events; arguments and errors as of `interval_report`.
 
     Examples
     --------
@@ -101,10 +83,8 @@ def interval_train(
     if not resolution >= 0.0 or not np.isfinite(resolution):
         raise UsageError(f"intervals: resolution: expected 0 s or more, got {resolution}.")
     spans = _joined(masked)
-    inside = np.zeros(len(instants), dtype=np.bool_)
     for start, end in spans:
-        inside |= (instants > start) & (instants < end)
-    instants = instants[~inside]
+        instants = instants[(instants <= start) | (instants >= end)]
     if len(instants) < FEWEST_EVENTS:
         raise EstimationError(
             f"intervals: expected at least {FEWEST_EVENTS} events outside the masked spans, got {len(instants)}."
@@ -114,12 +94,14 @@ def interval_train(
             f"intervals: expected events at different instants, got all at {instants[0]:g} s."
         )
     observed = _window(instants, window)
-    touched = _touched(instants, spans)
-    if not np.any(np.diff(instants)[~touched] > 0.0):
+    kept = np.ones(len(instants) - 1, dtype=np.bool_)
+    for start, end in spans:
+        kept &= (instants[:-1] > start) | (instants[1:] < end)
+    if not np.any(np.diff(instants)[kept] > 0.0):
         raise EstimationError(
             "intervals: expected one of more than 0 s without a masked instant in it, got none. Mask less."
         )
-    return IntervalTrain(instants, observed, window is not None, spans, ~touched, float(resolution))
+    return IntervalTrain(instants, observed, window is not None, spans, kept, float(resolution))
 
 
 MOST_SEAMS = 10_000
@@ -181,11 +163,3 @@ def _joined(masked: Sequence[Span]) -> tuple[Span, ...]:
         else:
             joined.append((start, end))
     return tuple(joined)
-
-
-def _touched(instants: Floats, spans: tuple[Span, ...]) -> NDArray[np.bool_]:
-    """Return which intervals have a masked instant between their ends."""
-    touched = np.zeros(len(instants) - 1, dtype=np.bool_)
-    for start, end in spans:
-        touched |= (instants[:-1] <= start) & (instants[1:] >= end)
-    return touched

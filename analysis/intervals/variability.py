@@ -89,12 +89,6 @@ def fano_curve(train: IntervalTrain) -> list[FanoFactor]:
     return [factor for factor in factors if np.isfinite(factor.value)]
 
 
-def usual_bin(train: IntervalTrain) -> float:
-    """Return the mean interval (s), rounded to one digit."""
-    mean = float(np.mean(train.intervals))
-    return float(f"{mean:.0e}")
-
-
 MOST_BINS = 10**7
 """Bins above which counts are 0 and 1 in any recording, and only fill memory."""
 
