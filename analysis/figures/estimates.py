@@ -39,14 +39,15 @@ def _draw_decay(dataset: xr.Dataset) -> Figure:
     panels += [_draw_peaks] * ("peak_height" in dataset)
     windows = [_draw_frequency, _draw_damping] if "window" in dataset.dims else []
     figure = canvas(14 + _PANEL_MM * (len(panels) + len(windows)))
-    axes = figure.subplots(len(panels) + len(windows), 1, squeeze=False)[:, 0]
+    axes = figure.subplots(len(panels) + len(windows), 1)
     for axis, draw in zip(axes, panels + windows, strict=True):
         draw(axis, dataset)
-    for axis in axes[: len(panels)]:
+    over_time, over_amplitude = axes[: len(panels)], axes[len(panels) :]
+    for axis in over_time:
         axis.set_xlim(float(dataset.time[0]), float(dataset.time[-1]))
-        axis.set_xlabel("time (s)" if axis is axes[len(panels) - 1] else "")
-        axis.tick_params(labelbottom=axis is axes[len(panels) - 1])
-    for axis in axes[len(panels) :]:
+        axis.set_xlabel("time (s)" if axis is over_time[-1] else "")
+        axis.tick_params(labelbottom=axis is over_time[-1])
+    for axis in over_amplitude:
         axis.set_xlim(left=0.0)
         axis.tick_params(labelbottom=axis is axes[-1])
     if windows:
@@ -98,19 +99,18 @@ def _draw_peaks(axis: Axes, dataset: xr.Dataset) -> None:
 
 
 def _draw_frequency(axis: Axes, dataset: xr.Dataset) -> None:
-    _draw_backbone(axis, dataset, "window_frequency", 2.0 * np.pi)
-    axis.set_ylabel("frequency (Hz)")
+    _draw_backbone(axis, dataset, "window_frequency", 2.0 * np.pi, "frequency (Hz)")
 
 
 def _draw_damping(axis: Axes, dataset: xr.Dataset) -> None:
-    _draw_backbone(axis, dataset, "window_damping", 1.0)
-    axis.set_ylabel("damping ratio (-)")
+    _draw_backbone(axis, dataset, "window_damping", 1.0, "damping ratio (-)")
 
 
-def _draw_backbone(axis: Axes, dataset: xr.Dataset, name: str, unit: float) -> None:
+def _draw_backbone(axis: Axes, dataset: xr.Dataset, name: str, unit: float, words: str) -> None:
     """Draw a variable of the windows over their amplitude, with its intervals."""
     x, y, error = (dataset[n].values for n in ("window_amplitude", name, f"{name}_error"))
     y, error = y / unit, error / unit
+    axis.set_ylabel(words)
     axis.ticklabel_format(axis="y", useOffset=False)
     axis.errorbar(x, y, yerr=1.96 * error, fmt="o", markersize=2, color=LINE, elinewidth=0.6, capsize=1.5)
     # One bad window must not press all others flat.

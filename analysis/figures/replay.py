@@ -42,17 +42,9 @@ _SMALL, _LARGE = 1e-2, 1e4
 def draw_replay(dataset: xr.Dataset, recording: str | None = None, window: Window = ANY) -> Figure:
     """Draw a comparison: the whole record, its first part, and the residual with the scores of running windows.
 
-    Clipped samples, which were not scored, are marked on the measured signal. The figure names the recording, and
-    whether the fit has seen it.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of `comparison_dataset`.
-    recording : str, optional
-        Which one, by the file of its recording or the name of the comparison; default: the first.
-    window : Window, optional
-        Drawn in place of the whole record and its first part.
+    The comparison is named by itself or by the file of its recording, else the first one is drawn. A window is drawn
+    in place of the whole record and its first part. Clipped samples, which were not scored, are marked on the measured
+    signal. The figure names the recording, and whether the fit has seen it.
 
     Raises
     ------

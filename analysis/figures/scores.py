@@ -21,11 +21,6 @@ _STYLES = ("-", "--", ":", "-.")
 def draw_scores(dataset: xr.Dataset) -> Figure:
     """Draw the variance accounted for against the swept parameter with the most values, a line for each other point.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As `open_dataset` gives a campaign of replays.
-
     Raises
     ------
     DatasetError
@@ -52,9 +47,9 @@ def draw_scores(dataset: xr.Dataset) -> Figure:
         axis.set_title(pair, fontsize=7.5)
     axes[-1].set_xlabel(label(dataset[along]))
     if others:
-        handles, labels = axes[0].get_legend_handles_labels()
+        entries = axes[0].get_legend_handles_labels()
         columns = 1 if len(others) > 1 else 2  # two long names do not fit side by side
-        figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False)
+        figure.legend(*entries, loc="outside lower center", ncols=columns, frameon=False)
     return figure
 
 

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, page_style, title
-from vibroimpact.analysis.figures.recordings import MOST_PANELS, short_name
+from vibroimpact.analysis.figures.page import (
+    LINE,
+    MARK,
+    STOP,
+    Floats,
+    canvas,
+    legend_outside,
+    page_style,
+    title,
+)
+from vibroimpact.analysis.figures.recordings import MOST_PANELS, short_name, spans_of
 from vibroimpact.analysis.figures.replay import comparison_of
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order
-from vibroimpact.analysis.figures.series import sampled_variables, within
+from vibroimpact.analysis.figures.series import sampled_variables, samples_within
 from vibroimpact.analysis.figures.window import ANY, Window
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError
@@ -35,8 +43,7 @@ _MULTIPLE_LINE: dict[str, Any] = {"color": STOP, "linestyle": ":", "linewidth": 
 _LEAST_MULTIPLES, _MOST_MULTIPLES = 10, 20
 
 
-@dataclass(frozen=True, slots=True)
-class _Signal:
+class _Signal(NamedTuple):
     """What one line shows."""
 
     name: str
@@ -62,8 +69,7 @@ def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Windo
             "figure: expected a time series of the run, got none recorded. "
             'Set time_series = { rate = ..., variables = ["displacement"] } in [record].'
         )
-    samples = dataset.vibroimpact.samples(**({} if run is None else {"run_index": run}))
-    samples = within(dataset, samples, window)
+    samples = samples_within(dataset, run, window)
     names = in_scene_order(dataset, sampled_variables(samples))[:MOST_PANELS]
     time = samples["time"].values
     signals = [
@@ -119,12 +125,7 @@ def _draw_panels(
 ) -> Figure:
     """Draw a panel for each group of signals; those of a run share the frequencies that its first one has.
 
-    Parameters
-    ----------
-    panels : sequence
-    rate : float or None
-        Angular frequency of the forcing, rad/s.
-    is_run, is_angular : bool
+    The rate is the angular frequency of the forcing, rad/s.
     """
     factor = 1.0 if is_angular else 0.5 / math.pi
     with page_style():
@@ -141,12 +142,7 @@ def _draw_panels(
                 for multiple in range(1, min(int(end / rate), _MOST_MULTIPLES) + 1):
                     axis.axvline(factor * rate * multiple, label=_MULTIPLES, **_MULTIPLE_LINE)
         axes[-1].set_xlabel("angular frequency (-)" if is_angular else "frequency (Hz)")
-        handles, labels = axes[0].get_legend_handles_labels()
-        entries = dict(zip(labels, handles, strict=True))
-        if entries:
-            figure.legend(
-                entries.values(), entries.keys(), loc="outside upper center", ncols=3, frameon=False
-            )
+        legend_outside(figure, axes[0], ncols=3)
         figure.align_ylabels(axes)
     return figure
 
@@ -227,8 +223,7 @@ def amplitude_spectrum(
     >>> round(float(frequency[place]) / (2.0 * np.pi), 6), round(float(amplitude[place]), 6)
     (4.0, 2.0)
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.isfinite(values), [False]])))
-    first, stop = max(edges.reshape(-1, 2), key=np.ptp, default=(0, 0))
+    first, stop = max(spans_of(np.isfinite(values)), key=np.ptp, default=(0, 0))
     time, values = time[first:stop], values[first:stop]
     if len(time) < _FEWEST:
         raise DatasetError(

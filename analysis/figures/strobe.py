@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from vibroimpact.analysis.figures.page import LINE, STOP, canvas, label
+from vibroimpact.analysis.figures.page import LINE, STOP_LINE, canvas, label
 from vibroimpact.analysis.figures.scene_text import observed_stops
 from vibroimpact.analysis.figures.sweeps import draw_diagram, one_value, varied
 from vibroimpact.fmus.errors import DatasetError
@@ -42,7 +42,7 @@ def draw_strobe(dataset: xr.Dataset, run: int | None = None) -> Figure:
     for stop in observed_stops(dataset):
         low, high = axis.get_xlim()
         if low <= stop.position <= high:
-            axis.axvline(stop.position, color=STOP, linestyle="--", linewidth=0.6, zorder=0)
+            axis.axvline(stop.position, **STOP_LINE)
     return figure
 
 

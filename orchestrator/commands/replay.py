@@ -163,17 +163,13 @@ def _write(dataset: xr.Dataset, output: Path, figure: Path | None) -> None:
     try:
         write_results(dataset, output, kind="replay")
         if figure is not None:
-            _draw(dataset, figure)
+            # matplotlib takes half a second to import; a replay alone does not pay for it.
+            from vibroimpact.analysis import figures
+            from vibroimpact.analysis.figures.replay import draw_replay
+
+            figures.save(draw_replay(dataset), figure)
     except OSError as error:
         raise UsageError(
             f"{error.filename or output}: expected a place where a file can be written, got "
             f"{error.strerror or error}. Choose another."
         ) from error
-
-
-def _draw(dataset: xr.Dataset, path: Path) -> None:
-    # matplotlib takes half a second to import; a replay alone does not pay for it.
-    from vibroimpact.analysis import figures
-    from vibroimpact.analysis.figures.replay import draw_replay
-
-    figures.save(draw_replay(dataset), path)
