@@ -15,13 +15,7 @@ _PANEL_MM = 32
 
 
 def draw_estimates(dataset: xr.Dataset) -> Figure:
-    """Draw the dataset of `vibroimpact estimate`: what it shows follows from what was estimated.
-
-    Raises
-    ------
-    DatasetError
-        If it is no such dataset.
-    """
+    """Draw the dataset of `vibroimpact estimate`: what it shows follows from what was estimated."""
     drawers = {"decay": _draw_decay, "response": _draw_response, "impacts": draw_impact_estimate}
     kind = str(dataset.attrs.get("estimates", ""))
     if kind not in drawers:
@@ -93,8 +87,7 @@ def _draw_peaks(axis: Axes, dataset: xr.Dataset) -> None:
     line = -0.5 * decrement * (number - number[0])
     level = np.average(np.log(height) - line, weights=height**2)
     axis.plot(dataset.peak_time, np.exp(level + line), color=MARK, linewidth=0.6, label="one decrement")
-    axis.set_yscale("log")
-    axis.set_ylabel(f"peaks ({unit_symbol(dataset.measured)})")
+    axis.set(yscale="log", ylabel=f"peaks ({unit_symbol(dataset.measured)})")
     axis.legend(frameon=False, loc="lower left", borderaxespad=0.1)
 
 
@@ -165,14 +158,11 @@ def _draw_response(dataset: xr.Dataset) -> Figure:
         label="measured" if measured else "simulated",
     )
     axes[0].plot(hertz, dataset.fitted_response, color=MARK, label="fitted resonance", zorder=3)
-    axes[0].set_yscale("log")
-    axes[0].set_ylabel(f"response ({unit_symbol(dataset.response)})")
+    axes[0].set(yscale="log", ylabel=f"response ({unit_symbol(dataset.response)})")
     axes[0].legend(frameon=False, loc="best", borderaxespad=0.3)
     if coherent:
         near = (dataset.frequency >= hertz[0]) & (dataset.frequency <= hertz[-1])
         axes[1].plot(dataset.frequency[near], dataset.coherence[near], color=LINE)
-        axes[1].set_ylabel("coherence (-)")
-        axes[1].set_ylim(0.0, 1.05)
-    axes[-1].set_xlabel("frequency (Hz)")
-    axes[-1].set_xlim(float(hertz[0]), float(hertz[-1]))
+        axes[1].set(ylim=(0.0, 1.05), ylabel="coherence (-)")
+    axes[-1].set(xlim=(float(hertz[0]), float(hertz[-1])), xlabel="frequency (Hz)")
     return figure

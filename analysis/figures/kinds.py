@@ -67,7 +67,8 @@ class FigureKind:
     Attributes
     ----------
     families : dict
-        For each family of data that it draws, the function that does.
+        For each family of data that it draws, the function that does, or raises a DatasetError where the data does not
+        hold what the figure shows.
     fits : callable
         Whether a dataset of runs holds what the figure shows.
     takes : tuple of str
@@ -161,8 +162,6 @@ KINDS: dict[str, FigureKind] = {
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
-#: Kinds that draw all runs; a kind that takes a run, and is none of these, draws a single one.
-_OF_ALL = ("strobe",)
 
 
 def draw_view(data: Data, kind: str, view: View) -> Figure:
@@ -273,8 +272,8 @@ def _refuse_run(dataset: Any, kind: str, run: int | None) -> None:
         raise DatasetError(
             f"figure: run: expected one run of those there are ({listed}), got none of run_index {run}."
         )
-    is_single = "run" in KINDS[kind].takes and kind not in _OF_ALL
-    if is_single and run is None and there.size > 1:
+    # a window of time is one of a single run
+    if "window" in KINDS[kind].takes and run is None and there.size > 1:
         if not KINDS[kind].fits(dataset):
             raise DatasetError(
                 f"figure: kind: expected one that fits this dataset ({', '.join(fitting(dataset))}), got {kind!r}."

@@ -18,13 +18,7 @@ _START = re.compile(r"displacement_start_([0-9]+)")
 
 
 def draw_energies(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
-    """Draw the total energy of a run and the energies of its modes over time, with its impacts.
-
-    Raises
-    ------
-    DatasetError
-        If energies were not sampled.
-    """
+    """Draw the total energy of a run and the energies of its modes over time, with its impacts."""
     samples = samples_within(dataset, run, window)
     modal = [(int(m[1]), m[0]) for m in map(_MODAL.fullmatch, map(str, samples.data_vars)) if m]
     if not modal or not {"energy_kinetic", "energy_potential"} <= set(map(str, samples.data_vars)):
@@ -59,11 +53,6 @@ def draw_shapes(dataset: xr.Dataset) -> Figure:
 
     The dataset is a sweep of `sensor.location` and `body.displacement_start[j]`; runs that start in one mode alone
     are drawn, each shape divided by its largest value.
-
-    Raises
-    ------
-    DatasetError
-        If the dataset is no such sweep.
     """
     runs = dataset.vibroimpact.runs
     starts = sorted((int(m[1]), m[0]) for m in map(_START.fullmatch, map(str, runs.variables)) if m)
@@ -86,8 +75,8 @@ def draw_shapes(dataset: xr.Dataset) -> Figure:
             along, shape / np.abs(shape).max(), color=COLOURS[place % len(COLOURS)], label=f"mode {number}"
         )
     axis.axhline(0.0, color=STOP, linewidth=0.4, zorder=0)
-    axis.set_xlim(0.0, 1.0)
-    axis.set_xlabel("location (fraction of the length)")
-    axis.set_ylabel("mode shape / its largest (-)")
+    axis.set(
+        xlim=(0.0, 1.0), xlabel="location (fraction of the length)", ylabel="mode shape / its largest (-)"
+    )
     legend_outside(figure, axis, ncols=3)
     return figure

@@ -54,11 +54,6 @@ def draw_portrait(dataset: xr.Dataset, run: int | None = None, window: Window = 
     """Draw velocity against displacement for each sampled pair; of a whole chain its modes too.
 
     Lines end at an impact and begin again after it, joined by dots.
-
-    Raises
-    ------
-    DatasetError
-        If no displacement was sampled together with its velocity.
     """
     samples = samples_within(dataset, run, window)
     orbits = _sampled_orbits(samples)
@@ -100,8 +95,7 @@ def _draw_orbit(axis: Any, orbit: _Orbit, jumps: Any, colour: str) -> None:
 
 def _joined(values: Floats, jumps: Any) -> Floats:
     """Return the values before and after each jump, with a gap after each pair, as one line."""
-    ends: Floats = np.stack([values[jumps - 1], values[jumps], np.full(jumps.size, np.nan)], axis=1).ravel()
-    return ends
+    return np.stack([values[jumps - 1], values[jumps], np.full(jumps.size, np.nan)], axis=1).ravel()
 
 
 def _sampled_orbits(samples: xr.Dataset) -> list[_Orbit]:
@@ -136,13 +130,7 @@ def _modal_orbits(dataset: xr.Dataset, orbits: list[_Orbit]) -> list[_Orbit]:
 
 
 def draw_impact_map(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
-    """Draw the impacts of one run in the plane of the impact map: forcing phase and velocity before impact.
-
-    Raises
-    ------
-    DatasetError
-        If the run has no impacts, or no forcing that gives them a phase.
-    """
+    """Draw the impacts of one run in the plane of the impact map: forcing phase and velocity before impact."""
     hits = impacts_within(dataset, run, window)
     phase, velocity = hits["impact_phase"].values, hits["impact_velocity"].values
     if not np.isfinite(phase).any():
@@ -159,8 +147,7 @@ def draw_impact_map(dataset: xr.Dataset, run: int | None = None, window: Window 
     axis.set_xlim(0.0, 2.0 * math.pi)
     axis.set_xticks(np.linspace(0.0, 2.0 * math.pi, 5), _QUARTERS)
     axis.set_ylim(bottom=0.0)
-    axis.set_xlabel(label(hits["impact_phase"]))
-    axis.set_ylabel(label(hits["impact_velocity"]))
+    axis.set(xlabel=label(hits["impact_phase"]), ylabel=label(hits["impact_velocity"]))
     return figure
 
 
@@ -188,11 +175,6 @@ def draw_return_map(dataset: xr.Dataset, run: int | None = None, window: Window 
     """Draw the velocity of each impact over that of the one before it on the same stop.
 
     Points on the diagonal repeat; a motion of period n has n points, chaos a line or a thin set.
-
-    Raises
-    ------
-    DatasetError
-        If no stop is hit twice.
     """
     hits = impacts_within(dataset, run, window)
     velocity, contact = hits["impact_velocity"].values, hits["impact_contact"].values
@@ -206,7 +188,7 @@ def draw_return_map(dataset: xr.Dataset, run: int | None = None, window: Window 
     figure = canvas(82)
     axis = figure.subplots()
     pairs = {stop: (values[:-1], values[1:]) for stop, values in chains.items()}
-    _draw_dots(figure, axis, pairs, _MANY - 1)
+    _draw_dots(figure, axis, pairs, _MANY - 1)  # pairs are one less than impacts
     limit = 1.05 * max(float(values.max()) for values in chains.values())
     axis.plot([0.0, limit], [0.0, limit], color=STOP, linewidth=0.4, zorder=0)
     unit = unit_symbol(hits["impact_velocity"])

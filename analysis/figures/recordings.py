@@ -44,11 +44,6 @@ def draw_recording(recording: Recording, window: Window = ANY) -> Figure:
     Clipped samples are marked; where samples are missing or overrange a band runs through the panel. Event trains
     show the interval after each event against its time. Long channels are drawn by the smallest and largest value of
     each of some thousand spans, so that no peak is lost.
-
-    Raises
-    ------
-    DatasetError
-        There is nothing to draw.
     """
     channels = list(recording.channels.values())[:MOST_PANELS]
     trains = list(recording.events.values())[:MOST_PANELS]
@@ -175,5 +170,4 @@ def _draw_train(axis: Axes, train: EventTrain) -> None:
     if train.window is not None:
         axis.set_xlim(*train.window)
     axis.set_title(_titled(train.name, [f"{len(train.times)} events"]), fontsize=7.5, loc="left", pad=2)
-    axis.set_ylabel("interval (s)")
-    axis.set_xlabel("time (s)")
+    axis.set(xlabel="time (s)", ylabel="interval (s)")

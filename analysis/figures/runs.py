@@ -82,8 +82,7 @@ def _draw_samples(dataset: xr.Dataset, run: int | None, window: Window) -> Figur
     # long numbers of late instants and of small displacements would run together
     middle.xaxis.set_major_locator(MaxNLocator(6))
     below.xaxis.set_major_locator(MaxNLocator(5))
-    below.set_xlabel(label(samples["displacement"]))
-    below.set_ylabel(label(samples["velocity"]))
+    below.set(xlabel=label(samples["displacement"]), ylabel=label(samples["velocity"]))
     legend_outside(figure, below, ncols=2)
     return figure
 
@@ -154,6 +153,5 @@ def _draw_extremes(axis: Axes, run: xr.Dataset, observed: list[ShownStop]) -> No
 def _draw_impacts(axis: Axes, hits: xr.Dataset) -> None:
     """Draw the velocity of each impact against time."""
     axis.plot(hits["impact_time"].values, hits["impact_velocity"].values, "o", color=MARK, markersize=2)
-    axis.set_xlabel(label(hits["impact_time"].rename("time")))
-    axis.set_ylabel(label(hits["impact_velocity"]))
+    axis.set(xlabel=label(hits["impact_time"].rename("time")), ylabel=label(hits["impact_velocity"]))
     axis.set_ylim(0.0, 1.05 * float(hits["impact_velocity"].max()) if hits.sizes["impact"] else 1.0)

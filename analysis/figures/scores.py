@@ -19,13 +19,7 @@ _STYLES = ("-", "--", ":", "-.")
 
 
 def draw_scores(dataset: xr.Dataset) -> Figure:
-    """Draw the variance accounted for against the swept parameter with the most values, a line for each other point.
-
-    Raises
-    ------
-    DatasetError
-        Nothing is swept, the points are no grid, or there are more lines than can be told apart.
-    """
+    """Draw the variance accounted for against the swept parameter with the most values, a line for each other point."""
     swept = [name for name in varied(dataset) if name in dataset.variance_accounted_for.dims]
     if not swept:
         raise DatasetError(

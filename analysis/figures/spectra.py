@@ -58,11 +58,6 @@ def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Windo
 
     A harmonic motion of amplitude A is a peak of height A. Of a forced motion whole periods are taken, so that the
     multiples lie on the grid of the frequencies. Of a nondimensional scene the axis is the angular frequency.
-
-    Raises
-    ------
-    DatasetError
-        If no time series was recorded, or its samples are too few.
     """
     if not sampled_variables(dataset):
         raise DatasetError(
@@ -81,25 +76,15 @@ def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Windo
 
 
 def draw_recording_spectrum(recording: Recording, window: Window = ANY) -> Figure:
-    """Draw the amplitude spectrum of each channel of a recording: of its longest stretch without a gap.
-
-    Raises
-    ------
-    DatasetError
-        If no channel has evenly spaced samples.
-    """
+    """Draw the amplitude spectrum of each channel of a recording: of its longest stretch without a gap."""
     channels = [channel for channel in recording.channels.values() if channel.axis.interval is not None]
     if not channels:
         raise DatasetError(
             f"{recording.title}: expected a channel of evenly spaced samples, got none. "
             "Only such samples have a spectrum."
         )
-    signals = []
-    for channel in channels[:MOST_PANELS]:
-        start, stop = window.part(channel.time)
-        part = channel.between(start, stop)
-        signals.append([_Signal(channel.name, channel.unit, part.time, part.values)])
-    return _draw_panels(signals, None)
+    parts = [channel.between(*window.part(channel.time)) for channel in channels[:MOST_PANELS]]
+    return _draw_panels([[_Signal(part.name, part.unit, part.time, part.values)] for part in parts], None)
 
 
 def draw_replay_spectrum(dataset: xr.Dataset, recording: str | None = None, window: Window = ANY) -> Figure:
@@ -187,8 +172,7 @@ def _upper_edge(frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
     starts = np.arange(0, len(frequency), per_span)
     if not starts.size:
         return frequency, amplitude
-    heights: Floats = np.maximum.reduceat(amplitude, starts)
-    return frequency[starts], heights
+    return frequency[starts], np.maximum.reduceat(amplitude, starts)
 
 
 def amplitude_spectrum(

@@ -62,10 +62,8 @@ def _draw_statistic(axis: Axes, report: SpikeReport) -> None:
     _line(axis, found.time, np.maximum(magnitude, 0.01 * found.threshold), color=LINE)
     axis.axhline(found.threshold, color=MARK, label="threshold")
     axis.axhline(found.lower_threshold, color=MARK, linestyle=":", label="spike ends below")
-    axis.set_yscale("log")
+    axis.set(yscale="log", xlabel="time (s)", xlim=(float(found.time[0]), float(found.time[-1])))
     axis.set_ylabel("robust score (-)" if scores else f"from baseline ({_unit(report)})")
-    axis.set_xlabel("time (s)")
-    axis.set_xlim(float(found.time[0]), float(found.time[-1]))
     legend_above(axis, ncols=2)
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
@@ -20,13 +18,7 @@ _MANY = 100
 
 
 def draw_strobe(dataset: xr.Dataset, run: int | None = None) -> Figure:
-    """Draw displacements at forcing phase 0 against the swept parameter, or the Poincare section of one run.
-
-    Raises
-    ------
-    DatasetError
-        If nothing was recorded once per period.
-    """
+    """Draw displacements at forcing phase 0 against the swept parameter, or the Poincare section of one run."""
     if "strobe_displacement" not in dataset.variables:
         raise DatasetError(
             "figure: expected a motion recorded once per period, got none. "
@@ -51,13 +43,11 @@ def draw_section(axis: Axes, run: xr.Dataset) -> None:
     x, y = run["strobe_displacement"], run["strobe_velocity"]
     size = 2.5 if np.isfinite(x.values).sum() <= _MANY else 1.0
     axis.plot(x.values, y.values, "o", markersize=size, markeredgewidth=0.0, color=LINE, rasterized=True)
-    limits: tuple[tuple[xr.DataArray, Any], ...] = ((x, axis.set_xlim), (y, axis.set_ylim))
-    for values, limit in limits:
+    for values, limits in ((x, "xlim"), (y, "ylim")):
         same = one_value(values.values)
         if same is not None:
             # a single point: numbers around it to nine digits say nothing
             room = 0.5 * abs(same) or 1.0
-            limit(same - room, same + room)
+            axis.set(**{limits: (same - room, same + room)})
     axis.xaxis.set_major_locator(MaxNLocator(5))
-    axis.set_xlabel(label(x))
-    axis.set_ylabel(label(y))
+    axis.set(xlabel=label(x), ylabel=label(y))

@@ -85,13 +85,7 @@ def draw_bifurcation(dataset: xr.Dataset) -> Figure:
 
 
 def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
-    """Draw quantities against the one swept parameter, a panel for each: every run, period or impact is a point.
-
-    Raises
-    ------
-    DatasetError
-        If not exactly one parameter is swept.
-    """
+    """Draw quantities against the one swept parameter, a panel for each: every run, period or impact is a point."""
     if len(varied(dataset)) != 1:
         raise DatasetError(wrong_sweep("one swept parameter", dataset))
     (name,) = varied(dataset)
@@ -269,8 +263,7 @@ def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[s
     )
     # Long numbers of small distances would run into each other.
     axis.xaxis.set_major_locator(MaxNLocator(4))
-    axis.set_xlabel(label(values[along]))
-    axis.set_ylabel(label(values[across]))
+    axis.set(xlabel=label(values[along]), ylabel=label(values[across]))
     axis.label_outer()
     bar = axis.figure.colorbar(mesh, ax=axis)
     bar.set_label(text)
