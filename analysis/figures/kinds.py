@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -33,7 +33,7 @@ from vibroimpact.analysis.figures.sweeps import (
     varied,
     wrong_sweep,
 )
-from vibroimpact.analysis.figures.window import Window
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.wording import option
@@ -50,14 +50,6 @@ _WORDS: dict[Family, str] = {
 }
 # More values than this are told by their ends.
 _MOST_LISTED = 6
-
-
-class View(NamedTuple):
-    """What of the data is drawn: a run by its `run_index`, a recording of a replay, a window of time."""
-
-    run: int | None
-    recording: str | None
-    window: Window
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,38 +99,28 @@ KINDS: dict[str, FigureKind] = {
         {"runs": lambda data, view: draw_impacts_per_period(data)},
         lambda data: _swept(data, 2, "impacts_per_period"),
     ),
-    "strobe": FigureKind(
-        {"runs": lambda data, view: draw_strobe(data, view.run)},
-        lambda data: "strobe_displacement" in data,
-        ("run",),
-    ),
+    "strobe": FigureKind({"runs": draw_strobe}, lambda data: "strobe_displacement" in data, ("run",)),
     "run": FigureKind(
-        {"runs": lambda data, view: draw_run(data, view.run, view.window)},
+        {"runs": draw_run},
         lambda data: bool(sampled_variables(data)) or "displacement_max" in data or "impact_velocity" in data,
         _SINGLE,
     ),
-    "portrait": FigureKind(
-        {"runs": lambda data, view: draw_portrait(data, view.run, view.window)}, _has_pair, _SINGLE
-    ),
-    "impact-map": FigureKind(
-        {"runs": lambda data, view: draw_impact_map(data, view.run, view.window)}, _has_phases, _SINGLE
-    ),
+    "portrait": FigureKind({"runs": draw_portrait}, _has_pair, _SINGLE),
+    "impact-map": FigureKind({"runs": draw_impact_map}, _has_phases, _SINGLE),
     "return-map": FigureKind(
-        {"runs": lambda data, view: draw_return_map(data, view.run, view.window)},
-        lambda data: data.sizes.get("impact", 0) > 1,
-        _SINGLE,
+        {"runs": draw_return_map}, lambda data: data.sizes.get("impact", 0) > 1, _SINGLE
     ),
     "spectrum": FigureKind(
         {
-            "runs": lambda data, view: draw_run_spectrum(data, view.run, view.window),
-            "recording": lambda data, view: draw_recording_spectrum(data, view.window),
-            "replay": lambda data, view: draw_replay_spectrum(data, view.recording, view.window),
+            "runs": draw_run_spectrum,
+            "recording": draw_recording_spectrum,
+            "replay": draw_replay_spectrum,
         },
         lambda data: bool(sampled_variables(data)),
         (*_SINGLE, "recording"),
     ),
     "energies": FigureKind(
-        {"runs": lambda data, view: draw_energies(data, view.run, view.window)},
+        {"runs": draw_energies},
         lambda data: "modal_energy_1" in data and {"energy_kinetic", "energy_potential"} <= set(data),
         _SINGLE,
     ),

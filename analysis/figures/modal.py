@@ -10,23 +10,23 @@ from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import COLOURS, LINE, STOP, canvas, label, legend_outside, unit_symbol
 from vibroimpact.analysis.figures.series import first_after_impacts, samples_within, with_gaps
-from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
 _MODAL = re.compile(r"modal_energy_([0-9]+)")
 _START = re.compile(r"displacement_start_([0-9]+)")
 
 
-def draw_energies(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_energies(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the total energy of a run and the energies of its modes over time, with its impacts."""
-    samples = samples_within(dataset, run, window)
+    samples = samples_within(dataset, view)
     modal = [(int(m[1]), m[0]) for m in map(_MODAL.fullmatch, map(str, samples.data_vars)) if m]
     if not modal or not {"energy_kinetic", "energy_potential"} <= set(map(str, samples.data_vars)):
         raise DatasetError(
             "figure: expected kinetic, potential and modal energies in the time series, got not all of them. "
             'Set variables = ["energy.kinetic", "energy.potential", "modal_energy[1]", ...] in time_series.'
         )
-    jumps = first_after_impacts(dataset, run, samples["time"].values)
+    jumps = first_after_impacts(dataset, view.run, samples["time"].values)
     time = with_gaps(samples["time"].values, jumps)
     figure = canvas(95)
     above, below = figure.subplots(2, 1, sharex=True)

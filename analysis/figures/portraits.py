@@ -28,7 +28,7 @@ from vibroimpact.analysis.figures.page import (
 )
 from vibroimpact.analysis.figures.scene_text import limits, swept_keys, table
 from vibroimpact.analysis.figures.series import first_after_impacts, impacts_within, samples_within, with_gaps
-from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
 _PANEL_MM = 62
@@ -50,19 +50,19 @@ class _Orbit(NamedTuple):
     velocity: Floats
 
 
-def draw_portrait(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_portrait(dataset: xr.Dataset, view: View) -> Figure:
     """Draw velocity against displacement for each sampled pair; of a whole chain its modes too.
 
     Lines end at an impact and begin again after it, joined by dots.
     """
-    samples = samples_within(dataset, run, window)
+    samples = samples_within(dataset, view)
     orbits = _sampled_orbits(samples)
     if not orbits:
         raise DatasetError(
             "figure: expected a displacement and its velocity in the time series, got no such pair. "
             'Set variables = ["displacement", "velocity"] in time_series.'
         )
-    jumps = first_after_impacts(dataset, run, samples["time"].values)
+    jumps = first_after_impacts(dataset, view.run, samples["time"].values)
     nondimensional = dataset.attrs.get("units_system") == "nondimensional"
     modal = _modal_orbits(dataset, orbits)
     panels = [(orbits, ("-", "-") if nondimensional else ("m", "m/s"))]
@@ -129,9 +129,9 @@ def _modal_orbits(dataset: xr.Dataset, orbits: list[_Orbit]) -> list[_Orbit]:
     return [_Orbit(f"mode_{j + 1}", f"mode {j + 1}", q[j], p[j]) for j in range(masses.size)]
 
 
-def draw_impact_map(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_impact_map(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the impacts of one run in the plane of the impact map: forcing phase and velocity before impact."""
-    hits = impacts_within(dataset, run, window)
+    hits = impacts_within(dataset, view)
     phase, velocity = hits["impact_phase"].values, hits["impact_velocity"].values
     if not np.isfinite(phase).any():
         raise DatasetError(
@@ -171,12 +171,12 @@ def _draw_dots(
         legend_outside(figure, axis, ncols=4, markerscale=2.0)
 
 
-def draw_return_map(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_return_map(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the velocity of each impact over that of the one before it on the same stop.
 
     Points on the diagonal repeat; a motion of period n has n points, chaos a line or a thin set.
     """
-    hits = impacts_within(dataset, run, window)
+    hits = impacts_within(dataset, view)
     velocity, contact = hits["impact_velocity"].values, hits["impact_contact"].values
     chains = {int(number): velocity[contact == number] for number in np.unique(contact)}
     chains = {number: values for number, values in chains.items() if values.size > 1}

@@ -24,7 +24,7 @@ from vibroimpact.analysis.figures.page import (
 from vibroimpact.analysis.figures.scene_text import ShownStop, observed_stops, stops
 from vibroimpact.analysis.figures.series import draw_series, sampled_variables, selected, time_part
 from vibroimpact.analysis.figures.strobe import draw_section
-from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.wording import option
 
@@ -32,7 +32,7 @@ from vibroimpact.fmus.wording import option
 _MOST_LARGE_MARKS = 100
 
 
-def draw_run(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_run(dataset: xr.Dataset, view: View) -> Figure:
     """Draw one run: time series with the stop and the impacts, and the phase portrait.
 
     Variables of components, and of a body where more than displacement and velocity was sampled, are drawn as
@@ -42,13 +42,13 @@ def draw_run(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) 
     """
     sampled = sampled_variables(dataset)
     if set(sampled) == {"displacement", "velocity"}:
-        return _draw_samples(dataset, run, window)
+        return _draw_samples(dataset, view)
     if sampled:
-        return draw_series(dataset, run, window)
-    if window.given:
+        return draw_series(dataset, view)
+    if view.window.given:
         raise UsageError("figure: window: expected a run with a time series, got none recorded.")
     if "displacement_max" in dataset.variables or "impact_velocity" in dataset.variables:
-        return _draw_periods(dataset, run)
+        return _draw_periods(dataset, view.run)
     raise DatasetError(
         "figure: expected a time series, extrema or impacts of the run, got none recorded. "
         'Set time_series = { rate = ..., variables = ["displacement", "velocity"] } in [record], '
@@ -56,17 +56,17 @@ def draw_run(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) 
     )
 
 
-def _draw_samples(dataset: xr.Dataset, run: int | None, window: Window) -> Figure:
+def _draw_samples(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the sampled displacement and velocity of a run."""
-    samples = dataset.vibroimpact.samples(**selected(run))
-    marks = _impact_points(dataset, run)
+    samples = dataset.vibroimpact.samples(**selected(view.run))
+    marks = _impact_points(dataset, view.run)
     words_of_marks = "just before impact" if len(marks) else None
-    part, words = time_part(dataset, samples, window)
+    part, words = time_part(dataset, samples, view.window)
     figure = canvas(150)
     above, middle, below = figure.subplots(3, 1, height_ratios=[1, 1, 1.5])
     dots = {"linestyle": "none", "marker": "o", "color": MARK, "zorder": 3}
     for axis, columns in ((above, (0, 1)), (middle, (0, 2)), (below, (1, 2))):
-        shown = part if axis is not below or window.given else (-math.inf, math.inf)
+        shown = part if axis is not below or view.window.given else (-math.inf, math.inf)
         rows, inside = _with_impacts(samples, marks, shown)
         axis.plot(rows[:, columns[0]], rows[:, columns[1]], color=LINE, rasterized=True)
         size = 2.2 if len(inside) <= _MOST_LARGE_MARKS else 0.8

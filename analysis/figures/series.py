@@ -25,7 +25,7 @@ from vibroimpact.analysis.figures.page import (
     unit_symbol,
 )
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order, limits
-from vibroimpact.analysis.figures.window import ANY, SHOWN_PERIODS, Window
+from vibroimpact.analysis.figures.window import SHOWN_PERIODS, View, Window
 from vibroimpact.fmus.errors import DatasetError
 
 _STYLES = ("-", "--", ":", "-.")
@@ -53,20 +53,20 @@ def sampled_variables(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-def draw_series(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_series(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the sampled variables of one run against time: a panel for each quantity, its stops, marks at the events.
 
     Panels and lines are in the order of the scene. Without a window the first forcing periods of a long record are
     drawn.
     """
-    samples = dataset.vibroimpact.samples(**selected(run))
-    part, words = time_part(dataset, samples, window)
+    samples = dataset.vibroimpact.samples(**selected(view.run))
+    part, words = time_part(dataset, samples, view.window)
     time = samples["time"].values
     samples = samples.isel(time=(time >= part[0]) & (time <= part[1]))
     panels: dict[tuple[str, str], list[xr.DataArray]] = {}
     for name in in_scene_order(dataset, sampled_variables(samples)):
         panels.setdefault((unit_symbol(samples[name]), _quantity(samples[name])), []).append(samples[name])
-    kind, instants = _instants(dataset, run)
+    kind, instants = _instants(dataset, view.run)
     instants = instants[(instants >= part[0]) & (instants <= part[1])]
     rows = sum(-(-len(variables) // _columns(variables)) for variables in panels.values())
     figure = canvas(8 + _PANEL_MM * len(panels) + _ROW_MM * rows)
@@ -100,23 +100,23 @@ def selected(run: int | None) -> dict[str, int]:
     return {} if run is None else {"run_index": run}
 
 
-def samples_within(dataset: xr.Dataset, run: int | None, window: Window) -> xr.Dataset:
+def samples_within(dataset: xr.Dataset, view: View) -> xr.Dataset:
     """Return the samples of a run in a window; all of them where none is given."""
-    samples: xr.Dataset = dataset.vibroimpact.samples(**selected(run))
-    if not window.given:
+    samples: xr.Dataset = dataset.vibroimpact.samples(**selected(view.run))
+    if not view.window.given:
         return samples
-    (start, stop), _ = time_part(dataset, samples, window)
+    (start, stop), _ = time_part(dataset, samples, view.window)
     time = samples["time"].values
     return samples.isel(time=np.flatnonzero((time >= start) & (time <= stop)))
 
 
-def impacts_within(dataset: xr.Dataset, run: int | None, window: Window) -> xr.Dataset:
+def impacts_within(dataset: xr.Dataset, view: View) -> xr.Dataset:
     """Return the impacts of a run in a window; all of them where none is given."""
-    hits: xr.Dataset = dataset.vibroimpact.impacts(**selected(run))
-    if not window.given:
+    hits: xr.Dataset = dataset.vibroimpact.impacts(**selected(view.run))
+    if not view.window.given:
         return hits
     time, rate = hits["impact_time"].values, forcing_rate(dataset, hits)
-    start, stop = window.part(time, None if rate is None else 2.0 * math.pi / rate)
+    start, stop = view.window.part(time, None if rate is None else 2.0 * math.pi / rate)
     return hits.isel(impact=np.flatnonzero((time >= start) & (time <= stop)))
 
 
@@ -124,7 +124,8 @@ def first_after_impacts(dataset: xr.Dataset, run: int | None, time: Floats) -> n
     """Return the places of the first instants after the impacts of a run, for impacts between two instants."""
     if "impact" not in dataset.dims:
         return np.empty(0, dtype=np.intp)
-    places = np.searchsorted(time, impacts_within(dataset, run, ANY)["impact_time"].values)
+    impacts: Floats = dataset.vibroimpact.impacts(**selected(run))["impact_time"].values
+    places = np.searchsorted(time, impacts)
     return places[(places > 0) & (places < time.size)]
 
 

@@ -25,7 +25,7 @@ from vibroimpact.analysis.figures.recordings import MOST_PANELS, short_name, spa
 from vibroimpact.analysis.figures.replay import comparison_of
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order
 from vibroimpact.analysis.figures.series import sampled_variables, samples_within
-from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.units import written_unit
@@ -53,7 +53,7 @@ class _Signal(NamedTuple):
     colour: str = LINE
 
 
-def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_run_spectrum(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the amplitude spectra of the sampled variables of one run, with the multiples of its forcing frequency.
 
     A harmonic motion of amplitude A is a peak of height A. Of a forced motion whole periods are taken, so that the
@@ -64,7 +64,7 @@ def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Windo
             "figure: expected a time series of the run, got none recorded. "
             'Set time_series = { rate = ..., variables = ["displacement"] } in [record].'
         )
-    samples = samples_within(dataset, run, window)
+    samples = samples_within(dataset, view)
     names = in_scene_order(dataset, sampled_variables(samples))[:MOST_PANELS]
     time = samples["time"].values
     signals = [
@@ -75,7 +75,7 @@ def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Windo
     return _draw_panels(signals, forcing_rate(dataset, samples), is_run=True, is_angular=is_angular)
 
 
-def draw_recording_spectrum(recording: Recording, window: Window = ANY) -> Figure:
+def draw_recording_spectrum(recording: Recording, view: View) -> Figure:
     """Draw the amplitude spectrum of each channel of a recording: of its longest stretch without a gap."""
     channels = [channel for channel in recording.channels.values() if channel.axis.interval is not None]
     if not channels:
@@ -83,16 +83,16 @@ def draw_recording_spectrum(recording: Recording, window: Window = ANY) -> Figur
             f"{recording.title}: expected a channel of evenly spaced samples, got none. "
             "Only such samples have a spectrum."
         )
-    parts = [channel.between(*window.part(channel.time)) for channel in channels[:MOST_PANELS]]
+    parts = [channel.between(*view.window.part(channel.time)) for channel in channels[:MOST_PANELS]]
     return _draw_panels([[_Signal(part.name, part.unit, part.time, part.values)] for part in parts], None)
 
 
-def draw_replay_spectrum(dataset: xr.Dataset, recording: str | None = None, window: Window = ANY) -> Figure:
+def draw_replay_spectrum(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the amplitude spectra of a measured signal and of its replay over each other."""
-    name, words = comparison_of(dataset, recording)
+    name, words = comparison_of(dataset, view.recording)
     measured = dataset[f"{name}_measured"]
     time = measured[str(measured.dims[0])].values
-    start, stop = window.part(time)
+    start, stop = view.window.part(time)
     rows = (time >= start) & (time <= stop)
     signals = [
         _Signal(

@@ -11,23 +11,24 @@ from matplotlib.ticker import MaxNLocator
 from vibroimpact.analysis.figures.page import LINE, STOP_LINE, canvas, label
 from vibroimpact.analysis.figures.scene_text import observed_stops
 from vibroimpact.analysis.figures.sweeps import draw_diagram, one_value, varied
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
 # Points of a section above which they are small, so that the layers of an attractor show.
 _MANY = 100
 
 
-def draw_strobe(dataset: xr.Dataset, run: int | None = None) -> Figure:
+def draw_strobe(dataset: xr.Dataset, view: View) -> Figure:
     """Draw displacements at forcing phase 0 against the swept parameter, or the Poincare section of one run."""
     if "strobe_displacement" not in dataset.variables:
         raise DatasetError(
             "figure: expected a motion recorded once per period, got none. "
             "Set strobe = true in [record] of a forced scene."
         )
-    if run is None and varied(dataset):
+    if view.run is None and varied(dataset):
         return draw_diagram(dataset, ["strobe_displacement"])
     runs = dataset.vibroimpact.runs
-    chosen = runs if run is None else runs.isel(run=runs["run_index"].values == run)
+    chosen = runs if view.run is None else runs.isel(run=runs["run_index"].values == view.run)
     figure = canvas(75)
     axis = figure.subplots()
     draw_section(axis, chosen.isel(run=0))

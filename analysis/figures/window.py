@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from vibroimpact.analysis.figures.page import Floats
 from vibroimpact.fmus.errors import UsageError
@@ -92,3 +93,11 @@ def _names() -> tuple[str, str]:
 
 #: Nothing was asked for.
 ANY = Window()
+
+
+class View(NamedTuple):
+    """What of the data is drawn: a run by its `run_index`, a recording of a replay, a window of time."""
+
+    run: int | None
+    recording: str | None
+    window: Window
