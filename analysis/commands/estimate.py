@@ -31,20 +31,7 @@ from vibroimpact.fmus.terminal import Terminal, wide_terminal
 
 @dataclass(frozen=True, slots=True)
 class Estimation:
-    """What every estimation is asked for: the options that all of them have.
-
-    Attributes
-    ----------
-    data : Path
-    channel : str or None
-    start, stop : float or None
-        Ends of the window, s.
-    run : int or None
-    output, figure : Path or None
-        Files to write.
-    force : bool
-        Whether `output` may hold something else.
-    """
+    """What every estimation is asked for: the options that all of them have, the window in s."""
 
     data: Path
     channel: str | None
@@ -96,12 +83,27 @@ def response_of(
     if estimator not in ("h1", "h2"):
         raise UsageError(f'--estimator: expected h1 or h2, got "{estimator}".')
     with _estimating(asked) as console:
-        if drive is not None:
-            dataset = _driven(console, asked, drive, form, band, segment, window, estimator)
-        elif is_recording(asked.data):
+        if drive is None and is_recording(asked.data):
             raise UsageError("--drive: expected the channel that drives, got none. Name it.")
-        else:
+        if drive is None:
             dataset = _swept(console, asked.data, band)
+        else:
+            recording = open_signals(asked.data, asked.run)
+            others = [name for name in recording.channels if name != drive]
+            answer = recording.channel(asked.channel or (others[0] if len(others) == 1 else None))
+            found = frequency_response(
+                recording.channel(drive),
+                answer,
+                segment=segment,
+                window=window,
+                start=asked.start,
+                stop=asked.stop,
+            )
+            resonance = fit_resonance(curve_of(found, form, band, estimator))
+            title = f"Response of {answer.name} to {drive}"
+            remarks = (*recording.remarks_counted, *found.remarks, *resolution_remark(found, resonance))
+            estimates = ResponseEstimates(resonance, found, title, found.unit, remarks)
+            dataset = _sourced(_shown_response(console, estimates), asked.data, recording)
     _write(console, dataset, asked)
 
 
@@ -117,29 +119,6 @@ def _estimating(asked: Estimation) -> Iterator[Terminal]:
         yield wide_terminal()
     except EstimationError as problem:
         raise EstimationError(f"{asked.data}: {problem}") from problem
-
-
-def _driven(
-    console: Terminal,
-    asked: Estimation,
-    drive: str,
-    form: str,
-    band: tuple[float, float] | None,
-    segment: int | None,
-    window: str,
-    estimator: str,
-) -> xr.Dataset:
-    recording = open_signals(asked.data, asked.run)
-    others = [name for name in recording.channels if name != drive]
-    answer = recording.channel(asked.channel or (others[0] if len(others) == 1 else None))
-    response = frequency_response(
-        recording.channel(drive), answer, segment=segment, window=window, start=asked.start, stop=asked.stop
-    )
-    resonance = fit_resonance(curve_of(response, form, band, estimator))
-    title = f"Response of {answer.name} to {drive}"
-    remarks = (*recording.remarks_counted, *response.remarks, *resolution_remark(response, resonance))
-    estimates = ResponseEstimates(resonance, response, title, response.unit, remarks)
-    return _sourced(_shown_response(console, estimates), asked.data, recording)
 
 
 def _swept(console: Terminal, data: Path, band: tuple[float, float] | None) -> xr.Dataset:
@@ -171,11 +150,8 @@ def _channel(recording: Recording, name: str | None) -> Channel:
 
 
 def _sourced(dataset: xr.Dataset, data: Path, recording: Recording) -> xr.Dataset:
-    known = {
-        key: recording.attrs[key]
-        for key in ("source_sha256", "scene")
-        if recording.attrs.get(key) is not None
-    }
+    known = {key: recording.attrs.get(key) for key in ("source_sha256", "scene")}
+    known = {key: value for key, value in known.items() if value is not None}
     return dataset.assign_attrs(source_file=data.name, **known)
 
 
@@ -187,13 +163,9 @@ def _write(console: Terminal, dataset: xr.Dataset, asked: Estimation) -> None:
         console.print(f"Estimates written to {asked.output}.")
     if asked.figure is not None:
         with writing(asked.figure):
-            _draw(dataset, asked.figure)
+            # matplotlib takes half a second to import; estimates alone do not pay for it.
+            from vibroimpact.analysis.figures import save
+            from vibroimpact.analysis.figures.estimates import draw_estimates
+
+            save(draw_estimates(dataset), asked.figure)
         console.print(f"Figure written to {asked.figure}.")
-
-
-def _draw(dataset: xr.Dataset, path: Path) -> None:
-    # matplotlib takes half a second to import; estimates alone do not pay for it.
-    from vibroimpact.analysis.figures import save
-    from vibroimpact.analysis.figures.estimates import draw_estimates
-
-    save(draw_estimates(dataset), path)

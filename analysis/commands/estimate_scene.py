@@ -32,25 +32,10 @@ _OPTION_RULES = {
 class ImpactOptions:
     """What a person says about impacting motion; None: not said.
 
-    Attributes
-    ----------
-    forcing_frequency, natural_frequency : float or None
-        Hz; a forcing frequency of 0 says that no force oscillates.
-    angular_frequency : float or None
-        Of the force, rad/s; 0 likewise.
-    amplitude, static_deflection : float or None
-        Force, N, and force over stiffness, unit of the channel.
-    phase : float or None
-        rad.
-    stop : float or None
-        Unit of the channel.
-    damping_ratio : float or None
-    mass : float or None
-        kg.
-    offset : float or None
-        What the channel reads at rest, in its unit.
-    clock_drifts : bool
-        The forcing frequency is a start value only.
+    Forcing and natural frequency are in Hz, the angular frequency of the force in rad/s, its amplitude in N, its phase
+    in rad, the mass in kg; static deflection (force over stiffness), stop and offset (what the channel reads at rest)
+    in the unit of the channel. A forcing frequency of 0 says that no force oscillates; with `clock_drifts` it is a
+    start value only.
     """
 
     forcing_frequency: float | None = None
@@ -76,13 +61,7 @@ class ImpactOptions:
 
 
 def kind_of(data: Path, *, one_run: bool) -> str:
-    """Return what `vibroimpact estimate` finds in data: decay, impacts or response.
-
-    Parameters
-    ----------
-    data : Path
-    one_run : bool
-        Whether one run is looked at: then a sweep of the frequency is no response.
+    """Return what `vibroimpact estimate` finds in data: decay, impacts or response; of one run never a response.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from vibroimpact.analysis.commands.estimate_options import estimate
+from vibroimpact.analysis.commands.estimate_options import WindowEnd, WindowStart, estimate
 from vibroimpact.analysis.commands.shared_options import DatasetFile, FigureFile, Force
 from vibroimpact.fmus.commands import commands as fmu_commands
 
@@ -46,8 +46,8 @@ def plot(
         str | None,
         typer.Option(help="Recording of a replay, fitted or not: a1.nc, or the name of a comparison."),
     ] = None,
-    start: Annotated[float | None, typer.Option("--from", help="Start of the window, s.")] = None,
-    stop: Annotated[float | None, typer.Option("--to", help="End of the window, s.")] = None,
+    start: WindowStart = None,
+    stop: WindowEnd = None,
     periods: Annotated[
         float | None,
         typer.Option(help="Length of the window in forcing periods, after --from or before --to."),

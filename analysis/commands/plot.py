@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,6 @@ from vibroimpact.analysis import figures
 from vibroimpact.analysis.commands.opened_file import opened_file
 from vibroimpact.analysis.dataset import dataset_file
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, writing
-from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.terminal import say
 
@@ -22,31 +21,21 @@ def draw_file(file: Path, output: Path, kind: str, run: int | None, options: Map
     file = dataset_file(file)
     refuse_outputs([file], None, output)
     with opened_file(file) as data:
-        _refuse_few_spikes(file, data)
-        figure = _drawn(file, data, lambda: figures.draw(data, kind, run, **options))
+        results = data.attrs.get("results_kind")
+        if isinstance(data, xr.Dataset) and results == "spikes" and "interval" not in data:
+            raise UsageError(
+                f"{file}: expected at least three spikes, whose intervals can be drawn, got fewer. "
+                "`vibroimpact spikes --figure` draws them beside the signal."
+            )
+        try:
+            figure = figures.draw(data, kind, run, **options)
+        except (LookupError, ValueError, TypeError, AttributeError) as problem:
+            # results may lack what their figure shows, or be another's
+            if results is None:
+                raise
+            raise DatasetError(
+                f"{file}: expected what `vibroimpact {results}` writes, got other contents: {str(problem)[:200]}"
+            ) from problem
     with writing(output):
         figures.save(figure, output)
     say(f"Figure written to {output}.")
-
-
-def _refuse_few_spikes(file: Path, data: xr.Dataset | Recording) -> None:
-    if isinstance(data, Recording) or data.attrs.get("results_kind") != "spikes":
-        return
-    if "interval" not in data:
-        raise UsageError(
-            f"{file}: expected at least three spikes, whose intervals can be drawn, got fewer. "
-            "`vibroimpact spikes --figure` draws them beside the signal."
-        )
-
-
-def _drawn(file: Path, data: xr.Dataset | Recording, draw: Callable[[], figures.Figure]) -> figures.Figure:
-    """Return the figure of a file; results may lack what their figure shows, or be another's."""
-    kind = data.attrs.get("results_kind")
-    if kind is None:
-        return draw()
-    try:
-        return draw()
-    except (LookupError, ValueError, TypeError, AttributeError) as problem:
-        raise DatasetError(
-            f"{file}: expected what `vibroimpact {kind}` writes, got other contents: {str(problem)[:200]}"
-        ) from problem

@@ -38,16 +38,10 @@ def _chosen(source: Recording, names: Sequence[str]) -> list[Channel]:
 
 
 def replay_signal(channel: Channel, *, si: bool = False) -> ReplaySignal:
-    """Return a channel as what `build_replay` takes.
+    """Return a channel as what `build_replay` takes, in its own unit or in the SI unit of its kind.
 
-    Parameters
-    ----------
-    channel : Channel
-        Its samples without a value (NaN) stay gaps; clipped ones are played as they are.
-    si : bool
-        In the SI unit of its kind instead of its own.
+    Samples without a value (NaN) stay gaps; clipped ones are played as they are.
     """
-
     unit = measured_unit(channel.unit)
     values, name = (channel.si(), unit.si) if si else (channel.values, unit.cf)
     time, interval = channel.time, channel.axis.interval

@@ -17,11 +17,11 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.kinds import KINDS, View, draw_view
+from vibroimpact.analysis.figures.kinds import KINDS, draw_view
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, drawing_into, label, laid_out, save
 from vibroimpact.analysis.figures.sweeps import largest_impact_velocity
-from vibroimpact.analysis.figures.window import Window
+from vibroimpact.analysis.figures.window import View, Window
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import UsageError
 

@@ -15,13 +15,7 @@ _PANEL_MM = 32
 
 
 def draw_estimates(dataset: xr.Dataset) -> Figure:
-    """Draw the dataset of `vibroimpact estimate`: what it shows follows from what was estimated.
-
-    Raises
-    ------
-    DatasetError
-        If it is no such dataset.
-    """
+    """Draw the dataset of `vibroimpact estimate`: what it shows follows from what was estimated."""
     drawers = {"decay": _draw_decay, "response": _draw_response, "impacts": draw_impact_estimate}
     kind = str(dataset.attrs.get("estimates", ""))
     if kind not in drawers:
@@ -39,14 +33,15 @@ def _draw_decay(dataset: xr.Dataset) -> Figure:
     panels += [_draw_peaks] * ("peak_height" in dataset)
     windows = [_draw_frequency, _draw_damping] if "window" in dataset.dims else []
     figure = canvas(14 + _PANEL_MM * (len(panels) + len(windows)))
-    axes = figure.subplots(len(panels) + len(windows), 1, squeeze=False)[:, 0]
+    axes = figure.subplots(len(panels) + len(windows), 1)
     for axis, draw in zip(axes, panels + windows, strict=True):
         draw(axis, dataset)
-    for axis in axes[: len(panels)]:
+    over_time, over_amplitude = axes[: len(panels)], axes[len(panels) :]
+    for axis in over_time:
         axis.set_xlim(float(dataset.time[0]), float(dataset.time[-1]))
-        axis.set_xlabel("time (s)" if axis is axes[len(panels) - 1] else "")
-        axis.tick_params(labelbottom=axis is axes[len(panels) - 1])
-    for axis in axes[len(panels) :]:
+        axis.set_xlabel("time (s)" if axis is over_time[-1] else "")
+        axis.tick_params(labelbottom=axis is over_time[-1])
+    for axis in over_amplitude:
         axis.set_xlim(left=0.0)
         axis.tick_params(labelbottom=axis is axes[-1])
     if windows:
@@ -92,25 +87,23 @@ def _draw_peaks(axis: Axes, dataset: xr.Dataset) -> None:
     line = -0.5 * decrement * (number - number[0])
     level = np.average(np.log(height) - line, weights=height**2)
     axis.plot(dataset.peak_time, np.exp(level + line), color=MARK, linewidth=0.6, label="one decrement")
-    axis.set_yscale("log")
-    axis.set_ylabel(f"peaks ({unit_symbol(dataset.measured)})")
+    axis.set(yscale="log", ylabel=f"peaks ({unit_symbol(dataset.measured)})")
     axis.legend(frameon=False, loc="lower left", borderaxespad=0.1)
 
 
 def _draw_frequency(axis: Axes, dataset: xr.Dataset) -> None:
-    _draw_backbone(axis, dataset, "window_frequency", 2.0 * np.pi)
-    axis.set_ylabel("frequency (Hz)")
+    _draw_backbone(axis, dataset, "window_frequency", 2.0 * np.pi, "frequency (Hz)")
 
 
 def _draw_damping(axis: Axes, dataset: xr.Dataset) -> None:
-    _draw_backbone(axis, dataset, "window_damping", 1.0)
-    axis.set_ylabel("damping ratio (-)")
+    _draw_backbone(axis, dataset, "window_damping", 1.0, "damping ratio (-)")
 
 
-def _draw_backbone(axis: Axes, dataset: xr.Dataset, name: str, unit: float) -> None:
+def _draw_backbone(axis: Axes, dataset: xr.Dataset, name: str, unit: float, words: str) -> None:
     """Draw a variable of the windows over their amplitude, with its intervals."""
     x, y, error = (dataset[n].values for n in ("window_amplitude", name, f"{name}_error"))
     y, error = y / unit, error / unit
+    axis.set_ylabel(words)
     axis.ticklabel_format(axis="y", useOffset=False)
     axis.errorbar(x, y, yerr=1.96 * error, fmt="o", markersize=2, color=LINE, elinewidth=0.6, capsize=1.5)
     # One bad window must not press all others flat.
@@ -165,14 +158,11 @@ def _draw_response(dataset: xr.Dataset) -> Figure:
         label="measured" if measured else "simulated",
     )
     axes[0].plot(hertz, dataset.fitted_response, color=MARK, label="fitted resonance", zorder=3)
-    axes[0].set_yscale("log")
-    axes[0].set_ylabel(f"response ({unit_symbol(dataset.response)})")
+    axes[0].set(yscale="log", ylabel=f"response ({unit_symbol(dataset.response)})")
     axes[0].legend(frameon=False, loc="best", borderaxespad=0.3)
     if coherent:
         near = (dataset.frequency >= hertz[0]) & (dataset.frequency <= hertz[-1])
         axes[1].plot(dataset.frequency[near], dataset.coherence[near], color=LINE)
-        axes[1].set_ylabel("coherence (-)")
-        axes[1].set_ylim(0.0, 1.05)
-    axes[-1].set_xlabel("frequency (Hz)")
-    axes[-1].set_xlim(float(hertz[0]), float(hertz[-1]))
+        axes[1].set(ylim=(0.0, 1.05), ylabel="coherence (-)")
+    axes[-1].set(xlim=(float(hertz[0]), float(hertz[-1])), xlabel="frequency (Hz)")
     return figure

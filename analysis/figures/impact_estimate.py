@@ -86,8 +86,7 @@ def _draw_motion(axes: np.ndarray, dataset: xr.Dataset) -> None:
         lower.axhspan(-2.0 * noise, 2.0 * noise, color=STOP, alpha=0.25, linewidth=0.0, zorder=0)
     lower.axhline(0.0, color="k", linewidth=0.3)
     lower.set_ylabel(f"residual ({unit_symbol(dataset.measured)})")
-    lower.set_xlabel("time (s)")
-    lower.set_xlim(low, high)
+    lower.set(xlim=(low, high), xlabel="time (s)")
 
 
 def _window(dataset: xr.Dataset) -> tuple[float, float, str]:

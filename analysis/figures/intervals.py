@@ -23,18 +23,10 @@ _KINDS = {"raw": "intervals", "log": "log intervals"}
 
 
 def draw_intervals(report: xr.Dataset) -> Figure:
-    """Draw the report of `interval_report`.
+    """Draw the dataset of `interval_report`, two columns (170 mm) wide.
 
-    Parameters
-    ----------
-    report : xarray.Dataset
-        As `analysis.intervals.interval_report` returns it.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Two columns (170 mm) wide: delay plot and density above; below the local slopes of the correlation sums of the
-        intervals and of their logarithms, for every embedding m, with shuffled surrogates dashed.
+    Delay plot and density above; below the local slopes of the correlation sums of the intervals and of their
+    logarithms, for every embedding m, with shuffled surrogates dashed.
     """
     with page_style():
         figure = canvas(_HEIGHT_MM, _WIDE)

@@ -33,7 +33,7 @@ from vibroimpact.analysis.figures.sweeps import (
     varied,
     wrong_sweep,
 )
-from vibroimpact.analysis.figures.window import Window
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.wording import option
@@ -53,31 +53,14 @@ _MOST_LISTED = 6
 
 
 @dataclass(frozen=True, slots=True)
-class View:
-    """What of the data is drawn.
-
-    Attributes
-    ----------
-    run : int or None
-        `run_index` of one run.
-    recording : str or None
-        Of a replay.
-    window : Window
-    """
-
-    run: int | None
-    recording: str | None
-    window: Window
-
-
-@dataclass(frozen=True, slots=True)
 class FigureKind:
     """A kind of figure.
 
     Attributes
     ----------
     families : dict
-        For each family of data that it draws, the function that does.
+        For each family of data that it draws, the function that does, or raises a DatasetError where the data does not
+        hold what the figure shows.
     fits : callable
         Whether a dataset of runs holds what the figure shows.
     takes : tuple of str
@@ -85,7 +68,7 @@ class FigureKind:
     """
 
     families: dict[Family, Callable[[Any, View], Figure]]
-    fits: Callable[[xr.Dataset], bool] = lambda dataset: True
+    fits: Callable[[Any], bool] = lambda dataset: True
     takes: tuple[str, ...] = ()
 
 
@@ -116,38 +99,28 @@ KINDS: dict[str, FigureKind] = {
         {"runs": lambda data, view: draw_impacts_per_period(data)},
         lambda data: _swept(data, 2, "impacts_per_period"),
     ),
-    "strobe": FigureKind(
-        {"runs": lambda data, view: draw_strobe(data, view.run)},
-        lambda data: "strobe_displacement" in data,
-        ("run",),
-    ),
+    "strobe": FigureKind({"runs": draw_strobe}, lambda data: "strobe_displacement" in data, ("run",)),
     "run": FigureKind(
-        {"runs": lambda data, view: draw_run(data, view.run, view.window)},
+        {"runs": draw_run},
         lambda data: bool(sampled_variables(data)) or "displacement_max" in data or "impact_velocity" in data,
         _SINGLE,
     ),
-    "portrait": FigureKind(
-        {"runs": lambda data, view: draw_portrait(data, view.run, view.window)}, _has_pair, _SINGLE
-    ),
-    "impact-map": FigureKind(
-        {"runs": lambda data, view: draw_impact_map(data, view.run, view.window)}, _has_phases, _SINGLE
-    ),
+    "portrait": FigureKind({"runs": draw_portrait}, _has_pair, _SINGLE),
+    "impact-map": FigureKind({"runs": draw_impact_map}, _has_phases, _SINGLE),
     "return-map": FigureKind(
-        {"runs": lambda data, view: draw_return_map(data, view.run, view.window)},
-        lambda data: data.sizes.get("impact", 0) > 1,
-        _SINGLE,
+        {"runs": draw_return_map}, lambda data: data.sizes.get("impact", 0) > 1, _SINGLE
     ),
     "spectrum": FigureKind(
         {
-            "runs": lambda data, view: draw_run_spectrum(data, view.run, view.window),
-            "recording": lambda data, view: draw_recording_spectrum(data, view.window),
-            "replay": lambda data, view: draw_replay_spectrum(data, view.recording, view.window),
+            "runs": draw_run_spectrum,
+            "recording": draw_recording_spectrum,
+            "replay": draw_replay_spectrum,
         },
         lambda data: bool(sampled_variables(data)),
         (*_SINGLE, "recording"),
     ),
     "energies": FigureKind(
-        {"runs": lambda data, view: draw_energies(data, view.run, view.window)},
+        {"runs": draw_energies},
         lambda data: "modal_energy_1" in data and {"energy_kinetic", "energy_potential"} <= set(data),
         _SINGLE,
     ),
@@ -171,8 +144,6 @@ KINDS: dict[str, FigureKind] = {
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
-#: Kinds that draw all runs; a kind that takes a run, and is none of these, draws a single one.
-_OF_ALL = ("strobe",)
 
 
 def draw_view(data: Data, kind: str, view: View) -> Figure:
@@ -195,12 +166,12 @@ def draw_view(data: Data, kind: str, view: View) -> Figure:
             f"figure: kind: expected one that fits {_WORDS[family]} ({', '.join(fitting(data))}), got {chosen!r}."
         )
     _refuse_options(data, chosen, family, view)
-    if not isinstance(data, Recording) and family == "runs":
+    if family == "runs":
         _refuse_run(data, chosen, view.run)
     try:
         return drawer(data, view)
     except DatasetError as problem:
-        if family != "runs" or (not isinstance(data, Recording) and KINDS[chosen].fits(data)):
+        if family != "runs" or KINDS[chosen].fits(data):
             raise
         raise DatasetError(f"{problem} Kinds that fit: {', '.join(fitting(data)) or 'none'}.") from problem
 
@@ -211,7 +182,7 @@ def fitting(data: Data) -> list[str]:
     return [
         name
         for name, kind in KINDS.items()
-        if family in kind.families and (isinstance(data, Recording) or family != "runs" or kind.fits(data))
+        if family in kind.families and (family != "runs" or kind.fits(data))
     ]
 
 
@@ -235,11 +206,10 @@ def _family(data: Data) -> Family:
     return "runs" if "run_index" in data.variables else "ladder"
 
 
-def _usual(data: Data, family: Family, view: View) -> str:
+def _usual(data: Any, family: Family, view: View) -> str:
     """Return the kind that says most of data."""
-    names: dict[Family, str] = {"spikes": "intervals", "ladder": "convergence"}
-    if isinstance(data, Recording) or family != "runs":
-        return names.get(family, family)
+    if family != "runs":
+        return {"spikes": "intervals", "ladder": "convergence"}.get(family, family)
     swept = varied(data)
     if view.run is not None or not swept:
         return "run"
@@ -250,29 +220,27 @@ def _usual(data: Data, family: Family, view: View) -> str:
     return "bifurcation" if len(swept) == 1 else "map"
 
 
-def _refuse_options(data: Data, kind: str, family: Family, view: View) -> None:
+def _refuse_options(data: Any, kind: str, family: Family, view: View) -> None:
     """Refuse options that a kind does not take: what is asked for is never left out."""
-    given = {
-        "run": view.run is not None,
-        "recording": view.recording is not None,
-        "window": view.window.given,
-    }
-    foreign = {"run": family != "runs", "recording": family != "replay", "window": False}
-    for name, is_given in given.items():
-        if not is_given or (name in KINDS[kind].takes and not foreign[name]):
+    for name, is_given, is_foreign in (
+        ("run", view.run is not None, family != "runs"),
+        ("recording", view.recording is not None, family != "replay"),
+        ("window", view.window.given, False),
+    ):
+        if not is_given or (name in KINDS[kind].takes and not is_foreign):
             continue
         takers = [taker for taker, one in KINDS.items() if name in one.takes and family in one.families]
         advice = "Leave it out."
-        if name == "run" and family == "replay" and isinstance(data, xr.Dataset):
+        if name == "run" and family == "replay":
             advice = f"Name a recording ({option('recording')}): {recordings_of(data)}."
-        elif takers and not foreign[name]:
+        elif takers and not is_foreign:
             advice = f"It goes with {', '.join(takers)}."
         raise UsageError(
             f"figure: {name}: expected none for {_WORDS[family]} drawn as {kind}, got one. {advice}"
         )
 
 
-def _refuse_run(dataset: xr.Dataset, kind: str, run: int | None) -> None:
+def _refuse_run(dataset: Any, kind: str, run: int | None) -> None:
     """Refuse a run that is not there, and no run where one of several must be named."""
     there = np.unique(dataset["run_index"].values)
     there = there[there >= 0]
@@ -286,12 +254,12 @@ def _refuse_run(dataset: xr.Dataset, kind: str, run: int | None) -> None:
         raise DatasetError(
             f"figure: run: expected one run of those there are ({listed}), got none of run_index {run}."
         )
-    is_single = "run" in KINDS[kind].takes and kind not in _OF_ALL
-    if is_single and run is None and there.size > 1 and not KINDS[kind].fits(dataset):
-        raise DatasetError(
-            f"figure: kind: expected one that fits this dataset ({', '.join(fitting(dataset))}), got {kind!r}."
-        )
-    if is_single and run is None and there.size > 1:
+    # a window of time is one of a single run
+    if "window" in KINDS[kind].takes and run is None and there.size > 1:
+        if not KINDS[kind].fits(dataset):
+            raise DatasetError(
+                f"figure: kind: expected one that fits this dataset ({', '.join(fitting(dataset))}), got {kind!r}."
+            )
         raise DatasetError(
             f"figure: run: expected one run, got {there.size}. Name one by its run_index ({option('run')}): {listed}."
         )

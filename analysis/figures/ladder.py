@@ -162,10 +162,8 @@ def _draw_ladder(axis: Axes, quantity: xr.DataArray) -> None:
         shown = np.where(values == 0.0, np.nan, np.abs(values))
         words = _entry(str(exchange), observed_order(step, values))
         _draw_line(axis, step[order], shown[order], place, words)
-    axis.set_xscale("log")
-    axis.set_yscale("log")
+    axis.set(xscale="log", yscale="log", ylabel=label(quantity))
     _mark_steps(axis, step[order])
-    axis.set_ylabel(label(quantity))
     legend_above(
         axis,
         "center",

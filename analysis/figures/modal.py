@@ -5,46 +5,36 @@ from __future__ import annotations
 import re
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.page import COLOURS, LINE, STOP, Floats, canvas, label, unit_symbol
-from vibroimpact.analysis.figures.series import within
-from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.analysis.figures.page import COLOURS, LINE, STOP, canvas, label, legend_outside, unit_symbol
+from vibroimpact.analysis.figures.series import first_after_impacts, samples_within, with_gaps
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
-
-Places = npt.NDArray[np.int64]
 
 _MODAL = re.compile(r"modal_energy_([0-9]+)")
 _START = re.compile(r"displacement_start_([0-9]+)")
 
 
-def draw_energies(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
-    """Draw the total energy of a run and the energies of its modes over time, with its impacts.
-
-    Raises
-    ------
-    DatasetError
-        If energies were not sampled.
-    """
-    selection = {} if run is None else {"run_index": run}
-    samples = within(dataset, dataset.vibroimpact.samples(**selection), window)
+def draw_energies(dataset: xr.Dataset, view: View) -> Figure:
+    """Draw the total energy of a run and the energies of its modes over time, with its impacts."""
+    samples = samples_within(dataset, view)
     modal = [(int(m[1]), m[0]) for m in map(_MODAL.fullmatch, map(str, samples.data_vars)) if m]
     if not modal or not {"energy_kinetic", "energy_potential"} <= set(map(str, samples.data_vars)):
         raise DatasetError(
             "figure: expected kinetic, potential and modal energies in the time series, got not all of them. "
             'Set variables = ["energy.kinetic", "energy.potential", "modal_energy[1]", ...] in time_series.'
         )
-    jumps = _jumps(dataset, samples, selection)
-    time = _with_gaps(samples["time"].values, jumps)
+    jumps = first_after_impacts(dataset, view.run, samples["time"].values)
+    time = with_gaps(samples["time"].values, jumps)
     figure = canvas(95)
     above, below = figure.subplots(2, 1, sharex=True)
     total = samples["energy_kinetic"].values + samples["energy_potential"].values
-    above.plot(time, _with_gaps(total, jumps), color=LINE, rasterized=True)
+    above.plot(time, with_gaps(total, jumps), color=LINE, rasterized=True)
     for place, name in sorted(modal):
         colour = COLOURS[(place - 1) % len(COLOURS)]
-        below.plot(time, _with_gaps(samples[name].values, jumps), color=colour, label=f"mode {place}")
+        below.plot(time, with_gaps(samples[name].values, jumps), color=colour, label=f"mode {place}")
     unit = unit_symbol(samples["energy_kinetic"])
     above.set_ylabel(f"total energy ({unit})")
     below.set_ylabel(f"energy of a mode ({unit})")
@@ -54,40 +44,19 @@ def draw_energies(dataset: xr.Dataset, run: int | None = None, window: Window = 
         axis.margins(x=0.0)
         for instant in samples["time"].values[jumps]:
             axis.axvline(instant, color=STOP, linewidth=0.4, zorder=0)
-    figure.legend(*below.get_legend_handles_labels(), loc="outside upper center", ncols=4, frameon=False)
+    legend_outside(figure, below, ncols=4)
     return figure
 
 
-def _jumps(dataset: xr.Dataset, samples: xr.Dataset, selection: dict[str, int]) -> Places:
-    """Return the places of the first samples after each impact."""
-    if "impact" not in dataset.dims:
-        return np.empty(0, dtype=np.int64)
-    time = samples["time"].values
-    places = np.searchsorted(time, dataset.vibroimpact.impacts(**selection)["impact_time"].values)
-    kept: Places = places[(places > 0) & (places < time.size)]
-    return kept
-
-
-def _with_gaps(values: Floats, jumps: Places) -> Floats:
-    """Return values with a gap before each place, so that no line is drawn across a jump."""
-    broken: Floats = np.insert(values.astype(np.float64), jumps, np.nan)
-    return broken
-
-
-def draw_shapes(dataset: xr.Dataset, run: int | None = None) -> Figure:
+def draw_shapes(dataset: xr.Dataset) -> Figure:
     """Draw the shapes of the modes that a beam was let go from, over its length.
 
     The dataset is a sweep of `sensor.location` and `body.displacement_start[j]`; runs that start in one mode alone
     are drawn, each shape divided by its largest value.
-
-    Raises
-    ------
-    DatasetError
-        If the dataset is no such sweep.
     """
     runs = dataset.vibroimpact.runs
     starts = sorted((int(m[1]), m[0]) for m in map(_START.fullmatch, map(str, runs.variables)) if m)
-    if run is not None or not starts or "location" not in runs or "displacement" not in dataset:
+    if not starts or "location" not in runs or "displacement" not in dataset:
         raise DatasetError(
             "figure: expected a sweep of sensor.location and body.displacement_start[j], with displacement in the "
             "time series, got another dataset. See examples/thesis/figure_7_2.toml."
@@ -106,8 +75,8 @@ def draw_shapes(dataset: xr.Dataset, run: int | None = None) -> Figure:
             along, shape / np.abs(shape).max(), color=COLOURS[place % len(COLOURS)], label=f"mode {number}"
         )
     axis.axhline(0.0, color=STOP, linewidth=0.4, zorder=0)
-    axis.set_xlim(0.0, 1.0)
-    axis.set_xlabel("location (fraction of the length)")
-    axis.set_ylabel("mode shape / its largest (-)")
-    figure.legend(loc="outside upper center", ncols=3, frameon=False)
+    axis.set(
+        xlim=(0.0, 1.0), xlabel="location (fraction of the length)", ylabel="mode shape / its largest (-)"
+    )
+    legend_outside(figure, axis, ncols=3)
     return figure

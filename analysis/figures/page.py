@@ -36,6 +36,7 @@ MARK = "#D55E00"
 STOP = "0.45"
 # Told apart with every kind of colour vision (Okabe and Ito).
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+STOP_LINE: dict[str, Any] = {"color": STOP, "linestyle": "--", "linewidth": 0.6, "zorder": 0}
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
@@ -136,6 +137,14 @@ def legend_above(axis: Axes, side: str = "left", *, ncols: int = 3, **options: A
         frameon=False,
         **(usual | options),
     )
+
+
+def legend_outside(figure: Figure, axis: Axes, **options: Any) -> None:
+    """Name the lines of a panel above all panels, where no data can be: each name once."""
+    handles, labels = axis.get_legend_handles_labels()
+    entries = dict(zip(labels, handles, strict=True))
+    if entries:
+        figure.legend(entries.values(), entries.keys(), loc="outside upper center", frameon=False, **options)
 
 
 _GIVEN: ContextVar[list[Axes] | None] = ContextVar("axes that were given", default=None)

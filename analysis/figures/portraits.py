@@ -17,16 +17,18 @@ from vibroimpact.analysis.figures.page import (
     LINE,
     MARK,
     STOP,
+    STOP_LINE,
     Floats,
     canvas,
     label,
     legend_above,
+    legend_outside,
     title,
     unit_symbol,
 )
 from vibroimpact.analysis.figures.scene_text import limits, swept_keys, table
-from vibroimpact.analysis.figures.series import impacts_within, within
-from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.analysis.figures.series import first_after_impacts, impacts_within, samples_within, with_gaps
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
 _PANEL_MM = 62
@@ -48,26 +50,19 @@ class _Orbit(NamedTuple):
     velocity: Floats
 
 
-def draw_portrait(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_portrait(dataset: xr.Dataset, view: View) -> Figure:
     """Draw velocity against displacement for each sampled pair; of a whole chain its modes too.
 
     Lines end at an impact and begin again after it, joined by dots.
-
-    Raises
-    ------
-    DatasetError
-        If no displacement was sampled together with its velocity.
     """
-    selection = {} if run is None else {"run_index": run}
-    samples = within(dataset, dataset.vibroimpact.samples(**selection), window)
+    samples = samples_within(dataset, view)
     orbits = _sampled_orbits(samples)
     if not orbits:
         raise DatasetError(
             "figure: expected a displacement and its velocity in the time series, got no such pair. "
             'Set variables = ["displacement", "velocity"] in time_series.'
         )
-    hits = dataset.vibroimpact.impacts(**selection) if "impact" in dataset.dims else None
-    jumps = np.searchsorted(samples["time"].values, [] if hits is None else hits["impact_time"].values)
+    jumps = first_after_impacts(dataset, view.run, samples["time"].values)
     nondimensional = dataset.attrs.get("units_system") == "nondimensional"
     modal = _modal_orbits(dataset, orbits)
     panels = [(orbits, ("-", "-") if nondimensional else ("m", "m/s"))]
@@ -85,24 +80,22 @@ def draw_portrait(dataset: xr.Dataset, run: int | None = None, window: Window = 
         if len(lines) > 1:
             legend_above(axis, "center", columnspacing=2.0, handlelength=2.0)
     for position in sorted({place for orbit in orbits for place in limits(dataset, orbit.name)}):
-        axes[0].axvline(position, color=STOP, linestyle="--", linewidth=0.6, zorder=0)
+        axes[0].axvline(position, **STOP_LINE)
     return figure
 
 
 def _draw_orbit(axis: Any, orbit: _Orbit, jumps: Any, colour: str) -> None:
     """Draw one line, broken where the velocity jumps; a long one is thin and faint, so that its layers show."""
     long = {"linewidth": 0.3, "alpha": 0.5} if orbit.displacement.size > _LONG else {}
-    inside = jumps[(jumps > 0) & (jumps < orbit.displacement.size)]
-    broken = [np.insert(values, inside, np.nan) for values in (orbit.displacement, orbit.velocity)]
+    broken = [with_gaps(values, jumps) for values in (orbit.displacement, orbit.velocity)]
     axis.plot(*broken, color=colour, label=orbit.words, rasterized=True, **long)
-    joined = [_joined(values, inside) for values in (orbit.displacement, orbit.velocity)]
+    joined = [_joined(values, jumps) for values in (orbit.displacement, orbit.velocity)]
     axis.plot(*joined, color=colour, linestyle=":", **({"linewidth": 0.6} | long), rasterized=True)
 
 
 def _joined(values: Floats, jumps: Any) -> Floats:
     """Return the values before and after each jump, with a gap after each pair, as one line."""
-    ends: Floats = np.stack([values[jumps - 1], values[jumps], np.full(jumps.size, np.nan)], axis=1).ravel()
-    return ends
+    return np.stack([values[jumps - 1], values[jumps], np.full(jumps.size, np.nan)], axis=1).ravel()
 
 
 def _sampled_orbits(samples: xr.Dataset) -> list[_Orbit]:
@@ -136,15 +129,9 @@ def _modal_orbits(dataset: xr.Dataset, orbits: list[_Orbit]) -> list[_Orbit]:
     return [_Orbit(f"mode_{j + 1}", f"mode {j + 1}", q[j], p[j]) for j in range(masses.size)]
 
 
-def draw_impact_map(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
-    """Draw the impacts of one run in the plane of the impact map: forcing phase and velocity before impact.
-
-    Raises
-    ------
-    DatasetError
-        If the run has no impacts, or no forcing that gives them a phase.
-    """
-    hits = impacts_within(dataset, run, window)
+def draw_impact_map(dataset: xr.Dataset, view: View) -> Figure:
+    """Draw the impacts of one run in the plane of the impact map: forcing phase and velocity before impact."""
+    hits = impacts_within(dataset, view)
     phase, velocity = hits["impact_phase"].values, hits["impact_velocity"].values
     if not np.isfinite(phase).any():
         raise DatasetError(
@@ -153,46 +140,43 @@ def draw_impact_map(dataset: xr.Dataset, run: int | None = None, window: Window 
         )
     figure = canvas(75)
     axis = figure.subplots()
-    contacts = np.unique(hits["impact_contact"].values)
-    for place, contact in enumerate(contacts):
-        own = hits["impact_contact"].values == contact
-        colour = COLOURS[place % len(COLOURS)] if len(contacts) > 1 else MARK
-        _draw_dots(axis, (phase[own], velocity[own]), own.sum(), colour, f"stop {contact}")
+    owner = hits["impact_contact"].values
+    _draw_dots(
+        figure, axis, {stop: (phase[owner == stop], velocity[owner == stop]) for stop in np.unique(owner)}
+    )
     axis.set_xlim(0.0, 2.0 * math.pi)
     axis.set_xticks(np.linspace(0.0, 2.0 * math.pi, 5), _QUARTERS)
     axis.set_ylim(bottom=0.0)
-    axis.set_xlabel(label(hits["impact_phase"]))
-    axis.set_ylabel(label(hits["impact_velocity"]))
-    if len(contacts) > 1:
-        figure.legend(loc="outside upper center", ncols=4, markerscale=2.0, frameon=False)
+    axis.set(xlabel=label(hits["impact_phase"]), ylabel=label(hits["impact_velocity"]))
     return figure
 
 
-def _draw_dots(axis: Axes, points: tuple[Floats, Floats], impacts: int, colour: str, words: str) -> None:
-    """Draw points of the impacts on one stop; many are small."""
-    axis.plot(
-        *points,
-        linestyle="none",
-        marker="o",
-        markersize=_DOT if impacts > _MANY else 3.0,
-        markeredgewidth=0.0,
-        color=colour,
-        label=words,
-        rasterized=True,
-    )
+def _draw_dots(
+    figure: Figure, axis: Axes, points: dict[int, tuple[Floats, Floats]], many: int = _MANY
+) -> None:
+    """Draw points of the impacts on each stop, small ones where there are many, and name several stops."""
+    for place, (stop, (x, y)) in enumerate(points.items()):
+        axis.plot(
+            x,
+            y,
+            linestyle="none",
+            marker="o",
+            markersize=_DOT if len(x) > many else 3.0,
+            markeredgewidth=0.0,
+            color=COLOURS[place % len(COLOURS)] if len(points) > 1 else MARK,
+            label=f"stop {stop}",
+            rasterized=True,
+        )
+    if len(points) > 1:
+        legend_outside(figure, axis, ncols=4, markerscale=2.0)
 
 
-def draw_return_map(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_return_map(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the velocity of each impact over that of the one before it on the same stop.
 
     Points on the diagonal repeat; a motion of period n has n points, chaos a line or a thin set.
-
-    Raises
-    ------
-    DatasetError
-        If no stop is hit twice.
     """
-    hits = impacts_within(dataset, run, window)
+    hits = impacts_within(dataset, view)
     velocity, contact = hits["impact_velocity"].values, hits["impact_contact"].values
     chains = {int(number): velocity[contact == number] for number in np.unique(contact)}
     chains = {number: values for number, values in chains.items() if values.size > 1}
@@ -203,15 +187,12 @@ def draw_return_map(dataset: xr.Dataset, run: int | None = None, window: Window 
         )
     figure = canvas(82)
     axis = figure.subplots()
-    for place, (number, values) in enumerate(chains.items()):
-        colour = COLOURS[place % len(COLOURS)] if len(chains) > 1 else MARK
-        _draw_dots(axis, (values[:-1], values[1:]), values.size, colour, f"stop {number}")
+    pairs = {stop: (values[:-1], values[1:]) for stop, values in chains.items()}
+    _draw_dots(figure, axis, pairs, _MANY - 1)  # pairs are one less than impacts
     limit = 1.05 * max(float(values.max()) for values in chains.values())
     axis.plot([0.0, limit], [0.0, limit], color=STOP, linewidth=0.4, zorder=0)
     unit = unit_symbol(hits["impact_velocity"])
     axis.set(xlim=(0.0, limit), ylim=(0.0, limit), xlabel=f"impact velocity $v_n$ ({unit})")
     axis.set_ylabel(f"next impact velocity $v_{{n+1}}$ ({unit})")
     axis.set_box_aspect(1.0)
-    if len(chains) > 1:
-        figure.legend(loc="outside upper center", ncols=4, markerscale=2.0, frameon=False)
     return figure

@@ -39,28 +39,11 @@ _LOG_FROM = 30.0
 
 
 def draw_recording(recording: Recording, window: Window = ANY) -> Figure:
-    """Draw the channels of a recording, a panel for each on its own time axis, then its event trains.
+    """Draw the first twelve channels of a recording, a panel for each on its own time axis, then its event trains.
 
     Clipped samples are marked; where samples are missing or overrange a band runs through the panel. Event trains
     show the interval after each event against its time. Long channels are drawn by the smallest and largest value of
     each of some thousand spans, so that no peak is lost.
-
-    Parameters
-    ----------
-    recording : Recording
-        Of more than twelve channels the first twelve are drawn.
-    window : Window, optional
-        Default: all there is.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One column wide.
-
-    Raises
-    ------
-    DatasetError
-        There is nothing to draw.
     """
     channels = list(recording.channels.values())[:MOST_PANELS]
     trains = list(recording.events.values())[:MOST_PANELS]
@@ -103,7 +86,10 @@ def _train_part(train: EventTrain, window: Window) -> EventTrain:
 
 def _draw_channel(axis: Axes, channel: Channel) -> None:
     """Draw one channel with its marks."""
-    axis.plot(*_outline(channel.time, channel.values), color=LINE, linewidth=0.6, rasterized=True)
+    line = channel.time, channel.values
+    if len(channel.time) > _MOST_POINTS:
+        line = outline(*line, -(-2 * len(channel.time) // _MOST_POINTS))
+    axis.plot(*line, color=LINE, linewidth=0.6, rasterized=True)
     entries = []
     absent = channel.quality & np.uint8(Quality.missing | Quality.overrange) != 0
     if np.any(absent):
@@ -114,8 +100,7 @@ def _draw_channel(axis: Axes, channel: Channel) -> None:
         axis.plot(
             channel.time[clipped],
             channel.values[clipped],
-            linestyle="none",
-            marker="o",
+            "o",
             markersize=2.2,
             color=MARK,
             rasterized=True,
@@ -144,28 +129,23 @@ def short_name(name: str, longest: int = _LONGEST_NAME) -> str:
     return name if len(name) <= longest else name[: longest - 1] + "…"
 
 
-def _outline(time: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return a line through the smallest and largest value of each of some thousand spans of time."""
-    if len(time) <= _MOST_POINTS:
-        return time, values
-    per_span = -(-2 * len(time) // _MOST_POINTS)
-    spans = -(-len(time) // per_span)
-    padded = np.full(spans * per_span, np.nan)
-    padded[: len(values)] = values
-    table = padded.reshape(spans, per_span)
-    known = np.isfinite(table)
-    low = np.where(known, table, np.inf).min(axis=1)
-    high = np.where(known, table, -np.inf).max(axis=1)
-    empty = ~known.any(axis=1)
-    low[empty] = high[empty] = np.nan
-    return np.repeat(time[::per_span], 2), np.stack([low, high], axis=1).ravel()
+def outline(time: Floats, values: Floats, per_span: int) -> tuple[Floats, Floats]:
+    """Return a line through the smallest and largest value of each span of so many samples; it looks the same."""
+    known = np.where(np.isfinite(values), values, np.nan)
+    starts = np.arange(0, len(time), per_span)
+    ends = [extreme.reduceat(known, starts) for extreme in (np.fmin, np.fmax)]
+    return np.repeat(time[starts], 2), np.stack(ends, axis=1).ravel()
+
+
+def spans_of(marked: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the first place of each run of marked samples and that after its last, shape (run, 2)."""
+    return np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]]))).reshape(-1, 2)
 
 
 def _draw_spans(axis: Axes, time: Floats, marked: NDArray[np.bool_]) -> None:
     """Draw a band over each run of marked samples."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], marked, [False]])))
     half = float(np.median(np.diff(time))) / 2
-    for begin, end in edges.reshape(-1, 2)[:_MOST_BANDS]:
+    for begin, end in spans_of(marked)[:_MOST_BANDS]:
         axis.axvspan(time[begin] - half, time[end - 1] + half, color=MARK, alpha=0.25, linewidth=0.3)
 
 
@@ -177,8 +157,7 @@ def _draw_train(axis: Axes, train: EventTrain) -> None:
         axis.plot(
             train.times[:-1],
             intervals,
-            linestyle="none",
-            marker=".",
+            ".",
             markersize=size,
             markeredgewidth=0.0,
             color=LINE,
@@ -191,5 +170,4 @@ def _draw_train(axis: Axes, train: EventTrain) -> None:
     if train.window is not None:
         axis.set_xlim(*train.window)
     axis.set_title(_titled(train.name, [f"{len(train.times)} events"]), fontsize=7.5, loc="left", pad=2)
-    axis.set_ylabel("interval (s)")
-    axis.set_xlabel("time (s)")
+    axis.set(xlabel="time (s)", ylabel="interval (s)")

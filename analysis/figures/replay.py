@@ -42,22 +42,9 @@ _SMALL, _LARGE = 1e-2, 1e4
 def draw_replay(dataset: xr.Dataset, recording: str | None = None, window: Window = ANY) -> Figure:
     """Draw a comparison: the whole record, its first part, and the residual with the scores of running windows.
 
-    Clipped samples, which were not scored, are marked on the measured signal. The figure names the recording, and
-    whether the fit has seen it.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        Of `comparison_dataset`.
-    recording : str, optional
-        Which one, by the file of its recording or the name of the comparison; default: the first.
-    window : Window, optional
-        Drawn in place of the whole record and its first part.
-
-    Raises
-    ------
-    DatasetError
-        There is no such comparison.
+    The comparison is named by itself or by the file of its recording, else the first one is drawn. A window is drawn
+    in place of the whole record and its first part. Clipped samples, which were not scored, are marked on the measured
+    signal. The figure names the recording, and whether the fit has seen it.
     """
     name, words = comparison_of(dataset, recording)
     scores = dataset.isel(comparison=[str(one) for one in dataset["comparison"].values].index(name))
@@ -78,8 +65,7 @@ def draw_replay(dataset: xr.Dataset, recording: str | None = None, window: Windo
         legend_above(axes[0], "right", handletextpad=0.5)
         _draw_residual(axes[-1], dataset, name, (scale * time, scale * parts[0]), size)
         _draw_running(axes[-1], scores, scale)
-        axes[-1].set_ylabel(f"residual\n({prefix}{unit_symbol(measured)})")
-        axes[-1].set_xlabel(f"time ({unit})")
+        axes[-1].set(xlabel=f"time ({unit})", ylabel=f"residual\n({prefix}{unit_symbol(measured)})")
     return figure
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
@@ -10,11 +11,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, label, legend_above
-from vibroimpact.analysis.figures.scene_text import observed_stops, stops
-from vibroimpact.analysis.figures.series import draw_series, sampled_variables, time_part
+from vibroimpact.analysis.figures.page import (
+    LINE,
+    MARK,
+    STOP_LINE,
+    Floats,
+    canvas,
+    label,
+    legend_above,
+    legend_outside,
+)
+from vibroimpact.analysis.figures.scene_text import ShownStop, observed_stops, stops
+from vibroimpact.analysis.figures.series import draw_series, sampled_variables, selected, time_part
 from vibroimpact.analysis.figures.strobe import draw_section
-from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.wording import option
 
@@ -22,7 +32,7 @@ from vibroimpact.fmus.wording import option
 _MOST_LARGE_MARKS = 100
 
 
-def draw_run(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_run(dataset: xr.Dataset, view: View) -> Figure:
     """Draw one run: time series with the stop and the impacts, and the phase portrait.
 
     Variables of components, and of a body where more than displacement and velocity was sampled, are drawn as
@@ -30,16 +40,15 @@ def draw_run(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) 
     the strobe points stand in for it. Of a long record the first forcing periods are drawn, unless a window says
     otherwise; the phase portrait then shows all of it.
     """
-    selection = {} if run is None else {"run_index": run}
     sampled = sampled_variables(dataset)
     if set(sampled) == {"displacement", "velocity"}:
-        return _draw_samples(dataset, selection, window)
+        return _draw_samples(dataset, view)
     if sampled:
-        return draw_series(dataset, selection, window)
-    if window.given:
+        return draw_series(dataset, view)
+    if view.window.given:
         raise UsageError("figure: window: expected a run with a time series, got none recorded.")
     if "displacement_max" in dataset.variables or "impact_velocity" in dataset.variables:
-        return _draw_periods(dataset, selection)
+        return _draw_periods(dataset, view.run)
     raise DatasetError(
         "figure: expected a time series, extrema or impacts of the run, got none recorded. "
         'Set time_series = { rate = ..., variables = ["displacement", "velocity"] } in [record], '
@@ -47,25 +56,24 @@ def draw_run(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) 
     )
 
 
-def _draw_samples(dataset: xr.Dataset, selection: dict[str, int], window: Window) -> Figure:
+def _draw_samples(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the sampled displacement and velocity of a run."""
-    samples = dataset.vibroimpact.samples(**selection)
-    marks = _impact_points(dataset, selection)
-    part, words = time_part(dataset, samples, window)
+    samples = dataset.vibroimpact.samples(**selected(view.run))
+    marks = _impact_points(dataset, view.run)
+    words_of_marks = "just before impact" if len(marks) else None
+    part, words = time_part(dataset, samples, view.window)
     figure = canvas(150)
     above, middle, below = figure.subplots(3, 1, height_ratios=[1, 1, 1.5])
     dots = {"linestyle": "none", "marker": "o", "color": MARK, "zorder": 3}
     for axis, columns in ((above, (0, 1)), (middle, (0, 2)), (below, (1, 2))):
-        shown = part if axis is not below or window.given else (-math.inf, math.inf)
+        shown = part if axis is not below or view.window.given else (-math.inf, math.inf)
         rows, inside = _with_impacts(samples, marks, shown)
         axis.plot(rows[:, columns[0]], rows[:, columns[1]], color=LINE, rasterized=True)
         size = 2.2 if len(inside) <= _MOST_LARGE_MARKS else 0.8
-        axis.plot(
-            inside[:, columns[0]], inside[:, columns[1]], markersize=size, label="just before impact", **dots
-        )
+        axis.plot(inside[:, columns[0]], inside[:, columns[1]], markersize=size, label=words_of_marks, **dots)
     for position in sorted({stop.position for stop in observed_stops(dataset)}):
-        above.axhline(position, color=STOP, linestyle="--", linewidth=0.6, zorder=0)
-        below.axvline(position, color=STOP, linestyle="--", linewidth=0.6, zorder=0, label="stop")
+        above.axhline(position, **STOP_LINE)
+        below.axvline(position, **STOP_LINE, label="stop")
     middle.sharex(above)
     above.tick_params(labelbottom=False)
     above.set_ylabel(label(samples["displacement"]))
@@ -74,25 +82,14 @@ def _draw_samples(dataset: xr.Dataset, selection: dict[str, int], window: Window
     # long numbers of late instants and of small displacements would run together
     middle.xaxis.set_major_locator(MaxNLocator(6))
     below.xaxis.set_major_locator(MaxNLocator(5))
-    below.set_xlabel(label(samples["displacement"]))
-    below.set_ylabel(label(samples["velocity"]))
-    _legend_above(figure, below, has_marks=len(marks) > 0)
+    below.set(xlabel=label(samples["displacement"]), ylabel=label(samples["velocity"]))
+    legend_outside(figure, below, ncols=2)
     return figure
 
 
-def _legend_above(figure: Figure, axis: Axes, *, has_marks: bool) -> None:
-    """Put a legend above all panels, each entry once."""
-    handles, labels = axis.get_legend_handles_labels()
-    entries = {
-        text: handle for handle, text in zip(handles, labels, strict=True) if has_marks or text == "stop"
-    }
-    if entries:
-        figure.legend(entries.values(), entries.keys(), loc="outside upper center", ncols=2, frameon=False)
-
-
-def _impact_points(dataset: xr.Dataset, selection: dict[str, int]) -> Floats:
+def _impact_points(dataset: xr.Dataset, run: int | None) -> Floats:
     """Return time, displacement and velocity of the observed point just before its impacts, shape (impact, 3)."""
-    hits = dataset.vibroimpact.impacts(**selection) if "impact" in dataset.dims else None
+    hits = dataset.vibroimpact.impacts(**selected(run)) if "impact" in dataset.dims else None
     known, seen = stops(dataset), observed_stops(dataset)
     if hits is None or hits.sizes["impact"] == 0 or int(hits["impact_contact"].max()) > len(known):
         return np.empty((0, 3))
@@ -118,54 +115,43 @@ def _with_impacts(samples: xr.Dataset, marks: Floats, part: tuple[float, float])
     return merged[np.argsort(merged[:, 0], kind="stable")], inside
 
 
-def _draw_periods(dataset: xr.Dataset, selection: dict[str, int]) -> Figure:
+def _draw_periods(dataset: xr.Dataset, run: int | None) -> Figure:
     """Draw what stands in for a time series: extremes, impact velocities, strobe points."""
     runs = dataset.vibroimpact.runs
-    chosen = runs if not selection else runs.isel(run=runs["run_index"].values == selection["run_index"])
+    chosen = runs if run is None else runs.isel(run=runs["run_index"].values == run)
     if chosen.sizes["run"] != 1:
         raise DatasetError(
             f"figure: expected one run, got {chosen.sizes['run']}. "
             f"Name one of {runs.sizes['run']} by its run_index ({option('run')})."
         )
-    run = chosen.isel(run=0)
-    has = set(map(str, dataset.variables))
-    drawers = [
-        draw_panel
-        for name, draw_panel in (
-            ("displacement_max", _extremes_panel),
-            ("impact_velocity", _impacts_panel),
-            ("strobe_velocity", _strobe_panel),
-        )
-        if name in has
-    ]
+    one = chosen.isel(run=0)
+    panels: dict[str, Callable[[Axes], None]] = {
+        "displacement_max": lambda axis: _draw_extremes(axis, one, observed_stops(dataset)),
+        "impact_velocity": lambda axis: _draw_impacts(axis, dataset.vibroimpact.impacts(**selected(run))),
+        "strobe_velocity": lambda axis: draw_section(axis, one),
+    }
+    drawers = [draw_panel for name, draw_panel in panels.items() if name in dataset.variables]
     figure = canvas(5 + 48 * len(drawers))
     for axis, draw_panel in zip(np.atleast_1d(figure.subplots(len(drawers), 1)), drawers, strict=True):
-        draw_panel(axis, dataset, run, selection)
+        draw_panel(axis)
     return figure
 
 
-def _extremes_panel(axis: Axes, dataset: xr.Dataset, run: xr.Dataset, selection: dict[str, int]) -> None:
+def _draw_extremes(axis: Axes, run: xr.Dataset, observed: list[ShownStop]) -> None:
     """Draw the largest and smallest displacement of each period, with the stops."""
     period = np.arange(1, run.sizes["period"] + 1)
     axis.plot(period, run["displacement_max"].values, "^", color=MARK, markersize=2.5, label="largest")
     axis.plot(period, run["displacement_min"].values, "v", color=LINE, markersize=2.5, label="smallest")
-    for stop in observed_stops(dataset):
-        axis.axhline(stop.position, color=STOP, linestyle="--", linewidth=0.6, zorder=0, label="stop")
+    for stop in observed:
+        axis.axhline(stop.position, **STOP_LINE, label="stop")
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.set_xlabel("recorded forcing period (-)")
     axis.set_ylabel(label(run["final_displacement"].rename("displacement")))
     legend_above(axis, "center", columnspacing=2.0, handlelength=2.0)
 
 
-def _impacts_panel(axis: Axes, dataset: xr.Dataset, run: xr.Dataset, selection: dict[str, int]) -> None:
+def _draw_impacts(axis: Axes, hits: xr.Dataset) -> None:
     """Draw the velocity of each impact against time."""
-    hits = dataset.vibroimpact.impacts(**selection)
     axis.plot(hits["impact_time"].values, hits["impact_velocity"].values, "o", color=MARK, markersize=2)
-    axis.set_xlabel(label(dataset["impact_time"].rename("time")))
-    axis.set_ylabel(label(hits["impact_velocity"]))
+    axis.set(xlabel=label(hits["impact_time"].rename("time")), ylabel=label(hits["impact_velocity"]))
     axis.set_ylim(0.0, 1.05 * float(hits["impact_velocity"].max()) if hits.sizes["impact"] else 1.0)
-
-
-def _strobe_panel(axis: Axes, dataset: xr.Dataset, run: xr.Dataset, selection: dict[str, int]) -> None:
-    """Draw displacement and velocity at forcing phase zero."""
-    draw_section(axis, run)

@@ -93,13 +93,9 @@ def limits(dataset: xr.Dataset, name: str) -> list[float]:
 
 
 def forcing_rate(dataset: xr.Dataset, run: xr.Dataset) -> float | None:
-    """Return the angular frequency of the forcing of one run, rad/s; None where nothing oscillates.
+    """Return the angular frequency of the forcing of a run, rad/s; None where nothing oscillates.
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-    run : xarray.Dataset
-        Rows of the run, with its swept values as coordinates.
+    The rows of the run have its swept values as coordinates.
     """
     scene = scene_of(dataset.attrs)
     for key, factor in (("angular_frequency", 1.0), ("frequency", 2.0 * math.pi)):

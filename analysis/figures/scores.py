@@ -19,18 +19,7 @@ _STYLES = ("-", "--", ":", "-.")
 
 
 def draw_scores(dataset: xr.Dataset) -> Figure:
-    """Draw the variance accounted for against the swept parameter with the most values, a line for each other point.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As `open_dataset` gives a campaign of replays.
-
-    Raises
-    ------
-    DatasetError
-        Nothing is swept, the points are no grid, or there are more lines than can be told apart.
-    """
+    """Draw the variance accounted for against the swept parameter with the most values, a line for each other point."""
     swept = [name for name in varied(dataset) if name in dataset.variance_accounted_for.dims]
     if not swept:
         raise DatasetError(
@@ -52,9 +41,9 @@ def draw_scores(dataset: xr.Dataset) -> Figure:
         axis.set_title(pair, fontsize=7.5)
     axes[-1].set_xlabel(label(dataset[along]))
     if others:
-        handles, labels = axes[0].get_legend_handles_labels()
+        entries = axes[0].get_legend_handles_labels()
         columns = 1 if len(others) > 1 else 2  # two long names do not fit side by side
-        figure.legend(handles, labels, loc="outside lower center", ncols=columns, frameon=False)
+        figure.legend(*entries, loc="outside lower center", ncols=columns, frameon=False)
     return figure
 
 

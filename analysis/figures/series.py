@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -25,7 +25,7 @@ from vibroimpact.analysis.figures.page import (
     unit_symbol,
 )
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order, limits
-from vibroimpact.analysis.figures.window import ANY, SHOWN_PERIODS, Window
+from vibroimpact.analysis.figures.window import SHOWN_PERIODS, View, Window
 from vibroimpact.fmus.errors import DatasetError
 
 _STYLES = ("-", "--", ":", "-.")
@@ -53,28 +53,20 @@ def sampled_variables(dataset: xr.Dataset) -> list[str]:
     ]
 
 
-def draw_series(dataset: xr.Dataset, selection: dict[str, Any], window: Window = ANY) -> Figure:
+def draw_series(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the sampled variables of one run against time: a panel for each quantity, its stops, marks at the events.
 
-    Panels and lines are in the order of the scene.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        With samples, as `open_dataset` gives it.
-    selection : dict
-        What names the run, as for `dataset.vibroimpact.samples`.
-    window : Window, optional
-        Default: the first forcing periods of a long record.
+    Panels and lines are in the order of the scene. Without a window the first forcing periods of a long record are
+    drawn.
     """
-    samples = dataset.vibroimpact.samples(**selection)
-    part, words = time_part(dataset, samples, window)
+    samples = dataset.vibroimpact.samples(**selected(view.run))
+    part, words = time_part(dataset, samples, view.window)
     time = samples["time"].values
     samples = samples.isel(time=(time >= part[0]) & (time <= part[1]))
     panels: dict[tuple[str, str], list[xr.DataArray]] = {}
     for name in in_scene_order(dataset, sampled_variables(samples)):
         panels.setdefault((unit_symbol(samples[name]), _quantity(samples[name])), []).append(samples[name])
-    kind, instants = _instants(dataset, selection)
+    kind, instants = _instants(dataset, view.run)
     instants = instants[(instants >= part[0]) & (instants <= part[1])]
     rows = sum(-(-len(variables) // _columns(variables)) for variables in panels.values())
     figure = canvas(8 + _PANEL_MM * len(panels) + _ROW_MM * rows)
@@ -103,23 +95,43 @@ def time_part(dataset: xr.Dataset, samples: xr.Dataset, window: Window) -> tuple
     return part, f", first {SHOWN_PERIODS} of {round(float(np.ptp(time)) / period, 1):g} periods"
 
 
-def within(dataset: xr.Dataset, samples: xr.Dataset, window: Window) -> xr.Dataset:
-    """Return the samples in a window; all of them where none is given."""
-    if not window.given:
+def selected(run: int | None) -> dict[str, int]:
+    """Return what names a run to the accessor of a dataset; nothing names the only one."""
+    return {} if run is None else {"run_index": run}
+
+
+def samples_within(dataset: xr.Dataset, view: View) -> xr.Dataset:
+    """Return the samples of a run in a window; all of them where none is given."""
+    samples: xr.Dataset = dataset.vibroimpact.samples(**selected(view.run))
+    if not view.window.given:
         return samples
-    (start, stop), _ = time_part(dataset, samples, window)
-    inside = np.flatnonzero((samples["time"].values >= start) & (samples["time"].values <= stop))
-    return samples.isel(time=inside)
+    (start, stop), _ = time_part(dataset, samples, view.window)
+    time = samples["time"].values
+    return samples.isel(time=np.flatnonzero((time >= start) & (time <= stop)))
 
 
-def impacts_within(dataset: xr.Dataset, run: int | None, window: Window) -> xr.Dataset:
+def impacts_within(dataset: xr.Dataset, view: View) -> xr.Dataset:
     """Return the impacts of a run in a window; all of them where none is given."""
-    hits: xr.Dataset = dataset.vibroimpact.impacts(**({} if run is None else {"run_index": run}))
-    if not window.given:
+    hits: xr.Dataset = dataset.vibroimpact.impacts(**selected(view.run))
+    if not view.window.given:
         return hits
     time, rate = hits["impact_time"].values, forcing_rate(dataset, hits)
-    start, stop = window.part(time, None if rate is None else 2.0 * math.pi / rate)
+    start, stop = view.window.part(time, None if rate is None else 2.0 * math.pi / rate)
     return hits.isel(impact=np.flatnonzero((time >= start) & (time <= stop)))
+
+
+def first_after_impacts(dataset: xr.Dataset, run: int | None, time: Floats) -> npt.NDArray[np.intp]:
+    """Return the places of the first instants after the impacts of a run, for impacts between two instants."""
+    if "impact" not in dataset.dims:
+        return np.empty(0, dtype=np.intp)
+    impacts: Floats = dataset.vibroimpact.impacts(**selected(run))["impact_time"].values
+    places = np.searchsorted(time, impacts)
+    return places[(places > 0) & (places < time.size)]
+
+
+def with_gaps(values: Floats, places: npt.NDArray[np.intp]) -> Floats:
+    """Return values with a gap before each place, so that no line is drawn across a jump."""
+    return np.insert(values.astype(np.float64), places, np.nan)
 
 
 def _quantity(variable: xr.DataArray) -> str:
@@ -129,11 +141,11 @@ def _quantity(variable: xr.DataArray) -> str:
     return _PARTICULARS.sub("", str(variable.name))
 
 
-def _instants(dataset: xr.Dataset, selection: dict[str, Any]) -> tuple[str, Floats]:
+def _instants(dataset: xr.Dataset, run: int | None) -> tuple[str, Floats]:
     """Return what happened at instants of the run, and when (s)."""
     for kind, clock in _INSTANTS:
         if kind in dataset.dims:
-            rows = getattr(dataset.vibroimpact, f"{kind}s")(**selection)
+            rows = getattr(dataset.vibroimpact, f"{kind}s")(**selected(run))
             return kind, rows[clock].values
     return "event", dataset["time"].values[:0]
 

@@ -4,20 +4,28 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from vibroimpact.analysis.figures.page import LINE, MARK, STOP, Floats, canvas, page_style, title
-from vibroimpact.analysis.figures.recordings import MOST_PANELS, short_name
+from vibroimpact.analysis.figures.page import (
+    LINE,
+    MARK,
+    STOP,
+    Floats,
+    canvas,
+    legend_outside,
+    page_style,
+    title,
+)
+from vibroimpact.analysis.figures.recordings import MOST_PANELS, short_name, spans_of
 from vibroimpact.analysis.figures.replay import comparison_of
 from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order
-from vibroimpact.analysis.figures.series import sampled_variables, within
-from vibroimpact.analysis.figures.window import ANY, Window
+from vibroimpact.analysis.figures.series import sampled_variables, samples_within
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.units import written_unit
@@ -35,8 +43,7 @@ _MULTIPLE_LINE: dict[str, Any] = {"color": STOP, "linestyle": ":", "linewidth": 
 _LEAST_MULTIPLES, _MOST_MULTIPLES = 10, 20
 
 
-@dataclass(frozen=True, slots=True)
-class _Signal:
+class _Signal(NamedTuple):
     """What one line shows."""
 
     name: str
@@ -46,24 +53,18 @@ class _Signal:
     colour: str = LINE
 
 
-def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Window = ANY) -> Figure:
+def draw_run_spectrum(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the amplitude spectra of the sampled variables of one run, with the multiples of its forcing frequency.
 
     A harmonic motion of amplitude A is a peak of height A. Of a forced motion whole periods are taken, so that the
     multiples lie on the grid of the frequencies. Of a nondimensional scene the axis is the angular frequency.
-
-    Raises
-    ------
-    DatasetError
-        If no time series was recorded, or its samples are too few.
     """
     if not sampled_variables(dataset):
         raise DatasetError(
             "figure: expected a time series of the run, got none recorded. "
             'Set time_series = { rate = ..., variables = ["displacement"] } in [record].'
         )
-    samples = dataset.vibroimpact.samples(**({} if run is None else {"run_index": run}))
-    samples = within(dataset, samples, window)
+    samples = samples_within(dataset, view)
     names = in_scene_order(dataset, sampled_variables(samples))[:MOST_PANELS]
     time = samples["time"].values
     signals = [
@@ -74,34 +75,24 @@ def draw_run_spectrum(dataset: xr.Dataset, run: int | None = None, window: Windo
     return _draw_panels(signals, forcing_rate(dataset, samples), is_run=True, is_angular=is_angular)
 
 
-def draw_recording_spectrum(recording: Recording, window: Window = ANY) -> Figure:
-    """Draw the amplitude spectrum of each channel of a recording: of its longest stretch without a gap.
-
-    Raises
-    ------
-    DatasetError
-        If no channel has evenly spaced samples.
-    """
+def draw_recording_spectrum(recording: Recording, view: View) -> Figure:
+    """Draw the amplitude spectrum of each channel of a recording: of its longest stretch without a gap."""
     channels = [channel for channel in recording.channels.values() if channel.axis.interval is not None]
     if not channels:
         raise DatasetError(
             f"{recording.title}: expected a channel of evenly spaced samples, got none. "
             "Only such samples have a spectrum."
         )
-    signals = []
-    for channel in channels[:MOST_PANELS]:
-        start, stop = window.part(channel.time)
-        part = channel.between(start, stop)
-        signals.append([_Signal(channel.name, channel.unit, part.time, part.values)])
-    return _draw_panels(signals, None)
+    parts = [channel.between(*view.window.part(channel.time)) for channel in channels[:MOST_PANELS]]
+    return _draw_panels([[_Signal(part.name, part.unit, part.time, part.values)] for part in parts], None)
 
 
-def draw_replay_spectrum(dataset: xr.Dataset, recording: str | None = None, window: Window = ANY) -> Figure:
+def draw_replay_spectrum(dataset: xr.Dataset, view: View) -> Figure:
     """Draw the amplitude spectra of a measured signal and of its replay over each other."""
-    name, words = comparison_of(dataset, recording)
+    name, words = comparison_of(dataset, view.recording)
     measured = dataset[f"{name}_measured"]
     time = measured[str(measured.dims[0])].values
-    start, stop = window.part(time)
+    start, stop = view.window.part(time)
     rows = (time >= start) & (time <= stop)
     signals = [
         _Signal(
@@ -119,12 +110,7 @@ def _draw_panels(
 ) -> Figure:
     """Draw a panel for each group of signals; those of a run share the frequencies that its first one has.
 
-    Parameters
-    ----------
-    panels : sequence
-    rate : float or None
-        Angular frequency of the forcing, rad/s.
-    is_run, is_angular : bool
+    The rate is the angular frequency of the forcing, rad/s.
     """
     factor = 1.0 if is_angular else 0.5 / math.pi
     with page_style():
@@ -141,12 +127,7 @@ def _draw_panels(
                 for multiple in range(1, min(int(end / rate), _MOST_MULTIPLES) + 1):
                     axis.axvline(factor * rate * multiple, label=_MULTIPLES, **_MULTIPLE_LINE)
         axes[-1].set_xlabel("angular frequency (-)" if is_angular else "frequency (Hz)")
-        handles, labels = axes[0].get_legend_handles_labels()
-        entries = dict(zip(labels, handles, strict=True))
-        if entries:
-            figure.legend(
-                entries.values(), entries.keys(), loc="outside upper center", ncols=3, frameon=False
-            )
+        legend_outside(figure, axes[0], ncols=3)
         figure.align_ylabels(axes)
     return figure
 
@@ -191,8 +172,7 @@ def _upper_edge(frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
     starts = np.arange(0, len(frequency), per_span)
     if not starts.size:
         return frequency, amplitude
-    heights: Floats = np.maximum.reduceat(amplitude, starts)
-    return frequency[starts], heights
+    return frequency[starts], np.maximum.reduceat(amplitude, starts)
 
 
 def amplitude_spectrum(
@@ -227,8 +207,7 @@ def amplitude_spectrum(
     >>> round(float(frequency[place]) / (2.0 * np.pi), 6), round(float(amplitude[place]), 6)
     (4.0, 2.0)
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], np.isfinite(values), [False]])))
-    first, stop = max(edges.reshape(-1, 2), key=np.ptp, default=(0, 0))
+    first, stop = max(spans_of(np.isfinite(values)), key=np.ptp, default=(0, 0))
     time, values = time[first:stop], values[first:stop]
     if len(time) < _FEWEST:
         raise DatasetError(

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import COLOURS, LINE, MARK, STOP, canvas, legend_above, page_style
+from vibroimpact.analysis.figures.recordings import outline
 from vibroimpact.analysis.spikes.report import SpikeReport
 from vibroimpact.analysis.spikes.waveforms import WAVEFORMS
 
@@ -24,17 +25,7 @@ _DASHES = {"half_sine": "-", "haversine": "--", "bell": ":"}
 
 
 def draw_spikes(report: SpikeReport) -> Figure:
-    """Draw signal and baseline, statistic and threshold, and the largest spike with its fitted curves.
-
-    Parameters
-    ----------
-    report : SpikeReport
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One column (85 mm) wide.
-    """
+    """Draw signal and baseline, statistic and threshold, and the largest spike with its fitted curves."""
     with page_style():
         panels = [_draw_signal, _draw_statistic]
         if report.dataset.sizes["spike"]:
@@ -71,10 +62,8 @@ def _draw_statistic(axis: Axes, report: SpikeReport) -> None:
     _line(axis, found.time, np.maximum(magnitude, 0.01 * found.threshold), color=LINE)
     axis.axhline(found.threshold, color=MARK, label="threshold")
     axis.axhline(found.lower_threshold, color=MARK, linestyle=":", label="spike ends below")
-    axis.set_yscale("log")
+    axis.set(yscale="log", xlabel="time (s)", xlim=(float(found.time[0]), float(found.time[-1])))
     axis.set_ylabel("robust score (-)" if scores else f"from baseline ({_unit(report)})")
-    axis.set_xlabel("time (s)")
-    axis.set_xlim(float(found.time[0]), float(found.time[-1]))
     legend_above(axis, ncols=2)
 
 
@@ -115,11 +104,7 @@ def _draw_close_up(axis: Axes, report: SpikeReport) -> None:
 
 
 def _line(axis: Axes, time: np.ndarray, values: np.ndarray, **style: Any) -> None:
-    """Draw a line; a long one by the extremes of equal parts, which look the same."""
+    """Draw a line, a long one by its extremes."""
     if len(time) > _MOST_POINTS:
-        length = -(-len(time) // (_MOST_POINTS // 4))
-        starts = np.arange(0, len(time), length)
-        lowest, highest = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
-        values = np.stack([lowest, highest], axis=1).ravel()
-        time = np.repeat(time[starts], 2)
+        time, values = outline(time, values, -(-4 * len(time) // _MOST_POINTS))
     axis.plot(time, values, rasterized=True, **style)

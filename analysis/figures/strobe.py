@@ -2,47 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from vibroimpact.analysis.figures.page import LINE, STOP, canvas, label
+from vibroimpact.analysis.figures.page import LINE, STOP_LINE, canvas, label
 from vibroimpact.analysis.figures.scene_text import observed_stops
 from vibroimpact.analysis.figures.sweeps import draw_diagram, one_value, varied
+from vibroimpact.analysis.figures.window import View
 from vibroimpact.fmus.errors import DatasetError
 
 # Points of a section above which they are small, so that the layers of an attractor show.
 _MANY = 100
 
 
-def draw_strobe(dataset: xr.Dataset, run: int | None = None) -> Figure:
-    """Draw displacements at forcing phase 0 against the swept parameter, or the Poincare section of one run.
-
-    Raises
-    ------
-    DatasetError
-        If nothing was recorded once per period.
-    """
+def draw_strobe(dataset: xr.Dataset, view: View) -> Figure:
+    """Draw displacements at forcing phase 0 against the swept parameter, or the Poincare section of one run."""
     if "strobe_displacement" not in dataset.variables:
         raise DatasetError(
             "figure: expected a motion recorded once per period, got none. "
             "Set strobe = true in [record] of a forced scene."
         )
-    if run is None and varied(dataset):
+    if view.run is None and varied(dataset):
         return draw_diagram(dataset, ["strobe_displacement"])
     runs = dataset.vibroimpact.runs
-    chosen = runs if run is None else runs.isel(run=runs["run_index"].values == run)
+    chosen = runs if view.run is None else runs.isel(run=runs["run_index"].values == view.run)
     figure = canvas(75)
     axis = figure.subplots()
     draw_section(axis, chosen.isel(run=0))
     for stop in observed_stops(dataset):
         low, high = axis.get_xlim()
         if low <= stop.position <= high:
-            axis.axvline(stop.position, color=STOP, linestyle="--", linewidth=0.6, zorder=0)
+            axis.axvline(stop.position, **STOP_LINE)
     return figure
 
 
@@ -51,13 +44,11 @@ def draw_section(axis: Axes, run: xr.Dataset) -> None:
     x, y = run["strobe_displacement"], run["strobe_velocity"]
     size = 2.5 if np.isfinite(x.values).sum() <= _MANY else 1.0
     axis.plot(x.values, y.values, "o", markersize=size, markeredgewidth=0.0, color=LINE, rasterized=True)
-    limits: tuple[tuple[xr.DataArray, Any], ...] = ((x, axis.set_xlim), (y, axis.set_ylim))
-    for values, limit in limits:
+    for values, limits in ((x, "xlim"), (y, "ylim")):
         same = one_value(values.values)
         if same is not None:
             # a single point: numbers around it to nine digits say nothing
             room = 0.5 * abs(same) or 1.0
-            limit(same - room, same + room)
+            axis.set(**{limits: (same - room, same + room)})
     axis.xaxis.set_major_locator(MaxNLocator(5))
-    axis.set_xlabel(label(x))
-    axis.set_ylabel(label(y))
+    axis.set(xlabel=label(x), ylabel=label(y))

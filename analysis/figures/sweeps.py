@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from vibroimpact.analysis.dataset.schema import scene_of, swept_names
-from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label
+from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_outside
 from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.fmus.errors import DatasetError
 
@@ -85,13 +85,7 @@ def draw_bifurcation(dataset: xr.Dataset) -> Figure:
 
 
 def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
-    """Draw quantities against the one swept parameter, a panel for each: every run, period or impact is a point.
-
-    Raises
-    ------
-    DatasetError
-        If not exactly one parameter is swept.
-    """
+    """Draw quantities against the one swept parameter, a panel for each: every run, period or impact is a point."""
     if len(varied(dataset)) != 1:
         raise DatasetError(wrong_sweep("one swept parameter", dataset))
     (name,) = varied(dataset)
@@ -114,9 +108,7 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
     axes[-1].set_xlabel(label(dataset[name]))
     axes[-1].margins(x=0.02)
     if len(directions) > 1:
-        handles, labels = axes[0].get_legend_handles_labels()
-        # Above the panels, where it cannot cover a point.
-        figure.legend(handles, labels, loc="outside upper center", ncols=2, markerscale=2.2, frameon=False)
+        legend_outside(figure, axes[0], ncols=2, markerscale=2.2)
     return figure
 
 
@@ -251,16 +243,9 @@ def largest_impact_velocity(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[str]:
-    """Draw one colour map with its bar; return what must be said of it.
+    """Draw one colour map over (vertical, horizontal) with its bar; return what must be said of it.
 
-    Parameters
-    ----------
-    values : xarray.DataArray
-        Of one branch: dimensions of the vertical and the horizontal axis.
-    text : str
-        Beside the bar.
-    of_all : ndarray
-        Values of all branches, which share their colours.
+    `of_all` are the values of all branches, which share their colours.
     """
     across, along = values.dims
     norm, same = _norm(of_all), one_value(of_all)
@@ -278,8 +263,7 @@ def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[s
     )
     # Long numbers of small distances would run into each other.
     axis.xaxis.set_major_locator(MaxNLocator(4))
-    axis.set_xlabel(label(values[along]))
-    axis.set_ylabel(label(values[across]))
+    axis.set(xlabel=label(values[along]), ylabel=label(values[across]))
     axis.label_outer()
     bar = axis.figure.colorbar(mesh, ax=axis)
     bar.set_label(text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from vibroimpact.analysis.figures.page import Floats
 from vibroimpact.fmus.errors import UsageError
@@ -19,12 +20,7 @@ _SLACK = 1e-6
 class Window:
     """What the user wants to see; nothing given: the first periods of a long record.
 
-    Attributes
-    ----------
-    start, stop : float or None
-        s, on the clock of the file.
-    periods : float or None
-        Length in forcing periods, from `start` on, or up to `stop`.
+    Start and stop are in s, on the clock of the file; forcing periods count from the start on, or up to the stop.
     """
 
     start: float | None = None
@@ -59,14 +55,7 @@ class Window:
         return (float(time[0]), float(time[-1])) if len(time) else (math.nan, math.nan)
 
     def part(self, time: Floats, period: float | None = None) -> tuple[float, float]:
-        """Return first and last instant to draw, s.
-
-        Parameters
-        ----------
-        time : ndarray of float, shape (sample,)
-            All there is, ascending, s.
-        period : float, optional
-            Forcing period, s.
+        """Return first and last instant to draw (s) of all there are, ascending, at a forcing period (s).
 
         Raises
         ------
@@ -91,15 +80,10 @@ class Window:
         length = (self.periods or SHOWN_PERIODS) * period if period is not None else math.inf
         if not self.given:
             return first, first + (length if last - first > (1.0 + _SLACK) * length else last - first)
-        if self.periods is None:
-            return (
-                first if self.start is None else self.start,
-                last if self.stop is None else self.stop,
-            )
-        if self.stop is not None:
-            return self.stop - length, self.stop
         start = first if self.start is None else self.start
-        return start, start + length
+        if self.periods is None:
+            return start, last if self.stop is None else self.stop
+        return (start, start + length) if self.stop is None else (self.stop - length, self.stop)
 
 
 def _names() -> tuple[str, str]:
@@ -109,3 +93,11 @@ def _names() -> tuple[str, str]:
 
 #: Nothing was asked for.
 ANY = Window()
+
+
+class View(NamedTuple):
+    """What of the data is drawn: a run by its `run_index`, a recording of a replay, a window of time."""
+
+    run: int | None
+    recording: str | None
+    window: Window

@@ -28,7 +28,20 @@ def run_to_folder(
 
 def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
     """Run a campaign and say what it did."""
-    _print(computed(scene, folder, workers=workers, scheduler=scheduler))
+    report = computed(scene, folder, workers=workers, scheduler=scheduler)
+    if report.resumed == report.runs and not report.chunks and not report.compaction_seconds:
+        say(f"Nothing to do: all {report.runs} points are in {report.dataset} already.")
+        return
+    kept = f", {report.resumed} were there" if report.resumed else ""
+    say(
+        f"{counted(report.runs - report.resumed, 'point')} computed in {report.compute_seconds:.1f} s by "
+        f"{counted(report.workers, 'worker')}{kept}: {report.dataset}"
+    )
+    if report.lost_workers:
+        lost = "was lost; what it" if report.lost_workers == 1 else "were lost; what they"
+        say(f"{counted(report.lost_workers, 'worker')} {lost} had not finished was computed again.", err=True)
+    for line in outcome_lines(report.dataset, report.runs):
+        say(line, err=True)
 
 
 def computed(
@@ -47,21 +60,3 @@ def computed(
     except CampaignInterrupted as interrupted:
         say(str(interrupted), err=True)
         raise typer.Exit(130) from None
-
-
-def _print(report: CampaignReport) -> None:
-    """Say what a campaign did."""
-    if report.resumed == report.runs and not report.chunks and not report.compaction_seconds:
-        say(f"Nothing to do: all {report.runs} points are in {report.dataset} already.")
-        return
-    computed = report.runs - report.resumed
-    kept = f", {report.resumed} were there" if report.resumed else ""
-    say(
-        f"{counted(computed, 'point')} computed in {report.compute_seconds:.1f} s by "
-        f"{counted(report.workers, 'worker')}{kept}: {report.dataset}"
-    )
-    if report.lost_workers:
-        lost = "was lost; what it" if report.lost_workers == 1 else "were lost; what they"
-        say(f"{counted(report.lost_workers, 'worker')} {lost} had not finished was computed again.", err=True)
-    for line in outcome_lines(report.dataset, report.runs):
-        say(line, err=True)

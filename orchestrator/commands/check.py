@@ -45,17 +45,16 @@ def check_scene(path: Path, changes: Sequence[str]) -> None:
     """
     scene = load_scene(path, changes)
     say(f"{path}: no problems")
-    for line in _aligned(_what_runs(scene)):
-        say(line)
+    _say_aligned(_what_runs(scene))
     cost = cost_of(scene)
-    for line in _aligned(_what_it_costs(scene, cost)):
-        say(line)
+    _say_aligned(_what_it_costs(scene, cost))
     if cost.trial is not None and cost.trial.outcome in FAILED and not cost.trial.given_up:
         raise typer.Exit(1)
 
 
-def _aligned(told: Iterator[tuple[str, str]]) -> Iterator[str]:
-    return (f"  {name:<{_WIDTH}}{text}" for name, text in told)
+def _say_aligned(lines: Iterator[tuple[str, str]]) -> None:
+    for name, text in lines:
+        say(f"  {name:<{_WIDTH}}{text}")
 
 
 def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:

@@ -110,28 +110,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
             typer.main.get_command(app).main(args=given, prog_name="vibroimpact")
     except SystemExit as end:
         sys.exit(end.code or (0 if all_was_written() else 1))
-    except VibroimpactError as error:
-        sys.exit(_report(str(error), error.exit_code, DEBUG in given))
     except KeyboardInterrupt:
         sys.exit(130)
     except Exception as error:
-        if isinstance(error, OSError) and error.errno in _FULL:
-            sys.exit(
-                _report(
-                    f"{error.filename or 'Output'}: cannot be written ({error.strerror}).", 1, DEBUG in given
-                )
-            )
-        # The last stop for what nobody foresaw: a person gets a line, a developer the place.
-        text = f"Unexpected error: {type(error).__name__}: {error}\nThis is a defect of vibroimpact."
-        hint = f" Repeat the command as `vibroimpact {DEBUG} ...` and report what it shows."
-        sys.exit(_report(text + ("" if DEBUG in given else hint), 1, DEBUG in given))
+        if DEBUG in given:
+            say(traceback.format_exc(), err=True)
+        say(_words(error, debug=DEBUG in given), err=True)
+        sys.exit(error.exit_code if isinstance(error, VibroimpactError) else 1)
 
 
-def _report(text: str, exit_code: int, debug: bool) -> int:
-    if debug:
-        say(traceback.format_exc(), err=True)
-    say(text, err=True)
-    return exit_code
+def _words(error: Exception, *, debug: bool) -> str:
+    """Return what to say of an error; of one that nobody foresaw, where a developer finds its place."""
+    if isinstance(error, VibroimpactError):
+        return str(error)
+    if isinstance(error, OSError) and error.errno in _FULL:
+        return f"{error.filename or 'Output'}: cannot be written ({error.strerror})."
+    hint = "" if debug else f" Repeat the command as `vibroimpact {DEBUG} ...` and report what it shows."
+    return f"Unexpected error: {type(error).__name__}: {error}\nThis is a defect of vibroimpact.{hint}"
 
 
 if __name__ == "__main__":

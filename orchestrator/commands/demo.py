@@ -63,11 +63,9 @@ def _told(report: CampaignReport, scene: Scene) -> str:
 
 
 def _table(readings: list[Reading]) -> Table:
-    rows = table("Angular frequencies read off the dataset", "<what", ">read", ">exact", ">grid steps apart")
-    for reading in readings:
-        steps = f"{abs(reading.steps):.2f}"
-        rows.add_row(reading.name, f"{reading.value:.6f}", f"{reading.exact:.6f}", steps)
-    return rows
+    rows = ((one.name, f"{one.value:.6f}", f"{one.exact:.6f}", f"{abs(one.steps):.2f}") for one in readings)
+    headings = ("<what", ">read", ">exact", ">grid steps apart")
+    return table("Angular frequencies read off the dataset", *headings, rows=rows)
 
 
 def _refuse_far_readings(readings: list[Reading]) -> None:

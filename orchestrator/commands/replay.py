@@ -39,26 +39,25 @@ def replay_recordings(
 ) -> None:
     """Replay recordings into a dataset, with scores and fits, or into the folder of a campaign."""
     loaded = load_scene(scene)
-    if output is not None and output.suffix == ".nc":
-        refuse_outputs([scene, *recordings, *score], output, figure)
-        named = with_recordings(loaded, recordings)
-        refuse_overwriting(output, force, lambda there: holds_scene(there, named))
-        if save_scene is not None:
-            refuse_outputs([scene, *recordings, *score], save_scene, ending=".toml")
-            _refuse_saving(save_scene, fit, force)
     if output is None:
         raise UsageError(
             "--output: expected a dataset (.nc) or the folder of a campaign, got nothing. Add -o."
         )
-    if output.name.lower().endswith(".nc") and output.suffix != ".nc":
-        raise UsageError(
-            f"{output}: expected a dataset NAME.nc or the folder of a campaign, got neither. Choose another name."
-        )
     if output.suffix != ".nc":
+        if output.name.lower().endswith(".nc"):
+            raise UsageError(
+                f"{output}: expected a dataset NAME.nc or the folder of a campaign, got neither. Choose another name."
+            )
         refuse_folder(output)
         _refuse_with_campaign(fit, score or None, save_scene, figure, execution)
         _campaign(with_recordings(loaded, recordings), output, workers, scheduler)
         return
+    refuse_outputs([scene, *recordings, *score], output, figure)
+    named = with_recordings(loaded, recordings)
+    refuse_overwriting(output, force, lambda there: holds_scene(there, named))
+    if save_scene is not None:
+        refuse_outputs([scene, *recordings, *score], save_scene, ending=".toml")
+        _refuse_saving(save_scene, fit, force)
     if workers is not None or scheduler is not None:
         raise UsageError("--workers, --scheduler: expected the folder of a campaign as output, got a file.")
     if figure is not None and loaded.replay is not None and not loaded.replay.compare:
@@ -163,17 +162,13 @@ def _write(dataset: xr.Dataset, output: Path, figure: Path | None) -> None:
     try:
         write_results(dataset, output, kind="replay")
         if figure is not None:
-            _draw(dataset, figure)
+            # matplotlib takes half a second to import; a replay alone does not pay for it.
+            from vibroimpact.analysis import figures
+            from vibroimpact.analysis.figures.replay import draw_replay
+
+            figures.save(draw_replay(dataset), figure)
     except OSError as error:
         raise UsageError(
             f"{error.filename or output}: expected a place where a file can be written, got "
             f"{error.strerror or error}. Choose another."
         ) from error
-
-
-def _draw(dataset: xr.Dataset, path: Path) -> None:
-    # matplotlib takes half a second to import; a replay alone does not pay for it.
-    from vibroimpact.analysis import figures
-    from vibroimpact.analysis.figures.replay import draw_replay
-
-    figures.save(draw_replay(dataset), path)
