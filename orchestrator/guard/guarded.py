@@ -262,8 +262,7 @@ class GuardedRunner:
     def close(self) -> None:
         """End the child and remove its notes."""
         if self._child is not None:
-            self._child.end()
-            self._child = None
+            self._end_child()
         self._folder.cleanup()
 
 

@@ -32,13 +32,13 @@ _FREQUENCY_POWER = {"frequency": 1.0, "stiffness": 2.0, "flexural_rigidity": 2.0
 MOST_ALIGNMENTS = 6
 #: Condition of the scaled normal matrix above which two numbers are one: their difference is derivative noise.
 MOST_CONDITION = 1e8
-#: A number that changes what is compared by less than this share, were it doubled, does not change it: rounding.
+#: Relative effect of doubling a number below which it is treated as having none.
 LEAST_CHANGE = 1e-9
 #: Step beside a start without effect, relative to the larger of a number and its scale.
 BESIDE = 0.1
-#: A square less than so many of its errors is not told from 0.
+#: Number of its standard errors below which a square is not told from 0.
 FLAT_ERRORS = 3.0
-#: The lag stays where it moves by less than this share of its own error.
+#: Change of a lag, as a share of its standard error, below which it has settled.
 LAG_STAYS = 0.1
 #: Draws of the noise of what drives: standard errors from it are good to about 1/sqrt(2 draws), a sixth.
 NOISE_DRAWS, NOISE_SEED = 20, 5

@@ -20,11 +20,11 @@ from vibroimpact.orchestrator.scene.places import stop_location, stop_mass
 
 Floats = NDArray[np.float64]
 
-#: Relative to the sum of what the modes contribute: farther beyond a stop is no rounding, the stop has moved.
+#: Distance beyond a stop, relative to the sum of what the modes contribute, above which the stop has moved.
 MOVED = 1e-12
-#: Likewise: nearer than this a contact is on its stop, as its FMU sees it too.
+#: Relative distance below which a contact is on its stop, as in its FMU.
 ROUNDING = 2.0 * float(np.finfo(np.float64).eps)
-#: Likewise: so far in front of its stop a contact is put, lest its FMU has it beyond by rounding.
+#: Relative distance in front of its stop at which a contact is put, lest rounding has it beyond in its FMU.
 MARGIN = 1e-14
 
 

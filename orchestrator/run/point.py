@@ -169,8 +169,11 @@ class _Run:
 
     def _begin_recording(self) -> None:
         record = self.scene.record
-        periods = self.scene.period is not None and (record.extrema or record.strobe)
-        self.driver.record(impacts=record.impacts, extrema=record.extrema, periods=periods)
+        self.driver.record(impacts=record.impacts, extrema=record.extrema, periods=self._has_periods())
+
+    def _has_periods(self) -> bool:
+        record = self.scene.record
+        return self.scene.period is not None and (record.extrema or record.strobe)
 
     # ---- time series ----
 
@@ -181,14 +184,9 @@ class _Run:
         count = math.floor((self.end_time - self.begin_time) * series.rate * (1.0 + 1e-12)) + 1
         for i in range(count):
             self.driver.advance(min(self.begin_time + i / series.rate, self.end_time))
-            row = self.plan.row(self.driver.sampled(), self.scene.forcing, self._angle())
-            self.samples.extend((self.driver.time, *row))
-
-    def _angle(self) -> float:
-        """Phase angle of the forcing at the present time, rad."""
-        if self.scene.forcing is None:
-            return 0.0
-        return self.scene.forcing.angular_frequency * self.driver.time + self.parameters["forcing.phase"]
+            time = self.driver.time
+            row = self.plan.row(self.driver.sampled(), self.scene.forcing, self.parameters, time)
+            self.samples.extend((time, *row))
 
     # ---- what was recorded ----
 
@@ -211,11 +209,8 @@ class _Run:
     def _is_pressed(self, body: OscillatorBody, contact: int) -> bool:
         stop = self.scene.stops[contact - 1]
         sign = 1.0 if stop.side == "upper" else -1.0
-        amplitude = self.parameters.get("forcing.amplitude", 0.0)
         spring = -sign * body.stiffness * stop.position
-        if self.scene.period is None:
-            return True
-        return spring > abs(amplitude)
+        return self.scene.period is None or spring > abs(self.parameters.get("forcing.amplitude", 0.0))
 
     def record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
         """Return the record of the run."""
@@ -248,9 +243,7 @@ class _Run:
         return (angle + self.parameters["forcing.phase"]) % TWO_PI
 
     def _period_rows(self) -> NDArray[np.float64] | None:
-        if self.scene.period is None or not (self.scene.record.extrema or self.scene.record.strobe):
-            return None
-        return self.driver.rows.of_kind(ROW_PERIOD)[:, 1:6]
+        return self.driver.rows.of_kind(ROW_PERIOD)[:, 1:6] if self._has_periods() else None
 
     def _sample_rows(self) -> NDArray[np.float64] | None:
         series = self.scene.record.time_series

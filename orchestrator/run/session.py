@@ -143,10 +143,7 @@ class Session:
 
     def sample(self) -> Sequence[float]:
         """Return the outputs now, in the order of `outputs`."""
-        angle = 0.0
-        if self._forcing is not None:
-            angle = self._forcing.angular_frequency * self.time + self._parameters["forcing.phase"]
-        return self._plan.row(self._driver.sampled(), self._forcing, angle)
+        return self._plan.row(self._driver.sampled(), self._forcing, self._parameters, self.time)
 
     def follow(self, times: Floats, name: str | None = None, values: Floats | None = None) -> Floats:
         """Go through all instants with an input that is linear between them; return the outputs at each.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,13 @@ class TimeSeriesPlan:
         """Whether the sampled variables are those of the FMU, one by one: nothing is left for `row` to do."""
         return forcing is None and self._columns == [[place] for place in range(len(self.names))]
 
-    def row(self, values: NDArray[np.float64], forcing: Forcing | None, angle: float) -> Sequence[float]:
+    def row(
+        self,
+        values: NDArray[np.float64],
+        forcing: Forcing | None,
+        parameters: Mapping[str, float],
+        time: float,
+    ) -> Sequence[float]:
         """Return the sampled variables at one instant.
 
         Parameters
@@ -57,10 +63,14 @@ class TimeSeriesPlan:
             What the FMU says.
         forcing : Forcing or None
             What drives the body.
-        angle : float
-            Its phase angle now, rad.
+        parameters : mapping of str to float
+            Parameters of the body, see `parameters.float_parameters`.
+        time : float
+            s.
         """
-        cosine = math.cos(angle) if forcing is not None else 0.0
+        cosine = 0.0
+        if forcing is not None:
+            cosine = math.cos(forcing.angular_frequency * time + parameters["forcing.phase"])
         driven = forcing is not None and forcing.kind == "base_acceleration"
         base = forcing.scalar_amplitude * cosine if forcing and driven and self._relative else 0.0
         row = []
