@@ -175,12 +175,10 @@ class EnergyBalance:
             [np.sum((y @ h.speeds.T) ** 2, axis=1) for y, h in zip(parts, self.halves, strict=True)], 1
         )
         sign = np.array([half.sign for half in self.halves])
-        stop = (
-            self._stop(value, slope, parameters)
-            if stop_position is None
-            else np.full(len(samples), stop_position)
-        )
-        stop = stop - (0.0 if stop_position is None else parameters.offset)
+        if stop_position is None:
+            stop = self._stop(value, slope, parameters)
+        else:
+            stop = np.full(len(samples), stop_position - parameters.offset)
         # the flight was cut at about the impact: what is missing to the stop, to first order
         missing = stop[:, None] - value
         edge = self.angular_frequency * np.array([half.edge for half in self.halves])
@@ -376,13 +374,11 @@ def sensitivities(
     0.45
     """
     r, square, wn = restitution, speed**2, natural_frequency
+    drag_seen = drag - (1.0 - r * r) * half_drag
     return {
         "restitution_per_relative_velocity": (1.0 - r * r) / r,
         "restitution_per_damping_ratio_velocity_measured": 2.0 * wn * drag / (r * square),
-        "restitution_per_damping_ratio_velocity_from_half_orbit": 2.0
-        * wn
-        * (drag - (1.0 - r * r) * half_drag)
-        / (r * square),
+        "restitution_per_damping_ratio_velocity_from_half_orbit": 2.0 * wn * drag_seen / (r * square),
         "joint_damping_ratio_per_relative_velocity": -square / (2.0 * wn * half_drag),
         "joint_restitution_per_relative_velocity": (1.0 - r * r - drag / half_drag) / r,
     }

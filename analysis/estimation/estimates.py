@@ -218,7 +218,7 @@ class ImpactEstimates:
             "remarks": "\n".join(self.remarks),
             "refusals": "\n".join(f"{refusal.method}: {refusal.reason}" for refusal in self.refusals),
             **{f"conditioning_{name}": value for name, value in self.conditioning.items()},
-            **dict(self.facts),
+            **self.facts,
         }
 
 
