@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset.schema import RAGGED, Direction, names_list
+from vibroimpact.analysis.dataset.schema import RAGGED, Direction, constant_names, names_list
 from vibroimpact.fmus.errors import DatasetError
 
 _RECORD_KEYS = {
@@ -43,7 +43,11 @@ class VibroimpactAccessor:
         kept = dataset.drop_vars([name for name, v in dataset.variables.items() if set(v.dims) & set(RAGGED)])
         if run_id.dims == ("run",):
             return kept
-        flat = kept.stack(run=run_id.dims, create_index=False) if run_id.dims else kept.expand_dims("run")
+        if run_id.dims:
+            flat = kept.stack(run=run_id.dims, create_index=False)
+        else:  # what is said of the only run is along `run` too
+            said = {name for name, one in kept.coords.items() if not one.dims} - set(constant_names(kept))
+            flat = kept.reset_coords(said).expand_dims("run").set_coords(said)
         flat = flat.isel(run=flat["run_id"].values >= 0)
         flat = flat.isel(run=np.argsort(flat["run_id"].values))
         return flat.transpose("run", ...)

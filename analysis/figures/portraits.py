@@ -146,7 +146,7 @@ def draw_impact_map(dataset: xr.Dataset, view: View) -> Figure:
     )
     axis.set_xlim(0.0, 2.0 * math.pi)
     axis.set_xticks(np.linspace(0.0, 2.0 * math.pi, 5), _QUARTERS)
-    axis.set_ylim(bottom=0.0)
+    axis.set_ylim(0.0, max(axis.get_ylim()[1], 1.05 * float(np.max(velocity))))
     axis.set(xlabel=label(hits["impact_phase"]), ylabel=label(hits["impact_velocity"]))
     return figure
 

@@ -96,6 +96,21 @@ def test_the_strobe_of_one_run_is_its_poincare_section(tmp_path: Path) -> None:
     assert axis.get_xlim() == pytest.approx((2.25, 6.75))
 
 
+@pytest.mark.parametrize("kind", ["strobe", "run"])
+def test_the_only_run_of_a_dataset_can_be_named(kind: str, tmp_path: Path) -> None:
+    # its number has no dimension, as that of a scene with one point
+    one = opened(up_down(), tmp_path).sel(angular_frequency=1.0, direction="down")
+    assert not one["run_index"].dims
+    runs = one.vibroimpact.runs
+    assert {runs[name].dims for name in ("run_index", "direction")} == {("run",)}
+    named = figures.draw(one, kind, run=int(one["run_index"]))
+    unnamed = figures.draw(one, kind)
+    for axis, other in zip(named.axes, unnamed.axes, strict=True):
+        assert [line.get_xydata().tolist() for line in axis.lines] == [
+            line.get_xydata().tolist() for line in other.lines
+        ]
+
+
 def test_a_return_map_joins_each_impact_with_the_next_on_its_own_stop() -> None:
     hits = np.ones((6, 7))
     hits[:, 0] = np.arange(6)

@@ -84,6 +84,13 @@ def test_an_impact_map_has_each_impact_at_its_phase_and_velocity() -> None:
     assert axis.get_xlabel() == "impact phase (rad)"
 
 
+def test_impacts_of_one_speed_are_below_the_top_of_their_map() -> None:
+    dataset = moving()
+    dataset["impact_velocity"].values[:] = 0.4, 0.4 * (1.0 + 1e-9)
+    (axis,) = figures.draw(dataset, "impact-map").axes
+    assert axis.get_ylim() == pytest.approx((0.0, 0.42))
+
+
 def test_energies_are_summed_and_those_of_the_modes_have_their_own_panel() -> None:
     names = ["energy.kinetic", "energy.potential", "modal_energy[1]", "modal_energy[2]"]
     parts = [np.full(100, value) for value in (1.0, 2.0, 0.5, 2.5)]
