@@ -71,6 +71,12 @@ def test_the_deadline_is_kept_within_one_step_of_a_coupled_run(case: str) -> Non
     assert record.outcome == Outcome.timeout
 
 
+def test_a_coupled_run_looks_at_the_clock_before_every_communication_step() -> None:
+    record = ran(changed("chatter", {}, 'how = "coupled"\ndeadline = 1e-9'), "coupled")
+    assert record.outcome == Outcome.timeout
+    assert record.message == "deadline: 1e-09 s passed at time 0"
+
+
 @pytest.mark.parametrize("case", BEYOND_NUMBERS)
 def test_a_motion_beyond_the_largest_numbers_is_one_error_that_names_the_time(case: str) -> None:
     with pytest.raises(ComponentError, match=r"expected finite numbers, got .* after time \d.* s"):
