@@ -6,13 +6,18 @@ module imports nothing above it, and another package can add commands of its own
 
 from __future__ import annotations
 
+import _thread
 import errno
 import functools
+import signal
 import sys
+import threading
 import traceback
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import metadata
+from itertools import takewhile
+from types import FrameType
 from typing import Annotated, Any
 
 import typer
@@ -33,6 +38,9 @@ PANELS = {
 """The commands as `--help` shows them, in the order in which they are used; those of other packages come last."""
 DEBUG = "--debug"
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
+_IMPORTING = "<frozen importlib._bootstrap>"
+_SOON = 0.02
+"""Seconds after which an interrupt that would have been lost comes again."""
 
 
 @contextmanager
@@ -98,14 +106,57 @@ def load_commands() -> None:
         entry.load()(app)
 
 
+@contextmanager
+def _no_interrupt_is_lost() -> Iterator[None]:
+    """Let an interrupt that would be lost come a moment later.
+
+    It is lost in two places. A compiled module whose import is interrupted may report an ImportError instead, which
+    its Python half takes for leave to do without it (so `xml.etree` does). And an exception in `__del__`, or in
+    another function whose caller cannot raise, is ignored.
+    """
+    handler, ignored = signal.getsignal(signal.SIGINT), sys.unraisablehook
+    # where Ctrl-C is ignored, or another program handles it, it stays so
+    if handler is not signal.default_int_handler or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    signal.signal(signal.SIGINT, _interrupt)
+    sys.unraisablehook = functools.partial(_ignore, ignored)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, handler)
+        sys.unraisablehook = ignored
+
+
+def _interrupt(number: int, place: FrameType | None) -> None:
+    frames = (frame for frame, _ in traceback.walk_stack(place))
+    ours = takewhile(lambda frame: frame.f_code is not main.__code__, frames)
+    if all(frame.f_code.co_filename != _IMPORTING for frame in ours):
+        raise KeyboardInterrupt
+    _interrupt_soon()
+
+
+def _ignore(otherwise: Callable[[Any], object], unraisable: Any) -> None:
+    if issubclass(unraisable.exc_type, KeyboardInterrupt):
+        _interrupt_soon()
+    else:
+        otherwise(unraisable)
+
+
+def _interrupt_soon() -> None:
+    again = threading.Timer(_SOON, _thread.interrupt_main)
+    again.daemon = True
+    again.start()
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code: 0 done, 1 failed, 2 misused, 130 interrupted."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         for word in given:
             refuse_no_text(word)
-        load_commands()
-        with command_line():
+        with _no_interrupt_is_lost(), command_line():
+            load_commands()
             # Reports misuse (2) and Ctrl-C (130) by itself; our own errors come out.
             typer.main.get_command(app).main(args=given, prog_name="vibroimpact")
     except SystemExit as end:
