@@ -12,6 +12,7 @@ import functools
 import signal
 import sys
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -144,9 +145,13 @@ def _ignore(otherwise: Callable[[Any], object], unraisable: Any) -> None:
 
 
 def _interrupt_soon() -> None:
-    again = threading.Timer(_SOON, _thread.interrupt_main)
-    again.daemon = True
-    again.start()
+    # `threading.Timer` would wait for a lock that the interrupted code may hold
+    _thread.start_new_thread(_interrupt_after, (_SOON,))
+
+
+def _interrupt_after(seconds: float) -> None:
+    time.sleep(seconds)
+    _thread.interrupt_main()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -113,6 +113,9 @@ def test_an_impact_elsewhere_at_the_instant_of_release_keeps_a_body_on_its_stop(
         (32001340, "the same"),
         (51001264, "the same, between five stops"),
         (5000528, "let go by two stops at one instant: motions of 1e-19 m"),
+        (71011009, "let go by two stops at one place, 3e-12 s apart: 1000 events"),
+        (71013959, "the same, between springs"),
+        (32008361, "held by two stops at one place as their force goes to 0: 1000 events"),
     ],
 )
 def test_a_random_body_that_once_failed_does_no_more(seed: int, what: str) -> None:

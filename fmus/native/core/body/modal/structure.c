@@ -10,6 +10,7 @@
 #include "body/modal/structure_contact.h"
 #include "body/modal/structure_drift.h"
 #include "body/modal/structure_forces.h"
+#include "body/modal/structure_held.h"
 #include "body/modal/structure_record.h"
 #include "body/modal/structure_settle.h"
 #include "motion/majorant.h"
@@ -57,8 +58,9 @@ static void move(const vi_structure *s, double u, vi_ending end, vi_instant targ
     const double radian = s->model->fastest > 0.0 ? 1.0 / s->model->fastest : 0.0;
     const double one = ONE_RELEASE * (radian + fabs(vi_clock_time(&s->model->clock, state->now)));
     for (int k = 0; k < s->model->contacts && u > 0.0; ++k) {
-        if (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k] && u <= one) {
-            continue;
+        if (state->status[k] == VI_CONTACT_TOUCHING && state->leaving[k]
+            && (u <= one || vi_structure_only_touches(s, k))) {
+            continue; /* those that others hold stay, however long */
         }
         if (state->status[k] == VI_CONTACT_TOUCHING) {
             state->status[k] = VI_CONTACT_FREE;
@@ -317,8 +319,9 @@ static void drift(const vi_structure *s, vi_instant target, const vi_step_reques
     case VI_DRIFT_ARRIVAL:
         vi_structure_meet(s, k, request->stop_at_contacts || fabs(remaining) <= landing_room(s));
         break;
-    /* a load that has changed at once lifts the contact off with an acceleration; else its force has fallen to 0 */
-    case VI_DRIFT_RELEASE: vi_structure_release(s, k, u > 0.0 ? 2 : 1); break;
+    /* a load that has changed at once lifts the contact off with an acceleration, unless others hold its point; else
+     * its force has fallen to 0 */
+    case VI_DRIFT_RELEASE: vi_structure_release(s, k, u > 0.0 || vi_structure_is_kept(s, k) ? 2 : 1); break;
     case VI_DRIFT_SEPARATION: vi_structure_separate(s, k, true); break;
     case VI_DRIFT_RETURN:
         vi_structure_return(s, k);

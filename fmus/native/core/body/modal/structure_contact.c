@@ -36,6 +36,12 @@ void vi_structure_release(const vi_structure *s, int k, int leaving)
     }
     s->state->status[k] = VI_CONTACT_TOUCHING;
     s->state->leaving[k] = leaving;
+    for (int l = 0; l < s->model->contacts && leaving == 1; ++l) {
+        /* what it held up until now has another acceleration at once */
+        if (s->state->status[l] == VI_CONTACT_TOUCHING && s->state->leaving[l] > 1) {
+            s->state->leaving[l] = 1;
+        }
+    }
 }
 
 /* ---- compliant stops ---- */
