@@ -5,6 +5,7 @@
 
 #include "body/contact_events.h"
 #include "body/landing.h"
+#include "body/modal/structure_held.h"
 #include "motion/majorant.h"
 
 /* Contacts whose clearance is below this many roundings of their displacement meet at the same instant. */
@@ -27,20 +28,33 @@ void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_i
     vi_contact_stick(&s->contacts[k], &s->model->clock, state->now, delay);
 }
 
+/* Which contacts touch only because contact k holds their point. */
+static void those_held_by(const vi_structure *s, int k, int touching[])
+{
+    const int32_t status = s->state->status[k];
+    for (int l = 0; l < s->model->contacts; ++l) {
+        touching[l] = s->state->status[l] == VI_CONTACT_TOUCHING && vi_structure_only_touches(s, l);
+    }
+    s->state->status[k] = VI_CONTACT_TOUCHING;
+    for (int l = 0; l < s->model->contacts; ++l) {
+        touching[l] = touching[l] && !vi_structure_only_touches(s, l);
+    }
+    s->state->status[k] = status;
+}
+
 void vi_structure_release(const vi_structure *s, int k, int leaving)
 {
     vi_contact *contact = &s->contacts[k];
+    int touching[VI_PORTS];
     vi_contact_lift(contact, &s->model->clock, s->state->now);
     if (contact->stick_end > contact->stick_start || s->state->tail_impulse[k] > 0.0) {
         vi_record_stick(s->record, contact->stick_start, contact->stick_end, k + 1, s->state->tail_impulse[k]);
     }
+    those_held_by(s, k, touching);
     s->state->status[k] = VI_CONTACT_TOUCHING;
     s->state->leaving[k] = leaving;
-    for (int l = 0; l < s->model->contacts && leaving == 1; ++l) {
-        /* what it held up until now has another acceleration at once */
-        if (s->state->status[l] == VI_CONTACT_TOUCHING && s->state->leaving[l] > 1) {
-            s->state->leaving[l] = 1;
-        }
+    for (int l = 0; l < s->model->contacts; ++l) {
+        s->state->leaving[l] = touching[l] ? 1 : s->state->leaving[l];
     }
 }
 

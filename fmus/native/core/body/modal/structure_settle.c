@@ -86,16 +86,32 @@ static void decide(const vi_structure *s, int k, double gap, double push)
     }
 }
 
+/* The rigid stop that pushes most, of those that have not been asked yet: what it holds leaves the others idle. */
+static int next_rigid(const resting_contacts *resting, const int asked[])
+{
+    int most = -1;
+    for (int i = 0; i < resting->rigid; ++i) {
+        if (!asked[i] && (most < 0 || resting->push[i] > resting->push[most])) {
+            most = i;
+        }
+    }
+    return most;
+}
+
 static void settle_resting(const vi_structure *s, const int candidate[])
 {
     double g[VI_PORTS][VI_PORTS];
+    int asked[VI_PORTS] = {0};
     resting_contacts resting;
     vi_structure_signed(s, s->model->compliance, g);
     order_resting(s, candidate, &resting);
     push_resting(s, g, &resting);
-    for (int i = 0; i < resting.count; ++i) {
-        const double push = i >= resting.rigid ? -resting.gap[i] : resting.push[i];
-        decide(s, resting.index[i], resting.gap[i], push);
+    for (int i = next_rigid(&resting, asked); i >= 0; i = next_rigid(&resting, asked)) {
+        asked[i] = 1;
+        decide(s, resting.index[i], resting.gap[i], resting.push[i]);
+    }
+    for (int i = resting.rigid; i < resting.count; ++i) {
+        decide(s, resting.index[i], resting.gap[i], -resting.gap[i]);
     }
 }
 
