@@ -84,7 +84,7 @@ def find_gaps(train: IntervalTrain) -> MissedBeats:
 
 
 def local_median(values: Floats) -> Floats:
-    """Return the median of the neighbours of each value, itself left out; windows shrink at no end but shift."""
+    """Return the median of the neighbours of each value, without it; at an end, that of the nearest whole window."""
     reach = min(NEIGHBOURS, (len(values) - 1) // 2)
     windows = np.lib.stride_tricks.sliding_window_view(values, 2 * reach + 1)
     others = np.delete(windows, reach, axis=1)

@@ -115,6 +115,8 @@ def test_an_impact_elsewhere_at_the_instant_of_release_keeps_a_body_on_its_stop(
         (5000528, "let go by two stops at one instant: motions of 1e-19 m"),
         (71011009, "let go by two stops at one place, 3e-12 s apart: 1000 events"),
         (71013959, "the same, between springs"),
+        (91001010, "clamped, its load handed from one stop to the other: 1000 events"),
+        (91003393, "the same, with a third stop at the place"),
         (32008361, "held by two stops at one place as their force goes to 0: 1000 events"),
     ],
 )

@@ -66,6 +66,22 @@ def test_a_clamped_mass_answers_a_load_from_either_side_at_once(above: int, belo
             assert body.displacement[0] == body.velocity[0] == 0.0
 
 
+@pytest.mark.parametrize("steps", [1, 3, 97, 400])
+@pytest.mark.parametrize(("above", "below"), [(1, 1), (1, 3), (2, 3), (3, 1)])
+def test_a_clamped_mass_answers_a_load_that_turns_round_slowly(above: int, below: int, steps: int) -> None:
+    shapes = (1.4, 1.0, 0.5)
+    stops = [Stop([s], 0.0, restitution=0.5) for s in shapes[:above]]
+    stops += [Stop([s], 0.0, restitution=0.5, side="lower") for s in shapes[:below]]
+    signs = np.array([stop.shape[0] * (1.0 if stop.side == "upper" else -1.0) for stop in stops])
+    with Structure(Modes([0.0], 0.0, 3.0, 2.5, -2.0), stops, 0.0, 0.0) as body:
+        for step in range(steps):
+            assert body.advance(20.0 * (step + 1) / steps - body.time) == DONE
+            assert signs @ body.forces == pytest.approx(3.0 * math.cos(2.5 * body.time - 2.0), abs=1e-12)
+            assert np.all(body.forces >= 0.0)
+            assert abs(body.displacement[0]) <= 1e-15
+        assert len(body.sticks) >= 15  # as often as the load has turned round
+
+
 @pytest.mark.parametrize("law", ["hertz", "kelvin_voigt"])
 def test_a_compliant_stop_on_a_clamped_point_is_never_pressed(law: str) -> None:
     stops = [

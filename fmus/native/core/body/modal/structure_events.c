@@ -160,7 +160,8 @@ static void releases(const vi_structure *s, const vi_drift *drift, const vi_situ
     const double scale = drift->force_scale[k] * s->model->compliance[k][k] / vi_structure_mobility_left(s, k);
     const double noise = VI_ROUNDING * (scale + size);
     vi_fall fall = {true, 0.0, 1.0};
-    if (fabs(force[0]) <= noise && fabs(thin) <= noise) {
+    /* opposite stops at one place, each of whose shares is rounding, may have left it a pull of so many roundings */
+    if (force[0] <= noise && force[0] >= -VI_PORTS * noise && fabs(thin) <= noise) {
         divide(force, vi_structure_first_of_force(s, drift, k));
         if (force[0] >= 0.0) {
             fall = fall_through(force, length, VI_ROUNDING * vi_polynomial_size(force, length));

@@ -5,9 +5,9 @@
 #include "body/modal/coupled_flow.h"
 #include "body/modal/structure_state.h"
 
-/* How long the force of power law k may act as that of a penetration at constant rate, s: within the tolerance, but no
- * shorter than moves it by a rounding of its displacement, else it would never get on. What ends that may still be to
- * come: it may begin without speed or, pressed in, where its damping leaves no force. */
+/* How long the force of power law k may act as that of a penetration at constant rate, s: as long as the tolerance
+ * allows, and at least until the penetration has changed by a rounding of the displacement. The penetration may begin
+ * without speed, or where damping leaves no force. */
 double vi_thin_time(const vi_structure *s, int k, double rate, const double acceleration[]);
 
 /* Give the impulse of a thin contact over u seconds of constant rate, to the state at the end. */
