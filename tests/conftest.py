@@ -83,6 +83,10 @@ def _draw_the_same_whatever_is_loaded() -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # no example fails for its time: the machine may be busy, and the first text drawn makes a table of all characters
+    too_slow = [hypothesis.HealthCheck.too_slow]
+    hypothesis.settings.register_profile("without a clock", deadline=None, suppress_health_check=too_slow)
+    hypothesis.settings.load_profile("without a clock")
     _draw_the_same_whatever_is_loaded()
     config.stash.setdefault(COUNTS, {})
 

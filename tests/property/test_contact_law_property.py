@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from support.structure import Modes, Stop, Structure
 from support.tolerance import ROUNDING
 
-FEW = settings(max_examples=100, deadline=None, derandomize=True)
+FEW = settings(max_examples=100, derandomize=True)
 
 #: Contacts with power laws are followed to a tolerance of 1e-10 at each of their segments.
 FOLLOWED = 1e-8

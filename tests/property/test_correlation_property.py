@@ -32,7 +32,7 @@ def brute_force(values: Floats, embedding: int, window: int) -> tuple[list[int],
 
 
 @given(sequences, st.integers(1, 5), st.integers(0, 7))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_near_pairs_are_those_of_a_count_one_by_one(values: Floats, embedding: int, window: int) -> None:
     found = near_pairs(values, RADII, embedding, window=window)
     for m in range(1, min(embedding, len(values)) + 1):
@@ -43,7 +43,7 @@ def test_near_pairs_are_those_of_a_count_one_by_one(values: Floats, embedding: i
 
 
 @given(sequences, st.randoms(use_true_random=False))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_without_a_window_single_numbers_may_come_in_any_order(values: Floats, order: object) -> None:
     shuffled = values.copy()
     order.shuffle(shuffled)  # type: ignore[attr-defined]
@@ -51,7 +51,7 @@ def test_without_a_window_single_numbers_may_come_in_any_order(values: Floats, o
 
 
 @given(sequences, st.integers(1, 6))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_c_grows_with_the_radius_and_falls_with_the_embedding(values: Floats, embedding: int) -> None:
     near = near_pairs(values, RADII, embedding)
     assert np.all(np.diff(near, axis=1) >= 0)

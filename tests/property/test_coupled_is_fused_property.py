@@ -80,7 +80,7 @@ def impacts_of(text: str) -> NDArray[np.float64]:
     return impacts
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     body=st.sampled_from([OSCILLATOR, CHAIN]),
     stop=laws,

@@ -15,7 +15,7 @@ from vibroimpact.analysis.decay.samples import DecaySamples
 TURN = np.arange(0.0, 100.0, 0.25)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.floats(-6.0, 6.0),
     st.floats(-5.0, 5.0),
@@ -37,7 +37,7 @@ def test_the_damping_ratio_does_not_depend_on_units_clock_or_offset(
         np.testing.assert_allclose(two.standard_error, one.standard_error, rtol=1e-4)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(0.0, 0.2), st.floats(0.0, 0.3), st.floats(0.0, 0.2), st.floats(-0.2, 0.3))
 def test_no_damping_law_ever_adds_energy(
     viscous: float, coulomb: float, quadratic: float, cubic: float

@@ -47,7 +47,7 @@ def estimated(time, values, forcing, known=None):
     return found
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(oscillators, st.floats(1.5, 2.2))
 def test_noiseless_record_gives_the_truth(parameters, ratio):
     record = record_of(made(parameters, ratio), periods=6, start=(parameters.stop_position - 0.3, 0.0))
@@ -67,7 +67,7 @@ def test_noiseless_record_gives_the_truth(parameters, ratio):
     assert weak["restitution"].value == pytest.approx(truth.restitution, abs=2e-3)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.floats(1e-6, 1e6), st.integers(0, 5))
 def test_scale_of_the_displacement_leaves_restitution_and_damping_unchanged(scale, seed):
     record = record_of(THESIS, periods=6)
@@ -81,7 +81,7 @@ def test_scale_of_the_displacement_leaves_restitution_and_damping_unchanged(scal
             assert second.standard_error == pytest.approx(first.standard_error, rel=1e-3)
 
 
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 @given(st.floats(-100.0, 100.0), st.integers(0, 5))
 def test_time_shift_leaves_all_but_the_phase_unchanged(shift, seed):
     record = record_of(THESIS, periods=6)

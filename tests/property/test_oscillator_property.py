@@ -12,9 +12,7 @@ from support.tolerance import DIFFERENCES, EPSILON, FLOW, ROUNDING
 
 from vibroimpact.fmus.core import Oscillator, flow, next_contact
 
-FEW = settings(
-    max_examples=60, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much]
-)
+FEW = settings(max_examples=60, derandomize=True, suppress_health_check=[HealthCheck.filter_too_much])
 FEWER = settings(FEW, max_examples=25)
 
 numbers = st.floats(-2.0, 2.0, allow_subnormal=False)

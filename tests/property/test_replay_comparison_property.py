@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 TIME = clock(2400)
 SEEDS = st.integers(0, 2**32 - 1)
-EXAMPLES = settings(max_examples=40, deadline=None)
+EXAMPLES = settings(max_examples=40)
 
 
 def noise(seed: int, count: int = 200) -> Floats:

@@ -28,7 +28,7 @@ def response(body: str, times: Floats, values: Floats) -> Floats:
         return session.follow(times, "base_acceleration", values)[:, 0]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(bodies, signals, signals, st.floats(-3.0, 3.0))
 def test_the_response_to_a_sum_of_drives_is_the_sum_of_responses(
     body: str, one: Floats, other: Floats, factor: float
@@ -41,7 +41,7 @@ def test_the_response_to_a_sum_of_drives_is_the_sum_of_responses(
     np.testing.assert_allclose(together, parts, rtol=0.0, atol=1e-11 * size * times[-1] ** 2)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(bodies, signals, st.integers(2, 7))
 def test_any_division_of_the_steps_gives_the_same_motion(body: str, values: Floats, parts: int) -> None:
     times = STEP * np.arange(len(values))

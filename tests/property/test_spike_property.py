@@ -23,7 +23,7 @@ def record(seed: int) -> np.ndarray:
     return pulses(time, starts, rng.uniform(1.0, 3.0, 4), LENGTH) + 0.02 * rng.standard_normal(len(time))
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     seed=st.integers(0, 1000),
     scale=SCALES,
@@ -44,7 +44,7 @@ def test_a_factor_scales_peaks_and_impulses_and_an_offset_changes_nothing(
     assert other.duration == pytest.approx(plain.duration, rel=1e-7)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 1000), shift=st.floats(-1e3, 1e3))
 def test_another_origin_of_time_shifts_instants_and_nothing_else(seed: int, shift: float) -> None:
     values = record(seed)
@@ -54,7 +54,7 @@ def test_another_origin_of_time_shifts_instants_and_nothing_else(seed: int, shif
     assert later.impulse == pytest.approx(plain.impulse, rel=1e-6)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(part=st.floats(0.01, 0.9), offset=st.floats(0.0, 1.0), peak=SCALES)
 def test_a_half_sine_is_above_a_threshold_as_long_as_its_formula_says(
     part: float, offset: float, peak: float

@@ -23,7 +23,7 @@ from support.random_structures import (
 from support.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 from support.tolerance import ROUNDING
 
-FEW = settings(max_examples=100, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+FEW = settings(max_examples=100, derandomize=True, suppress_health_check=list(HealthCheck))
 
 #: No body may be further beyond a rigid stop, relative to the displacements that add up to its position.
 PENETRATION = 1e-12
@@ -315,7 +315,7 @@ def test_the_stop_list_has_a_stop_of_every_law() -> None:
     # a strategy that never drew a law would make every test above pass
     drawn: set[str] = set()
 
-    @settings(max_examples=200, deadline=None, derandomize=True, database=None)
+    @settings(max_examples=200, derandomize=True, database=None)
     @given(scenes())
     def look(scene: Scene) -> None:
         drawn.update(stop.law for stop in scene.stops)

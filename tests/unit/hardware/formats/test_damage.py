@@ -135,14 +135,14 @@ def test_the_whole_files_of_these_tests_are_imported(ending: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(damaged())
 def test_a_damaged_file_is_imported_or_refused_and_nothing_else(case: tuple[str, bytes]) -> None:
     refusal = import_or_refuse(*case)
     assert refusal is None or "expected" in refusal
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.sampled_from(["csv", "lvm", "tdms", "nc"]), st.binary(max_size=400))
 def test_binary_garbage_of_any_name_is_refused_or_read_as_text(ending: str, content: bytes) -> None:
     refusal = import_or_refuse(ending, content)

@@ -71,7 +71,7 @@ def test_headings_and_units_are_found_above_the_rows(
     assert headings(header, 2, delimiter if "words" not in header[0] else ",") == (names, units)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     table=arrays(
         np.float64,

@@ -17,7 +17,7 @@ TIME = np.linspace(0.0, 1.0, 2000)
 RING = 600.0 * np.exp(-6.0 * TIME) * np.sin(2.0 * np.pi * 30.0 * TIME)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(limit=st.floats(150.0, 500.0), digits=st.integers(1, 9), sign=st.sampled_from([-1.0, 1.0]))
 def test_every_sample_beyond_the_limit_of_the_chain_is_found_and_no_other(
     limit: float, digits: int, sign: float

@@ -22,7 +22,7 @@ def placed(instants: Floats, interval: float | None = None, rate: float | None =
     return place(Table([column], Column("time", instants)), column, rate)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     interval=st.floats(1e-6, 10.0),
     begin=st.floats(-100.0, 100.0),
@@ -186,7 +186,7 @@ def test_a_clock_that_begins_again_makes_two_records() -> None:
     assert tables[1].columns[0].values[0] == 30.0
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(digits=st.integers(0, 6), seed=st.integers(0, 10**6))
 def test_the_weight_of_the_last_printed_digit_is_found(digits: int, seed: int) -> None:
     values = np.round(np.random.default_rng(seed).uniform(1.0, 1000.0, 400), digits)

@@ -82,7 +82,7 @@ def test_bisection_bounds_the_evaluations() -> None:
     bend=st.floats(0.0, 1e6),
     power=st.sampled_from([1.0, 2.0, 3.0, 0.5]),
 )
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_any_falling_function_is_followed_to_its_root(
     root: float, share: float, slope: float, bend: float, power: float
 ) -> None:
@@ -96,7 +96,7 @@ def test_any_falling_function_is_followed_to_its_root(
 
 
 @given(start=st.floats(1e-3, 1e3), speed=st.floats(-1e2, 1e2), gravity=st.floats(1e-2, 1e2))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_thrown_ball_lands_when_the_formula_says(start: float, speed: float, gravity: float) -> None:
     def height(u: float) -> float:
         h = start + u * (speed - 0.5 * gravity * u)

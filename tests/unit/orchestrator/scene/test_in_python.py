@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from support.places import ROOT
 
@@ -120,8 +120,6 @@ VALUES = st.recursive(
 )
 
 
-# the first text that is drawn takes seconds where the machine is busy: a table of all characters is made
-@settings(deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.dictionaries(st.sampled_from(["body", "record", "forcing", "stop", "sweep", "component"]), VALUES))
 def test_any_mapping_is_a_scene_or_one_error(tables):
     try:
