@@ -15,7 +15,7 @@ BIN := $(VENV)/bin
 NATIVE := $(shell find fmus/native -name '*.c' -o -name '*.h' -o -name '*.toml' -o -name '*.md') \
 	$(wildcard fmus/packaging/description/*.py) fmus/packaging/build.py fmus/packaging/compiler.py
 # tests side by side, four at most, as many start processes of their own; `make test PARALLEL=` runs them one by one
-PARALLEL ?= -n logical --maxprocesses 4 --dist worksteal
+PARALLEL ?= -n auto --maxprocesses 4 --dist worksteal
 SETUP := pyproject.toml hatch_build.py
 # pip says what it does: it takes minutes, and silence looks like a stall
 INSTALL = $(BIN)/python -m pip install --disable-pip-version-check
@@ -58,6 +58,7 @@ lint: $(VENV)/lint.stamp ## check style, types and the directions of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy tests/benchmarks
 	$(BIN)/lint-imports
 
 docs: $(VENV)/docs.stamp $(VENV)/fmus.stamp ## build the documentation site, its pictures and its tutorial; a warning is an error

@@ -30,6 +30,13 @@ FAST_FOLDERS = ("architecture", "unit")
 """All that `--fast` takes tests from."""
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Return one more than there are processors: some tests wait, for a deadline or for processes of their own."""
+    usable = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
+    return len(usable) + 1
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are not marked slow"
     parser.addoption("--fast", action="store_true", help=text)

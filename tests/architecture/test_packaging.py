@@ -12,6 +12,7 @@ import pytest
 from support.places import ROOT
 
 from vibroimpact.fmus import components
+from vibroimpact.fmus.packaging.build import BUILT
 
 PACKAGES = ("fmus", "orchestrator", "analysis", "hardware")
 
@@ -67,6 +68,19 @@ def test_the_wheel_has_all_packages_and_the_fmus_and_is_for_one_platform(wheel: 
     # the binaries bind it to a platform, but to no version of Python
     assert "-py3-none-" in wheel.name
     assert not wheel.name.endswith("-any.whl")
+
+
+@pytest.mark.slow
+def test_building_twice_in_different_places_gives_the_same_bytes(wheel: Path) -> None:
+    here = {
+        path.relative_to(BUILT).as_posix(): path.read_bytes() for path in BUILT.rglob("*") if path.is_file()
+    }
+    place = "vibroimpact/fmus/built/"
+    with zipfile.ZipFile(wheel) as archive:
+        names = [name for name in archive.namelist() if name.startswith(place)]
+        there = {name.removeprefix(place): archive.read(name) for name in names}
+    assert len(here) == 2 * len(components()) + 2  # and the core library and the fingerprint
+    assert here == there
 
 
 @pytest.mark.slow

@@ -91,8 +91,7 @@ def _bare_process(
 
 
 def _points_only(work: Work) -> Task:
-    scene = parse_scene(work.scene_text, work.source)
-    branches, runner = expand(scene), named_runner(scene, work.runner)
+    branches, runner = expand(work.scene), named_runner(work.scene, work.runner)
 
     def run(chunk: Chunk) -> None:
         for place in points_of(branches, chunk):

@@ -16,31 +16,44 @@ from pathlib import Path
 import pytest
 from distributed.security import Security
 from support.campaign_process import CampaignProcess, run_campaign_process, wait_until
-from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_text
+from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_text, scene_of
 from support.places import TESTS
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
+from vibroimpact.orchestrator.campaign.single_run import run_scene
 
 POINTS, MILLISECONDS = 600, 3.0
 """Enough that half a second of work is left when four parts are there, on either path."""
 TWO = ("--workers", "2")
-PATHS = ("independent", "up-down")
+FINISHED_POINTS = 10
+independent = pytest.mark.parametrize("uninterrupted", ["independent"], indirect=True)
+up_and_down = pytest.mark.parametrize("uninterrupted", ["up-down"], indirect=True)
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals and sessions")
 
 
-@pytest.fixture(scope="module", params=PATHS)
+@pytest.fixture(scope="module")
 def uninterrupted(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[Path, Path]:
-    """Return a scene and the dataset of its campaign that nothing disturbed."""
+    """Return a scene whose path is the parameter, and the dataset of all its points from one process."""
     folder = tmp_path_factory.mktemp(request.param)
-    scene = folder / "scene.toml"
+    scene, dataset = folder / "scene.toml", folder / "run.nc"
     points = POINTS if request.param == "independent" else POINTS // 2
     scene.write_text(frequency_text(points, request.param, MILLISECONDS))
+    run_scene(scene_of(scene.read_text()), dataset, runner="support.busy_runner:BusyRunner")
+    return scene, dataset
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Return a scene and the dataset of its campaign that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("finished")
+    scene = folder / "scene.toml"
+    scene.write_text(frequency_text(FINISHED_POINTS))
     code, out, err = run_campaign_process(scene, folder / "campaign", *TWO)
     assert code == 0, err
-    assert f"{POINTS} points computed" in out
+    assert f"{FINISHED_POINTS} points computed" in out
     return scene, folder / "campaign" / "dataset.nc"
 
 
@@ -57,6 +70,7 @@ def resume(scene: Path, folder: Path) -> str:
     return out
 
 
+@up_and_down
 def test_a_campaign_survives_a_worker_that_is_killed(
     uninterrupted: tuple[Path, Path], tmp_path: Path
 ) -> None:
@@ -77,7 +91,12 @@ def test_a_campaign_survives_a_worker_that_is_killed(
     assert not list(scratch.rglob("*"))
 
 
-@pytest.mark.parametrize("everyone", [True, False], ids=["from a terminal", "to the command alone"])
+@pytest.mark.parametrize(
+    ("uninterrupted", "everyone"),
+    [("independent", True), ("up-down", False)],
+    indirect=["uninterrupted"],
+    ids=["independent, from a terminal", "up-down, to the command alone"],
+)
 def test_after_ctrl_c_the_same_command_resumes_bit_identically(
     uninterrupted: tuple[Path, Path], tmp_path: Path, everyone: bool
 ) -> None:
@@ -143,6 +162,7 @@ def killed(uninterrupted: tuple[Path, Path], tmp_path_factory: pytest.TempPathFa
     return campaign.folder
 
 
+@up_and_down
 def test_after_kill_9_the_workers_end_and_the_same_command_resumes_bit_identically(
     uninterrupted: tuple[Path, Path], killed: Path, tmp_path: Path
 ) -> None:
@@ -152,6 +172,7 @@ def test_after_kill_9_the_workers_end_and_the_same_command_resumes_bit_identical
     assert_same_rows(folder / "dataset.nc", expected)
 
 
+@up_and_down
 def test_damaged_parts_are_noticed_and_computed_again(
     uninterrupted: tuple[Path, Path], killed: Path, tmp_path: Path
 ) -> None:
@@ -168,19 +189,19 @@ def test_damaged_parts_are_noticed_and_computed_again(
     assert_same_rows(folder / "dataset.nc", expected)
 
 
-def test_a_finished_campaign_has_nothing_left_to_do(uninterrupted: tuple[Path, Path]) -> None:
-    scene, dataset = uninterrupted
+def test_a_finished_campaign_has_nothing_left_to_do(finished: tuple[Path, Path]) -> None:
+    scene, dataset = finished
     before = dataset.stat().st_mtime_ns
     code, out, _ = run_campaign_process(scene, dataset.parent, *TWO)
     assert code == 0
-    assert f"Nothing to do: all {POINTS} points are in" in out
+    assert f"Nothing to do: all {FINISHED_POINTS} points are in" in out
     assert dataset.stat().st_mtime_ns == before
 
 
 def test_a_changed_scene_is_refused_with_the_key_that_changed(
-    uninterrupted: tuple[Path, Path], tmp_path: Path
+    finished: tuple[Path, Path], tmp_path: Path
 ) -> None:
-    scene, dataset = uninterrupted
+    scene, dataset = finished
     changed = tmp_path / "changed.toml"
     changed.write_text(scene.read_text().replace("restitution = 0.7", "restitution = 0.8"))
     code, _, err = run_campaign_process(changed, dataset.parent, *TWO)
@@ -189,8 +210,8 @@ def test_a_changed_scene_is_refused_with_the_key_that_changed(
     assert "stop[1].restitution was 0.7, is 0.8" in err
 
 
-def test_a_changed_comment_is_the_same_scene(uninterrupted: tuple[Path, Path], tmp_path: Path) -> None:
-    scene, dataset = uninterrupted
+def test_a_changed_comment_is_the_same_scene(finished: tuple[Path, Path], tmp_path: Path) -> None:
+    scene, dataset = finished
     changed = tmp_path / "changed.toml"
     changed.write_text("# the same\n" + scene.read_text().replace("restitution = 0.7", "restitution = 0.70"))
     code, out, _ = run_campaign_process(changed, dataset.parent, *TWO)
@@ -347,6 +368,7 @@ def dask_cluster() -> Iterator[str]:
         yield address
 
 
+@up_and_down
 def test_a_campaign_on_a_dask_cluster_gives_the_same_rows_and_leaves_the_workers(
     uninterrupted: tuple[Path, Path], tmp_path: Path, dask_cluster: str
 ) -> None:
@@ -403,6 +425,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
+@independent
 def test_a_full_disk_ends_the_campaign_with_a_message_and_room_lets_it_go_on(
     uninterrupted: tuple[Path, Path], small_disk: Path
 ) -> None:

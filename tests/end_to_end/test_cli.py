@@ -15,9 +15,11 @@ import typer
 from support.campaign_scenes import assert_same_rows
 from support.command_line import in_this_process, vibroimpact
 from support.places import EXAMPLES
+from support.serial_pool import campaign_here
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
 from vibroimpact.fmus import fmu_path
+from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER
 from vibroimpact.orchestrator.commands.cli import PANELS, app, load_commands, main
 
 HEAVY = (
@@ -135,7 +137,18 @@ def test_every_example_of_a_single_body_runs(example: str, tmp_path: Path) -> No
     assert rows.attrs["scene"] == (EXAMPLES / example).read_text()
 
 
-@pytest.mark.parametrize("path", ["independent", "up", "down", "up-down"])
+@pytest.mark.parametrize("path", ["up", "down"])
+def test_a_campaign_of_one_process_has_the_rows_of_a_run(
+    tmp_path: Path, path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = tmp_path / "scene.toml"
+    scene.write_text(small_sweep(path))
+    assert in_this_process("run", scene, "-o", tmp_path / "run.nc").returncode == 0
+    campaign_here(monkeypatch, scene.read_text(), tmp_path / "campaign", runner=DEFAULT_RUNNER)
+    assert_same_rows(tmp_path / "run.nc", tmp_path / "campaign" / "dataset.nc")
+
+
+@pytest.mark.parametrize("path", ["independent", "up-down"])
 def test_run_and_campaign_give_bit_identical_rows(tmp_path: Path, path: str) -> None:
     scene = tmp_path / "scene.toml"
     scene.write_text(small_sweep(path))

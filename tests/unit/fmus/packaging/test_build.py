@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pytest
 
-from vibroimpact.fmus import components
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.packaging import build as building
 from vibroimpact.fmus.packaging.build import BUILT, CORE_LIBRARY, NATIVE, build, fingerprint, is_current, main
@@ -28,39 +27,18 @@ def keep_one_component(sources: Path) -> None:
             shutil.rmtree(description.parent)
 
 
-@pytest.fixture(scope="module")
-def built_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the folder of a build from a copy of the sources in another place."""
-    folder = tmp_path_factory.mktemp("elsewhere")
-    shutil.copytree(NATIVE, folder / "native")
-    build(folder / "built", native=folder / "native")
-    return folder / "built"
-
-
-@pytest.mark.slow
-def test_building_twice_in_different_places_gives_the_same_bytes(built_elsewhere: Path) -> None:
-    one, other = (
-        {path.relative_to(folder): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
-        for folder in (BUILT, built_elsewhere)
-    )
-    assert len(one) == 2 * len(components()) + 2  # and the core library and the fingerprint
-    assert one == other
-
-
-@pytest.mark.slow
-def test_an_edit_of_the_c_makes_the_build_out_of_date(built_elsewhere: Path, sources: Path) -> None:
-    assert is_current(built_elsewhere, native=sources)
+def test_an_edit_of_the_c_makes_the_build_out_of_date(sources: Path) -> None:
+    assert is_current(BUILT, native=sources)
     source = next((sources / "core").rglob("*.c"))
     source.write_text(source.read_text() + "\n")
-    assert not is_current(built_elsewhere, native=sources)
+    assert not is_current(BUILT, native=sources)
     assert fingerprint(sources) != fingerprint()
 
 
-@pytest.mark.slow
-def test_a_source_that_moves_makes_the_build_out_of_date(built_elsewhere: Path, sources: Path) -> None:
+def test_a_source_that_moves_makes_the_build_out_of_date(sources: Path) -> None:
     header = sources / "core" / "motion" / "flow.h"
     header.rename(sources / "core" / "contact" / "flow.h")
-    assert not is_current(built_elsewhere, native=sources)
+    assert not is_current(BUILT, native=sources)
 
 
 @pytest.mark.slow
@@ -100,32 +78,28 @@ def test_a_machine_without_a_compiler_is_told_what_to_install(monkeypatch: pytes
 
 
 @pytest.mark.slow
-def test_the_core_library_exports_the_functions_that_the_fmu_hides(sources: Path, tmp_path: Path) -> None:
-    (sources / "core" / "zz_probe.c").write_text("int vi_probe(void);\nint vi_probe(void) { return 42; }\n")
-    keep_one_component(sources)
-    library = build(tmp_path, native=sources)[0]
-    assert library.name == f"{CORE_LIBRARY}{library_suffix()}"
-    assert ctypes.CDLL(str(library)).vi_probe() == 42
-    with zipfile.ZipFile(tmp_path / "fmi3" / "Oscillator.fmu") as fmu:
-        (binary,) = (name for name in fmu.namelist() if name.startswith("binaries/"))
-        component = ctypes.CDLL(fmu.extract(binary, tmp_path))
-    assert hasattr(component, "fmi3DoStep")
-    assert not hasattr(component, "vi_probe")
-
-
-@pytest.mark.slow
-def test_the_command_builds_and_says_what_is_out_of_date(
+def test_the_command_builds_says_what_is_out_of_date_and_exports_what_the_fmu_hides(
     sources: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    (sources / "core" / "zz_probe.c").write_text("int vi_probe(void);\nint vi_probe(void) { return 42; }\n")
     keep_one_component(sources)
     monkeypatch.setattr(building, "update_readmes", lambda write=True: ())
     monkeypatch.setattr(building, "build", partial(build, native=sources))
     monkeypatch.setattr(building, "is_current", partial(is_current, native=sources))
-    arguments = ["--output", str(tmp_path / "built")]
-    codes = [main([*arguments, *more]) for more in (["--check"], [], ["--check"])]
+    built = tmp_path / "built"
+    codes = [main(["--output", str(built), *more]) for more in (["--check"], [], ["--check"])]
     assert codes == [1, 0, 0]
     out, err = capsys.readouterr()
     assert len(err.splitlines()) == 1
     assert "out of date" in err
-    assert all(Path(line).is_file() for line in out.splitlines())
-    assert str(tmp_path / "built" / "fmi3" / "Oscillator.fmu") in out.splitlines()
+    written = [Path(line) for line in out.splitlines()]
+    assert all(path.is_file() for path in written)
+
+    library, fmu = built / f"{CORE_LIBRARY}{library_suffix()}", built / "fmi3" / "Oscillator.fmu"
+    assert {library, fmu} <= set(written)
+    assert ctypes.CDLL(str(library)).vi_probe() == 42
+    with zipfile.ZipFile(fmu) as archive:
+        (binary,) = (name for name in archive.namelist() if name.startswith("binaries/"))
+        component = ctypes.CDLL(archive.extract(binary, tmp_path))
+    assert hasattr(component, "fmi3DoStep")
+    assert not hasattr(component, "vi_probe")
