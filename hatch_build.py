@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import tempfile
@@ -15,6 +16,8 @@ PACKAGES = ("fmus", "orchestrator", "analysis", "hardware")
 DOOR = "door"
 PACKAGE = "vibroimpact"
 ZIG = "ziglang>=0.13"
+RELEASE = "VIBROIMPACT_RELEASE"
+"""Variable that, where it is set, makes a wheel carry the libraries of all platforms: `make wheel`."""
 
 
 class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
@@ -25,12 +28,12 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
         self._make_importable()
         from vibroimpact.fmus.packaging.compiler import has_compiler
 
-        return [] if has_compiler() else [ZIG]
+        return [] if has_compiler() and RELEASE not in os.environ else [ZIG]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile the FMUs: into the wheel, or into the checkout for an editable install."""
         self._make_importable()
-        from vibroimpact.fmus.packaging.build import BUILT, build
+        from vibroimpact.fmus.packaging.build import BUILT, build, build_platforms
 
         # strict is for the project's own machines: a newer compiler's new warning must not stop a user
         if version == "editable":
@@ -39,6 +42,8 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
         else:
             self._built = Path(tempfile.mkdtemp())
             build(self._built, strict=False)
+            if RELEASE in os.environ:
+                build_platforms(self._built)
             build_data["force_include"][str(self._built)] = f"{PACKAGE}/fmus/built"
             build_data["force_include"][str(Path(self.root, "LICENSE"))] = f"{PACKAGE}/fmus/LICENSE"
         build_data["pure_python"] = False

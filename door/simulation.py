@@ -20,6 +20,7 @@ from vibroimpact.orchestrator.campaign import cost_of as scene_cost
 from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
 from vibroimpact.orchestrator.replay.replaying import replay_scene
+from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.scene import Scene
 
 SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
@@ -192,6 +193,56 @@ def cost_of(scene: SceneLike) -> SceneCost:
     1
     """
     return scene_cost(_scene(scene))
+
+
+def export_fmu(
+    scene: SceneLike,
+    path: PathLike,
+    *,
+    fmi: str = "3.0",
+    full: bool = False,
+    external: bool = False,
+    enumerations: bool = False,
+    platform: str | None = None,
+) -> Path:
+    """Write an FMU of a scene's body, stops and forcing, for another tool; components alone: `vi.fmus.export`.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        Of one body. What it sweeps has the value that it has in its own table.
+    path : path
+        The file to write.
+    fmi, full, external, enumerations, platform
+        As `vibroimpact.fmus.export` has them.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+    UsageError
+        The scene has another kind of body, or the file cannot be written.
+    ComponentError
+        There is no library for a platform, and nothing to compile it with.
+
+    Examples
+    --------
+    >>> export_fmu("rig.toml", "rig.fmu", platform="all")    # doctest: +SKIP
+    """
+    return export_scene(
+        _scene(scene),
+        _path(path),
+        fmi=fmi,
+        full=full,
+        external=external,
+        enumerations=enumerations,
+        platform=platform,
+    )
 
 
 def _scene(given: SceneLike) -> Scene:

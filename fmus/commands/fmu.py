@@ -1,9 +1,10 @@
-"""What `vibroimpact fmu` does: list, build, check and export the package's components."""
+"""What `vibroimpact fmu` does with components: list, build, check and export them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.archive import platforms, unpack
@@ -14,8 +15,6 @@ from vibroimpact.fmus.packaging.python_fmus import build_user_contact_law
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.shipped import FOLDERS, component_name, components, fmu_path
 from vibroimpact.fmus.terminal import say, wide_terminal
-
-USER_CONTACT_LAW = "user-contact-law"
 
 
 def print_components() -> None:
@@ -59,23 +58,39 @@ def check_all(files: Sequence[Path]) -> None:
     say(f"{len(paths)} FMU{'s' if len(paths) != 1 else ''} checked: no problems.")
 
 
-def _export_user_law(law: Path | None, output: Path | None, counts: Mapping[str, int | None]) -> Path:
+def export_user_law(law: Path | None, output: Path | None, given: Sequence[str]) -> Path:
+    """Write the FMU of a contact law of the user's; `given` are the options that it has no use for."""
     if law is None:
         raise UsageError("--law: expected the Python file of your law, got nothing. Add --law my_law.py.")
-    for option, count in counts.items():
-        if count is not None:
-            raise UsageError(f"--{option}: a contact law has no {option} of its own; leave the option out.")
+    if given:
+        raise UsageError(f"{given[0]}: a contact law has none of its own; leave the option out.")
     return build_user_contact_law(law, output or law.with_suffix(".fmu"))
 
 
-def export(
-    component: str, output: Path | None, counts: Mapping[str, int | None], fmi: str, law: Path | None
-) -> None:
-    """Write the FMU of a component, or of a contact law of the user's."""
-    if component == USER_CONTACT_LAW:
-        say(str(_export_user_law(law, output, counts)))
-        return
-    if law is not None:
-        raise UsageError(f"--law: expected the component {USER_CONTACT_LAW} with it, got {component}.")
+def export_component(
+    component: str,
+    output: Path | None,
+    counts: Mapping[str, Any],
+    changes: Sequence[str] | None,
+    fmi: str,
+    platform: str | None,
+    **kinds: bool,
+) -> Path:
+    """Write the FMU of a component, start values changed by `NAME=VALUE`."""
     path = output or Path(f"{component_name(component)}.fmu")
-    say(str(export_fmu(component, path, **counts, fmi=fmi)))
+    starts = None if changes is None else dict(map(_start, changes))
+    return export_fmu(
+        component, path, **counts, starts=starts, fmi=fmi, platform=platform, note=note, **kinds
+    )
+
+
+def note(text: str) -> None:
+    """Say what takes a while, beside what the command says."""
+    say(text, err=True)
+
+
+def _start(change: str) -> tuple[str, str]:
+    name, equals, value = change.partition("=")
+    if not equals:
+        raise UsageError(f"--set: expected NAME=VALUE, got {change[:200]!r}. For example: --set mass=2")
+    return name.strip(), value.strip()

@@ -1,4 +1,6 @@
-"""The options of the command `vibroimpact fmu`: list, build, check and export the package's components.
+"""The options of the command `vibroimpact fmu`: list, build and check the package's components.
+
+`export` takes scenes too and is declared where they are known, in the orchestrator.
 
 What a command does is imported when it is called: `--help` loads nothing heavy.
 """
@@ -53,26 +55,3 @@ def check_files(
     from vibroimpact.fmus.commands.fmu import check_all
 
     check_all(files or ())
-
-
-@commands.command("export")
-def export_component(
-    component: Annotated[str, typer.Argument(help="Component, for example oscillator.")],
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
-    contacts: Annotated[int | None, typer.Option(help="Contacts in its description; default: all.")] = None,
-    modes: Annotated[int | None, typer.Option(help="Beam: modes in its description; default: all.")] = None,
-    masses: Annotated[int | None, typer.Option(help="Chain: masses, likewise.")] = None,
-    sensors: Annotated[int | None, typer.Option(help="Beam: sensors, likewise.")] = None,
-    fmi: Annotated[str, typer.Option(help="FMI version, 3.0 or 2.0.")] = "3.0",
-    law: Annotated[Path | None, typer.Option(help="user-contact-law: the Python file of your law.")] = None,
-) -> None:
-    """Write an FMU for another tool, with as many contacts, modes, ... as wanted. Needs no compiler.
-
-    Example: vibroimpact fmu export beam --modes 8 --contacts 2 -o beam8.fmu
-
-    A contact law of your own in Python: vibroimpact fmu export user-contact-law --law my_law.py -o my_law.fmu
-    """
-    from vibroimpact.fmus.commands.fmu import export
-
-    counts = {"contacts": contacts, "modes": modes, "masses": masses, "sensors": sensors}
-    export(component, output, counts, fmi, law)

@@ -19,7 +19,7 @@ Numbers = Sequence[float] | Array
 Boundary = Literal["clamped_free", "clamped_clamped", "clamped_pinned", "pinned_pinned"]
 
 #: The ends of a beam, each with the number that the FMU's enumeration BeamBoundary gives it.
-BOUNDARIES: dict[str, int] = {name: number for number, name in enumerate(get_args(Boundary), 1)}
+BOUNDARIES: dict[Boundary, int] = {name: number for number, name in enumerate(get_args(Boundary), 1)}
 HIGHEST_DERIVATIVE = 3
 
 

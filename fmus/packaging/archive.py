@@ -23,7 +23,7 @@ from pathlib import Path, PurePosixPath
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.file_state import FileState, file_state, is_settled
-from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.packaging.platform_names import architecture, binary_folder, library_suffix
 from vibroimpact.fmus.private_folder import (
     CACHE_VARIABLE,
     UnsafeFolderError,
@@ -129,8 +129,9 @@ def binary_path(fmu: UnpackedFmu) -> Path:
     ComponentFileError
         It has none; the message names the platforms it does have.
     """
-    # FMI 2.0.4 allows FMI 3.0's names of platforms too
-    folders = dict.fromkeys((binary_folder(fmu.fmi_version), binary_folder("3.0")))
+    # FMI 2.0.4 allows FMI 3.0's names of platforms too; in an FMU for several, linux64 is not that of ARM
+    own, exact = binary_folder(fmu.fmi_version), binary_folder("3.0")
+    folders = dict.fromkeys((exact, own) if architecture() == "aarch64" else (own, exact))
     names = [f"{folder}/{fmu.identifiers[0]}{library_suffix()}" for folder in folders]
     for name in names:
         if (fmu.folder / "binaries" / name).is_file():

@@ -28,7 +28,7 @@ from vibroimpact.fmus.packaging.description import (
     with_table,
 )
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
-from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
+from vibroimpact.fmus.packaging.platform_names import TARGETS, Platform, binary_folder, library_suffix
 from vibroimpact.fmus.shipped import FOLDERS
 
 HERE = Path(__file__).resolve().parent
@@ -36,6 +36,8 @@ PACKAGE = HERE.parent
 NATIVE = PACKAGE / "native"
 BUILT = PACKAGE / "built"
 CORE_LIBRARY = "libvibroimpact_core"
+#: Where a release has the libraries of all platforms, each in a folder of its platform's name.
+PLATFORMS_FOLDER = "platforms"
 #: Length of an array below which gcc warns of loops over its further elements, though they never run.
 SMALLEST_ARRAY = 2
 #: Name of the file that says from which sources the folder was built.
@@ -76,6 +78,25 @@ def build(output: Path = BUILT, *, native: Path = NATIVE, strict: bool = True) -
         written += _build_component(component, output, native, strict)
     (output / FINGERPRINT).write_text(fingerprint(native) + "\n", encoding="ascii")
     return (*written, output / FINGERPRINT)
+
+
+def build_platforms(output: Path, *, native: Path = NATIVE) -> tuple[Path, ...]:
+    """Compile the libraries of all components for every platform, into `PLATFORMS_FOLDER`; takes minutes.
+
+    Raises
+    ------
+    ComponentError
+        The ziglang package is not there, or found an error.
+    """
+    written = []
+    for platform in map(Platform, TARGETS):
+        folder = output / PLATFORMS_FOLDER / platform.name
+        folder.mkdir(parents=True, exist_ok=True)
+        for component in read_components(native):
+            written.append(folder / f"{component.name}{platform.suffix}")
+            written[-1].write_bytes(compile_component(component, native, platform=platform))
+            print(written[-1], file=sys.stderr, flush=True)
+    return tuple(written)
 
 
 def is_current(output: Path = BUILT, *, native: Path = NATIVE) -> bool:
@@ -131,41 +152,66 @@ def _build_core(output: Path, native: Path, strict: bool) -> Path:
     return target
 
 
-def _build_component(component: ComponentDescription, output: Path, native: Path, strict: bool) -> list[Path]:
+def compile_component(
+    component: ComponentDescription,
+    native: Path = NATIVE,
+    *,
+    strict: bool = True,
+    platform: Platform | None = None,
+) -> bytes:
+    """Return a component's shared library, for this machine or another platform.
+
+    Raises
+    ------
+    ComponentError
+        No compiler works, or one found an error.
+    """
     own = native / component.folder
     shared = [native / "core", native / "adapters"]
-    sources = [path for folder in (*shared, own) for path in _c_files(folder)]
+    # what is called by ctypes is in the core library alone: an FMU exports FMI's functions and no others
+    door = native / "core" / "door"
+    sources = [path for folder in (*shared, own) for path in _c_files(folder) if door not in path.parents]
     with tempfile.TemporaryDirectory() as folder:
         generated = Path(folder)
         (generated / header_name(component)).write_text(c_header(component), encoding="utf-8")
-        library = generated / f"{component.name}{library_suffix()}"
+        library = generated / f"{component.name}{library_suffix() if platform is None else platform.suffix}"
         include = [*shared, own, generated, fmi_headers()]
-        compile_library(library, sources, include, definitions=_sizes(component), strict=strict)
-        binary = library.read_bytes()
+        compile_library(
+            library, sources, include, definitions=sizes(component), strict=strict, platform=platform
+        )
+        return library.read_bytes()
+
+
+def _build_component(component: ComponentDescription, output: Path, native: Path, strict: bool) -> list[Path]:
+    binary = compile_component(component, native, strict=strict)
     return [
         _write_component(component, binary, output / folder, version) for version, folder in FOLDERS.items()
     ]
 
 
-def _sizes(component: ComponentDescription) -> dict[str, int]:
-    # as sizes.h names them: what a component has no use for is no part of its saved states
+def sizes(component: ComponentDescription) -> dict[str, int]:
+    """Return the sizes that a component is compiled for, as sizes.h names them.
+
+    What a component has no use for is no part of its saved states.
+    """
     blocks = component.repeats
-    sizes = {"VI_MODES": blocks.get("mode", blocks.get("mass", 0)), "VI_PORTS": blocks.get("contact", 0)}
-    return {name: max(size, SMALLEST_ARRAY) for name, size in sizes.items()}
+    largest = {"VI_MODES": blocks.get("mode", blocks.get("mass", 0)), "VI_PORTS": blocks.get("contact", 0)}
+    return {name: max(size, SMALLEST_ARRAY) for name, size in largest.items()}
 
 
 def _write_component(component: ComponentDescription, binary: bytes, folder: Path, version: str) -> Path:
     members = {
         "modelDescription.xml": model_description(component, version).encode("utf-8"),
         f"binaries/{binary_folder(version)}/{component.name}{library_suffix()}": binary,
-        **_documentation(component),
+        **documentation(component),
     }
     path = folder / f"{component.name}.fmu"
     write_fmu(path, members)
     return path
 
 
-def _documentation(component: ComponentDescription) -> dict[str, bytes]:
+def documentation(component: ComponentDescription) -> dict[str, bytes]:
+    """Return the members of an FMU that a person reads: what the component is, with its table of variables."""
     path = _readme(component)
     has_readme = path.is_file()
     text = with_table(path.read_text(encoding="utf-8"), component) if has_readme else component.description

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.fmus.packaging.platform_names import library_suffix, system
+from vibroimpact.fmus.packaging.platform_names import Platform, library_suffix, system
 from vibroimpact.fmus.python_child import python_command
 
 #: Chosen by the user; if it does not work that is an error, not a reason to take another.
@@ -61,6 +61,7 @@ def compile_library(
     definitions: Mapping[str, int] = MappingProxyType({}),
     export_all: bool = False,
     strict: bool = True,
+    platform: Platform | None = None,
 ) -> None:
     """Compile C files into one shared library.
 
@@ -76,14 +77,16 @@ def compile_library(
         Export every function, not only those marked for export.
     strict : bool
         Warnings are errors; off where users build, since a newer compiler may know new warnings.
+    platform : Platform, optional
+        Another machine than this one, compiled for by the ziglang package.
 
     Raises
     ------
     ComponentError
         With the compiler's own words.
     """
-    compiler = find_compiler()
-    options = [*LANGUAGE, *WARNINGS, *(["-Werror"] if strict else []), *_platform_options(compiler)]
+    compiler = find_compiler() if platform is None else zig_compiler()
+    options = [*LANGUAGE, *WARNINGS, *(["-Werror"] if strict else []), *_platform_options(compiler, platform)]
     options += [] if export_all else ["-fvisibility=hidden"]
     options += [f"-D{name}={value}" for name, value in definitions.items()]
     folders = [f"-I{folder}" for folder in include]
@@ -97,11 +100,31 @@ def compile_library(
         )
 
 
-def _platform_options(compiler: Sequence[str]) -> list[str]:
-    options = ["-shared"] if system() == "windows" else ["-shared", "-fPIC"]
+def zig_compiler() -> tuple[str, ...]:
+    """Return the command of the compiler that makes libraries for other machines.
+
+    Raises
+    ------
+    ComponentError
+        The package ziglang is not installed.
+    """
+    if not importlib.util.find_spec("ziglang"):
+        raise ComponentError(
+            "compiler: expected the package ziglang to compile for another machine, got none. "
+            "Install it: `pip install 'vibroimpact[cross]'`."
+        )
+    return tuple(python_command("-m", "ziglang", "cc"))
+
+
+def _platform_options(compiler: Sequence[str], platform: Platform | None = None) -> list[str]:
+    windows = (system() if platform is None else platform.system) == "windows"
+    options = ["-shared"] if windows else ["-shared", "-fPIC"]
     if "ziglang" in compiler:
         # by default zig compiles for the very processor at hand; a wheel must run on every one
         options += ["-mcpu=baseline", "-fno-sanitize=undefined"]
+    if platform is not None:
+        # symbols for a debugger are three quarters of a library, and name the folder it was compiled in
+        options += ["-target", platform.target, "-s"]
     return options
 
 
@@ -113,7 +136,7 @@ def _candidates() -> Iterator[tuple[str, ...]]:
         yield tuple(shlex.split(os.environ["CC"]))
     yield from ((path,) for path in map(shutil.which, ON_PATH) if path)
     if importlib.util.find_spec("ziglang"):
-        yield tuple(python_command("-m", "ziglang", "cc"))
+        yield zig_compiler()
 
 
 @cache

@@ -1,24 +1,51 @@
-"""Writes an FMU with just as many contacts, modes, masses and sensors as wanted; needs no compiler.
+"""Writes an FMU for another tool: a lean description, with start values of one's own; needs no compiler.
 
 The binary is the one that was built: it knows its maxima, and reads from the FMU's resources how many its
-description has. Contacts that no description mentions keep the law `none`. Value references stay as they are.
+description has, and which start values. Contacts that no description mentions keep the law `none`. Value references
+stay as they are.
 """
 
 from __future__ import annotations
 
+import difflib
+import math
 import os
+import re
+import struct
+import time
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from importlib import metadata
 from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.packaging.build import read_components
-from vibroimpact.fmus.packaging.description import ComponentDescription, model_description, plural
+from vibroimpact.fmus.packaging.build import documentation, read_components
+from vibroimpact.fmus.packaging.cross import SHIPPED, Note, chosen_platforms, library_for, members_for
+from vibroimpact.fmus.packaging.description import (
+    ComponentDescription,
+    Edition,
+    Experiment,
+    Number,
+    Variable,
+    lean,
+    model_description,
+    plural,
+    with_starts,
+)
+from vibroimpact.fmus.packaging.experiment import default_experiment
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.packaging.platform_names import TARGETS, this_platform
+from vibroimpact.fmus.packaging.sources import c_files, source_members
 from vibroimpact.fmus.shipped import component_name, fmu_path
 
 #: The member that says how many of each repeated block the description has: lines such as `modes 8`.
 SIZES_MEMBER = "resources/sizes.txt"
+#: The member with the start values that are not the component's own, as resources.h describes it.
+STARTS_MEMBER = "resources/starts.txt"
+#: How many of a repeated block a lean description has where nobody says it.
+LEAN_COUNTS = {"contact": 2, "sensor": 0}
+
+Start = Number | str
 
 
 def export_fmu(
@@ -30,6 +57,13 @@ def export_fmu(
     masses: int | None = None,
     sensors: int | None = None,
     fmi: str = "3.0",
+    starts: Mapping[str, Start] | None = None,
+    full: bool = False,
+    external: bool = False,
+    enumerations: bool = False,
+    stop_time: float | None = None,
+    platform: str | None = None,
+    note: Note = lambda _: None,
 ) -> Path:
     """Write an FMU of a component of the package.
 
@@ -40,10 +74,27 @@ def export_fmu(
     output : path
         File to write.
     contacts, modes, masses, sensors : int, optional
-        How many its description has; all that were compiled in when absent. `modes` of a Beam and `masses` of a
-        Chain start with this number.
+        How many its description has. `modes` of a Beam and `masses` of a Chain start with this number. Absent: as
+        many as `starts` speaks of, at least two contacts, no sensors, and as many modes or masses as the component
+        starts with; all that were compiled in for a `full` one.
     fmi : str
         `3.0` or `2.0`.
+    starts : mapping of str to number or str, optional
+        Start values by variable name, SI: a number, a truth value, or the name of an enumeration's value. Absent: those
+        of the component, with a displacement that makes it move.
+    full : bool
+        Describe all variables, as this package's own importer needs them.
+    external : bool
+        Describe what a tool needs that answers contacts itself.
+    enumerations : bool
+        Describe enumerations as such, not as integers.
+    stop_time : float, optional
+        When a run ends where nobody says it, s; by default as suits the body's frequencies.
+    platform : str, optional
+        `all`, or names with commas between them (`x86_64-windows,x86_64-linux`), for what machines it is; by default
+        this one and those whose libraries a release brings along.
+    note : callable
+        Told what is compiled for another machine.
 
     Returns
     -------
@@ -54,24 +105,177 @@ def export_fmu(
     ------
     ComponentFileError
         There is no such component or it was not built.
+    ComponentError
+        There is no library for a platform, and nothing to compile it with.
     UsageError
-        More of them than were compiled in, a component that has none, or a file that cannot be written.
+        More of them than were compiled in, a component that has none, a start value of no such variable or out of its
+        range, or a file that cannot be written.
     """
     target = Path(output)
+    full_name = component_name(name)
+    original = next(component for component in read_components() if component.name == full_name)
+    given = original.start_of_export if starts is None and not full else starts or {}
+    own_starts = _checked_starts(original, given)
     asked = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
     counts = {block: count for block, count in asked.items() if count is not None}
-    full_name = component_name(name)
-    component = next(component for component in read_components() if component.name == full_name)
-    _check_counts(component, counts)
-    component = component.with_repeats(counts)
+    _check_counts(original, counts)
+    if not full:
+        counts = _lean_counts(original, own_starts) | counts
+    component = original.with_repeats(counts)
+    component = with_starts(component, own_starts)
+    edition = None
+    if not full:
+        edition = _edition(default_experiment(full_name, _numbers(component), stop_time))
+        component = lean(component, external=external, enumerations=enumerations)
+    _refuse_starts_beyond(component, own_starts)
     with zipfile.ZipFile(fmu_path(name, fmi)) as archive:
         members = {member: archive.read(member) for member in archive.namelist()}
-    members["modelDescription.xml"] = model_description(component, fmi).encode("utf-8")
+    if platform is not None or SHIPPED.is_dir():
+        members = _for_platforms(members, original, fmi, platform, note)
+    if not full:
+        members |= source_members(original, fmi)
+    text = model_description(component, fmi, edition, c_files(members))
+    members["modelDescription.xml"] = text.encode("utf-8")
+    members |= documentation(component)
     if counts:
         lines = (f"{plural(block)} {count}\n" for block, count in counts.items())
         members[SIZES_MEMBER] = "".join(lines).encode("ascii")
+    if own_starts:
+        members[STARTS_MEMBER] = "".join(_start_lines(original, own_starts)).encode("ascii")
     write_fmu(target, members)
     return target
+
+
+def _for_platforms(
+    members: Mapping[str, bytes], component: ComponentDescription, fmi: str, names: str | None, note: Note
+) -> dict[str, bytes]:
+    """Return the members with libraries for other machines in place of that of this one, or beside it."""
+    here = this_platform()
+    platforms = chosen_platforms(names or "all")
+    own = {name: content for name, content in members.items() if name.startswith("binaries/")}
+    rest = {name: content for name, content in members.items() if name not in own}
+    binaries = members_for(lambda p: library_for(component, p, note), component.name, platforms, fmi)
+    # what a release leaves out is this machine's own, if it is none of those
+    return rest | (own if names is None and here.name not in TARGETS else {}) | binaries
+
+
+def _edition(experiment: Experiment) -> Edition:
+    seconds = os.environ.get("SOURCE_DATE_EPOCH", "")
+    moment = time.gmtime(int(seconds) if seconds.isdecimal() else None)
+    return Edition(metadata.version("vibroimpact"), time.strftime("%Y-%m-%dT%H:%M:%SZ", moment), experiment)
+
+
+def _numbers(component: ComponentDescription) -> dict[str, Number]:
+    return {v.name: v.start for v in component.variables if v.start is not None}
+
+
+def _lean_counts(component: ComponentDescription, starts: Mapping[str, Number]) -> dict[str, int]:
+    """Return how many of each block a lean description has: no fewer than the start values speak of."""
+    counts = dict.fromkeys(component.repeats, 0) | {
+        block: min(count, component.repeats[block])
+        for block, count in LEAN_COUNTS.items()
+        if block in component.repeats
+    }
+    for variable in component.variables:
+        if variable.counts:
+            counts[variable.counts] = int(starts.get(variable.name, variable.start or 0))
+    for variable in component.variables:
+        if variable.repeat and variable.name in starts:
+            counts[variable.repeat] = max(counts[variable.repeat], variable.repeat_index)
+    return counts
+
+
+def _checked_starts(component: ComponentDescription, starts: Mapping[str, Start]) -> dict[str, Number]:
+    variables = {v.name: v for v in component.variables}
+    checked: dict[str, Number] = {}
+    problems = []
+    for name, value in starts.items():
+        variable = variables.get(name)
+        if variable is None or variable.start is None or variable.dimensions:
+            problems.append(f"{component.name}: {_no_such_start(component, name)}")
+            continue
+        number = _as_number(component, variable, value)
+        if number is None:
+            problems.append(
+                f"{component.name}: {name}: expected {_expected(component, variable)}, got {value!r}."
+            )
+            continue
+        checked[name] = number
+    if problems:
+        raise UsageError("\n".join(problems))
+    return checked
+
+
+def _no_such_start(component: ComponentDescription, name: str) -> str:
+    known = [v.name for v in component.variables if v.start is not None and not v.dimensions]
+    if bracketed := re.match(r"(\w+)\[(\d+)\]", name):
+        block = bracketed[1] if bracketed[1] in component.repeats else ""
+        most = component.repeats.get(block, 0)
+        if block and int(bracketed[2]) > most:
+            return f"{name}: expected {block} 1 to {most}, got {bracketed[2]}."
+    near = difflib.get_close_matches(name, known, n=1)
+    hint = f" Did you mean {near[0]}?" if near else ""
+    return f"{name}: expected a parameter or an input, got none of this name.{hint}"
+
+
+def _as_number(component: ComponentDescription, variable: Variable, value: Start) -> Number | None:
+    """Return a start value as its variable's type has it; None where it is none, or out of range."""
+    number: Number | None
+    names = {
+        item.name: item.value
+        for e in component.enumerations
+        if e.name == variable.enumeration
+        for item in e.items
+    }
+    if variable.type == "Boolean":
+        return {"true": True, "false": False}.get(str(value).lower())
+    try:
+        if variable.type == "Float64":
+            number = float(value)
+        else:
+            number = names[str(value)] if str(value) in names else int(str(value))
+    except (ValueError, OverflowError):
+        return None
+    lowest = -math.inf if variable.minimum is None else variable.minimum
+    highest = math.inf if variable.maximum is None else variable.maximum
+    fits = (
+        math.isfinite(number)
+        and lowest <= number <= highest
+        and (isinstance(number, float) or abs(number) < 2**31)
+    )
+    return number if fits and (not names or number in names.values()) else None
+
+
+def _expected(component: ComponentDescription, variable: Variable) -> str:
+    for enumeration in component.enumerations:
+        if enumeration.name == variable.enumeration:
+            return f"one of {', '.join(item.name for item in enumeration.items)}"
+    if variable.type == "Boolean":
+        return "true or false"
+    what = "a number" if variable.type == "Float64" else "a whole number"
+    if variable.minimum is not None and variable.maximum is not None:
+        return f"{what} from {variable.minimum:g} to {variable.maximum:g}"
+    return what if variable.minimum is None else f"{what} >= {variable.minimum:g}"
+
+
+def _refuse_starts_beyond(component: ComponentDescription, starts: Mapping[str, Number]) -> None:
+    """Refuse start values of what the description leaves out."""
+    names = {v.name for v in component.variables}
+    beyond = [name for name in starts if name not in names]
+    if beyond:
+        counts = ", ".join(f"{plural(block)} {count}" for block, count in component.repeats.items())
+        raise UsageError(
+            f"{component.name}: {beyond[0]}: expected a start value of what the description has ({counts}), "
+            "got another. Ask for more of them, or for the full description."
+        )
+
+
+def _start_lines(component: ComponentDescription, starts: Mapping[str, Number]) -> Iterator[str]:
+    for variable in component.variables:
+        if variable.name in starts:
+            value = starts[variable.name]
+            packed = struct.pack(">d", value) if variable.type == "Float64" else struct.pack(">q", value)
+            yield f"{variable.value_reference} {packed.hex()}\n"
 
 
 def _check_counts(component: ComponentDescription, counts: Mapping[str, int]) -> None:

@@ -1,9 +1,10 @@
-"""How FMI names the machine this Python runs on."""
+"""How FMI names the machine this Python runs on, and those that an FMU can be made for."""
 
 from __future__ import annotations
 
 import platform
 import sys
+from dataclasses import dataclass
 
 from vibroimpact.fmus.errors import ComponentFileError
 
@@ -18,7 +19,48 @@ ARCHITECTURES = {
 }
 SYSTEMS = {"linux": "linux", "darwin": "darwin", "win32": "windows"}
 SUFFIXES = {"linux": ".so", "darwin": ".dylib", "windows": ".dll"}
+TARGETS = {
+    "x86_64-linux": "x86_64-linux-gnu.2.17",
+    "aarch64-linux": "aarch64-linux-gnu.2.17",
+    "x86_64-windows": "x86_64-windows-gnu",
+    "x86_64-darwin": "x86_64-macos",
+    "aarch64-darwin": "aarch64-macos",
+}
+"""What zig calls the platforms that an export can be made for, by FMI 3.0's names; glibc 2.17 is of 2012."""
 FMI2_SYSTEMS = {"linux": "linux", "darwin": "darwin", "windows": "win"}
+
+
+@dataclass(frozen=True, slots=True)
+class Platform:
+    """A machine that an FMU can be made for, by the name that FMI 3.0 gives it: `x86_64-windows`."""
+
+    name: str
+
+    @property
+    def system(self) -> str:
+        """`linux`, `darwin` or `windows`."""
+        return self.name.rpartition("-")[2]
+
+    @property
+    def suffix(self) -> str:
+        """`.so`, `.dylib` or `.dll`."""
+        return SUFFIXES[self.system]
+
+    @property
+    def target(self) -> str:
+        """What zig calls it."""
+        return TARGETS[self.name]
+
+    def folder(self, fmi_version: str) -> str:
+        """Return its folder in `binaries/`; FMI 2.0 has no name for ARM but on macOS, where one file may hold both."""
+        if fmi_version.startswith("3") or (self.name.startswith("aarch64") and self.system != "darwin"):
+            return self.name
+        return f"{FMI2_SYSTEMS[self.system]}64"
+
+
+def this_platform() -> Platform:
+    """Return the machine that this Python runs on."""
+    return Platform(f"{architecture()}-{system()}")
 
 
 def system() -> str:

@@ -6,11 +6,12 @@ What a command does is imported when it is called: `--help` loads nothing heavy.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 from vibroimpact.analysis.commands.shared_options import FigureFile, Force
+from vibroimpact.fmus.commands.options import commands as fmu_commands
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).")]
 Changes = Annotated[
@@ -27,6 +28,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands of this package to the command line."""
     for command in (check, run, campaign, demo, replay):
         app.command()(command)
+    fmu_commands.command()(export)
 
 
 def check(scene: SceneFile, changes: Changes = None) -> None:
@@ -132,3 +134,60 @@ def replay(
         *(scene, recordings or (), score or (), output, fit, save_scene, figure, execution),
         *(workers, scheduler, force),
     )
+
+
+def export(
+    component: Annotated[
+        str, typer.Argument(help="Component, for example oscillator, or the scene file (TOML) of one body.")
+    ],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="File to write.")] = None,
+    changes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="NAME=VALUE",
+            help="Start value of a variable, for example contact[1].law=restitution, or a key of the scene; "
+            "may be repeated.",
+        ),
+    ] = None,
+    contacts: Annotated[int | None, typer.Option(help="Contacts in its description.")] = None,
+    modes: Annotated[int | None, typer.Option(help="Beam: modes in its description.")] = None,
+    masses: Annotated[int | None, typer.Option(help="Chain: masses, likewise.")] = None,
+    sensors: Annotated[int | None, typer.Option(help="Beam: sensors, likewise.")] = None,
+    fmi: Annotated[str, typer.Option(help="FMI version, 3.0 or 2.0.")] = "3.0",
+    full: Annotated[
+        bool,
+        typer.Option("--full", help="Describe all variables, as the importer of this package needs them."),
+    ] = False,
+    ports: Annotated[
+        Literal["external"] | None,
+        typer.Option(help="external: describe what a tool needs that answers contacts itself."),
+    ] = None,
+    enumerations: Annotated[
+        bool, typer.Option("--enumerations", help="Keep enumerations; else they are integers.")
+    ] = False,
+    platform: Annotated[
+        str | None,
+        typer.Option(
+            help="Machines it is for: all, or names such as x86_64-windows,x86_64-linux. Needs the extra cross where "
+            "this release has no libraries for them."
+        ),
+    ] = None,
+    law: Annotated[Path | None, typer.Option(help="user-contact-law: the Python file of your law.")] = None,
+) -> None:
+    """Write an FMU for another tool: a component, or the body of a scene with its stops. Needs no compiler.
+
+    Without --set a component starts with a displacement, so that a run of it shows motion. A scene's numbers are the
+    start values; what it sweeps has the value that it has in its own table.
+
+    Example: vibroimpact fmu export beam --modes 8 --contacts 2 -o beam8.fmu
+
+    A rig, ready: vibroimpact fmu export examples/single_run.toml -o rig.fmu
+
+    A contact law of your own in Python: vibroimpact fmu export user-contact-law --law my_law.py -o my_law.fmu
+    """
+    from vibroimpact.orchestrator.commands.export import export_to_file
+
+    counts = {"contacts": contacts, "modes": modes, "masses": masses, "sensors": sensors}
+    kinds = {"full": full, "external": ports == "external", "enumerations": enumerations}
+    export_to_file(component, output, counts, changes, fmi, kinds, platform, law)

@@ -1,5 +1,6 @@
 /* What both adapters share: instances, variables and saved states, of a small component made for this test. */
 #include "../../fmus/native/adapters/instance.c"
+#include "../../fmus/native/adapters/resources.c"
 
 #include "check.h"
 
@@ -178,9 +179,55 @@ static void the_longest_message_fits(void)
     vi_instance_free(NULL);
 }
 
-int main(void)
+static void write_starts(const char *folder, const char *text)
 {
+    char path[VI_PATH_LENGTH];
+    (void)snprintf(path, sizeof path, "%s/starts.txt", folder);
+    FILE *file = fopen(path, "w");
+    CHECK(file != NULL && fputs(text, file) >= 0 && fclose(file) == 0, "%s", path);
+}
+
+static void start_values_are_there_after_each_reset(const char *folder)
+{
+    write_starts(folder, "1 4000000000000000\n4 1\n0 3ff0000000000000\n5 1\n77 1\n4294967295 7\n1 no number");
+    vi_instance *instance = vi_instance_new("thing");
+    CHECK(instance != NULL && vi_instance_describe(instance, "instantiate", folder), "%s", "memory");
+    const thing *t = instance->self;
+    for (int n = 0; n < 2; ++n) {
+        CHECK(t->parameter == 2.0 && t->flag == 1, "%g, %d", t->parameter, (int)t->flag);
+        CHECK(t->time == 0.0 && t->rows[0] == 0.0, "%g: what cannot be set has no start", t->time);
+        CHECK(t->count == 5, "%d: was_set is called for each", (int)t->count);
+        vi_instance_reset(instance);
+    }
+    vi_instance_free(instance);
+}
+
+static void any_start_values_do_no_harm(uint64_t *seed, const char *folder)
+{
+    static const char characters[] = "0123456789abcdefx- \n\n";
+    for (int n = 0; n < 300; ++n) {
+        char text[400];
+        for (size_t i = 0; i + 1 < sizeof text; ++i) {
+            text[i] = characters[choice(seed, sizeof characters - 1)];
+        }
+        text[sizeof text - 1] = '\0';
+        write_starts(folder, text);
+        vi_instance *instance = vi_instance_new("thing");
+        CHECK(instance != NULL && vi_instance_describe(instance, "instantiate", folder), "%s", "memory");
+        CHECK(instance->start_count <= VARIABLES, "%d", (int)instance->start_count);
+        vi_instance_free(instance);
+    }
+}
+
+int main(int count, char *arguments[])
+{
+    CHECK(count > 0, "%d", count);
+    /* beside this program, in a folder of its own */
+    char *folder = arguments[0];
+    *strrchr(folder, '/') = '\0';
     uint64_t seed = 5;
+    start_values_are_there_after_each_reset(folder);
+    any_start_values_do_no_harm(&seed, folder);
     random_references_and_sizes_are_errors_or_right(&seed);
     states_come_back_and_damaged_ones_do_not(&seed);
     the_longest_message_fits();

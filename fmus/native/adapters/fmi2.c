@@ -90,9 +90,11 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         instance->callback = functions != NULL ? (void (*)(void))functions->logger : NULL;
         instance->environment = functions != NULL ? functions->componentEnvironment : NULL;
         instance->logging = loggingOn != fmi2False;
-        vi_sizes sizes;
-        vi_sizes_read_uri(fmuResourceLocation, &sizes);
-        vi_instance_size(instance, &sizes);
+        char folder[VI_PATH_LENGTH];
+        if (!vi_instance_describe(instance, "fmi2Instantiate", vi_folder_of_uri(fmuResourceLocation, folder))) {
+            vi_instance_free(instance);
+            return NULL;
+        }
     }
     return instance;
 }

@@ -37,8 +37,27 @@ void vi_instance_free(vi_instance *instance)
     if (instance != NULL) {
         free(instance->self);
         free(instance->name);
+        free(instance->starts);
         free(instance);
     }
+}
+
+/* Starts of other variables than those that may be set, or of arrays, are no start values. */
+static void put_start(vi_instance *instance, const vi_start *start)
+{
+    const vi_variable *variable =
+        start->reference < component->variable_count ? &component->variables[start->reference] : NULL;
+    if (variable == NULL || variable->access == VI_READ_ONLY || variable->count != 1) {
+        return;
+    }
+    char *field = (char *)instance->self + variable->offset;
+    const int32_t truth = start->bits != 0;
+    if (variable->type == VI_BOOLEAN) {
+        memcpy(field, &truth, sizeof truth);
+    } else {
+        memcpy(field, &start->bits, sizeof start->bits);
+    }
+    component->was_set(instance->self, start->reference);
 }
 
 void vi_instance_reset(vi_instance *instance)
@@ -48,16 +67,13 @@ void vi_instance_reset(vi_instance *instance)
     for (int i = 0; component->sized != NULL && i < instance->sizes.count; ++i) {
         component->sized(instance->self, instance->sizes.of[i].block, instance->sizes.of[i].size);
     }
+    for (size_t i = 0; i < instance->start_count; ++i) {
+        put_start(instance, &instance->starts[i]);
+    }
     instance->mode = VI_MODE_INSTANTIATED;
     instance->outputs_stale = false;
     instance->start_time = 0.0;
     instance->stop_time = HUGE_VAL;
-}
-
-void vi_instance_size(vi_instance *instance, const vi_sizes *sizes)
-{
-    instance->sizes = *sizes;
-    vi_instance_reset(instance);
 }
 
 enum { LEVEL_WARNING = 1, LEVEL_ERROR = 3 }; /* in both versions of FMI */
@@ -89,6 +105,18 @@ static void warn(const vi_instance *instance, const char *function, const char *
     va_start(arguments, format);
     report(instance, LEVEL_WARNING, "logStatusWarning", function, format, arguments);
     va_end(arguments);
+}
+
+bool vi_instance_describe(vi_instance *instance, const char *function, const char *folder)
+{
+    vi_sizes_read(folder, &instance->sizes);
+    instance->starts = calloc(component->variable_count, sizeof(vi_start));
+    if (instance->starts == NULL) {
+        return vi_instance_fail(instance, function, "out of memory");
+    }
+    instance->start_count = vi_starts_read(folder, instance->starts, component->variable_count);
+    vi_instance_reset(instance);
+    return true;
 }
 
 static const char *mode_name(vi_mode_of_use mode)
@@ -231,7 +259,7 @@ struct vi_saved {
     unsigned char data[];
 };
 
-static const char MAGIC[8] = "vibstat1";
+static const char MAGIC[8] = {'v', 'i', 'b', 's', 't', 'a', 't', '1'};
 
 static const uint64_t HASH_START = 1469598103934665603u;
 

@@ -39,6 +39,8 @@ struct vi_instance {
     void *environment;
     void (*callback)(void);
     vi_sizes sizes;          /* of the description */
+    vi_start *starts;        /* of the description, where they are not the component's own */
+    size_t start_count;
 };
 
 /* NULL when memory is out. */
@@ -46,8 +48,9 @@ vi_instance *vi_instance_new(const char *name);
 void vi_instance_free(vi_instance *instance);
 void vi_instance_reset(vi_instance *instance);
 
-/* The description has these sizes: the start values are theirs, now and after each reset. */
-void vi_instance_size(vi_instance *instance, const vi_sizes *sizes);
+/* Take sizes and start values of the description from the folder of resources, now and after each reset; NULL: the
+ * component's own. Return false, after logging, when memory is out. */
+bool vi_instance_describe(vi_instance *instance, const char *function, const char *folder);
 
 /* Log an error `function: text` and return false. */
 bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...);

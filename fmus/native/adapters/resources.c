@@ -1,6 +1,6 @@
 #include "resources.h"
 
-#include <stdbool.h>
+#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,8 +8,6 @@
 #if defined(_WIN32)
 #include <windows.h>
 #endif
-
-static const char FILE_NAME[] = "sizes.txt";
 
 /* The path is UTF-8 in FMI. */
 static FILE *open_to_read(const char *path)
@@ -22,15 +20,17 @@ static FILE *open_to_read(const char *path)
 #endif
 }
 
+static FILE *open_member(const char *folder, const char *name)
+{
+    char path[VI_PATH_LENGTH];
+    const int length = folder != NULL ? snprintf(path, sizeof path, "%s/%s", folder, name) : 0;
+    return length > 0 && length < VI_PATH_LENGTH ? open_to_read(path) : NULL;
+}
+
 void vi_sizes_read(const char *folder, vi_sizes *sizes)
 {
     sizes->count = 0;
-    if (folder == NULL) {
-        return;
-    }
-    char path[VI_PATH_LENGTH];
-    const int length = snprintf(path, sizeof path, "%s/%s", folder, FILE_NAME);
-    FILE *file = length > 0 && length < VI_PATH_LENGTH ? open_to_read(path) : NULL;
+    FILE *file = open_member(folder, "sizes.txt");
     if (file == NULL) {
         return;
     }
@@ -40,6 +40,21 @@ void vi_sizes_read(const char *folder, vi_sizes *sizes)
         sizes->count += 1;
     }
     (void)fclose(file);
+}
+
+size_t vi_starts_read(const char *folder, vi_start starts[], size_t most)
+{
+    FILE *file = open_member(folder, "starts.txt");
+    if (file == NULL) {
+        return 0;
+    }
+    size_t count = 0;
+    /* the widths are those of the two numbers */
+    while (count < most && fscanf(file, "%9" SCNu32 " %16" SCNx64, &starts[count].reference, &starts[count].bits) == 2) {
+        count += 1;
+    }
+    (void)fclose(file);
+    return count;
 }
 
 static bool hexadecimal(char c)
@@ -83,9 +98,8 @@ static const char *path_of(const char *uri)
     return path;
 }
 
-void vi_sizes_read_uri(const char *uri, vi_sizes *sizes)
+const char *vi_folder_of_uri(const char *uri, char folder[VI_PATH_LENGTH])
 {
-    char folder[VI_PATH_LENGTH];
     const char *path = uri != NULL ? path_of(uri) : NULL;
-    vi_sizes_read(path != NULL && decode(path, folder) ? folder : NULL, sizes);
+    return path != NULL && decode(path, folder) ? folder : NULL;
 }

@@ -5,10 +5,12 @@ README come from the same file. Imports the standard library only: the package's
 """
 
 from vibroimpact.fmus.packaging.description.c_header import c_header, header_name
+from vibroimpact.fmus.packaging.description.lean import Edition, Experiment, lean, with_starts
 from vibroimpact.fmus.packaging.description.model import (
     ComponentDescription,
     Enumeration,
     EnumerationItem,
+    Number,
     UnitDefinition,
     Variable,
     plural,
@@ -19,16 +21,21 @@ from vibroimpact.fmus.packaging.description.readme_table import readme_table, wi
 
 __all__ = [
     "ComponentDescription",
+    "Edition",
     "Enumeration",
     "EnumerationItem",
+    "Experiment",
+    "Number",
     "UnitDefinition",
     "Variable",
     "c_header",
     "header_name",
+    "lean",
     "model_description",
     "plural",
     "read_component",
     "readme_table",
     "unit_definitions",
+    "with_starts",
     "with_table",
 ]

@@ -52,6 +52,7 @@ class EnumerationItem:
     name: str
     value: int
     description: str = ""
+    ports: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +85,9 @@ class Variable:
         Name of the block it repeats in (`contact`), empty for a single variable.
     repeat_index : int
         1-based index in that block, 0 for a single variable.
+    ports : str
+        Who has a use for it: `importer` (this package's own alone), `external` (a tool that answers contacts);
+        empty: everybody.
     counts : str
         Name of the block of which it says how many are in use (`mode`); an export gives it that start value.
     shown_name, shown_description : str
@@ -110,6 +114,7 @@ class Variable:
     repeat: str = ""
     repeat_index: int = 0
     counts: str = ""
+    ports: str = ""
     shown_name: str = ""
     shown_description: str = ""
 
@@ -135,6 +140,8 @@ class ComponentDescription:
         Identifies this very list of variables; FMI 3.0 instantiationToken and FMI 2.0 guid.
     repeats : mapping of str to int
         How often each repeated block occurs, `{"contact": 2}`.
+    start_of_export : mapping of str to float
+        Start values, by variable name, of an export that is given none: a run of it shows motion.
     """
 
     name: str
@@ -149,6 +156,7 @@ class ComponentDescription:
     units: tuple[UnitDefinition, ...]
     enumerations: tuple[Enumeration, ...]
     variables: tuple[Variable, ...]
+    start_of_export: Mapping[str, Number]
 
     def variables_of(self, version: int) -> tuple[Variable, ...]:
         """Return the variables that FMI 2.0 (`version=2`) or 3.0 (`version=3`) can express, in order."""
@@ -158,6 +166,21 @@ class ComponentDescription:
         """Return the names of the inputs of that FMI version that an output depends on directly."""
         inputs = {v.name for v in self.variables_of(version) if v.causality == "input"}
         return tuple(name for name in variable.dependencies or () if name in inputs)
+
+    def knowns_at_start(self, variable: Variable, version: int) -> tuple[str, ...]:
+        """Return the names of the knowns that an unknown of initialization may depend on.
+
+        Its inputs, and all start values but those of the other modes or masses than its own.
+        """
+
+        def may_matter(known: Variable) -> bool:
+            other = variable.repeat in {"mode", "mass"} and known.repeat == variable.repeat
+            return not (other and known.repeat_index != variable.repeat_index)
+
+        starts = (
+            v for v in self.variables_of(version) if v.causality == "parameter" and v.initial == "exact"
+        )
+        return (*self.direct_inputs(variable, version), *(v.name for v in starts if may_matter(v)))
 
     def with_repeats(self, repeats: Mapping[str, int]) -> ComponentDescription:
         """Return the component with fewer repeated blocks; the value references that stay are unchanged.

@@ -6,10 +6,11 @@ FMI 3.0 names unknowns by their value references, FMI 2.0 by their position, cou
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from vibroimpact.fmus.packaging.description.lean import Edition, Experiment
 from vibroimpact.fmus.packaging.description.model import (
     ComponentDescription,
     Enumeration,
@@ -23,12 +24,15 @@ LOG_CATEGORIES = {
     "logStatusWarning": "What is unusual but was dealt with",
     "logEvents": "Contacts, sticking and release, as they happen",
 }
-#: Start and stop time and step that a tool offers first, s.
-DEFAULT_EXPERIMENT = {"startTime": "0", "stopTime": "10", "stepSize": "0.01"}
 FMI2_TYPES = {"Float64": "Real", "Int64": "Integer", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 
 
-def model_description(component: ComponentDescription, fmi: str) -> str:
+def model_description(
+    component: ComponentDescription,
+    fmi: str,
+    edition: Edition | None = None,
+    source_files: Sequence[str] = (),
+) -> str:
     """Return a component's model description; the same component gives the same bytes.
 
     Parameters
@@ -36,6 +40,10 @@ def model_description(component: ComponentDescription, fmi: str) -> str:
     component : ComponentDescription
     fmi : str
         `2.0` or `3.0`. Variables that only FMI 3.0 knows are left out for `2.0`.
+    edition : Edition, optional
+        Of an export: version and date are told, and what each unknown of initialization depends on.
+    source_files : sequence of str
+        C files of the FMU to be named, where `fmi` is `2.0`; FMI 3.0 has a file for them.
     """
     version = int(fmi[0])
     identity = {"fmiVersion": fmi, "guid" if version == 2 else "instantiationToken": component.token}
@@ -47,19 +55,29 @@ def model_description(component: ComponentDescription, fmi: str) -> str:
         "generationTool": "vibroimpact",
         "variableNamingConvention": "structured",
     }
+    if edition is not None:
+        head |= {
+            "version": edition.version,
+            "copyright": "vibroimpact developers",
+            "generationDateAndTime": edition.date_and_time,
+        }
     root = Element("fmiModelDescription", identity | head)
-    SubElement(root, "CoSimulation", _capabilities(component, version))
+    interface = SubElement(root, "CoSimulation", _capabilities(component, version))
+    if version == 2 and source_files:
+        files = SubElement(interface, "SourceFiles")
+        for name in source_files:
+            SubElement(files, "File", name=name)
     if component.units:
         root.append(unit_definitions(component.units))
     _add_types(root, component.enumerations, version)
     categories = SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
         SubElement(categories, "Category", name=name, description=description)
-    SubElement(root, "DefaultExperiment", DEFAULT_EXPERIMENT)
+    SubElement(root, "DefaultExperiment", _experiment(edition.experiment if edition else Experiment()))
     variables = SubElement(root, "ModelVariables")
     for variable in component.variables_of(version):
         _add_variable(variables, variable, version)
-    _add_structure(root, component, version)
+    _add_structure(root, component, version, initial_dependencies=edition is not None)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -73,6 +91,15 @@ def literal(value: Number) -> str:
     if math.isfinite(value):
         return repr(value)
     return "NaN" if math.isnan(value) else ("INF" if value > 0 else "-INF")
+
+
+def _experiment(experiment: Experiment) -> dict[str, str]:
+    return {
+        "startTime": literal(experiment.start_time),
+        "stopTime": literal(experiment.stop_time),
+        "tolerance": literal(experiment.tolerance),
+        "stepSize": literal(experiment.step_size),
+    }
 
 
 def _capabilities(component: ComponentDescription, version: int) -> dict[str, str]:
@@ -157,7 +184,9 @@ def _present(attributes: Mapping[str, str | None]) -> dict[str, str]:
     return {key: value for key, value in attributes.items() if value}
 
 
-def _add_structure(root: Element, component: ComponentDescription, version: int) -> None:
+def _add_structure(
+    root: Element, component: ComponentDescription, version: int, *, initial_dependencies: bool
+) -> None:
     variables = component.variables_of(version)
     if version == 2:
         key, references = "index", {v.name: str(place) for place, v in enumerate(variables, 1)}
@@ -174,6 +203,12 @@ def _add_structure(root: Element, component: ComponentDescription, version: int)
             unknown = SubElement(
                 parent, "Unknown" if version == 2 else kind, {key: references[variable.name]}
             )
-            if kind == "Output" and variable.dependencies is not None:
-                inputs = component.direct_inputs(variable, version)
-                unknown.set("dependencies", " ".join(references[name] for name in inputs))
+            if variable.dependencies is None:
+                continue
+            if kind == "Output":
+                knowns = component.direct_inputs(variable, version)
+            elif initial_dependencies:
+                knowns = component.knowns_at_start(variable, version)
+            else:
+                continue
+            unknown.set("dependencies", " ".join(references[name] for name in knowns))

@@ -32,8 +32,9 @@ TYPES = ("Float64", "Int64", "Boolean", "Enumeration")
 REQUIRED_KEYS = {"name", "description", "causality", "variability", "type", "field", "code"}
 OPTIONAL_KEYS = {
     *("unit", "enumeration", "start", "min", "max", "initial"),
-    *("repeat", "dimensions", "fmi", "dependencies", "counts"),
+    *("repeat", "dimensions", "fmi", "dependencies", "counts", "ports"),
 }
+PORTS = ("importer", "external")
 #: Stands in a dependency for every index of a repeated block, as `{k}` stands for the variable's own.
 ALL = "{*}"
 
@@ -113,6 +114,7 @@ def _component(table: Mapping[str, Any], path: Path, token: str) -> ComponentDes
         units=tuple(UnitDefinition(**{"base": {}, **unit}) for unit in table.get("unit", ())),
         enumerations=tuple(_enumeration(entry) for entry in table.get("enumeration", ())),
         variables=tuple(_numbered(table["variable"], repeats)),
+        start_of_export=head.get("start_of_export", {}),
     )
 
 
@@ -184,6 +186,7 @@ def _variable(
         repeat=entry.get("repeat", ""),
         repeat_index=index,
         counts=entry.get("counts", ""),
+        ports=entry.get("ports", ""),
         shown_name=entry["name"].replace("{k}", "k"),
         shown_description=entry["description"].replace("{k}", "k"),
     )
@@ -278,6 +281,7 @@ def _rules(table: Mapping[str, Any]) -> tuple[Rule, ...]:
             "a repeated block of the file",
             lambda e: "counts" not in e or e["counts"] in _repeat_names(table),
         ),
+        ("ports", f"one of {', '.join(PORTS)}, or none", lambda e: e.get("ports", PORTS[0]) in PORTS),
         ("repeat", "a count in [component]", lambda e: _repeat_is_counted(table["component"], e)),
     )
 

@@ -4,8 +4,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-#include "door/door.h"
-
 static char *next_line(vi_log_ring *ring)
 {
     char *line = ring->lines[ring->count % VI_LOG_LINES];
@@ -13,7 +11,7 @@ static char *next_line(vi_log_ring *ring)
     return line;
 }
 
-VI_DOOR void vi_log_ring_fmi3(void *environment, int status, const char *category, const char *message)
+void vi_log_ring_fmi3(void *environment, int status, const char *category, const char *message)
 {
     (void)status;
     (void)category;
@@ -22,8 +20,8 @@ VI_DOOR void vi_log_ring_fmi3(void *environment, int status, const char *categor
     }
 }
 
-VI_DOOR void vi_log_ring_fmi2(void *environment, const char *instance, int status, const char *category,
-                              const char *message, ...)
+void vi_log_ring_fmi2(void *environment, const char *instance, int status, const char *category, const char *message,
+                      ...)
 {
     (void)instance;
     (void)status;
@@ -37,12 +35,12 @@ VI_DOOR void vi_log_ring_fmi2(void *environment, const char *instance, int statu
     va_end(arguments);
 }
 
-VI_DOOR void *vi_log_ring_allocate(size_t count, size_t size)
+void *vi_log_ring_allocate(size_t count, size_t size)
 {
     return calloc(count, size);
 }
 
-VI_DOOR void vi_log_ring_free(void *memory)
+void vi_log_ring_free(void *memory)
 {
     free(memory);
 }

@@ -9,6 +9,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "door/door.h"
+
 enum { VI_LOG_LINES = 20, VI_LOG_LENGTH = 480 };
 
 typedef struct {
@@ -17,14 +19,14 @@ typedef struct {
 } vi_log_ring;
 
 /* fmi3LogMessageCallback, with the ring as instance environment. */
-void vi_log_ring_fmi3(void *environment, int status, const char *category, const char *message);
+VI_DOOR void vi_log_ring_fmi3(void *environment, int status, const char *category, const char *message);
 
 /* fmi2CallbackLogger, with the ring as component environment. */
-void vi_log_ring_fmi2(void *environment, const char *instance, int status, const char *category, const char *message,
-                      ...);
+VI_DOOR void vi_log_ring_fmi2(void *environment, const char *instance, int status, const char *category, const char *message,
+                              ...);
 
 /* fmi2CallbackAllocateMemory and fmi2CallbackFreeMemory. */
-void *vi_log_ring_allocate(size_t count, size_t size);
-void vi_log_ring_free(void *memory);
+VI_DOOR void *vi_log_ring_allocate(size_t count, size_t size);
+VI_DOOR void vi_log_ring_free(void *memory);
 
 #endif

@@ -24,7 +24,7 @@ def test_the_list_names_every_component_in_both_versions_of_fmi() -> None:
         ("export beam --law my_law.py", "--law: expected the component user-contact-law with it, got beam."),
         (
             "export user-contact-law --law my_law.py --modes 2",
-            "--modes: a contact law has no modes of its own",
+            "--modes: a contact law has none of its own",
         ),
         ("export beem", "component: expected one of"),
         ("build --output FILE", "--output: expected a folder to fill"),

@@ -7,15 +7,14 @@ from typing import Any
 import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions
+from support.command_line import in_this_process
 from support.component_fmu import LOGGER2, VERSIONS, ComponentFmu
-from typer.testing import CliRunner
 
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.commands import commands
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
 from vibroimpact.fmus.packaging.check import check_fmu
-from vibroimpact.fmus.packaging.export import SIZES_MEMBER, export_fmu
+from vibroimpact.fmus.packaging.export import SIZES_MEMBER, STARTS_MEMBER, export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 
 pytestmark = pytest.mark.slow
@@ -32,7 +31,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def exported(folder: Path, body: str, fmi: str, count: int, contacts: int) -> Path:
     counts: dict[str, int] = {BODIES[body]: count, "contacts": contacts}
-    return export_fmu(body, folder / f"{body}{fmi[0]}.fmu", fmi=fmi, **counts)
+    return export_fmu(body, folder / f"{body}{fmi[0]}.fmu", fmi=fmi, starts={}, **counts)
 
 
 @pytest.mark.parametrize("fmi", VERSIONS)
@@ -88,9 +87,10 @@ def test_an_export_moves_as_the_component_that_it_was_made_from(tmp_path: Path) 
 
 
 def test_only_what_was_asked_for_is_written_into_the_resources(tmp_path: Path) -> None:
-    path = export_fmu("Beam", tmp_path / "b.fmu", modes=8, contacts=2, sensors=1)
-    assert (unpack(path).folder / SIZES_MEMBER).read_text() == "contacts 2\nmodes 8\nsensors 1\n"
-    bare = export_fmu("Beam", tmp_path / "all.fmu")
+    path = export_fmu("Beam", tmp_path / "b.fmu", modes=8, contacts=2, sensors=1, starts={})
+    assert not (unpack(path).folder / STARTS_MEMBER).exists()
+    assert (unpack(path).folder / SIZES_MEMBER).read_text() == "modes 8\ncontacts 2\nsensors 1\n"
+    bare = export_fmu("Beam", tmp_path / "all.fmu", full=True)
     assert not (unpack(bare).folder / SIZES_MEMBER).exists()
     assert bare.read_bytes() == fmu_path("Beam").read_bytes()
 
@@ -112,8 +112,8 @@ def test_the_command_line_exports_a_beam_and_a_chain(tmp_path: Path) -> None:
         ["beam", "--modes", "8", "--contacts", "2", "-o", str(beam)],
         ["chain", "--masses", "5", "--contacts", "1", "--fmi", "2.0", "-o", str(chain)],
     ):
-        result = CliRunner().invoke(commands, ["export", *arguments])
-        assert result.exit_code == 0, result.output
+        done = in_this_process("fmu", "export", *arguments)
+        assert done.returncode == 0, done.stderr
     with ComponentFmu(beam) as fmu:
         assert fmu.get("modes") == 8
     with ComponentFmu(chain, version="2.0") as fmu:

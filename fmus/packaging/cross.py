@@ -1,0 +1,117 @@
+"""Libraries of the components for other machines than this one: shipped with a release, kept, or compiled by zig."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Mapping
+from importlib import metadata, util
+from pathlib import Path
+
+from vibroimpact.fmus.errors import ComponentError, UsageError
+from vibroimpact.fmus.packaging.build import BUILT, PLATFORMS_FOLDER, compile_component, fingerprint
+from vibroimpact.fmus.packaging.description import ComponentDescription
+from vibroimpact.fmus.packaging.platform_names import TARGETS, Platform
+from vibroimpact.fmus.private_folder import UnsafeFolderError, private_folder
+
+SHIPPED = BUILT / PLATFORMS_FOLDER
+Note = Callable[[str], None]
+
+
+def chosen_platforms(names: str) -> tuple[Platform, ...]:
+    """Return the platforms that `all`, or names with commas between them, stand for.
+
+    Raises
+    ------
+    UsageError
+        A name that FMI has not, or for which nothing can be made.
+    """
+    wanted = list(TARGETS) if names.strip() == "all" else [name.strip() for name in names.split(",")]
+    unknown = [name for name in wanted if name not in TARGETS]
+    if unknown:
+        raise UsageError(f"platform: expected all, or some of {', '.join(TARGETS)}, got {unknown[0]!r}.")
+    return tuple(Platform(name) for name in dict.fromkeys(wanted))
+
+
+def library_for(component: ComponentDescription, platform: Platform, note: Note = lambda _: None) -> bytes:
+    """Return a component's library for a platform.
+
+    Parameters
+    ----------
+    component : ComponentDescription
+        As it is compiled in, not one of an export.
+    platform : Platform
+    note : callable
+        Told what is compiled, which takes from seconds to, the first time for Windows, minutes.
+
+    Raises
+    ------
+    ComponentError
+        It is not there and cannot be compiled.
+    """
+    name = f"{component.name}{platform.suffix}"
+    shipped = SHIPPED / platform.name / name
+    if shipped.is_file():
+        return shipped.read_bytes()
+    kept = _kept(platform) / name
+    if kept.is_file():
+        return kept.read_bytes()
+    note(f"{platform.name}: compiling {component.name}")
+    library = compile_component(component, strict=False, platform=platform)
+    beside = kept.with_name(f".{name}.new")
+    beside.write_bytes(library)
+    beside.replace(kept)
+    return library
+
+
+def members_for(
+    components_library: Callable[[Platform], bytes], name: str, platforms: Iterable[Platform], fmi: str
+) -> dict[str, bytes]:
+    """Return the members of an FMU that hold its binaries.
+
+    Parameters
+    ----------
+    components_library : callable
+        Returns the library for a platform.
+    name : str
+        The model identifier.
+    platforms : iterable of Platform
+    fmi : str
+        `3.0` or `2.0`, which has one folder for both processors of macOS: there the file holds both.
+    """
+    members: dict[str, dict[Platform, bytes]] = {}
+    for platform in platforms:
+        place = f"binaries/{platform.folder(fmi)}/{name}{platform.suffix}"
+        members.setdefault(place, {})[platform] = components_library(platform)
+    return {place: universal(libraries) for place, libraries in members.items()}
+
+
+def universal(libraries: Mapping[Platform, bytes]) -> bytes:
+    """Return one library for several processors of macOS, a Mach-O file of several; a single one as it is."""
+    if len(libraries) == 1:
+        return next(iter(libraries.values()))
+    header, body = struct.pack(">II", 0xCAFEBABE, len(libraries)), bytearray(1 << _ALIGNMENT)
+    for platform, library in libraries.items():
+        processor = platform.name.partition("-")[0]
+        offset = len(body)
+        header += struct.pack(">5I", *_MACH_PROCESSORS[processor], offset, len(library), _ALIGNMENT)
+        body += library + bytes(-len(library) % (1 << _ALIGNMENT))
+    body[: len(header)] = header
+    return bytes(body)
+
+
+#: Type and subtype of a processor in Mach-O, and the power of two that each part begins at a multiple of.
+_MACH_PROCESSORS = {"x86_64": (0x01000007, 3), "aarch64": (0x0100000C, 0)}
+_ALIGNMENT = 14
+
+
+def _kept(platform: Platform) -> Path:
+    """Return the folder of what was compiled for a platform from these sources by this compiler."""
+    compiler = metadata.version("ziglang") if util.find_spec("ziglang") else "none"
+    try:
+        folder = private_folder("libraries") / f"{fingerprint()[:16]}-zig-{compiler}" / platform.name
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except (OSError, UnsafeFolderError) as error:
+        raise ComponentError(
+            f"cache of libraries: expected a folder that can be written, got: {error}"
+        ) from error
+    return folder

@@ -1,0 +1,86 @@
+"""A component as other tools take it: what only this package's importer uses is left out.
+
+OMSimulator writes no result when an output is NaN before its first event, or when there is an array; libcosim and Ecos
+cannot set an enumeration. The binary is the same: variables that no description mentions keep their values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from vibroimpact.fmus.packaging.description.model import (
+    ComponentDescription,
+    Enumeration,
+    Number,
+    Variable,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Experiment:
+    """What a tool offers first: start and stop time and step, s, and a relative tolerance."""
+
+    stop_time: float = 10.0
+    step_size: float = 0.01
+    start_time: float = 0.0
+    tolerance: float = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Edition:
+    """Which version of the package wrote a description, and when; what to try with it."""
+
+    version: str
+    date_and_time: str
+    experiment: Experiment
+
+
+def lean(
+    component: ComponentDescription, *, external: bool = False, enumerations: bool = False
+) -> ComponentDescription:
+    """Return a component without what few tools take.
+
+    Parameters
+    ----------
+    component : ComponentDescription
+    external : bool
+        Keep what a tool needs that answers contacts itself: applied forces, contact masses, instants of contacts.
+    enumerations : bool
+        Keep enumerations; else they are integers, their names in the descriptions.
+    """
+    left_out = {"importer"} if external else {"importer", "external"}
+    types = {e.name: _without(e, left_out) for e in component.enumerations}
+    kept = [v for v in component.variables if v.ports not in left_out and not v.dimensions]
+    if not enumerations:
+        kept = [_as_integer(v, types[v.enumeration]) if v.enumeration else v for v in kept]
+    units = {v.unit for v in kept}
+    return replace(
+        component,
+        units=tuple(unit for unit in component.units if unit.name in units),
+        enumerations=tuple(types.values()) if enumerations else (),
+        variables=tuple(kept),
+    )
+
+
+def with_starts(component: ComponentDescription, starts: Mapping[str, Number]) -> ComponentDescription:
+    """Return a component with other start values, by variable name."""
+    changed = (replace(v, start=starts[v.name]) if v.name in starts else v for v in component.variables)
+    return replace(component, variables=tuple(changed))
+
+
+def _without(enumeration: Enumeration, left_out: set[str]) -> Enumeration:
+    return replace(enumeration, items=tuple(item for item in enumeration.items if item.ports not in left_out))
+
+
+def _as_integer(variable: Variable, enumeration: Enumeration) -> Variable:
+    values = [item.value for item in enumeration.items]
+    names = ", ".join(f"{item.value} {item.name}" for item in enumeration.items)
+    return replace(
+        variable,
+        type="Int64",
+        enumeration="",
+        minimum=min(values),
+        maximum=max(values),
+        description=f"{variable.description}: {names}",
+    )

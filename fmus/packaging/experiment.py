@@ -1,0 +1,96 @@
+"""How long a tool should run an exported body, and with which step, so that its motion is seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from vibroimpact.fmus.packaging.description import Experiment, Number
+
+PERIODS = 20
+"""Periods of the slowest motion that a default experiment shows."""
+
+STEPS_PER_PERIOD = 20
+"""Steps in a period of the fastest motion."""
+
+MOST_STEPS = 10_000
+"""Steps in a default experiment: what is faster than they can show is computed all the same."""
+
+Starts = Mapping[str, Number]
+
+
+def default_experiment(component: str, starts: Starts, stop_time: float | None = None) -> Experiment:
+    """Return the default experiment of a body, from its start values.
+
+    Parameters
+    ----------
+    component : str
+        Name of the component.
+    starts : mapping of str to number
+        All its start values by variable name.
+    stop_time : float, optional
+        When it ends, s.
+
+    Returns
+    -------
+    Experiment
+        `PERIODS` periods of its slowest natural frequency or of its forcing, whichever is slower, and
+        `STEPS_PER_PERIOD` steps in each of the fastest, `MOST_STEPS` at most; both rounded to two digits.
+    """
+    natural = NATURAL[component](starts) if component in NATURAL else []
+    angular = [w for w in (*natural, abs(float(starts.get("forcing.angular_frequency", 0.0)))) if w > 0.0]
+    if not all(map(math.isfinite, angular)) or not angular:
+        return Experiment() if stop_time is None else Experiment(stop_time, stop_time / MOST_STEPS)
+    stop = _rounded(PERIODS * 2.0 * math.pi / min(angular)) if stop_time is None else stop_time
+    step = _rounded(2.0 * math.pi / max(angular) / STEPS_PER_PERIOD)
+    return Experiment(stop_time=stop, step_size=max(step, _rounded(stop / MOST_STEPS)))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.1e}")
+
+
+def _oscillator(starts: Starts) -> list[float]:
+    mass, stiffness = float(starts["mass"]), float(starts["stiffness"])
+    return [math.sqrt(stiffness / mass)] if mass > 0.0 and stiffness > 0.0 else []
+
+
+def _chain(starts: Starts) -> list[float]:
+    """Return the natural angular frequencies: equations.md 5, thesis (6.1) to (6.8)."""
+    count = int(starts["masses"])
+    mass = np.array([float(starts[f"mass[{i}]"]) for i in range(1, count + 1)])
+    stiffness = [float(starts[f"stiffness[{i}]"]) for i in range(1, count + 1)]
+    spring = np.array([*stiffness, float(starts["far_stiffness"])])
+    if not (mass > 0.0).all() or not np.isfinite(spring).all():
+        return []
+    matrix = np.diag(spring[:-1] + spring[1:]) - np.diag(spring[1:-1], 1) - np.diag(spring[1:-1], -1)
+    root = np.sqrt(mass)
+    squares = np.linalg.eigvalsh(matrix / np.outer(root, root))
+    # what is left of a rigid motion is rounding
+    return [math.sqrt(square) for square in squares if square > squares[-1] * 1e-12]
+
+
+def _beam(starts: Starts) -> list[float]:
+    """Return the natural angular frequencies: equations.md 6, thesis table 7.1."""
+    from vibroimpact.fmus.core.modes import BOUNDARIES, beam_modes  # loads the core library
+
+    value = {key: float(number) for key, number in starts.items()}
+    section = value["width"] * value["thickness"]
+    rigidity = (
+        value["flexural_rigidity"] or value["youngs_modulus"] * section * value["thickness"] ** 2 / 12.0
+    )
+    mass_per_length = value["mass_per_length"] or value["density"] * section
+    boundary = next(name for name, number in BOUNDARIES.items() if number == int(starts["boundary"]))
+    if not (rigidity > 0.0 and mass_per_length > 0.0 and value["length"] > 0.0):
+        return []
+    scale = math.sqrt(rigidity / mass_per_length) / value["length"] ** 2
+    return [scale * float(xi) ** 2 for xi in beam_modes(boundary, int(starts["modes"])).eigenvalues]
+
+
+NATURAL: dict[str, Callable[[Starts], list[float]]] = {
+    "Oscillator": _oscillator,
+    "Chain": _chain,
+    "Beam": _beam,
+}

@@ -1,0 +1,67 @@
+"""A component's C sources as members of an FMU, so that any tool can compile it for a target of its own.
+
+Below `sources/` lie the rooms of the core, and all else beside them: `sources` is the only folder of headers, and
+the sizes are in a header, since FMI 2.0 has no way to tell a tool of either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from vibroimpact.fmus.packaging.build import NATIVE, sizes
+from vibroimpact.fmus.packaging.description import ComponentDescription, c_header, header_name
+
+BUILD_DESCRIPTION = "sources/buildDescription.xml"
+SIZES_HEADER = "sizes.h"
+
+
+def source_members(component: ComponentDescription, fmi: str, native: Path = NATIVE) -> dict[str, bytes]:
+    """Return the members below `sources/` of an FMU.
+
+    Parameters
+    ----------
+    component : ComponentDescription
+        As it is compiled in, not one of an export: the value references are places in its table.
+    fmi : str
+        `3.0` or `2.0`; the adapter of the other version is left out.
+    native : Path
+        The C sources.
+    """
+    other = "fmi2" if fmi.startswith("3") else "fmi3"
+    core = native / "core"
+    files = {path.relative_to(core).as_posix(): path for path in core.rglob("*.[ch]")}
+    for folder in (native / "adapters", native / component.folder):
+        files |= {path.name: path for path in folder.glob("*.[ch]") if not path.name.startswith(other)}
+    members = {
+        name: path.read_bytes() for name, path in sorted(files.items()) if not name.startswith("door/")
+    }
+    members[header_name(component)] = c_header(component).encode("utf-8")
+    members[SIZES_HEADER] = _sizes_header(component).encode("ascii")
+    members = {f"sources/{name}": content for name, content in members.items()}
+    if fmi.startswith("3"):
+        members[BUILD_DESCRIPTION] = _build_description(component, members).encode("utf-8")
+    return members
+
+
+def c_files(members: Mapping[str, bytes]) -> list[str]:
+    """Return the names of the files to compile, as a description has them: relative to `sources`."""
+    folder = "sources/"
+    return [name.removeprefix(folder) for name in members if name.startswith(folder) and name.endswith(".c")]
+
+
+def _sizes_header(component: ComponentDescription) -> str:
+    lines = (f"#define {name} {value}\n" for name, value in sizes(component).items())
+    return "/* The largest bodies that this component is compiled for. */\n" + "".join(lines)
+
+
+def _build_description(component: ComponentDescription, members: Mapping[str, bytes]) -> str:
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    configuration = SubElement(root, "BuildConfiguration", modelIdentifier=component.name)
+    files = SubElement(configuration, "SourceFileSet", language="C11")
+    for name in c_files(members):
+        SubElement(files, "SourceFile", name=name)
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

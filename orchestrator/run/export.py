@@ -1,0 +1,79 @@
+"""A scene's body with its stops as an FMU for other tools: the scene's numbers are its start values."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.packaging.cross import Note
+from vibroimpact.fmus.packaging.export import export_fmu
+from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
+from vibroimpact.orchestrator.scene import Scene
+
+
+def export_scene(
+    scene: Scene,
+    output: str | os.PathLike[str],
+    *,
+    fmi: str = "3.0",
+    full: bool = False,
+    external: bool = False,
+    enumerations: bool = False,
+    platform: str | None = None,
+    note: Note = lambda _: None,
+) -> Path:
+    """Write an FMU of a scene's body, stops and forcing; a default run of it takes as long as the scene records.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of one body, not replayed. What it sweeps has the value that it has in its own table.
+    output : path
+        File to write.
+    fmi : str
+        `3.0` or `2.0`.
+    full, external, enumerations, platform, note
+        As `vibroimpact.fmus.export` has them.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    UsageError
+        The scene has another kind of body, or the file cannot be written.
+    """
+    body = scene.body_given
+    if body is None:
+        raise UsageError(
+            f"{scene.source}: expected the scene of one body, with [body], got components. "
+            "Each of them is an FMU already."
+        )
+    if scene.replay is not None:
+        raise UsageError(
+            f"{scene.source}: replay: expected a scene that drives its body by [forcing], got a recording, "
+            "which an FMU of a body does not hold. Leave [replay] out, and give the signal to the input force."
+        )
+    return export_fmu(
+        FMU_NAMES[body.kind],
+        output,
+        contacts=len(scene.stops),
+        fmi=fmi,
+        starts={**float_parameters(scene, None), **integer_parameters(scene)},
+        full=full,
+        external=external,
+        enumerations=enumerations,
+        stop_time=_duration(scene),
+        platform=platform,
+        note=note,
+    )
+
+
+def _duration(scene: Scene) -> float:
+    record = scene.record
+    if scene.period is None:
+        return record.transient_time + record.recorded_time
+    return (record.transient_periods + record.recorded_periods) * scene.period

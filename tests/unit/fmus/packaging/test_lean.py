@@ -1,0 +1,193 @@
+"""A lean description has nothing that other tools stumbled over, and its binary is the one that it describes."""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+from support.component_fmu import VERSIONS, ComponentFmu
+
+from vibroimpact.fmus import components, fmu_path
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.check import check_fmu
+from vibroimpact.fmus.packaging.export import STARTS_MEMBER, export_fmu
+from vibroimpact.fmus.packaging.fmpy_door import read_description
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+
+BODIES = ("Oscillator", "Chain", "Beam")
+
+
+def description(path: Path) -> ElementTree.Element:
+    return ElementTree.parse(unpack(path).folder / "modelDescription.xml").getroot()
+
+
+def simulated(path: Path, **options: Any) -> dict[str, Any]:
+    result = simulate_fmu(str(path), fmi_type="CoSimulation", **options)
+    return {name: result[name] for name in result.dtype.names}
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+@pytest.mark.parametrize("name", components())
+def test_a_lean_fmu_has_nothing_that_other_tools_stumble_over(tmp_path: Path, name: str, fmi: str) -> None:
+    path = export_fmu(name, tmp_path / "lean.fmu", fmi=fmi)
+    assert check_fmu(path) == ()
+    root = description(path)
+    assert not [e.tag for e in root.iter() if e.tag in {"Dimension", "Enumeration", "EnumerationType"}]
+    variables = read_description(path).modelVariables
+    names = [v.name for v in variables]
+    inside = ("record.", "applied_", "event_time", "last_time", "last_phase", "stick_")
+    if name != "ImpactStop":
+        assert not [n for n in names if any(part in n for part in inside)]
+        assert "contact[1].mass" not in names
+    with ComponentFmu(path, version=fmi) as fmu:
+        values = {v.name: fmu.get(v.name) for v in variables if v.causality != "independent"}
+    assert not [n for n, value in values.items() if not math.isfinite(value)]
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+@pytest.mark.parametrize("name", components())
+def test_every_start_value_lies_in_its_range_and_every_unknown_says_its_knowns(
+    tmp_path: Path, name: str, fmi: str
+) -> None:
+    path = export_fmu(name, tmp_path / "lean.fmu", fmi=fmi)
+    ranged = 0
+    for variable in read_description(path).modelVariables:
+        if variable.start is not None:
+            for bound, sign in ((variable.min, 1.0), (variable.max, -1.0)):
+                ranged += bound is not None
+                assert bound is None or sign * float(variable.start) >= sign * float(bound), variable.name
+    assert ranged
+    root = description(path)
+    unknowns = [*root.iter("InitialUnknown"), *root.findall("ModelStructure/InitialUnknowns/Unknown")]
+    assert unknowns
+    assert all("dependencies" in unknown.attrib for unknown in unknowns)
+    assert {"version", "generationDateAndTime", "copyright"} <= root.attrib.keys()
+    assert root.find("DefaultExperiment").get("tolerance")  # type: ignore[union-attr]
+
+
+def test_no_displacement_waits_for_an_input_when_a_run_begins(tmp_path: Path) -> None:
+    # else a body and its stop in another tool are an algebraic loop at the start
+    for fmi in VERSIONS:
+        root = description(export_fmu("oscillator", tmp_path / f"{fmi}.fmu", fmi=fmi, external=True))
+        variables = list(root.find("ModelVariables"))  # type: ignore[arg-type]
+        key = "valueReference" if fmi == "3.0" else "index"
+        keys = {
+            e.get("name"): e.get("valueReference") if fmi == "3.0" else str(place)
+            for place, e in enumerate(variables, 1)
+        }
+        inputs = {keys[e.get("name")] for e in variables if e.get("causality") == "input"}
+        unknowns = {
+            e.get(key): set((e.get("dependencies") or "").split())
+            for e in [*root.iter("InitialUnknown"), *root.findall("ModelStructure/InitialUnknowns/Unknown")]
+        }
+        for name in ("displacement", "velocity", "contact[1].displacement", "contact[1].velocity"):
+            assert not unknowns[keys[name]] & inputs, name
+        assert unknowns[keys["contact[1].force"]] & inputs
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+@pytest.mark.parametrize("name", BODIES)
+def test_a_run_that_nobody_set_anything_for_shows_motion(tmp_path: Path, name: str, fmi: str) -> None:
+    path = export_fmu(name, tmp_path / "plain.fmu", fmi=fmi)
+    values = simulated(path, output=["displacement"])
+    assert np.ptp(values["displacement"]) > 1e-3
+    turns = np.count_nonzero(np.diff(np.sign(np.diff(values["displacement"]))))
+    assert turns >= 20
+    assert 100 <= len(values["time"]) <= 20_000
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_start_values_of_an_export_are_those_of_the_description_and_of_the_binary(
+    tmp_path: Path, fmi: str
+) -> None:
+    starts = {
+        "mass": 2.0,
+        "contact[1].law": "restitution",
+        "contact[1].position": 0.1,
+        "contact[1].side": "lower",
+        "impact_limit": 12,
+        "velocity_start": -1e-300,
+    }
+    path = export_fmu("oscillator", tmp_path / "rig.fmu", fmi=fmi, starts=starts)
+    with ComponentFmu(path, version=fmi, initialize=False) as fmu:
+        described = fmu.start_values()
+        for _ in range(2):
+            assert {name: fmu.get(name) for name in described} == described
+            fmu.fmu.reset()
+    wanted = {**starts, "contact[1].law": 1, "contact[1].side": 2}
+    assert {name: described[name] for name in wanted} == wanted
+    assert described["displacement_start"] == 0.0
+
+
+def test_names_of_an_enumeration_may_be_kept(tmp_path: Path) -> None:
+    path = export_fmu("beam", tmp_path / "b.fmu", enumerations=True, starts={"boundary": "pinned_pinned"})
+    assert check_fmu(path) == ()
+    variable = next(v for v in read_description(path).modelVariables if v.name == "boundary")
+    assert (variable.type, variable.start) == ("Enumeration", "4")
+
+
+def test_more_is_described_where_start_values_speak_of_it(tmp_path: Path) -> None:
+    path = export_fmu(
+        "beam", tmp_path / "b.fmu", starts={"modes": 6, "contact[3].law": 1, "sensor[2].location": 0.5}
+    )
+    names = {v.name for v in read_description(path).modelVariables}
+    assert {"damping_ratio[6]", "contact[3].law", "sensor[2].displacement"} <= names
+    assert not {"damping_ratio[7]", "contact[4].law", "sensor[3].displacement"} & names
+
+
+def test_external_ports_are_described_when_they_are_asked_for(tmp_path: Path) -> None:
+    path = export_fmu("chain", tmp_path / "c.fmu", external=True)
+    assert check_fmu(path) == ()
+    variables = {v.name: v for v in read_description(path).modelVariables}
+    assert {"contact[1].applied_force", "contact[1].mass", "contact[1].event_time"} <= variables.keys()
+    assert "6 external_force" in variables["contact[1].law"].description
+    plain = {v.name: v for v in read_description(export_fmu("chain", tmp_path / "p.fmu")).modelVariables}
+    assert "external" not in plain["contact[1].law"].description
+    assert plain["contact[1].law"].max == "4"
+
+
+@pytest.mark.parametrize(
+    ("starts", "said"),
+    [
+        ({"mas": 2.0}, "mas: expected a parameter or an input, got none of this name. Did you mean mass?"),
+        ({"mass": -1.0}, "mass: expected a number >= 0, got -1.0."),
+        ({"mass": "heavy"}, "mass: expected a number >= 0, got 'heavy'."),
+        ({"mass": math.nan}, "mass: expected a number >= 0, got nan."),
+        ({"mass": 10**400}, "mass: expected a number >= 0"),
+        ({"displacement": 1.0}, "displacement: expected a parameter or an input, got none of this name."),
+        ({"contact[1].law": "sticky"}, "expected one of none, restitution, kelvin_voigt, hertz"),
+        ({"contact[1].law": 7}, "contact[1].law: expected one of none"),
+        ({"contact[3].law": 1}, "contact[3].law: expected contact 1 to 2, got 3."),
+        ({"contact[1].restitution": 1.5}, "contact[1].restitution: expected a number from 0 to 1, got 1.5."),
+        ({"impact_limit": 2.5}, "impact_limit: expected a whole number >= 0, got 2.5."),
+        ({"record.impacts": "perhaps"}, "record.impacts: expected true or false, got 'perhaps'."),
+    ],
+)
+def test_a_start_value_that_cannot_be_is_refused(tmp_path: Path, starts: dict[str, Any], said: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        export_fmu("oscillator", tmp_path / "o.fmu", starts=starts)
+    assert said in str(caught.value)
+    assert not (tmp_path / "o.fmu").exists()
+
+
+def test_a_start_value_beyond_the_number_that_was_asked_for_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(
+        UsageError, match=r"contact\[2\]\.law: expected a start value of what the description has"
+    ):
+        export_fmu("oscillator", tmp_path / "o.fmu", contacts=1, starts={"contact[2].law": 1})
+
+
+def test_start_values_that_were_tampered_with_do_no_harm(tmp_path: Path) -> None:
+    with zipfile.ZipFile(fmu_path("Oscillator")) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    text = "999999999 0\n1 4000000000000000\n-1 0\n" + "1 zz\n" * 1000
+    write_fmu(tmp_path / "o.fmu", {**members, STARTS_MEMBER: text.encode()})
+    with ComponentFmu(tmp_path / "o.fmu") as fmu:
+        assert fmu.get("mass") == 2.0
