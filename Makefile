@@ -1,6 +1,6 @@
 # Everything sets itself up: a virtual environment in .venv, the packages, the FMUs.
 .DEFAULT_GOAL := help
-.PHONY: help demo fast test soak coverage oldest sanitize bench lint docs clean
+.PHONY: help demo fast test soak coverage exchange wheel oldest sanitize bench lint docs clean
 
 OLDEST := $(or $(PYTHON),python3.11)
 ifneq ($(PYTHON),)
@@ -50,6 +50,13 @@ bench: $(VENV)/bench.stamp $(VENV)/fmus.stamp ## run the benchmarks; each leaves
 coverage: $(VENV)/test.stamp $(VENV)/fmus.stamp ## ask 300 records whether the intervals of estimates hold the truth; goes on where it ended; SEED= RECORDS=
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m interval_coverage
 
+exchange: $(VENV)/exchange.stamp $(VENV)/fmus.stamp ## try the exports in every tool that is here, compile them for other machines
+	PYTHONPATH=tests $(BIN)/python -m exchange
+	$(BIN)/python -m pytest -q tests/unit/fmus/packaging/test_cross.py -rs
+
+wheel: $(VENV)/exchange.stamp ## make a wheel with the libraries of all platforms, into dist
+	VIBROIMPACT_RELEASE=1 $(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --wheel-dir dist .
+
 oldest: ## run all tests on Python 3.11 with the lowest versions that pyproject.toml allows
 	@$(OLDEST) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || { echo "make oldest: expected Python 3.11, got $$($(OLDEST) --version 2>&1). Say where it is: make oldest PYTHON=/path/to/python3.11" >&2; exit 1; }
 	@$(MAKE) test VENV=.venv-oldest INSTALL='$$(INSTALL_LOWEST)' PYTHON=$(OLDEST)
@@ -90,6 +97,12 @@ $(VENV)/test.stamp: $(SETUP) | $(BIN)/python
 $(VENV)/bench.stamp: $(SETUP) | $(BIN)/python
 	$(ANNOUNCE)
 	$(INSTALL) -e '.[test,bench]'
+	@touch $@ $(VENV)/test.stamp $(VENV)/demo.stamp $(VENV)/fmus.stamp
+
+# other tools, and the compiler for other machines
+$(VENV)/exchange.stamp: $(SETUP) | $(BIN)/python
+	$(ANNOUNCE)
+	$(INSTALL) -e '.[test,cross]'
 	@touch $@ $(VENV)/test.stamp $(VENV)/demo.stamp $(VENV)/fmus.stamp
 
 $(VENV)/lint.stamp: $(SETUP) | $(BIN)/python

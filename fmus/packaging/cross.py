@@ -9,6 +9,7 @@ from pathlib import Path
 
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.packaging.build import BUILT, PLATFORMS_FOLDER, compile_component, fingerprint
+from vibroimpact.fmus.packaging.compiler import zig_compiler
 from vibroimpact.fmus.packaging.description import ComponentDescription
 from vibroimpact.fmus.packaging.platform_names import TARGETS, Platform
 from vibroimpact.fmus.private_folder import UnsafeFolderError, private_folder
@@ -55,6 +56,7 @@ def library_for(component: ComponentDescription, platform: Platform, note: Note 
     kept = _kept(platform) / name
     if kept.is_file():
         return kept.read_bytes()
+    zig_compiler()
     note(f"{platform.name}: compiling {component.name}")
     library = compile_component(component, strict=False, platform=platform)
     beside = kept.with_name(f".{name}.new")

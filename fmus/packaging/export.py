@@ -45,6 +45,9 @@ STARTS_MEMBER = "resources/starts.txt"
 #: How many of a repeated block a lean description has where nobody says it.
 LEAN_COUNTS = {"contact": 2, "sensor": 0}
 
+#: What start values begin with that set a body in motion, or may be in the way of a displacement.
+SET_IN_MOTION = ("forcing.", "contact[")
+
 Start = Number | str
 
 
@@ -80,8 +83,9 @@ def export_fmu(
     fmi : str
         `3.0` or `2.0`.
     starts : mapping of str to number or str, optional
-        Start values by variable name, SI: a number, a truth value, or the name of an enumeration's value. Absent: those
-        of the component, with a displacement that makes it move.
+        Start values by variable name, SI: a number, a truth value, or the name of an enumeration's value; the others
+        are the component's own. Where none is of forcing, contacts or the state at the start, the body is displaced, so
+        that a run shows motion.
     full : bool
         Describe all variables, as this package's own importer needs them.
     external : bool
@@ -114,7 +118,9 @@ def export_fmu(
     target = Path(output)
     full_name = component_name(name)
     original = next(component for component in read_components() if component.name == full_name)
-    given = original.start_of_export if starts is None and not full else starts or {}
+    given = dict(starts or {})
+    if not full and not any(name.startswith(SET_IN_MOTION) or "_start" in name for name in given):
+        given |= original.start_of_export
     own_starts = _checked_starts(original, given)
     asked = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
     counts = {block: count for block, count in asked.items() if count is not None}
@@ -260,8 +266,8 @@ def _expected(component: ComponentDescription, variable: Variable) -> str:
 
 def _refuse_starts_beyond(component: ComponentDescription, starts: Mapping[str, Number]) -> None:
     """Refuse start values of what the description leaves out."""
-    names = {v.name for v in component.variables}
-    beyond = [name for name in starts if name not in names]
+    most = {v.name: math.inf if v.maximum is None else v.maximum for v in component.variables}
+    beyond = [name for name, start in starts.items() if start > most.get(name, -math.inf)]
     if beyond:
         counts = ", ".join(f"{plural(block)} {count}" for block, count in component.repeats.items())
         raise UsageError(

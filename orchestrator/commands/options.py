@@ -177,8 +177,8 @@ def export(
 ) -> None:
     """Write an FMU for another tool: a component, or the body of a scene with its stops. Needs no compiler.
 
-    Without --set a component starts with a displacement, so that a run of it shows motion. A scene's numbers are the
-    start values; what it sweeps has the value that it has in its own table.
+    A component that is given no forcing, contact or start of motion starts displaced, so that a run of it shows motion.
+    A scene's numbers are the start values; what it sweeps has the value that it has in its own table.
 
     Example: vibroimpact fmu export beam --modes 8 --contacts 2 -o beam8.fmu
 

@@ -83,8 +83,8 @@ OF_COMPONENTS = [
         '"a.record.rows"',
         "connection[1].from: expected a number, or true or false, got the array of Float64 a.record.rows.",
     ),
-    ("mass = 2", "mass = nan", "component.a.parameters.mass: expected a finite number, got nan."),
-    ("mass = 2", "mass = true", "component.a.parameters.mass: expected a finite number, got true."),
+    ("mass = 2", "mass = nan", "component.a.parameters.mass: expected a finite number >= 0, got nan."),
+    ("mass = 2", "mass = true", "component.a.parameters.mass: expected a finite number >= 0, got true."),
     (
         "mass = 2",
         "mas = 2",
@@ -112,7 +112,7 @@ OF_COMPONENTS = [
     (
         "mass = 2",
         "impact_limit = 1.5",
-        "component.a.parameters.impact_limit: expected a whole number, got 1.5.",
+        "component.a.parameters.impact_limit: expected a whole number >= 0, got 1.5.",
     ),
     (
         '"2.0"',

@@ -182,6 +182,12 @@ def test_a_start_value_beyond_the_number_that_was_asked_for_is_refused(tmp_path:
         UsageError, match=r"contact\[2\]\.law: expected a start value of what the description has"
     ):
         export_fmu("oscillator", tmp_path / "o.fmu", contacts=1, starts={"contact[2].law": 1})
+    with pytest.raises(UsageError, match="Beam: modes: expected a start value of what the description has"):
+        export_fmu("beam", tmp_path / "o.fmu", modes=4, starts={"modes": 6})
+    with pytest.raises(
+        UsageError, match=r"record\.impacts: .* Ask for more of them, or for the full description"
+    ):
+        export_fmu("oscillator", tmp_path / "o.fmu", starts={"record.impacts": True})
 
 
 def test_start_values_that_were_tampered_with_do_no_harm(tmp_path: Path) -> None:

@@ -160,7 +160,7 @@ WRONG_SWEEPS = [
         COUPLED,
         '"a.impact_limit" = { values = [1, 1.5] }',
         'sweep."a.impact_limit"',
-        "a whole number, got 1.5",
+        "a whole number >= 0, got 1.5",
     ),
     (
         COUPLED,

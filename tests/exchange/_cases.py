@@ -1,0 +1,96 @@
+"""What is exchanged: bodies with stops, each a scene, the FMU exported of it, and the dataset of its own run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import open_dataset
+from vibroimpact.fmus.packaging.export import export_fmu
+from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.run.export import export_scene
+from vibroimpact.orchestrator.scene import Scene
+
+RATE = 512.0
+"""Samples per second: a step has no rounding, neither in binary nor in the nanoseconds that libcosim counts."""
+
+COUNT = 4000
+OUTPUTS = ("displacement", "velocity")
+
+Rows = NDArray[np.float64]
+
+STOPS = [
+    {"position": 0.1, "law": "restitution", "restitution": 0.6},
+    {"position": -0.15, "side": "lower", "law": "kelvin_voigt", "stiffness": 2e3, "damping": 1.0},
+]
+BODIES: dict[str, dict[str, Any]] = {
+    "oscillator": {
+        "body": {"mass": 2.0, "stiffness": 8.0, "damping_ratio": 0.02},
+        "forcing": {"amplitude": 3.0, "angular_frequency": 1.7},
+        "stop": STOPS,
+    },
+    "chain of 3": {
+        "body": {"kind": "chain", "masses": [1.0, 2.0, 1.5], "stiffnesses": [40.0, 20.0, 30.0]},
+        "forcing": {"amplitude": [0.0, 2.0, 1.0], "angular_frequency": 2.0},
+        "stop": [{**stop, "mass": 2} for stop in STOPS],
+    },
+    "beam of 4 modes with a stop": {
+        "body": {
+            "kind": "beam",
+            "modes": 4,
+            "length": 0.25,
+            "youngs_modulus": 7e10,
+            "density": 2700.0,
+            "width": 0.02,
+            "thickness": 0.002,
+            "damping_ratio": 0.02,
+        },
+        "forcing": {"amplitude": 0.5, "angular_frequency": 150.0},
+        "stop": [{"position": 0.004, "law": "restitution", "restitution": 0.6}],
+    },
+}
+IMPACT_STOP = "impact stop"
+NAMES = (*BODIES, IMPACT_STOP)
+ANSWERS = ("applied_force", "applied_stiffness", "applied_damping")
+
+
+def outputs(name: str) -> tuple[str, ...]:
+    """Return the outputs that are compared."""
+    return ANSWERS if name == IMPACT_STOP else OUTPUTS
+
+
+def made(name: str, fmi: str, folder: Path) -> tuple[Path, Rows]:
+    """Return the FMU of a case, and what its outputs are after each step by our own run."""
+    path = folder / "exported.fmu"
+    if name == IMPACT_STOP:
+        starts = {
+            "law": "kelvin_voigt",
+            "stiffness": 1e4,
+            "damping": 3.0,
+            "displacement": 0.01,
+            "velocity": 0.5,
+        }
+        answer = [1e4 * 0.01 + 3.0 * 0.5, 1e4, 3.0]
+        return export_fmu("impact_stop", path, fmi=fmi, starts=starts), np.tile(answer, (COUNT, 1))
+    scene = _scene(BODIES[name])
+    run_scene(scene, folder / "run.nc")
+    samples = open_dataset(folder / "run.nc").vibroimpact.samples()
+    rows = np.column_stack([samples[output].values for output in OUTPUTS])[1 : COUNT + 1]
+    return export_scene(scene, path, fmi=fmi), rows
+
+
+def _scene(tables: dict[str, Any]) -> Scene:
+    period = 2.0 * np.pi / tables["forcing"]["angular_frequency"]
+    record = {
+        "recorded_periods": int(np.ceil((COUNT + 1) / RATE / period)),
+        "time_series": {"rate": RATE, "variables": list(OUTPUTS)},
+    }
+    return Scene.from_dict({**tables, "record": record})
+
+
+def difference(rows: Rows, expected: Rows) -> float:
+    """Return the largest difference, as a part of the largest value of the same output."""
+    return float(np.max(np.abs(rows - expected).max(axis=0) / np.abs(expected).max(axis=0)))
