@@ -55,7 +55,7 @@ exchange: $(VENV)/exchange.stamp $(VENV)/fmus.stamp ## try the exports in every 
 	$(BIN)/python -m pytest -q tests/unit/fmus/packaging/test_cross.py -rs
 
 wheel: $(VENV)/exchange.stamp ## make a wheel with the libraries of all platforms, into dist
-	VIBROIMPACT_RELEASE=1 $(BIN)/python -m pip wheel --disable-pip-version-check --no-deps --wheel-dir dist .
+	VIBROIMPACT_RELEASE=1 $(BIN)/python -m hatchling build -t wheel -d dist
 
 oldest: ## run all tests on Python 3.11 with the lowest versions that pyproject.toml allows
 	@$(OLDEST) -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11))' || { echo "make oldest: expected Python 3.11, got $$($(OLDEST) --version 2>&1). Say where it is: make oldest PYTHON=/path/to/python3.11" >&2; exit 1; }

@@ -11,10 +11,12 @@ import argparse
 import hashlib
 import html
 import importlib.util
+import os
 import shutil
 import sys
 import tempfile
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from vibroimpact.fmus.errors import ComponentError, VibroimpactError
@@ -73,9 +75,13 @@ def build(output: Path = BUILT, *, native: Path = NATIVE, strict: bool = True) -
     """
     output.mkdir(parents=True, exist_ok=True)
     (output / FINGERPRINT).unlink(missing_ok=True)
-    written = [_build_core(output, native, strict)]
-    for component in read_components(native):
-        written += _build_component(component, output, native, strict)
+    components = read_components(native)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        core = pool.submit(_build_core, output, native, strict)
+        binaries = pool.map(lambda component: compile_component(component, native, strict=strict), components)
+        written = [core.result()]
+        for component, binary in zip(components, binaries, strict=True):
+            written += _write_versions(component, binary, output)
     (output / FINGERPRINT).write_text(fingerprint(native) + "\n", encoding="ascii")
     return (*written, output / FINGERPRINT)
 
@@ -88,15 +94,18 @@ def build_platforms(output: Path, *, native: Path = NATIVE) -> tuple[Path, ...]:
     ComponentError
         The ziglang package is not there, or found an error.
     """
-    written = []
-    for platform in map(Platform, TARGETS):
-        folder = output / PLATFORMS_FOLDER / platform.name
-        folder.mkdir(parents=True, exist_ok=True)
-        for component in read_components(native):
-            written.append(folder / f"{component.name}{platform.suffix}")
-            written[-1].write_bytes(compile_component(component, native, platform=platform))
-            print(written[-1], file=sys.stderr, flush=True)
-    return tuple(written)
+
+    def compiled(pair: tuple[ComponentDescription, Platform]) -> Path:
+        component, platform = pair
+        path = output / PLATFORMS_FOLDER / platform.name / f"{component.name}{platform.suffix}"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(compile_component(component, native, platform=platform))
+        print(path, file=sys.stderr, flush=True)
+        return path
+
+    pairs = [(component, Platform(name)) for name in TARGETS for component in read_components(native)]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return tuple(pool.map(compiled, pairs))
 
 
 def is_current(output: Path = BUILT, *, native: Path = NATIVE) -> bool:
@@ -182,8 +191,7 @@ def compile_component(
         return library.read_bytes()
 
 
-def _build_component(component: ComponentDescription, output: Path, native: Path, strict: bool) -> list[Path]:
-    binary = compile_component(component, native, strict=strict)
+def _write_versions(component: ComponentDescription, binary: bytes, output: Path) -> list[Path]:
     return [
         _write_component(component, binary, output / folder, version) for version, folder in FOLDERS.items()
     ]

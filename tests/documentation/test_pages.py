@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import re
 import shlex
@@ -139,3 +140,12 @@ def test_every_page_of_the_site_is_in_a_table_of_contents() -> None:
         path for folder in folders for path in (ROOT / folder).rglob("*.md") if "built" not in path.parts
     }
     assert sorted(str(path.relative_to(ROOT)) for path in pages - entries) == []
+
+
+def test_the_reference_of_python_names_what_is_there() -> None:
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    functions = re.findall(r"^\.\. autofunction:: (.+)\.(\w+)$", text, re.M)
+    modules = re.findall(r"^\.\. automodule:: (\S+)\n(?:   :.*\n)*?   :members: (.+)$", text, re.M)
+    named = functions + [(module, name.strip()) for module, names in modules for name in names.split(",")]
+    assert ("vibroimpact.orchestrator.run", "PointRunner") in named
+    assert [(m, n) for m, n in named if not hasattr(importlib.import_module(m), n)] == []
