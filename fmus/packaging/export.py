@@ -22,6 +22,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.build import documentation, read_components
 from vibroimpact.fmus.packaging.cross import SHIPPED, Note, chosen_platforms, library_for, members_for
 from vibroimpact.fmus.packaging.description import (
+    TERMINALS_MEMBER,
     ComponentDescription,
     Edition,
     Experiment,
@@ -30,6 +31,7 @@ from vibroimpact.fmus.packaging.description import (
     lean,
     model_description,
     plural,
+    terminals,
     with_starts,
 )
 from vibroimpact.fmus.packaging.experiment import default_experiment
@@ -140,6 +142,8 @@ def export_fmu(
         members = _for_platforms(members, original, fmi, platform, note)
     if not full:
         members |= source_members(original, fmi)
+        if fmi == "3.0":
+            members[TERMINALS_MEMBER] = terminals(component).encode("utf-8")
     text = model_description(component, fmi, edition, c_files(members))
     members["modelDescription.xml"] = text.encode("utf-8")
     members |= documentation(component)

@@ -18,8 +18,11 @@ from vibroimpact.fmus.packaging.description.model import (
 from vibroimpact.fmus.packaging.description.model_xml import model_description, unit_definitions
 from vibroimpact.fmus.packaging.description.reading import read_component
 from vibroimpact.fmus.packaging.description.readme_table import readme_table, with_table
+from vibroimpact.fmus.packaging.description.terminals import MEMBER as TERMINALS_MEMBER
+from vibroimpact.fmus.packaging.description.terminals import terminals
 
 __all__ = [
+    "TERMINALS_MEMBER",
     "ComponentDescription",
     "Edition",
     "Enumeration",
@@ -35,6 +38,7 @@ __all__ = [
     "plural",
     "read_component",
     "readme_table",
+    "terminals",
     "unit_definitions",
     "with_starts",
     "with_table",

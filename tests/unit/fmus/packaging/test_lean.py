@@ -11,14 +11,16 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from lxml import etree
 from support.component_fmu import VERSIONS, ComponentFmu
 
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.check import check_fmu
+from vibroimpact.fmus.packaging.description import TERMINALS_MEMBER
 from vibroimpact.fmus.packaging.export import STARTS_MEMBER, export_fmu
-from vibroimpact.fmus.packaging.fmpy_door import read_description
+from vibroimpact.fmus.packaging.fmpy_door import read_description, schema_folder
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 
 BODIES = ("Oscillator", "Chain", "Beam")
@@ -151,6 +153,32 @@ def test_external_ports_are_described_when_they_are_asked_for(tmp_path: Path) ->
     plain = {v.name: v for v in read_description(export_fmu("chain", tmp_path / "p.fmu")).modelVariables}
     assert "external" not in plain["contact[1].law"].description
     assert plain["contact[1].law"].max == "4"
+
+
+@pytest.mark.parametrize("name", components())
+def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
+    tmp_path: Path, name: str
+) -> None:
+    path = export_fmu(name, tmp_path / "x.fmu", external=True)
+    text = (unpack(path).folder / TERMINALS_MEMBER).read_bytes()
+    etree.XMLSchema(file=str(schema_folder() / "fmi3" / "fmi3TerminalsAndIcons.xsd")).assertValid(
+        etree.fromstring(text)
+    )
+    plugs = {
+        plug.get("name"): {e.get("memberName"): e.get("variableName") for e in plug}
+        for plug in ElementTree.fromstring(text).iter("Terminal")
+    }
+    names = {v.name for v in read_description(path).modelVariables}
+    assert {variable for members in plugs.values() for variable in members.values()} <= names
+    assert "displacement" in plugs["point"]
+    if name != "ImpactStop":
+        # a contact and a stop fit together
+        stop = {"displacement", "velocity", "applied_restitution"}
+        stop |= {"applied_force", "applied_stiffness", "applied_damping"}
+        assert stop <= plugs["contact[1]"].keys()
+        assert plugs["contact[2]"]["force"] == "contact[2].force"
+    if name == "Chain":
+        assert plugs["mass[2]"] | {"force": "force[2]"} == plugs["mass[2]"]
 
 
 @pytest.mark.parametrize(
