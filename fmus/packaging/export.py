@@ -269,15 +269,18 @@ def _expected(component: ComponentDescription, variable: Variable) -> str:
 
 
 def _refuse_starts_beyond(component: ComponentDescription, starts: Mapping[str, Number]) -> None:
-    """Refuse start values of what the description leaves out."""
+    """Refuse start values of what the description leaves out, or beyond what it has."""
     most = {v.name: math.inf if v.maximum is None else v.maximum for v in component.variables}
-    beyond = [name for name, start in starts.items() if start > most.get(name, -math.inf)]
-    if beyond:
-        counts = ", ".join(f"{plural(block)} {count}" for block, count in component.repeats.items())
-        raise UsageError(
-            f"{component.name}: {beyond[0]}: expected a start value of what the description has ({counts}), "
-            "got another. Ask for more of them, or for the full description."
-        )
+    more = "Ask for more of them, for external ports, or for the full description."
+    for name, start in starts.items():
+        if name not in most:
+            raise UsageError(
+                f"{component.name}: {name}: expected a variable of this description, got one that it leaves out. {more}"
+            )
+        if start > most[name]:
+            raise UsageError(
+                f"{component.name}: {name}: expected at most {most[name]:g} in this description, got {start:g}. {more}"
+            )
 
 
 def _start_lines(component: ComponentDescription, starts: Mapping[str, Number]) -> Iterator[str]:
