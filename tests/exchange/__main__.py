@@ -37,7 +37,7 @@ def main() -> int:
             cells = list(_cells(tool, fmi))
             good &= all(isinstance(cell, float) and cell <= GOAL for cell in cells)
             texts = [cell if isinstance(cell, str) else f"{cell:.1g}" for cell in cells]
-            lines.append(f"| {tool.name} {tool.version()} | {fmi} | {' | '.join(texts)} |")
+            lines.append(f"| {tool.shown()} | {fmi} | {' | '.join(texts)} |")
             console.print(lines[-1])
     text = PAGE.read_text(encoding="utf-8")
     table = "\n".join((BEGIN, *lines, END))

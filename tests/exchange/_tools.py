@@ -53,9 +53,9 @@ class Tool:
         """Return where its program is."""
         return os.environ.get(self.variable) or shutil.which(self.program)
 
-    def version(self) -> str:
-        """Return its version, empty where nobody says it."""
-        return metadata.version(self.package) if self.package else ""
+    def shown(self) -> str:
+        """Return its name with the version of its package."""
+        return f"{self.name} ({self.package} {metadata.version(self.package)})" if self.package else self.name
 
 
 TOOLS = (
