@@ -50,6 +50,9 @@ LEAN_COUNTS = {"contact": 2, "sensor": 0}
 #: What start values begin with that set a body in motion, or may be in the way of a displacement.
 SET_IN_MOTION = ("forcing.", "contact[")
 
+#: The last second that has a year of four digits.
+YEAR_9999 = 253_402_300_799
+
 Start = Number | str
 
 
@@ -171,7 +174,7 @@ def _for_platforms(
 
 def _edition(experiment: Experiment) -> Edition:
     seconds = os.environ.get("SOURCE_DATE_EPOCH", "")
-    moment = time.gmtime(int(seconds) if seconds.isdecimal() else None)
+    moment = time.gmtime(min(int(seconds), YEAR_9999) if seconds.isdecimal() else None)
     return Edition(metadata.version("vibroimpact"), time.strftime("%Y-%m-%dT%H:%M:%SZ", moment), experiment)
 
 
