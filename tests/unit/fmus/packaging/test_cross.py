@@ -120,6 +120,7 @@ def test_an_error_of_the_compiler_is_told(tmp_path: Path, monkeypatch: pytest.Mo
         raise ComponentError("Oscillator.dll: expected zig to compile it")
 
     monkeypatch.setattr(cross, "compile_component", fail)
+    monkeypatch.setattr(cross, "zig_compiler", lambda: ())
     with pytest.raises(ComponentError, match=r"Oscillator\.dll"):
         library_for(next(c for c in read_components() if c.name == "Oscillator"), Platform("x86_64-windows"))
     assert not list((tmp_path / "cache").rglob("Oscillator*"))

@@ -285,7 +285,7 @@ def test_a_thousand_lives_of_a_python_component_in_one_process_take_no_more_memo
 
     path = list(sys.path)
     before = live(100)
-    assert (
-        live(900) - before < 4e6
-    )  # 18 kB each, and an entry of sys.path, where each is an instance of its own
+    # a leak is 18 kB for each, 16 MB; what else this process does may take some
+    assert live(900) - before < 8e6
+    # an entry of sys.path, where each is an instance of its own
     assert len(sys.path) <= len(path) + 1
