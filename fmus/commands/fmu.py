@@ -91,6 +91,6 @@ def note(text: str) -> None:
 
 def _start(change: str) -> tuple[str, str]:
     name, equals, value = change.partition("=")
-    if not equals:
+    if not equals or not name.strip():
         raise UsageError(f"--set: expected NAME=VALUE, got {change[:200]!r}. For example: --set mass=2")
     return name.strip(), value.strip()

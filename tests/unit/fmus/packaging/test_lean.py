@@ -11,14 +11,18 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from lxml import etree
 from support.component_fmu import VERSIONS, ComponentFmu
 
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.build import read_components
 from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.description import TERMINALS_MEMBER
+from vibroimpact.fmus.packaging.experiment import MOST_STEPS, default_experiment
 from vibroimpact.fmus.packaging.export import STARTS_MEMBER, export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description, schema_folder
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
@@ -230,3 +234,16 @@ def test_a_stop_that_a_tool_switches_on_is_hit(tmp_path: Path, name: str) -> Non
     path = export_fmu(name, tmp_path / "plain.fmu")
     values = simulated(path, start_values={"contact[1].law": 1}, output=["contact[1].count"])
     assert values["contact[1].count"][-1] >= 3
+
+
+@given(st.sampled_from(BODIES), st.data())
+@settings(max_examples=60)
+def test_any_start_values_have_an_experiment_that_ends(name: str, data: st.DataObject) -> None:
+    component = next(c for c in read_components() if c.name == name)
+    starts = {v.name: v.start for v in component.variables if v.start is not None}
+    sizes = st.sampled_from((0.0, 5e-324, 1e-300, 1e-5, 1.0, 1e5, 1e300, 1.7e308))
+    chosen = [v for v in starts if isinstance(starts[v], float) and not v.startswith(("contact", "sensor"))]
+    starts |= data.draw(st.dictionaries(st.sampled_from(chosen), sizes, max_size=6))
+    experiment = default_experiment(name, starts)
+    assert 0.0 < experiment.step_size < experiment.stop_time < math.inf
+    assert experiment.stop_time / experiment.step_size <= 1.1 * MOST_STEPS
