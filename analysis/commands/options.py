@@ -165,11 +165,17 @@ def replay_fmu(
         bool, typer.Option("--si", help="Play values in SI units: g becomes m/s2, mV becomes V.")
     ] = False,
     run: Annotated[int | None, typer.Option(help="run_index, of a dataset of several runs.", min=0)] = None,
+    fmi: Annotated[str, typer.Option(help="FMI version, 3.0 or 2.0.")] = "3.0",
+    platform: Annotated[
+        str | None, typer.Option(help="Machines it is for: all, or names, as for `fmu export`.")
+    ] = None,
 ) -> None:
-    """Make an FMU that plays recorded channels in this or another tool: value, slope, validity.
+    """Make an FMU that plays recorded channels in this or another tool: value, slope, validity. Needs no compiler.
 
     Example: vibroimpact fmu replay a0.nc --channel base --si -o a0.fmu
+
+    For a tool of FMI 2.0 on Windows: vibroimpact fmu replay a0.nc --fmi 2.0 --platform x86_64-windows -o a0.fmu
     """
     from vibroimpact.analysis.commands.replay_fmu import build_player
 
-    build_player(recording, output, channel or (), si, run)
+    build_player(recording, output, channel or (), si, run, fmi, platform)

@@ -18,12 +18,21 @@ from vibroimpact.fmus.terminal import say
 EVEN = 0.01
 
 
-def build_player(recording: Path, output: Path, channel: Sequence[str], si: bool, run: int | None) -> None:
+def build_player(
+    recording: Path,
+    output: Path,
+    channel: Sequence[str],
+    si: bool,
+    run: int | None,
+    fmi: str = "3.0",
+    platform: str | None = None,
+) -> None:
     """Write the FMU that plays channels of a recording, all without a name, and say what it plays."""
     refuse_outputs([recording], output, ending=".fmu")
     source = open_signals(recording, run)
     chosen = _chosen(source, channel)
-    build_replay({item.name: replay_signal(item, si=si) for item in chosen}, output)
+    signals = {item.name: replay_signal(item, si=si) for item in chosen}
+    build_replay(signals, output, fmi=fmi, platform=platform, note=lambda text: say(text, err=True))
     for item in chosen:
         say(_described(item, si))
     say(str(output))

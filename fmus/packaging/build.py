@@ -177,9 +177,8 @@ def compile_component(
     """
     own = native / component.folder
     shared = [native / "core", native / "adapters"]
-    # what is called by ctypes is in the core library alone: an FMU exports FMI's functions and no others
-    door = native / "core" / "door"
-    sources = [path for folder in (*shared, own) for path in _c_files(folder) if door not in path.parents]
+    sources = [path for path in _c_files(shared[0]) if is_part(component, path.relative_to(shared[0]))]
+    sources += [path for folder in (shared[1], own) for path in _c_files(folder)]
     with tempfile.TemporaryDirectory() as folder:
         generated = Path(folder)
         (generated / header_name(component)).write_text(c_header(component), encoding="utf-8")
@@ -189,6 +188,11 @@ def compile_component(
             library, sources, include, definitions=sizes(component), strict=strict, platform=platform
         )
         return library.read_bytes()
+
+
+def is_part(component: ComponentDescription, file: Path) -> bool:
+    """Return whether a component has a file of the core; what is called by ctypes is in the core library alone."""
+    return file.parts[0] != "door" and component.uses(file.as_posix())
 
 
 def _write_versions(component: ComponentDescription, binary: bytes, output: Path) -> list[Path]:

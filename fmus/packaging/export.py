@@ -12,36 +12,24 @@ import math
 import os
 import re
 import struct
-import time
-import zipfile
 from collections.abc import Iterator, Mapping
-from importlib import metadata
 from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.packaging.build import documentation, read_components
-from vibroimpact.fmus.packaging.cross import SHIPPED, Note, chosen_platforms, library_for, members_for
+from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.description import (
-    TERMINALS_MEMBER,
     ComponentDescription,
-    Edition,
-    Experiment,
     Number,
     Variable,
     lean,
-    model_description,
     plural,
-    terminals,
     with_starts,
 )
 from vibroimpact.fmus.packaging.experiment import default_experiment
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
-from vibroimpact.fmus.packaging.platform_names import TARGETS, this_platform
-from vibroimpact.fmus.packaging.sources import c_files, source_members
-from vibroimpact.fmus.shipped import component_name, fmu_path
+from vibroimpact.fmus.packaging.members import Contents, component_of, edition_of, members_of
+from vibroimpact.fmus.shipped import component_name
 
-#: The member that says how many of each repeated block the description has: lines such as `modes 8`.
-SIZES_MEMBER = "resources/sizes.txt"
 #: The member with the start values that are not the component's own, as resources.h describes it.
 STARTS_MEMBER = "resources/starts.txt"
 #: How many of a repeated block a lean description has where nobody says it.
@@ -50,8 +38,8 @@ LEAN_COUNTS = {"contact": 2, "sensor": 0}
 #: What start values begin with that set a body in motion, or may be in the way of a displacement.
 SET_IN_MOTION = ("forcing.", "contact[")
 
-#: The last second that has a year of four digits.
-YEAR_9999 = 253_402_300_799
+#: The component that only a recording makes an FMU of.
+REPLAY = "Replay"
 
 Start = Number | str
 
@@ -122,7 +110,12 @@ def export_fmu(
     """
     target = Path(output)
     full_name = component_name(name)
-    original = next(component for component in read_components() if component.name == full_name)
+    if full_name == REPLAY:
+        raise UsageError(
+            f"{name}: expected a component that needs no recording, got one that plays it. Make its FMU by "
+            "`vibroimpact fmu replay recording.nc -o replay.fmu`."
+        )
+    original = component_of(full_name)
     given = dict(starts or {})
     if not full and not any(name.startswith(SET_IN_MOTION) or "_start" in name for name in given):
         given |= original.start_of_export
@@ -136,46 +129,15 @@ def export_fmu(
     component = with_starts(component, own_starts)
     edition = None
     if not full:
-        edition = _edition(default_experiment(full_name, _numbers(component), stop_time))
+        edition = edition_of(default_experiment(full_name, _numbers(component), stop_time))
         component = lean(component, external=external, enumerations=enumerations)
     _refuse_starts_beyond(component, own_starts)
-    with zipfile.ZipFile(fmu_path(name, fmi)) as archive:
-        members = {member: archive.read(member) for member in archive.namelist()}
-    if platform is not None or SHIPPED.is_dir():
-        members = _for_platforms(members, original, fmi, platform, note)
-    if not full:
-        members |= source_members(original, fmi)
-        if fmi == "3.0":
-            members[TERMINALS_MEMBER] = terminals(component).encode("utf-8")
-    text = model_description(component, fmi, edition, c_files(members))
-    members["modelDescription.xml"] = text.encode("utf-8")
-    members |= documentation(component)
-    if counts:
-        lines = (f"{plural(block)} {count}\n" for block, count in counts.items())
-        members[SIZES_MEMBER] = "".join(lines).encode("ascii")
+    resources = {}
     if own_starts:
-        members[STARTS_MEMBER] = "".join(_start_lines(original, own_starts)).encode("ascii")
-    write_fmu(target, members)
+        resources[STARTS_MEMBER] = "".join(_start_lines(original, own_starts)).encode("ascii")
+    contents = Contents(original, component, fmi, edition, counts, resources, platform, note)
+    write_fmu(target, members_of(contents))
     return target
-
-
-def _for_platforms(
-    members: Mapping[str, bytes], component: ComponentDescription, fmi: str, names: str | None, note: Note
-) -> dict[str, bytes]:
-    """Return the members with libraries for other machines in place of that of this one, or beside it."""
-    here = this_platform()
-    platforms = chosen_platforms(names or "all")
-    own = {name: content for name, content in members.items() if name.startswith("binaries/")}
-    rest = {name: content for name, content in members.items() if name not in own}
-    binaries = members_for(lambda p: library_for(component, p, note), component.name, platforms, fmi)
-    # what a release leaves out is this machine's own, if it is none of those
-    return rest | (own if names is None and here.name not in TARGETS else {}) | binaries
-
-
-def _edition(experiment: Experiment) -> Edition:
-    seconds = os.environ.get("SOURCE_DATE_EPOCH", "")
-    moment = time.gmtime(min(int(seconds), YEAR_9999) if seconds.isdecimal() else None)
-    return Edition(metadata.version("vibroimpact"), time.strftime("%Y-%m-%dT%H:%M:%SZ", moment), experiment)
 
 
 def _numbers(component: ComponentDescription) -> dict[str, Number]:

@@ -2,29 +2,33 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import re
-import shutil
-import tempfile
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibroimpact.fmus.errors import ComponentError, UsageError
-from vibroimpact.fmus.packaging.python_fmus import SOURCES, PythonFmu, make_fmu, require_pythonfmu
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.packaging.cross import Note
+from vibroimpact.fmus.packaging.description import (
+    ComponentDescription,
+    Experiment,
+    UnitDefinition,
+    Variable,
+)
+from vibroimpact.fmus.packaging.export import REPLAY
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.packaging.members import Contents, component_of, edition_of, members_of
 from vibroimpact.fmus.units import Unit, si_unit
 
-REPLAY = SOURCES / "replay"
-#: As in `python/replay/replay.py`, which must not import this package.
-FOLDER, HEADER, FORMAT = "signals", "signals.json", "vibroimpact signals 1"
-#: Endings of a channel's further variables, and the variable that all channels share.
+#: The folder of the signal files, the list of them, and its first line, as native/replay/recording.c has them.
+FOLDER, LIST, FORMAT = "resources/signals", "signals.txt", "vibroimpact signals 2"
+#: Endings of a channel's further variables, and the variables that all channels share.
 ENDINGS = ("_rate", "_valid", "_gain", "_offset")
-TIME_SHIFT = "time_shift"
+SHARED = ("time", "time_shift")
 MOST_CHANNELS = 256
 #: Most samples of all channels and time axes together: 512 MiB, half of what an FMU may unpack to.
 MOST_SAMPLES = 1 << 26
@@ -63,8 +67,15 @@ class ReplaySignal:
         return cls(None, values, unit, start, interval)
 
 
-def build_replay(signals: Mapping[str, ReplaySignal], output: Path | str) -> Path:
-    """Make an FMU (FMI 2.0) that plays signals: value, slope and validity of each as outputs.
+def build_replay(
+    signals: Mapping[str, ReplaySignal],
+    output: Path | str,
+    *,
+    fmi: str = "3.0",
+    platform: str | None = None,
+    note: Note = lambda _: None,
+) -> Path:
+    """Make an FMU that plays signals: value, slope and validity of each as outputs.
 
     Parameters
     ----------
@@ -72,17 +83,24 @@ def build_replay(signals: Mapping[str, ReplaySignal], output: Path | str) -> Pat
         By the name of the output: letters, digits and underscores, a letter first.
     output : path
         The FMU file to write. Equal signals give equal bytes.
+    fmi : str
+        `3.0` or `2.0`.
+    platform, note
+        As in `export_fmu`.
 
     Returns
     -------
     Path
-        The FMU; `python/replay/README.md` describes its variables and its signal files.
+        The FMU; `native/replay/README.md` describes its variables and its signal files.
 
     Raises
     ------
     UsageError
-        The signals contradict themselves (all problems, one on each line), the file cannot be written, or pythonfmu
-        is not installed.
+        The signals contradict themselves (all problems, one on each line), or the file cannot be written.
+    ComponentFileError
+        The component was not built.
+    ComponentError
+        There is no library for a platform, and nothing to compile it with.
 
     Examples
     --------
@@ -93,24 +111,15 @@ def build_replay(signals: Mapping[str, ReplaySignal], output: Path | str) -> Pat
     arrays, problems = _checked(signals)
     if problems:
         raise UsageError("\n".join(f"replay: {problem}" for problem in problems))
-    try:
-        require_pythonfmu()
-    except ComponentError as error:
-        raise UsageError(str(error)) from error
-    with tempfile.TemporaryDirectory() as folder:
-        _write_signals(Path(folder, FOLDER), arrays)
-        script = Path(folder, f"{_module_name()}.py")
-        shutil.copyfile(REPLAY / "replay.py", script)
-        units = {name: unit for name, array in arrays.items() for name, unit in _units(name, array.unit)}
-        units[TIME_SHIFT] = Unit({"s": 1})
-        parts = PythonFmu(script, (Path(folder, FOLDER),), REPLAY / "README.md", units, "replay")
-        return make_fmu(parts, output)
-
-
-def _module_name() -> str:
-    # Python keeps one module of a name in a process: FMUs made by different versions must not get each other's
-    digest = hashlib.sha256((REPLAY / "replay.py").read_bytes()).hexdigest()
-    return f"vibroimpact_replay_{digest[:8]}"
+    original = component_of(REPLAY)
+    # without a date: a dataset knows by its hash which signals were played
+    edition = edition_of(_experiment(arrays), dated=False)
+    counts = {"channel": len(arrays)}
+    contents = Contents(
+        original, _described(original, arrays), fmi, edition, counts, _signal_files(arrays), platform, note
+    )
+    write_fmu(output, members_of(contents))
+    return output
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +131,17 @@ class _Arrays:
     start: float
     interval: float
     times: Floats | None
+
+    @property
+    def begin(self) -> float:
+        """Time of the first sample, s."""
+        return self.start if self.times is None else float(self.times[0])
+
+    @property
+    def end(self) -> float:
+        """Time of the last sample, s."""
+        last = len(self.values) - 1
+        return self.start + last * self.interval if self.times is None else float(self.times[last])
 
 
 def _checked(signals: Mapping[str, ReplaySignal]) -> tuple[dict[str, _Arrays], list[str]]:
@@ -141,7 +161,7 @@ def _checked(signals: Mapping[str, ReplaySignal]) -> tuple[dict[str, _Arrays], l
 def _name_problems(names: list[str]) -> Iterator[str]:
     if not 0 < len(names) <= MOST_CHANNELS:
         yield f"expected 1 to {MOST_CHANNELS} channels, got {len(names)}."
-    taken: dict[str, str] = {TIME_SHIFT: "all channels"}
+    taken = dict.fromkeys(SHARED, "all channels")
     for name in names:
         if not _NAME.fullmatch(name):
             yield f"{name!r}: expected a name of letters, digits and underscores, a letter first."
@@ -181,29 +201,66 @@ def _arrays(signal: ReplaySignal) -> _Arrays:
     return _Arrays(values, unit, 0.0, 0.0, times)
 
 
-def _units(name: str, unit: Unit) -> Iterator[tuple[str, Unit]]:
-    yield name, unit
-    yield f"{name}_rate", unit.per_second
-    yield f"{name}_offset", unit.difference
+def _experiment(arrays: Mapping[str, _Arrays]) -> Experiment:
+    """Return the span of the records, and the finest sampling interval."""
+    step = min((a.end - a.begin) / (len(a.values) - 1) for a in arrays.values())
+    return Experiment(
+        start_time=min(a.begin for a in arrays.values()),
+        stop_time=max(a.end for a in arrays.values()),
+        step_size=step,
+    )
 
 
-def _write_signals(folder: Path, arrays: Mapping[str, _Arrays]) -> None:
-    """Write the signal files; channels with the same instants share an axis."""
-    folder.mkdir()
-    axes: dict[str, dict[str, Any]] = {}
-    numbers: dict[Any, str] = {}
-    channels = {}
-    for name, signal in sorted(arrays.items()):
-        stored = None if signal.times is None else signal.times.tobytes()
-        key = (len(signal.values), signal.start, signal.interval, stored)
-        axis = numbers.setdefault(key, str(len(numbers) + 1))
-        if axis not in axes:
-            axes[axis] = {"count": len(signal.values)}
-            if stored is None:
-                axes[axis] |= {"start": signal.start, "interval": signal.interval}
-            else:
-                (folder / f"times_{axis}.f64").write_bytes(stored)
-        channels[name] = {"axis": axis, "unit": signal.unit.name}
-        (folder / f"channel_{name}.f64").write_bytes(signal.values.tobytes())
-    header = {"format": FORMAT, "axes": axes, "channels": channels}
-    (folder / HEADER).write_text(json.dumps(header, indent=2) + "\n", encoding="utf-8")
+def _described(original: ComponentDescription, arrays: Mapping[str, _Arrays]) -> ComponentDescription:
+    """Return the component with the channels' own names and units."""
+    names = list(arrays)
+    units = {unit.name: unit for unit in original.units}
+
+    def unit_of(variable: Variable, name: str) -> str:
+        unit = arrays[name].unit
+        own = {"": unit, "_rate": unit.per_second, "_offset": unit.difference}
+        found = own.get(_ending(variable))
+        if found is None or not found.name:
+            return ""
+        units[found.name] = UnitDefinition(found.name, found.exponents, found.factor, found.offset)
+        return found.name
+
+    def named(variable: Variable) -> Variable:
+        if not variable.repeat:
+            return variable
+        name = names[variable.repeat_index - 1]
+        description = variable.description.replace(f"channel {variable.repeat_index}", name)
+        return replace(
+            variable, name=name + _ending(variable), description=description, unit=unit_of(variable, name)
+        )
+
+    component = original.with_repeats({"channel": len(names)})
+    variables = tuple(named(variable) for variable in component.variables)
+    return replace(component, variables=variables, units=tuple(units.values()))
+
+
+def _ending(variable: Variable) -> str:
+    """Return what follows the channel's name in that of its variable: nothing for the value."""
+    member = variable.shown_name.rpartition(".")[2]
+    return "" if member == "value" else f"_{member}"
+
+
+def _signal_files(arrays: Mapping[str, _Arrays]) -> dict[str, bytes]:
+    """Return the signal files; channels with the same instants share an axis."""
+    axes: dict[bytes, int] = {}
+    members: dict[str, bytes] = {}
+    lines, channels = [FORMAT], []
+    for name, signal in arrays.items():
+        count = len(signal.values)
+        even = signal.times is None
+        stored = np.array([signal.start, signal.interval], "<f8") if signal.times is None else signal.times
+        kind = f"axis {'even' if even else 'listed'} {count}"
+        key = kind.encode() + stored.tobytes()
+        if key not in axes:
+            axes[key] = len(axes) + 1
+            lines.append(kind)
+            members[f"{FOLDER}/axis_{axes[key]}.f64"] = stored.tobytes()
+        channels.append(f"channel {name} {axes[key]}")
+        members[f"{FOLDER}/channel_{name}.f64"] = signal.values.tobytes()
+    members[f"{FOLDER}/{LIST}"] = "\n".join([*lines, *channels, ""]).encode("ascii")
+    return members

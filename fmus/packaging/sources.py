@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from vibroimpact.fmus.packaging.build import NATIVE, sizes
+from vibroimpact.fmus.packaging.build import NATIVE, is_part, sizes
 from vibroimpact.fmus.packaging.description import ComponentDescription, c_header, header_name
 
 BUILD_DESCRIPTION = "sources/buildDescription.xml"
@@ -33,11 +33,10 @@ def source_members(component: ComponentDescription, fmi: str, native: Path = NAT
     other = "fmi2" if fmi.startswith("3") else "fmi3"
     core = native / "core"
     files = {path.relative_to(core).as_posix(): path for path in core.rglob("*.[ch]")}
+    files = {name: path for name, path in files.items() if is_part(component, Path(name))}
     for folder in (native / "adapters", native / component.folder):
         files |= {path.name: path for path in folder.glob("*.[ch]") if not path.name.startswith(other)}
-    members = {
-        name: path.read_bytes() for name, path in sorted(files.items()) if not name.startswith("door/")
-    }
+    members = {name: path.read_bytes() for name, path in sorted(files.items())}
     members[header_name(component)] = c_header(component).encode("utf-8")
     members[SIZES_HEADER] = _sizes_header(component).encode("ascii")
     members = {f"sources/{name}": content for name, content in members.items()}

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
-from vibroimpact.orchestrator.importer.wiring import Transfer
+from vibroimpact.orchestrator.importer.wiring import Transfer, drawn_inputs
 
 
 def stepping_order(
@@ -14,14 +14,19 @@ def stepping_order(
 ) -> list[Component]:
     """Components with event mode first, then others with states, those without states last.
 
+    Of those with states the ones that give an input its slope come last, such as a Replay: value and slope mean the
+    start of a step.
+
     Among equals a component comes after those whose outputs its own outputs depend on directly. In a circle only the
     outputs that are connected count: those that are merely looked at may be late.
     """
 
+    drawing = _drawing(connections)
+
     def rank(component: Component) -> int:
         if not component.has_states:
-            return 2
-        return 0 if component.event_mode else 1
+            return 3
+        return 0 if component.event_mode else 2 if component.name in drawing else 1
 
     after = _feeding(components, connections, connected=False)
     after_connected = _feeding(components, connections, connected=True)
@@ -58,6 +63,14 @@ def fresh_inputs(
         return earlier if not jacobi or answers else []
 
     return {c.name: fresh(c) for c in order}
+
+
+def _drawing(connections: Sequence[ConnectionSpec]) -> set[str]:
+    """Return the components that give another one an input and its slope."""
+    pairs: dict[tuple[str, str], list[ConnectionSpec]] = {}
+    for connection in connections:
+        pairs.setdefault((connection.source[0], connection.target[0]), []).append(connection)
+    return {source for (source, _), joined in pairs.items() if drawn_inputs(joined)}
 
 
 def _feeding(

@@ -78,6 +78,12 @@ def _merged(cycles: Sequence[tuple[int, ...]]) -> list[tuple[int, ...]]:
     return [tuple(sorted(loop)) for loop in loops]
 
 
+def drawn_inputs(connections: Connections) -> set[str]:
+    """Return the inputs, among connections from one component to another, that a value and its slope are given for."""
+    named = {c.target[1] for c in connections}
+    return {name for x in named if f"{x}_rate" in named for name in (x, f"{x}_rate")}
+
+
 @dataclass(frozen=True, slots=True)
 class StatusCall:
     """A bare call that returns FMI's status, with what an error message needs."""
@@ -135,15 +141,21 @@ class Transfer:
         return copy if bool(np.all(gains == 1.0)) else convert
 
     def _bind_rates(self) -> None:
-        """Inputs that come with an input for their slope (`force`, `force_rate`) can follow a straight line."""
+        """Inputs that come with an input for their slope (`force`, `force_rate`) can follow a straight line.
+
+        Where the source gives the slope too, both say what comes from the start of a step on.
+        """
         variables = self.target.variables
         slopes = [f"{c.target[1]}_rate" for c in self.connections]
+        given = drawn_inputs(self.connections)
         self._sloping = [
-            i for i, name in enumerate(slopes) if name in variables and variables[name].causality == "input"
+            i
+            for i, name in enumerate(slopes)
+            if name in variables and variables[name].causality == "input" and name not in given
         ]
         names = [slopes[i] for i in self._sloping]
         self._rates = self.target.group("Float64", names) if names else None
-        self._kept: list[int] = []
+        self._kept = [i for i, c in enumerate(self.connections) if c.target[1] in given]
         self._begin_values = self.write.values.copy()
 
     def keep_at_start(self, inputs: Container[str], *, kept: bool) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.fmus.packaging.export import export_fmu
+from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.scene import Scene
@@ -52,19 +53,22 @@ BODIES: dict[str, dict[str, Any]] = {
         "stop": [{"position": 0.004, "law": "restitution", "restitution": 0.6}],
     },
 }
-IMPACT_STOP = "impact stop"
-NAMES = (*BODIES, IMPACT_STOP)
+IMPACT_STOP, REPLAY = "impact stop", "replay"
+NAMES = (*BODIES, IMPACT_STOP, REPLAY)
 ANSWERS = ("applied_force", "applied_stiffness", "applied_damping")
+PLAYED = ("base", "base_rate", "sparse", "sparse_rate")
 
 
 def outputs(name: str) -> tuple[str, ...]:
     """Return the outputs that are compared."""
-    return ANSWERS if name == IMPACT_STOP else OUTPUTS
+    return {IMPACT_STOP: ANSWERS, REPLAY: PLAYED}.get(name, OUTPUTS)
 
 
 def made(name: str, fmi: str, folder: Path) -> tuple[Path, Rows]:
     """Return the FMU of a case, and what its outputs are after each step by our own run."""
     path = folder / "exported.fmu"
+    if name == REPLAY:
+        return _replay(fmi, path)
     if name == IMPACT_STOP:
         starts = {
             "law": "kelvin_voigt",
@@ -80,6 +84,29 @@ def made(name: str, fmi: str, folder: Path) -> tuple[Path, Rows]:
     samples = open_dataset(folder / "run.nc").vibroimpact.samples()
     rows = np.column_stack([samples[output].values for output in OUTPUTS])[1 : COUNT + 1]
     return export_scene(scene, path, fmi=fmi), rows
+
+
+def _replay(fmi: str, path: Path) -> tuple[Path, Rows]:
+    """Return an FMU of noise at twice the rate with a gap, and of a slow channel on instants of its own."""
+    random = np.random.default_rng(13)
+    times = np.arange(2 * COUNT + 2) / (2.0 * RATE)
+    values, instants = random.normal(size=len(times)), (np.cumsum(random.integers(25, 150, 60)) + 0.5) / RATE
+    gap = slice(1001, 1300)
+    values[gap] = np.nan
+    good = np.isfinite(values)
+    bridged = np.where(good, values, np.interp(times, times[good], values[good]))
+    slow = random.normal(size=len(instants))
+    signals = {
+        "base": ReplaySignal.evenly(values, "m/s2", 0.5 / RATE),
+        "sparse": ReplaySignal(instants, slow, "N"),
+    }
+    now = slice(2, 2 * COUNT + 1, 2)
+    at = times[now]
+    inside = (at >= instants[0]) & (at < instants[-1])
+    segment = np.clip(np.searchsorted(instants, at, "right") - 1, 0, len(instants) - 2)
+    slopes = np.where(inside, (np.diff(slow) / np.diff(instants))[segment], 0.0)
+    rows = (bridged[now], (np.diff(bridged) * 2.0 * RATE)[now], np.interp(at, instants, slow), slopes)
+    return build_replay(signals, path, fmi=fmi), np.column_stack(rows)
 
 
 def _scene(tables: dict[str, Any]) -> Scene:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +12,8 @@ import pytest
 
 from exchange._cases import COUNT, NAMES, RATE, difference, made, outputs
 from exchange._tools import TOOLS, Tool, values
+from vibroimpact.fmus.packaging.export import export_fmu
+from vibroimpact.fmus.packaging.fmpy_door import read_description
 
 # programs that are not here are named by `make exchange` alone
 PAIRS = [(tool, fmi) for tool in TOOLS for fmi in tool.versions if tool.package or not tool.missing()]
@@ -25,3 +30,45 @@ def test_an_export_in_another_tool_is_our_own_run(tmp_path: Path, tool: Tool, fm
     assert rows.shape == expected.shape
     assert np.ptp(expected[:, 0]) > 0.0 or name == "impact stop"
     assert difference(rows, expected) <= 1e-9
+
+
+SYSTEM = """\
+<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription name="pair" version="1.0"
+    xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription">
+  <ssd:System name="pair"><ssd:Elements>
+    <ssd:Component name="a" type="application/x-fmu-sharedlibrary" source="resources/1.fmu"/>
+    <ssd:Component name="b" type="application/x-fmu-sharedlibrary" source="resources/2.fmu"/>
+  </ssd:Elements></ssd:System>
+  <ssd:DefaultExperiment startTime="0" stopTime="1"/>
+</ssd:SystemStructureDescription>
+"""
+
+BOTH_STARTS = """
+import sys
+from libcosimpy.CosimExecution import CosimExecution
+from libcosimpy.CosimObserver import CosimObserver
+execution = CosimExecution.from_ssp_file(sys.argv[1], step_size=10**7)
+observer = CosimObserver.create_last_value()
+execution.add_observer(observer)
+execution.step()
+print(*(observer.last_real_values(index, [int(sys.argv[2])])[0] for index in (0, 1)))
+"""
+
+
+@pytest.mark.slow
+def test_two_exports_of_one_component_are_two_fmus_in_a_system_of_libcosim(tmp_path: Path) -> None:
+    # it knows FMUs by their token, and gave both the resources, and so the start values, of one
+    pytest.importorskip("libcosimpy")
+    with zipfile.ZipFile(tmp_path / "pair.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", SYSTEM)
+        for place in (1, 2):
+            starts = {"displacement_start": float(place), "stiffness": 0.0}
+            path = export_fmu("oscillator", tmp_path / f"{place}.fmu", fmi="2.0", starts=starts)
+            archive.write(path, f"resources/{place}.fmu")
+    (reference,) = (
+        v.valueReference for v in read_description(path).modelVariables if v.name == "displacement"
+    )
+    command = [sys.executable, "-c", BOTH_STARTS, str(tmp_path / "pair.ssp"), str(reference)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+    assert "1.0 2.0" in done.stdout.splitlines()

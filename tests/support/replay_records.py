@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from fmpy import extract, read_model_description
-from fmpy.fmi2 import FMU2Slave
+from fmpy import read_model_description
 from numpy.typing import NDArray
 
+from support.component_fmu import ComponentFmu
 from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal
 
 INTERVAL = 1.0 / 3000.0
@@ -48,35 +48,19 @@ SIGNALS = {
 }
 
 
-class Player:
-    """An instance by FMPy's own class."""
+class Player(ComponentFmu):
+    """An instance of a Replay FMU."""
 
-    def __init__(self, path: Path, folder: Path, start: float = 0.0, **parameters: float) -> None:
-        description = read_model_description(str(path))
-        self.references = {v.name: v.valueReference for v in description.modelVariables}
-        self.unzipped = folder if folder.exists() else Path(extract(str(path), str(folder)))
-        self.fmu = FMU2Slave(
-            guid=description.guid,
-            unzipDirectory=str(self.unzipped),
-            modelIdentifier=description.coSimulation.modelIdentifier,
-            instanceName="record",
-        )
-        self.fmu.instantiate()
-        for name, value in parameters.items():
-            self.fmu.setReal([self.references[name]], [value])
-        self.fmu.setupExperiment(startTime=start)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
-        self.time = start
-
-    def step(self, size: float) -> None:
-        self.fmu.doStep(self.time, size)
-        self.time += size
+    def __init__(self, path: Path, start: float = 0.0, **parameters: float) -> None:
+        version = str(read_model_description(str(path)).fmiVersion)
+        self.start = start
+        super().__init__(path, parameters, version=version, start_time=start)
 
     def now(self, name: str) -> tuple[float, float, bool]:
-        value, rate = self.fmu.getReal([self.references[name], self.references[f"{name}_rate"]])
-        return value, rate, bool(self.fmu.getBoolean([self.references[f"{name}_valid"]])[0])
+        return self.get(name), self.get(f"{name}_rate"), bool(self.get(f"{name}_valid"))
 
     def at(self, name: str, time: float) -> tuple[float, float, bool]:
-        self.step(time - self.time)
+        """Return what is played at `time`, before or after the present one but after the start."""
+        self.time = self.start
+        self.step(time - self.start)
         return self.now(name)

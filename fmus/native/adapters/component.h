@@ -58,6 +58,14 @@ typedef struct {
     /* The model description has `count` of the repeated variables `block` ("modes", "contacts"); called after
      * `defaults`. NULL for a component to which this makes no difference. */
     void (*sized)(void *self, const char *block, int count);
+
+    /* For a component that reads more of the FMU's resources than start values; else all three are NULL. `open` reads them
+     * once for an instance from the folder (NULL: there is none) and may allocate; NULL, with the reason in `message`, when
+     * they are not what they must be. `attach` hands them over after `defaults`, and with NULL before they are read: they
+     * are no part of the used size. */
+    void *(*open)(const char *folder, char message[VI_MESSAGE_LENGTH]);
+    void (*attach)(void *self, const void *resources);
+    void (*close)(void *resources);
 } vi_component;
 
 /* The one component that this shared library holds. */

@@ -79,7 +79,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (fmuType != fmi2CoSimulation) {
         return refuse(functions, instanceName, "fmi2Instantiate: only co-simulation is available");
     }
-    if (fmuGUID == NULL || strcmp(fmuGUID, vi_this_component.token) != 0) {
+    if (!vi_token_fits(fmuGUID)) {
         return refuse(functions, instanceName,
                       "fmi2Instantiate: the guid is not this component's: the binary and the model description are of "
                       "different versions");

@@ -66,7 +66,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
         refuse(logMessage, instanceEnvironment, "fmi3InstantiateCoSimulation: expected an instance name, got none");
         return NULL;
     }
-    if (instantiationToken == NULL || strcmp(instantiationToken, vi_this_component.token) != 0) {
+    if (!vi_token_fits(instantiationToken)) {
         refuse(logMessage, instanceEnvironment,
                "fmi3InstantiateCoSimulation: the instantiation token is not this component's: the binary and the "
                "model description are of different versions");

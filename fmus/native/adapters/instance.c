@@ -13,6 +13,14 @@ static const vi_component *const component = &vi_this_component;
 
 /* ---- life ---- */
 
+bool vi_token_fits(const char *token)
+{
+    static const char own[] = "000000000000}"; /* as many characters as are an export's own */
+    const size_t length = strlen(component->token);
+    return token != NULL && strlen(token) == length && length >= sizeof own - 1
+           && strncmp(token, component->token, length - (sizeof own - 1)) == 0;
+}
+
 vi_instance *vi_instance_new(const char *name)
 {
     vi_instance *instance = calloc(1, sizeof(vi_instance));
@@ -35,6 +43,9 @@ vi_instance *vi_instance_new(const char *name)
 void vi_instance_free(vi_instance *instance)
 {
     if (instance != NULL) {
+        if (instance->resources != NULL) {
+            component->close(instance->resources);
+        }
         free(instance->self);
         free(instance->name);
         free(instance->starts);
@@ -64,6 +75,9 @@ void vi_instance_reset(vi_instance *instance)
 {
     memset(instance->self, 0, component->struct_size);
     component->defaults(instance->self);
+    if (component->attach != NULL) {
+        component->attach(instance->self, instance->resources);
+    }
     for (int i = 0; component->sized != NULL && i < instance->sizes.count; ++i) {
         component->sized(instance->self, instance->sizes.of[i].block, instance->sizes.of[i].size);
     }
@@ -115,6 +129,13 @@ bool vi_instance_describe(vi_instance *instance, const char *function, const cha
         return vi_instance_fail(instance, function, "out of memory");
     }
     instance->start_count = vi_starts_read(folder, instance->starts, component->variable_count);
+    if (component->open != NULL) {
+        instance->message[0] = '\0';
+        instance->resources = component->open(folder, instance->message);
+        if (instance->resources == NULL) {
+            return vi_instance_fail(instance, function, "%s", instance->message);
+        }
+    }
     vi_instance_reset(instance);
     return true;
 }
@@ -312,6 +333,9 @@ bool vi_instance_restore(vi_instance *instance, const char *function, const vi_s
 {
     if (saved == NULL || saved->size > component->struct_size) {
         return vi_instance_fail(instance, function, "expected a saved state, got none");
+    }
+    if (component->attach != NULL && saved->size != component->used_size(instance->self)) {
+        return vi_instance_fail(instance, function, "expected a state that fits the FMU's resources, got one of others");
     }
     memcpy(instance->self, saved->data, saved->size);
     instance->mode = (vi_mode_of_use)saved->mode;

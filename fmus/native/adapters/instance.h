@@ -41,7 +41,11 @@ struct vi_instance {
     vi_sizes sizes;          /* of the description */
     vi_start *starts;        /* of the description, where they are not the component's own */
     size_t start_count;
+    void *resources;         /* what the component has opened; NULL for most */
 };
+
+/* Is a token this component's? Its last twelve digits are an export's own: two exports are two FMUs to any tool. */
+bool vi_token_fits(const char *token);
 
 /* NULL when memory is out. */
 vi_instance *vi_instance_new(const char *name);
@@ -49,7 +53,7 @@ void vi_instance_free(vi_instance *instance);
 void vi_instance_reset(vi_instance *instance);
 
 /* Take sizes and start values of the description from the folder of resources, now and after each reset; NULL: the
- * component's own. Return false, after logging, when memory is out. */
+ * component's own. Return false, after logging, when memory is out or the component cannot use its resources. */
 bool vi_instance_describe(vi_instance *instance, const char *function, const char *folder);
 
 /* Log an error `function: text` and return false. */

@@ -14,13 +14,13 @@ static FILE *open_to_read(const char *path)
 {
 #if defined(_WIN32)
     wchar_t wide[VI_PATH_LENGTH];
-    return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, VI_PATH_LENGTH) > 0 ? _wfopen(wide, L"r") : NULL;
+    return MultiByteToWideChar(CP_UTF8, 0, path, -1, wide, VI_PATH_LENGTH) > 0 ? _wfopen(wide, L"rb") : NULL;
 #else
-    return fopen(path, "r");
+    return fopen(path, "rb");
 #endif
 }
 
-static FILE *open_member(const char *folder, const char *name)
+FILE *vi_resource_open(const char *folder, const char *name)
 {
     char path[VI_PATH_LENGTH];
     const int length = folder != NULL ? snprintf(path, sizeof path, "%s/%s", folder, name) : 0;
@@ -30,7 +30,7 @@ static FILE *open_member(const char *folder, const char *name)
 void vi_sizes_read(const char *folder, vi_sizes *sizes)
 {
     sizes->count = 0;
-    FILE *file = open_member(folder, "sizes.txt");
+    FILE *file = vi_resource_open(folder, "sizes.txt");
     if (file == NULL) {
         return;
     }
@@ -44,7 +44,7 @@ void vi_sizes_read(const char *folder, vi_sizes *sizes)
 
 size_t vi_starts_read(const char *folder, vi_start starts[], size_t most)
 {
-    FILE *file = open_member(folder, "starts.txt");
+    FILE *file = vi_resource_open(folder, "starts.txt");
     if (file == NULL) {
         return 0;
     }

@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 enum { VI_MOST_SIZES = 8, VI_BLOCK_LENGTH = 16, VI_PATH_LENGTH = 4096 };
 
@@ -32,6 +33,9 @@ void vi_sizes_read(const char *folder, vi_sizes *sizes);
 
 /* Read at most `most` start values, and return how many there are. 0 when the folder is NULL, or has no such file. */
 size_t vi_starts_read(const char *folder, vi_start starts[], size_t most);
+
+/* Open a file of the folder of resources to be read, byte by byte; NULL when the folder is, or there is no such file. */
+FILE *vi_resource_open(const char *folder, const char *name);
 
 /* The folder in a URI (FMI 2.0): file:///path, file://localhost/path or file:/path, percent-encoded. NULL when it is none. */
 const char *vi_folder_of_uri(const char *uri, char folder[VI_PATH_LENGTH]);

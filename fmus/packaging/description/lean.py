@@ -29,7 +29,7 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True)
 class Edition:
-    """Which version of the package wrote a description, and when; what to try with it."""
+    """Which version of the package wrote a description, and when (empty: not told); what to try with it."""
 
     version: str
     date_and_time: str

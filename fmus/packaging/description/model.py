@@ -142,6 +142,8 @@ class ComponentDescription:
         How often each repeated block occurs, `{"contact": 2}`.
     start_of_export : mapping of str to float
         Start values, by variable name, of an export that is given none: a run of it shows motion.
+    core : tuple of str
+        Modules of the core that it is made of, `body/complaint`; empty: all of them.
     """
 
     name: str
@@ -157,6 +159,11 @@ class ComponentDescription:
     enumerations: tuple[Enumeration, ...]
     variables: tuple[Variable, ...]
     start_of_export: Mapping[str, Number]
+    core: tuple[str, ...] = ()
+
+    def uses(self, file: str) -> bool:
+        """Return whether a file of the core, by its path there, is part of it."""
+        return not self.core or file.removesuffix(".c").removesuffix(".h") in self.core
 
     def variables_of(self, version: int) -> tuple[Variable, ...]:
         """Return the variables that FMI 2.0 (`version=2`) or 3.0 (`version=3`) can express, in order."""
@@ -170,11 +177,11 @@ class ComponentDescription:
     def knowns_at_start(self, variable: Variable, version: int) -> tuple[str, ...]:
         """Return the names of the knowns that an unknown of initialization may depend on.
 
-        Its inputs, and all start values but those of the other modes or masses than its own.
+        Its inputs, and all start values but those of the other modes, masses or channels than its own.
         """
 
         def may_matter(known: Variable) -> bool:
-            other = variable.repeat in {"mode", "mass"} and known.repeat == variable.repeat
+            other = variable.repeat in {"mode", "mass", "channel"} and known.repeat == variable.repeat
             return not (other and known.repeat_index != variable.repeat_index)
 
         starts = (

@@ -56,11 +56,8 @@ def model_description(
         "variableNamingConvention": "structured",
     }
     if edition is not None:
-        head |= {
-            "version": edition.version,
-            "copyright": "vibroimpact developers",
-            "generationDateAndTime": edition.date_and_time,
-        }
+        told = {"copyright": "vibroimpact developers", "generationDateAndTime": edition.date_and_time}
+        head |= {"version": edition.version, **_present(told)}
     root = Element("fmiModelDescription", identity | head)
     interface = SubElement(root, "CoSimulation", _capabilities(component, version))
     if version == 2 and source_files:

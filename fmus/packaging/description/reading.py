@@ -115,6 +115,7 @@ def _component(table: Mapping[str, Any], path: Path, token: str) -> ComponentDes
         enumerations=tuple(_enumeration(entry) for entry in table.get("enumeration", ())),
         variables=tuple(_numbered(table["variable"], repeats)),
         start_of_export=head.get("start_of_export", {}),
+        core=tuple(head.get("core", ())),
     )
 
 

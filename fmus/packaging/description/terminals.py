@@ -1,7 +1,8 @@
 """terminalsAndIcons.xml of FMI 3.0: which variables belong to one plug, so that a tool connects them at once.
 
-A body has a terminal for its observed point, and one for each contact, sensor and mass. The terminal of an ImpactStop
-has the members of a body's contact: displacement and velocity in, applied force and slopes out.
+A body has a terminal for its observed point, and one for each contact, sensor and mass; a Replay one for each channel.
+The terminal of an ImpactStop has the members of a body's contact: displacement and velocity in, applied force and
+slopes out.
 """
 
 from __future__ import annotations
@@ -46,6 +47,10 @@ def _place(variable: Variable) -> tuple[str, str]:
         return "", ""
     if not variable.repeat:
         return WHOLE, variable.name
+    if variable.repeat == "channel":
+        # a channel of a recording is called by its own name
+        member = variable.shown_name.removeprefix("channel[k].")
+        return variable.name.removesuffix(f"_{member}"), member
     terminal = f"{variable.repeat}[{variable.repeat_index}]"
     # contact[1].force, and force[1] of mass 1
     return terminal, variable.name.replace(f"[{variable.repeat_index}]", "").removeprefix(

@@ -12,7 +12,7 @@ from support.command_line import in_this_process
 from support.component_fmu import VERSIONS
 
 from vibroimpact.fmus.errors import ComponentError, UsageError
-from vibroimpact.fmus.packaging import cross, export
+from vibroimpact.fmus.packaging import cross, members
 from vibroimpact.fmus.packaging.build import read_components
 from vibroimpact.fmus.packaging.cross import chosen_platforms, library_for, universal
 from vibroimpact.fmus.packaging.export import export_fmu
@@ -37,7 +37,7 @@ def release(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for name in TARGETS:
         (folder / name).mkdir(parents=True)
         (folder / name / f"Oscillator{Platform(name).suffix}").write_bytes(name.encode())
-    for module in (cross, export):
+    for module in (cross, members):
         monkeypatch.setattr(module, "SHIPPED", folder)
     return folder
 

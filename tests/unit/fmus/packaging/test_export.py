@@ -14,8 +14,9 @@ from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
 from vibroimpact.fmus.packaging.check import check_fmu
-from vibroimpact.fmus.packaging.export import SIZES_MEMBER, STARTS_MEMBER, export_fmu
+from vibroimpact.fmus.packaging.export import STARTS_MEMBER, export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
+from vibroimpact.fmus.packaging.members import SIZES_MEMBER
 
 pytestmark = pytest.mark.slow
 

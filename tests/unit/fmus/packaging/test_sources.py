@@ -12,6 +12,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.build import build_platform_binary
 from support.component_fmu import VERSIONS
+from support.exports import exported
 
 from vibroimpact.fmus import components
 from vibroimpact.fmus.packaging.export import Start, export_fmu
@@ -28,7 +29,7 @@ STARTS: dict[str, dict[str, Start]] = {
 def test_every_file_that_is_named_is_there_and_nothing_is_included_that_is_not(
     tmp_path: Path, name: str, fmi: str
 ) -> None:
-    path = export_fmu(name, tmp_path / "x.fmu", fmi=fmi)
+    path = exported(name, tmp_path / "x.fmu", fmi=fmi)
     with zipfile.ZipFile(path) as archive:
         texts = {
             n.removeprefix("sources/"): archive.read(n).decode()

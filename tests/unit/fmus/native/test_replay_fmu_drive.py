@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.component_fmu import VERSIONS
 from support.replay_records import COUNT, INTERVAL, SIGNALS, base_values, gappy_values
 from support.structure import Modes, Stop, Structure
 
@@ -22,12 +23,10 @@ from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.scene import load_scene
 
-pytest.importorskip("pythonfmu")
 
-
-@pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build_replay(SIGNALS, tmp_path_factory.mktemp("replay") / "record.fmu")
+@pytest.fixture(scope="module", params=VERSIONS)
+def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_replay(SIGNALS, tmp_path_factory.mktemp("replay") / "record.fmu", fmi=request.param)
 
 
 @pytest.fixture(autouse=True)
@@ -55,7 +54,7 @@ def driven(
         ConnectionSpec(("record", "base"), ("body", "base_acceleration")),
         ConnectionSpec(("record", "base_rate"), ("body", "base_acceleration_rate")),
     ]
-    # declared first, and yet stepped last: it has no states
+    # declared first, and yet stepped last: it gives an input its slope
     return Importer([ComponentSpec("record", fmu), body], joined, exchange=exchange, macro_step=INTERVAL)
 
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
-import json
 import math
+import shutil
+import struct
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
-from fmpy import extract, simulate_fmu
+from fmpy import simulate_fmu
+from fmpy.fmi1 import FMICallException
+from support.component_fmu import VERSIONS
 from support.replay_records import (
     COUNT,
     DAY,
@@ -29,18 +32,19 @@ from support.replay_records import (
 from support.tolerance import ROUNDING
 
 from vibroimpact.analysis.recording import Channel, EventTrain, Quality, Recording, TimeAxis, write_recording
+from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.packaging.check import check_fmu
+from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description, validate
-from vibroimpact.fmus.packaging.replay_fmu import REPLAY, ReplaySignal, build_replay
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.packaging.replay_fmu import FOLDER, ReplaySignal, build_replay
 from vibroimpact.orchestrator.commands.cli import main
 
-pytest.importorskip("pythonfmu")
 
-
-@pytest.fixture(scope="module")
-def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build_replay(SIGNALS, tmp_path_factory.mktemp("replay") / "record.fmu")
+@pytest.fixture(scope="module", params=VERSIONS)
+def fmu(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_replay(SIGNALS, tmp_path_factory.mktemp("replay") / "record.fmu", fmi=request.param)
 
 
 @pytest.fixture(autouse=True)
@@ -49,27 +53,16 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def opened(fmu: Path, tmp_path: Path) -> Iterator[Callable[..., Player]]:
+def opened(fmu: Path) -> Iterator[Callable[..., Player]]:
     players: list[Player] = []
 
     def start(path: Path = fmu, start: float = 0.0, **parameters: float) -> Player:
-        players.append(Player(path, tmp_path / f"unpacked{len(players)}", start, **parameters))
+        players.append(Player(path, start, **parameters))
         return players[-1]
 
     yield start
     for player in players:
-        player.fmu.freeInstance()
-
-
-@pytest.fixture(scope="module")
-def slave() -> ModuleType:
-    """The slave's own module, as pythonfmu loads it."""
-    spec = importlib.util.spec_from_file_location("replay_under_test", REPLAY / "replay.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+        player.free()
 
 
 # What it plays.
@@ -131,12 +124,11 @@ def test_just_before_a_sample_the_value_is_of_what_was_and_the_slope_of_what_com
 
 @pytest.mark.parametrize("name", ["base", "force"])
 def test_times_may_come_in_any_order(opened, name) -> None:  # type: ignore[no-untyped-def]
-    player, signal = opened(), SIGNALS[name]
+    player, signal = opened(start=-1.0), SIGNALS[name]
     times = np.arange(COUNT) * INTERVAL if signal.time is None else np.asarray(signal.time)
     for time in np.random.default_rng(8).uniform(times[0], times[-1], 300):
-        assert player.at(name, time)[0] == pytest.approx(
-            np.interp(time, times, np.asarray(signal.values)), rel=1e-9
-        )
+        value = player.at(name, time)[0]
+        assert value == pytest.approx(np.interp(player.time, times, np.asarray(signal.values)), abs=1e-10)
 
 
 def test_a_gap_is_bridged_and_not_valid(opened) -> None:  # type: ignore[no-untyped-def]
@@ -160,7 +152,7 @@ def test_outside_the_record_the_last_value_is_held_without_slope_and_not_valid(
     player, values = opened(start=-1.0), np.asarray(SIGNALS[name].values)
     assert player.now(name) == (values[first], 0.0, False)
     assert player.at(name, (first - 0.5) * INTERVAL) == (values[first], 0.0, False)
-    assert player.at(name, last * INTERVAL) == (values[last], 0.0, True)
+    assert player.at(name, last * INTERVAL) == (pytest.approx(values[last]), 0.0, True)
     assert player.at(name, (last + 0.5) * INTERVAL) == (values[last], 0.0, False)
     assert player.at(name, 1e9) == (values[last], 0.0, False)
 
@@ -181,6 +173,48 @@ def test_a_step_may_be_repeated_to_another_end(opened) -> None:  # type: ignore[
     again.fmu.doStep(0.0, 0.03)
     once.fmu.doStep(0.0, 0.03)
     assert again.now("force") == once.now("force")
+
+
+def test_a_state_is_its_time_and_its_parameters_and_another_instance_goes_on_from_it(opened) -> None:  # type: ignore[no-untyped-def]
+    one = opened(base_gain=3.0)
+    kept = one.at("base", 20.25 * INTERVAL)
+    state = one.serialized()
+    assert len(state) < 400  # of 4 channels of 600 samples
+    assert one.at("base", 90.5 * INTERVAL) != kept
+    one.restore(state)
+    assert one.now("base") == kept
+    other = opened()
+    other.restore(state)
+    assert other.now("base") == kept
+    other.time = 20.25 * INTERVAL
+    other.step(INTERVAL)
+    one.time = 20.25 * INTERVAL
+    one.step(INTERVAL)
+    assert other.now("base") == one.now("base") != kept
+
+
+def test_a_state_of_a_recording_with_other_channels_is_refused(opened, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    other = opened(build_replay({"base": SIGNALS["base"]}, tmp_path / "other.fmu"))
+    for one, another in ((opened(), other), (other, opened())):
+        state = another.serialized()
+        with pytest.raises(FMICallException):
+            one.restore(state)
+    assert any("a state that fits the FMU's resources" in message for message in other.messages)
+
+
+def test_steps_that_do_not_go_forward_are_refused(opened) -> None:  # type: ignore[no-untyped-def]
+    player = opened()
+    for size in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(FMICallException):
+            player.step(size)
+        player.time = 0.0
+    assert "expected a finite number > 0" in player.messages[0]
+
+
+@pytest.mark.parametrize("name", ["base_gain", "gappy_offset", "time_shift"])
+def test_a_parameter_that_is_no_number_is_refused(opened, name) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(FMICallException):
+        opened(**{name: math.nan})
 
 
 def test_fmpy_simulates_it_alone(fmu: Path) -> None:
@@ -206,28 +240,34 @@ def test_two_records_in_one_process_keep_apart(opened, tmp_path: Path) -> None: 
     assert two.now("base")[0] == pytest.approx(5.25)
 
 
+def changed(fmu: Path, target: Path, files: dict[str, bytes | None]) -> Path:
+    """Write an FMU with other signal files; None takes one out."""
+    with zipfile.ZipFile(fmu) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    for name, content in files.items():
+        members.pop(f"{FOLDER}/{name}", None)
+        if content is not None:
+            members[f"{FOLDER}/{name}"] = content
+    write_fmu(target, members)
+    return target
+
+
 def test_exchanged_signal_files_are_played(opened, fmu: Path, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    folder = Path(extract(str(fmu), str(tmp_path / "unpacked0")))
-    values = np.arange(COUNT, dtype="<f8")
-    values.tofile(folder / "resources" / "signals" / "channel_base.f64")
-    player = opened(fmu)
+    values = np.arange(COUNT, dtype="<f8").tobytes()
+    player = opened(changed(fmu, tmp_path / "x.fmu", {"channel_base.f64": values}))
     assert player.at("base", 10.5 * INTERVAL) == (pytest.approx(10.5), pytest.approx(1.0 / INTERVAL), True)
 
 
-def test_equal_signals_make_equal_files(fmu: Path, tmp_path: Path) -> None:
-    reordered = dict(reversed(SIGNALS.items()))
-    assert build_replay(reordered, tmp_path / "again.fmu").read_bytes() == fmu.read_bytes()
-
-
-def test_instances_share_one_copy_of_the_samples_until_a_file_changes(
-    slave, fmu: Path, tmp_path: Path
-) -> None:  # type: ignore[no-untyped-def]
-    # pythonfmu keeps every instance's object for good: data of their own would be a leak
-    folder = Path(extract(str(fmu), str(tmp_path / "shared"))) / "resources" / "signals"
-    first = slave.load_signals(folder)
-    assert slave.load_signals(folder) is first
-    (folder / "times_1.f64").touch()
-    assert slave.load_signals(folder) is not first
+def test_equal_signals_make_equal_files_and_others_another_token(tmp_path: Path) -> None:
+    first, again = (
+        build_replay(s, tmp_path / n) for s, n in ((SIGNALS, "1"), (dict(reversed(SIGNALS.items())), "2"))
+    )
+    assert first.read_bytes() == again.read_bytes()
+    louder = build_replay(
+        SIGNALS | {"base": ReplaySignal.evenly(2.0 * base_values(), "m s-2", INTERVAL)}, tmp_path / "3"
+    )
+    tokens = {read_description(path).instantiationToken for path in (first, louder)}
+    assert len(tokens) == 2
 
 
 # What it says of itself.
@@ -238,21 +278,21 @@ def test_the_description_is_valid_and_says_what_importers_need(fmu: Path) -> Non
     assert validate(fmu) == ()
     assert check_fmu(fmu) == ()
     description = read_description(fmu)
-    assert not description.coSimulation.canGetAndSetFMUstate
+    assert description.coSimulation.canGetAndSetFMUstate
     assert all(unknown.dependencies == [] for unknown in description.outputs)
     variables = {v.name: v for v in description.modelVariables}
     kinds = {
-        name: (v.causality, v.type, v.start)
+        name: (v.causality, v.type.replace("Real", "Float64"), v.start)
         for name, v in variables.items()
-        if name.startswith(("base", "time"))
+        if name.startswith(("base", "time_"))
     }
     assert kinds == {
-        "base": ("output", "Real", None),
-        "base_rate": ("output", "Real", None),
+        "base": ("output", "Float64", None),
+        "base_rate": ("output", "Float64", None),
         "base_valid": ("output", "Boolean", None),
-        "base_gain": ("parameter", "Real", "1"),
-        "base_offset": ("parameter", "Real", "0"),
-        "time_shift": ("parameter", "Real", "0"),
+        "base_gain": ("parameter", "Float64", "1.0"),
+        "base_offset": ("parameter", "Float64", "0.0"),
+        "time_shift": ("parameter", "Float64", "0.0"),
     }
     units = {name: variables[name].unit for name in ("base", "base_rate", "gappy", "force_rate", "late")}
     assert units == {
@@ -291,6 +331,7 @@ GOOD = [0.0, 1.0, 2.0]
         (dict.fromkeys(("a", "a_rate"), ReplaySignal(GOOD, GOOD)), "a_rate is taken by a"),
         (dict.fromkeys(("a", "A"), ReplaySignal(GOOD, GOOD)), "is taken by"),
         ({"time_shift": ReplaySignal(GOOD, GOOD)}, "taken by all channels"),
+        ({"Time": ReplaySignal(GOOD, GOOD)}, "taken by all channels"),
     ],
 )
 def test_signals_that_contradict_themselves_are_refused(
@@ -302,53 +343,84 @@ def test_signals_that_contradict_themselves_are_refused(
     assert not (tmp_path / "x.fmu").exists()
 
 
-def damaged_header(text: str) -> Callable[[Path], object]:
-    return lambda folder: (folder / "signals.json").write_text(text)
-
-
-HEADER = {
-    "format": "vibroimpact signals 1",
-    "axes": {"1": {"count": 3, "start": 0.0, "interval": 0.1}},
-    "channels": {"a": {"axis": "1"}},
+LIST = "vibroimpact signals 2\naxis even 3\naxis listed 3\nchannel a 1\nchannel b 2\n"
+TWO = {
+    "a": ReplaySignal.evenly([1.0, 2.0, 4.0], "m", 0.5),
+    "b": ReplaySignal([0.0, 0.1, 1.0], [1.0, 2.0, 4.0], "N"),
 }
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = build_replay(TWO, tmp_path_factory.mktemp("pair") / "pair.fmu")
+    with zipfile.ZipFile(path) as archive:
+        assert archive.read(f"{FOLDER}/signals.txt").decode() == LIST
+    return path
+
+
+def numbers(*values: float) -> bytes:
+    return struct.pack(f"<{len(values)}d", *values)
+
+
+def listed(old: str, new: str) -> dict[str, bytes | None]:
+    assert old in LIST
+    return {"signals.txt": LIST.replace(old, new).encode()}
 
 
 @pytest.mark.parametrize(
     ("damage", "message"),
     [
-        (
-            lambda folder: (folder / "channel_a.f64").write_bytes(b"\0" * 20),
-            "expected 24 bytes, 3 little-endian",
-        ),
-        (lambda folder: (folder / "channel_a.f64").unlink(), "got no file"),
-        (lambda folder: np.full(3, np.nan).tofile(folder / "channel_a.f64"), "no number at all"),
-        (lambda folder: np.full(3, np.inf).tofile(folder / "channel_a.f64"), "got infinity"),
-        (damaged_header("{"), "expected JSON"),
-        (damaged_header("[1]"), 'expected "vibroimpact signals 1"'),
-        (damaged_header(json.dumps(HEADER | {"format": "2"})), 'expected "vibroimpact signals 1"'),
-        (damaged_header(json.dumps(HEADER | {"channels": {}})), "expected tables"),
-        (damaged_header(json.dumps(HEADER | {"channels": {"a": {"axis": "2"}}})), "axis: expected one of 1"),
-        (damaged_header(json.dumps(HEADER | {"axes": {"1": {"count": 1e9}}})), "count: expected 2 to"),
-        (
-            damaged_header(json.dumps(HEADER | {"axes": {"1": {"count": 3}}})),
-            "times_1.f64: expected 24 bytes",
-        ),
-        (
-            damaged_header(json.dumps(HEADER | {"axes": {"1": {"count": 3, "start": 0, "interval": 0}}})),
-            "an interval > 0",
-        ),
+        ({"channel_a.f64": numbers(1.0, 2.0)}, "channel_a.f64: expected 24 bytes, 3 little-endian float64"),
+        ({"channel_a.f64": numbers(1.0, 2.0, 3.0) + b"x"}, "channel_a.f64: expected 24 bytes"),
+        ({"channel_a.f64": None}, "channel_a.f64: expected 24 bytes, 3 little-endian float64, got no file"),
+        ({"channel_a.f64": numbers(*[math.nan] * 3)}, "no number at all"),
+        ({"channel_a.f64": numbers(1.0, math.inf, 2.0)}, "got infinity"),
+        ({"axis_1.f64": numbers(0.0, 0.0)}, "axis_1.f64: expected a finite start and an interval > 0 s"),
+        ({"axis_1.f64": numbers(math.nan, 0.5)}, "axis_1.f64: expected a finite start"),
+        ({"axis_1.f64": numbers(0.0, 1e308)}, "axis_1.f64: expected a finite start"),
+        ({"axis_2.f64": numbers(0.0, 1.0, 1.0)}, "axis_2.f64: expected finite times that ascend strictly"),
+        ({"axis_2.f64": numbers(0.0, math.nan, 1.0)}, "axis_2.f64: expected finite times"),
+        ({"axis_2.f64": numbers(-math.inf, 0.0, 1.0)}, "axis_2.f64: expected finite times"),
+        (listed("signals 2", "signals 1"), "line 1: expected `vibroimpact signals 2`"),
+        (listed("even 3", "even 1"), "line 2: expected `axis even COUNT`"),
+        (listed("even 3", "even 999999999"), "channel_a.f64: expected at most 100000000 numbers in all"),
+        (listed("listed 3", "listed 999999999"), "axis_2.f64: expected at most 100000000 numbers in all"),
+        (listed("listed 3", "listed 99999000"), "axis_2.f64: expected 799992000 bytes"),
+        (listed("listed 3", "listed 99999999999999999999"), "line 3: expected"),
+        (listed("a 1", "../a 1"), "line 4: expected"),
+        (listed("a 1", "a 3"), "line 4: expected `axis even COUNT`"),
+        (listed("a 1", "a 1 x"), "line 4: expected"),
+        (listed("b 2\n", "b 2\n\n"), "line 6: expected"),
+        (listed("channel b 2\n", ""), "expected the 2 channels of the model description, got 1"),
+        (listed("channel a 1\nchannel b 2\n", ""), "expected at least one channel, got none"),
+        (listed("b 2\n", "b 2\n" + "axis even 3\n" * 300), "axis_3.f64: expected 16 bytes"),
+        (listed("b 2\n", "b 2\n" + "channel a 1\n" * 300), "expected at most 256 of these"),
+        (listed("a 1", "a" * 5000), "line 4: expected"),
+        ({"signals.txt": b"\xff\x00" * 500}, "line 1: expected"),
+        ({"signals.txt": None}, "expected the signal files of a recording, got none"),
     ],
 )
-def test_damaged_signal_files_are_refused_by_name(  # type: ignore[no-untyped-def]
-    slave, damage: Callable[[Path], object], message: str, tmp_path: Path
+def test_damaged_signal_files_are_refused_by_name(
+    pair: Path, damage: dict[str, bytes | None], message: str, tmp_path: Path
 ) -> None:
-    (tmp_path / "signals.json").write_text(json.dumps(HEADER))
-    np.array([1.0, 2.0, 3.0]).tofile(tmp_path / "channel_a.f64")
-    slave.load_signals(tmp_path)
-    damage(tmp_path)
-    with pytest.raises(ValueError, match="expected") as caught:
-        slave.load_signals(tmp_path)
-    assert message in str(caught.value)
+    messages: list[str] = []
+
+    class Failing(Player):
+        def _log3(self, *arguments: Any) -> None:
+            messages.append(arguments[-1].decode())
+
+    with pytest.raises(Exception, match=r"nstanti|fmi3ExitInitializationMode"):
+        Failing(changed(pair, tmp_path / "x.fmu", damage)).free()
+    (told,) = messages
+    assert message in told
+
+
+def test_the_component_without_a_recording_says_how_to_make_one(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="vibroimpact fmu replay"):
+        export_fmu("replay", tmp_path / "x.fmu")
+    shutil.copy(fmu_path("Replay"), tmp_path / "bare.fmu")
+    with pytest.raises(FMICallException):
+        Player(tmp_path / "bare.fmu")
 
 
 # The command.
@@ -425,14 +497,3 @@ def test_the_command_refuses_with_one_line(
     assert exit_code("fmu", "replay", *arguments) == 2
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert message in line
-
-
-def test_without_pythonfmu_the_message_says_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    find_spec = importlib.util.find_spec
-    monkeypatch.setattr(
-        "importlib.util.find_spec", lambda name: None if name == "pythonfmu" else find_spec(name)
-    )
-    with pytest.raises(UsageError, match=r"pip install 'vibroimpact\[python-fmus\]'"):
-        build_replay(SIGNALS, tmp_path / "x.fmu")

@@ -1,0 +1,44 @@
+/* A recording in memory: the signal files of the folder of resources (README.md says what they hold), read once. */
+#ifndef VIBROIMPACT_RECORDING_H
+#define VIBROIMPACT_RECORDING_H
+
+#include <stdint.h>
+
+#include "body/complaint.h"
+
+enum { VI_REPLAY_CHANNELS = 256 };
+
+/* Instants of samples, s: evenly spaced from `start`, or listed in `times`. */
+typedef struct {
+    int64_t count;
+    double start, interval;
+    double *times; /* NULL: evenly spaced */
+} vi_axis;
+
+/* Samples `first` to `last` have no value. */
+typedef struct {
+    int64_t first, last;
+} vi_gap;
+
+/* A channel: a value at each instant of its axis, and the gaps in ascending order. */
+typedef struct {
+    int axis;
+    double *values;
+    vi_gap *gaps;
+    int64_t gap_count;
+} vi_signal;
+
+/* What the files hold. */
+typedef struct {
+    int axis_count, signal_count;
+    vi_axis axes[VI_REPLAY_CHANNELS];
+    vi_signal signals[VI_REPLAY_CHANNELS];
+} vi_recording;
+
+/* Read the recording in a folder of resources. Without a folder, or without signal files in it, a recording without
+ * channels; NULL, with the reason in `message`, where files are not what they must be or memory is out. */
+vi_recording *vi_recording_open(const char *folder, char message[VI_MESSAGE_LENGTH]);
+
+void vi_recording_close(vi_recording *recording);
+
+#endif

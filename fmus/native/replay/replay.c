@@ -1,0 +1,169 @@
+#include "replay.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "component.h"
+#include "player.h"
+#include "replay_variables.h"
+
+static void defaults(void *self)
+{
+    replay *it = self;
+    it->described = -1;
+    for (int k = 0; k < VI_REPLAY_CHANNELS; ++k) {
+        it->channels[k].gain = 1.0;
+    }
+}
+
+static void *open_recording(const char *folder, char message[VI_MESSAGE_LENGTH])
+{
+    return vi_recording_open(folder, message);
+}
+
+static void close_recording(void *resources)
+{
+    vi_recording_close(resources);
+}
+
+static void attach(void *self, const void *resources)
+{
+    ((replay *)self)->recording = resources;
+}
+
+static void sized(void *self, const char *block, int count)
+{
+    if (strcmp(block, "channels") == 0) {
+        ((replay *)self)->described = count;
+    }
+}
+
+static void was_set(void *self, uint32_t value_reference)
+{
+    (void)self;
+    (void)value_reference;
+}
+
+static int channel_count(const replay *it)
+{
+    return it->recording == NULL ? 0 : it->recording->signal_count;
+}
+
+static void update_outputs(void *self)
+{
+    replay *it = self;
+    const double time = it->time - it->time_shift;
+    vi_place places[VI_REPLAY_CHANNELS];
+    for (int a = 0; a < (it->recording == NULL ? 0 : it->recording->axis_count); ++a) {
+        places[a] = vi_axis_place(&it->recording->axes[a], time);
+    }
+    for (int k = 0; k < channel_count(it); ++k) {
+        const vi_signal *signal = &it->recording->signals[k];
+        const vi_playing now = vi_signal_at(signal, &it->recording->axes[signal->axis], &places[signal->axis]);
+        replay_channel *channel = &it->channels[k];
+        channel->value = channel->gain * now.value + channel->offset;
+        channel->rate = channel->gain * now.rate;
+        channel->valid = now.valid;
+    }
+}
+
+static void check_parameters(const replay *it, char *message)
+{
+    vi_check_finite(message, "time_shift", it->time_shift);
+    for (int k = 0; k < channel_count(it); ++k) {
+        char name[32];
+        (void)snprintf(name, sizeof name, "gain of channel %d", k + 1);
+        vi_check_finite(message, name, it->channels[k].gain);
+        (void)snprintf(name, sizeof name, "offset of channel %d", k + 1);
+        vi_check_finite(message, name, it->channels[k].offset);
+    }
+}
+
+static void check_channels(const replay *it, char *message)
+{
+    const int count = channel_count(it);
+    if (count == 0) {
+        vi_complain(message, "resources/signals: expected the signal files of a recording, got none. Make an FMU of one: "
+                             "vibroimpact fmu replay recording.nc -o replay.fmu");
+    } else if (it->described >= 0 && it->described != count) {
+        vi_complain(message, "resources/signals/signals.txt: expected the %d channels of the model description, got %d",
+                    it->described, count);
+    }
+}
+
+static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
+{
+    replay *it = self;
+    message[0] = '\0';
+    check_channels(it, message);
+    check_parameters(it, message);
+    vi_check_finite(message, "start time", start_time);
+    if (message[0] != '\0') {
+        return false;
+    }
+    it->time = start_time;
+    update_outputs(it);
+    return true;
+}
+
+/* What is played follows the time alone: a step may begin and end anywhere. */
+static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
+{
+    replay *it = self;
+    if (!(request->size > 0.0) || !isfinite(request->time + request->size)) {
+        (void)snprintf(message, VI_MESSAGE_LENGTH, "communicationStepSize: expected a finite number > 0, got %.17g",
+                       request->size);
+        return VI_STEP_ERROR;
+    }
+    it->time = request->time + request->size;
+    update_outputs(it);
+    return VI_STEP_DONE;
+}
+
+static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
+{
+    (void)self;
+    message[0] = '\0';
+    return true;
+}
+
+static bool never(const void *self)
+{
+    (void)self;
+    return false;
+}
+
+static double present_time(const void *self)
+{
+    return ((const replay *)self)->time;
+}
+
+/* The recording itself stays where it is. */
+static size_t used_size(const void *self)
+{
+    return offsetof(replay, channels) + (size_t)channel_count(self) * sizeof(replay_channel);
+}
+
+const vi_component vi_this_component = {
+    .name = REPLAY_NAME,
+    .token = REPLAY_TOKEN,
+    .variables = replay_variables,
+    .variable_count = REPLAY_VARIABLE_COUNT,
+    .struct_size = sizeof(replay),
+    .defaults = defaults,
+    .initialize = initialize,
+    .was_set = was_set,
+    .update_outputs = update_outputs,
+    .step = step,
+    .resolve = resolve,
+    .event_pending = never,
+    .needs_events = never,
+    .time = present_time,
+    .used_size = used_size,
+    .sized = sized,
+    .open = open_recording,
+    .attach = attach,
+    .close = close_recording,
+};

@@ -1,0 +1,133 @@
+"""What an FMU that is written for others holds: libraries, sources, description, documentation, resources."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import time
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from importlib import metadata
+
+from vibroimpact.fmus.packaging.build import documentation, read_components
+from vibroimpact.fmus.packaging.cross import SHIPPED, Note, chosen_platforms, library_for, members_for
+from vibroimpact.fmus.packaging.description import (
+    TERMINALS_MEMBER,
+    ComponentDescription,
+    Edition,
+    Experiment,
+    model_description,
+    plural,
+    terminals,
+)
+from vibroimpact.fmus.packaging.platform_names import TARGETS, this_platform
+from vibroimpact.fmus.packaging.sources import c_files, source_members
+from vibroimpact.fmus.shipped import fmu_path
+
+#: The member that says how many of each repeated block the description has: lines such as `modes 8`.
+SIZES_MEMBER = "resources/sizes.txt"
+#: The last second that has a year of four digits.
+YEAR_9999 = 253_402_300_799
+#: Digits at a token's end that are an export's own, as instance.h has them.
+OWN_DIGITS = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Contents:
+    """What an FMU is made of.
+
+    Attributes
+    ----------
+    original, component : ComponentDescription
+        As it is compiled in, and as it is described.
+    fmi : str
+        `3.0` or `2.0`.
+    edition : Edition or None
+        None: a full description, for this package's own importer.
+    counts : mapping of str to int
+        How many of each repeated block are described, where that is not all.
+    resources : mapping of str to bytes
+        Further members, all below `resources/`.
+    platform : str, optional
+        As in `export_fmu`.
+    note : callable
+        Told what is compiled for another machine.
+    """
+
+    original: ComponentDescription
+    component: ComponentDescription
+    fmi: str
+    edition: Edition | None
+    counts: Mapping[str, int] = field(default_factory=dict)
+    resources: Mapping[str, bytes] = field(default_factory=dict)
+    platform: str | None = None
+    note: Note = lambda _: None
+
+
+def component_of(name: str) -> ComponentDescription:
+    """Return a component as it is compiled in, by its full name."""
+    return next(component for component in read_components() if component.name == name)
+
+
+def edition_of(experiment: Experiment, *, dated: bool = True) -> Edition:
+    """Return this version of the package; the date is now, or that of `SOURCE_DATE_EPOCH`."""
+    seconds = os.environ.get("SOURCE_DATE_EPOCH", "")
+    moment = time.gmtime(min(int(seconds), YEAR_9999) if seconds.isdecimal() else None)
+    date = time.strftime("%Y-%m-%dT%H:%M:%SZ", moment) if dated else ""
+    return Edition(metadata.version("vibroimpact"), date, experiment)
+
+
+def members_of(contents: Contents) -> dict[str, bytes]:
+    """Return the members of an FMU.
+
+    Raises
+    ------
+    ComponentFileError
+        The component was not built.
+    ComponentError
+        There is no library for a platform, and nothing to compile it with.
+    """
+    original, fmi = contents.original, contents.fmi
+    with zipfile.ZipFile(fmu_path(original.name, fmi)) as archive:
+        members = {member: archive.read(member) for member in archive.namelist()}
+    if contents.platform is not None or SHIPPED.is_dir():
+        members = _for_platforms(members, contents)
+    resources = dict(contents.resources)
+    if contents.counts:
+        lines = (f"{plural(block)} {count}\n" for block, count in contents.counts.items())
+        resources[SIZES_MEMBER] = "".join(lines).encode("ascii")
+    component = replace(contents.component, token=_own_token(original.token, resources))
+    if contents.edition is not None:
+        members |= source_members(original, fmi)
+        if fmi == "3.0":
+            members[TERMINALS_MEMBER] = terminals(component).encode("utf-8")
+    text = model_description(component, fmi, contents.edition, c_files(members))
+    members["modelDescription.xml"] = text.encode("utf-8")
+    return members | documentation(component) | resources
+
+
+def _own_token(token: str, resources: Mapping[str, bytes]) -> str:
+    """Return a token of which the last digits follow from the resources.
+
+    libcosim takes two FMUs of one token for one, and gives both the resources of the first.
+    """
+    if not resources:
+        return token
+    digest = hashlib.sha256()
+    for name in sorted(resources):
+        digest.update(name.encode() + b"\0" + hashlib.sha256(resources[name]).digest())
+    return f"{token[: -OWN_DIGITS - 1]}{digest.hexdigest()[:OWN_DIGITS]}}}"
+
+
+def _for_platforms(members: Mapping[str, bytes], contents: Contents) -> dict[str, bytes]:
+    """Return the members with libraries for other machines in place of that of this one, or beside it."""
+    here, component = this_platform(), contents.original
+    platforms = chosen_platforms(contents.platform or "all")
+    own = {name: content for name, content in members.items() if name.startswith("binaries/")}
+    rest = {name: content for name, content in members.items() if name not in own}
+    binaries = members_for(
+        lambda p: library_for(component, p, contents.note), component.name, platforms, contents.fmi
+    )
+    # what a release leaves out is this machine's own, if it is none of those
+    return rest | (own if contents.platform is None and here.name not in TARGETS else {}) | binaries
