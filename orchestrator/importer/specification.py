@@ -11,6 +11,7 @@ from vibroimpact.fmus.shipped import package_folder
 
 Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
+Side = Literal["upper", "lower"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,3 +72,49 @@ class EventSpec:
     variable: str
     direction: Crossing = "falling"
     level: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class StopContactSpec:
+    """A body of any tool that meets a stop which yields.
+
+    Attributes
+    ----------
+    body, stop : str
+        The two components.
+    displacement, velocity, force : str
+        Variables of the body: the motion of the contact point, and the force input that acts on it.
+    mass : float or None
+        Effective mass of the contact point, kg; None: a trial step finds it.
+    stop_displacement, stop_force : str
+        Variables of the stop: the input that it is given the motion by, and the force that it answers, which presses
+        the body away and is >= 0.
+    stop_velocity : str or None
+        Likewise; None: it takes no velocity.
+    side : {"upper", "lower"} or None
+        On which side of the motion the stop is; None: its parameter `side` says it.
+    """
+
+    body: str
+    displacement: str
+    velocity: str
+    force: str
+    stop: str
+    mass: float | None = None
+    stop_displacement: str = "displacement"
+    stop_velocity: str | None = "velocity"
+    stop_force: str = "applied_force"
+    side: Side | None = None
+
+    @property
+    def name(self) -> str:
+        """The name of its force, `stop.output -> body.input`."""
+        return f"{self.stop}.{self.stop_force} -> {self.body}.{self.force}"
+
+    @property
+    def connections(self) -> tuple[ConnectionSpec, ...]:
+        """The connections by which the stop is given the motion of the body."""
+        inputs = {self.displacement: self.stop_displacement, self.velocity: self.stop_velocity}
+        return tuple(
+            ConnectionSpec((self.body, output), (self.stop, name)) for output, name in inputs.items() if name
+        )

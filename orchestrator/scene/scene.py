@@ -106,6 +106,8 @@ class Scene(SceneTable):
         for component in document["components"]:
             component["fmu"] = component["fmu"].name
         del document["start_units"]  # they follow from the FMUs
+        if not general.contacts:
+            del document["contacts"]  # campaigns from before there were any go on
         return document
 
     @property

@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.scene.rules.scene import rule_problems
 from vibroimpact.orchestrator.scene.sweep_table import read_short_sweep
 
 _SHORT_TABLES = ("body", "forcing", "stop", "sensor", "replay")
-_GENERAL_TABLES = ("component", "connection", "event")
+_GENERAL_TABLES = ("component", "connection", "contact", "event")
 _COMMON_TABLES = ("record", "sweep", "execution")
 _OPTIONAL_TABLES = ("load_cell", "exciter", "noise", "daq")
 
@@ -52,7 +52,9 @@ def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, An
 
 
 def _mixed_problem(general: list[str], short: list[str]) -> Problem:
-    expected = "[component.NAME], [[connection]] and [[event]], or [body], [forcing] and [[stop]]"
+    expected = (
+        "[component.NAME], [[connection]], [[contact]] and [[event]], or [body], [forcing] and [[stop]]"
+    )
     got = " beside ".join(", ".join(f"[{name}]" for name in names) for names in (general, short))
     hint = 'Remove those of one form; the body of the short form is fmu = "Oscillator" in the general one.'
     return Problem(general[0], expected, got, hint)

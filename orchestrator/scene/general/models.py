@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from vibroimpact.orchestrator.importer.specification import Crossing
+from vibroimpact.orchestrator.importer.specification import Crossing, Side
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.models import Finite, NotNegative, Positive, SceneTable
 
@@ -88,6 +88,56 @@ class EventTable(SceneTable):
         ),
     ]
     level: Annotated[Finite, Rule(doc="in the unit of the variable")] = 0.0
+
+
+def _name_of(what: str, example: str) -> Rule:
+    return Rule(f"the name of {what}", hint=f'For example "{example}".', doc=f"the name of {what}")
+
+
+class StopContactTable(SceneTable):
+    """`[[contact]]` with `stop`: a body of any tool that meets a stop which yields."""
+
+    body: Annotated[_Text, _name_of("a component", "mass")]
+    displacement: Annotated[
+        _Text, _name_of("an output of the body: the displacement of its contact point", "x")
+    ]
+    velocity: Annotated[_Text, _name_of("an output of the body: the velocity of that point", "v")]
+    force: Annotated[_Text, _name_of("an input of the body: the force on that point", "f")]
+    mass: Annotated[
+        Positive | None,
+        Rule(
+            unit="kg",
+            doc="effective mass of the contact point; by it the steps of a contact are chosen",
+            default="found by a trial step; required of a body that cannot restore its state",
+        ),
+    ] = None
+    stop: Annotated[
+        _Text, _name_of("a component that answers with a force, and can restore its state", "stop")
+    ]
+    side: Annotated[
+        Side | None,
+        Rule(
+            doc='`"upper"`: the stop is above, `"lower"`: below; of a stop without a parameter `side`',
+            default="the stop's own",
+        ),
+    ] = None
+    stop_displacement: Annotated[_Text, _name_of("the stop's input for the displacement", "displacement")] = (
+        "displacement"
+    )
+    stop_velocity: Annotated[
+        _Text | None,
+        replace(
+            _name_of("the stop's input for the velocity", "velocity"),
+            default="`velocity`, where the stop has it",
+        ),
+    ] = None
+    stop_force: Annotated[
+        _Text,
+        replace(
+            _name_of("the stop's force", "applied_force"),
+            doc="the name of the stop's force, >= 0, which presses the body away",
+        ),
+    ] = "applied_force"
 
 
 class GeneralRecord(SceneTable):

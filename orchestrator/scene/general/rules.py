@@ -25,8 +25,13 @@ from vibroimpact.orchestrator.scene.general.component_facts import (
     VariableFacts,
 )
 from vibroimpact.orchestrator.scene.general.components import components_of
-from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
-from vibroimpact.orchestrator.scene.general.scene import component_variable, gain_place
+from vibroimpact.orchestrator.scene.general.models import (
+    ConnectionTable,
+    EventTable,
+    GeneralRecord,
+    StopContactTable,
+)
+from vibroimpact.orchestrator.scene.general.scene import component_variable, gain_place, mass_place
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
@@ -54,6 +59,7 @@ class GeneralDraft(DraftTables):
         self.components = components_of(document.get("component"), folder, self.problems)
         self.connections = tuple(self.read(ConnectionTable, *entry) for entry in self.entries("connection"))
         self.events = tuple(self.read(EventTable, *entry) for entry in self.entries("event"))
+        self.contacts = tuple(self.read(StopContactTable, *entry) for entry in self.entries("contact"))
         self.record = self.table(GeneralRecord, "record", {})
         self.execution = self.table(Execution, "execution", {})
 
@@ -68,7 +74,9 @@ class GeneralDraft(DraftTables):
         return facts.variables.get(component_variable(reference)[1]) if facts else None
 
     def unit(self, key: str) -> str:
-        """Return the unit of a variable or gain as its description or connection writes it; `1` where it has none."""
+        """Return the unit of a variable, gain or contact mass as it is written where it is declared; else `1`."""
+        if mass_place(key) is not None and "contact" not in self.components:
+            return "kg"
         variable, place = self.variable(key), gain_place(key)
         connection = self.connections[place] if place is not None and variable is None else None
         return (variable.unit_name if variable else connection and connection.gain_unit) or "1"
@@ -279,7 +287,7 @@ def _exchange_has_a_step(draft: GeneralDraft) -> Iterator[Problem]:
         return
     step = draft.execution.macro_step
     if step is None:
-        if draft.connections:
+        if draft.connections or draft.contacts:
             hint = "Add macro_step = ... to [execution]: the time between two exchanges of values."
             expected = "a number > 0 where components are connected"
             yield Problem("execution.macro_step", expected, "nothing", hint)

@@ -7,9 +7,16 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec, Exchange
+from vibroimpact.orchestrator.importer.specification import (
+    ComponentSpec,
+    ConnectionSpec,
+    EventSpec,
+    Exchange,
+    StopContactSpec,
+)
 
 _GAIN_KEY = re.compile(r"connection\[([1-9][0-9]{0,8})\]\.gain")
+_MASS_KEY = re.compile(r"contact\[([1-9][0-9]{0,8})\]\.mass")
 
 
 def component_variable(reference: str) -> tuple[str, str]:
@@ -33,6 +40,18 @@ def gain_place(key: str) -> int | None:
     (0, None)
     """
     match = _GAIN_KEY.fullmatch(key)
+    return int(match[1]) - 1 if match else None
+
+
+def mass_place(key: str) -> int | None:
+    """Return the 0-based place of the contact whose mass a key names; None when it names none.
+
+    Examples
+    --------
+    >>> mass_place("contact[2].mass"), mass_place("ball.mass")
+    (1, None)
+    """
+    match = _MASS_KEY.fullmatch(key)
     return int(match[1]) - 1 if match else None
 
 
@@ -62,7 +81,9 @@ class GeneralScene:
     units : mapping of str to str
         Unit of each recorded variable and swept key as the description writes it; `1` where it has none.
     start_units : mapping of str to str
-        The same of each start value and gain that the scene gives.
+        The same of each start value, gain and contact mass that the scene gives.
+    contacts : tuple of StopContactSpec
+        In the order of the file.
     """
 
     components: tuple[ComponentSpec, ...]
@@ -75,9 +96,10 @@ class GeneralScene:
     guard: bool
     units: Mapping[str, str]
     start_units: Mapping[str, str] = field(default_factory=dict)
+    contacts: tuple[StopContactSpec, ...] = ()
 
     def value(self, key: str) -> float:
-        """Return the number that `COMPONENT.VARIABLE` or `connection[N].gain` has.
+        """Return the number that `COMPONENT.VARIABLE`, `connection[N].gain` or `contact[N].mass` has.
 
         Raises
         ------
@@ -87,20 +109,26 @@ class GeneralScene:
         place = gain_place(key)
         if place is not None:
             return self._connection(place, key).gain
+        place = mass_place(key)
+        if place is not None:
+            return self._mass(place, key)
         component, variable = self._start_value(key)
         return float(self.components[component].parameters[variable])
 
     def numbers(self) -> Iterator[tuple[str, float]]:
-        """Yield each start value that is a number and each gain, with its key."""
+        """Yield each start value that is a number, each gain and each contact mass, with its key."""
         for component in self.components:
             for variable, start in component.parameters.items():
                 if isinstance(start, int | float) and not isinstance(start, bool):
                     yield f"{component.name}.{variable}", float(start)
         for number, connection in enumerate(self.connections, start=1):
             yield f"connection[{number}].gain", connection.gain
+        for number, contact in enumerate(self.contacts, start=1):
+            if contact.mass is not None:
+                yield f"contact[{number}].mass", contact.mass
 
     def at(self, values: Mapping[str, float]) -> GeneralScene:
-        """Return this scene with other start values and gains, without validating it again.
+        """Return this scene with other start values, gains and masses, without validating it again.
 
         Raises
         ------
@@ -108,22 +136,36 @@ class GeneralScene:
             For a key that is neither swept nor given in the scene.
         """
         components, connections = list(self.components), list(self.connections)
+        contacts = list(self.contacts)
         for key, value in values.items():
             place = gain_place(key)
             if place is not None:
                 self._connection(place, key)
                 connections[place] = replace(connections[place], gain=float(value))
                 continue
+            place = mass_place(key)
+            if place is not None:
+                self._mass(place, key)
+                contacts[place] = replace(contacts[place], mass=float(value))
+                continue
             index, variable = self._start_value(key)
             before = components[index].parameters
             typed = float(value) if isinstance(before[variable], float) else int(value)
             components[index] = replace(components[index], parameters={**before, variable: typed})
-        return replace(self, components=tuple(components), connections=tuple(connections))
+        return replace(
+            self, components=tuple(components), connections=tuple(connections), contacts=tuple(contacts)
+        )
 
     def _connection(self, place: int, key: str) -> ConnectionSpec:
         if place < len(self.connections):
             return self.connections[place]
         raise UsageError(f"{key}: expected one of {len(self.connections)} connections, got an absent one.")
+
+    def _mass(self, place: int, key: str) -> float:
+        mass = self.contacts[place].mass if place < len(self.contacts) else None
+        if mass is not None:
+            return mass
+        raise UsageError(f"{key}: expected a contact mass that this scene gives or sweeps, got none.")
 
     def _start_value(self, key: str) -> tuple[int, str]:
         """Return the place of the component and the variable that a key names."""

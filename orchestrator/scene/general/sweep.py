@@ -1,4 +1,4 @@
-"""The sweep of a general scene: over start values of any component, and over gains of connections."""
+"""The sweep of a general scene: over start values of any component, gains of connections, masses of contacts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 from vibroimpact.orchestrator.scene.general.component_facts import Misfit, swept_value
 from vibroimpact.orchestrator.scene.general.components import settable_names, start_problems
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, reference_problem
-from vibroimpact.orchestrator.scene.general.scene import component_variable, gain_place
+from vibroimpact.orchestrator.scene.general.scene import component_variable, gain_place, mass_place
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
@@ -40,15 +40,17 @@ def _key_problems(key: str, entry: object, draft: GeneralDraft) -> Iterator[Prob
     hint = _quotes_hint(key, entry, draft)
     if hint:
         yield Problem(where, "a start value or a gain of this scene", quoted(key), hint)
-    elif _names_a_connection(key, draft):
+    elif _names_an_entry(key, "connection", draft):
         yield from _gain_problems(key, where, draft)
+    elif _names_an_entry(key, "contact", draft):
+        yield from _mass_problems(key, where, draft)
     else:
         yield from _start_value_problems(key, where, draft)
 
 
-def _names_a_connection(key: str, draft: GeneralDraft) -> bool:
+def _names_an_entry(key: str, name: str, draft: GeneralDraft) -> bool:
     table = component_variable(key)[0]
-    return table.partition("[")[0] == "connection" and table not in draft.components
+    return table.partition("[")[0] == name and table not in draft.components
 
 
 def _quotes_hint(key: str, entry: Any, draft: GeneralDraft) -> str:
@@ -76,6 +78,13 @@ def _gain_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Proble
         yield Problem(where, "the gain of a connection of real numbers", got)
 
 
+def _mass_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Problem]:
+    place, count = mass_place(key), len(draft.contacts)
+    if place is None or place >= count:
+        hint = f"Indices start at 1 and this scene has {count} [[contact]]."
+        yield Problem(where, "the mass of a contact", quoted(key), hint)
+
+
 def _start_value_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Problem]:
     problem = reference_problem(draft, where, key)
     facts, variable = draft.facts(key), draft.variable(key)
@@ -100,6 +109,8 @@ def _axis_problems(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:
         return
     variable = draft.variable(axis.key)
     if variable is None:
+        if mass_place(axis.key) is not None and not all(value > 0.0 for value in axis.values):
+            yield Problem(key_path(("sweep", axis.key)), "numbers > 0", quoted(min(axis.values)))
         return
     for value in axis.values:
         fitted = swept_value(variable, value)

@@ -7,12 +7,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
+from vibroimpact.orchestrator.importer.specification import (
+    ComponentSpec,
+    ConnectionSpec,
+    EventSpec,
+    StopContactSpec,
+)
 from vibroimpact.orchestrator.scene.general.component_facts import Misfit, StartValue, swept_value
 from vibroimpact.orchestrator.scene.general.components import DraftComponent
-from vibroimpact.orchestrator.scene.general.models import ConnectionTable, EventTable, GeneralRecord
+from vibroimpact.orchestrator.scene.general.contact_rules import contact_problems, velocity_input
+from vibroimpact.orchestrator.scene.general.models import (
+    ConnectionTable,
+    EventTable,
+    GeneralRecord,
+)
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable, mass_place
 from vibroimpact.orchestrator.scene.general.sweep import read_general_sweep
 from vibroimpact.orchestrator.scene.models import Execution, Record
 from vibroimpact.orchestrator.scene.problems import Problem
@@ -23,7 +33,7 @@ def read_general(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, A
     """Validate a document that has components; as `read_tables`."""
     draft = GeneralDraft(document, folder)
     axes, sweep_problems = read_general_sweep(draft)
-    problems = draft.problems + general_problems(draft) + sweep_problems
+    problems = draft.problems + general_problems(draft) + contact_problems(draft) + sweep_problems
     if problems:
         return {}, problems
     assert draft.header is not None
@@ -71,6 +81,7 @@ def _general(
         exchange=execution.exchange,
         guard=execution.guard,
         units={key: draft.unit(key) for key in (*record.variables, *(axis.key for axis in axes))},
+        contacts=tuple(_contact(draft, place, axes) for place in range(len(draft.contacts))),
     )
     return replace(general, start_units={key: draft.unit(key) for key, _ in general.numbers()})
 
@@ -102,3 +113,21 @@ def _connection(table: ConnectionTable) -> ConnectionSpec:
 
 def _event(table: EventTable) -> EventSpec:
     return EventSpec(*component_variable(table.watch), table.direction, table.level)
+
+
+def _contact(draft: GeneralDraft, place: int, axes: tuple[SweepAxis, ...]) -> StopContactSpec:
+    table = draft.contacts[place]
+    assert table is not None
+    swept = next((axis.values[0] for axis in axes if mass_place(axis.key) == place), None)
+    return StopContactSpec(
+        body=table.body,
+        displacement=table.displacement,
+        velocity=table.velocity,
+        force=table.force,
+        stop=table.stop,
+        mass=swept if table.mass is None else table.mass,
+        stop_displacement=table.stop_displacement,
+        stop_velocity=velocity_input(draft, table),
+        stop_force=table.stop_force,
+        side=table.side,
+    )

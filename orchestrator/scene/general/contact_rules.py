@@ -1,0 +1,178 @@
+"""Rules of the contacts of a general scene: `[[contact]]` tables against the model descriptions of their components."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+from vibroimpact.fmus.units import Unit, agree, parse_unit
+from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, VariableFacts
+from vibroimpact.orchestrator.scene.general.models import StopContactTable
+from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
+from vibroimpact.orchestrator.scene.general.scene import component_variable, mass_place
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+
+#: Variables of a stop that say which law it follows, on which side it is; and the law without a force.
+LAW, SIDE, RESTITUTION = "law", "side", 1
+VELOCITY = "velocity"
+
+
+def contact_problems(draft: GeneralDraft) -> list[Problem]:
+    """Return everything that is wrong with the contacts of a general scene."""
+    rules = (_variables_are_there, _stops_answer_with_a_force, _bodies_say_their_mass, _inputs_are_free)
+    return [
+        problem
+        for place, table in enumerate(draft.contacts)
+        if table is not None
+        for rule in rules
+        for problem in rule(draft, place, table)
+    ]
+
+
+def velocity_input(draft: GeneralDraft, table: StopContactTable) -> str | None:
+    """Return the stop's input for the velocity; None where it takes none."""
+    if table.stop_velocity is not None:
+        return table.stop_velocity
+    facts = _facts(draft, table.stop)
+    return VELOCITY if facts is not None and VELOCITY in facts.variables else None
+
+
+def _facts(draft: GeneralDraft, component: str) -> ComponentFacts | None:
+    found = draft.components.get(component)
+    return found.facts if found else None
+
+
+def _variables_are_there(draft: GeneralDraft, place: int, table: StopContactTable) -> Iterator[Problem]:
+    for key in ("body", "stop"):
+        yield from _component_problems(draft, place, key, getattr(table, key))
+    if table.body == table.stop:
+        yield Problem(
+            key_path(("contact", place, "stop")), "a component other than the body", quoted(table.stop)
+        )
+        return
+    metre, speed, newton = map(parse_unit, ("m", "m/s", "N"))
+    named = (
+        ("body", "displacement", table.displacement, "output", metre),
+        ("body", VELOCITY, table.velocity, "output", speed),
+        ("body", "force", table.force, "input", newton),
+        ("stop", "stop_displacement", table.stop_displacement, "input", metre),
+        ("stop", "stop_velocity", velocity_input(draft, table), "input", speed),
+        ("stop", "stop_force", table.stop_force, "output", newton),
+    )
+    for owner, key, name, causality, unit in named:
+        component = getattr(table, owner)
+        facts = _facts(draft, component)
+        if facts is not None and name is not None:
+            where = key_path(("contact", place, key))
+            yield from _variable_problems(where, component, facts, name, causality, unit)
+
+
+def _component_problems(draft: GeneralDraft, place: int, key: str, name: str) -> Iterator[Problem]:
+    if draft.components and name not in draft.components:
+        where = key_path(("contact", place, key))
+        near = partial(nearest, name, draft.components)
+        yield Problem(where, "a component of this scene", quoted(name), near)
+
+
+def _variable_problems(
+    where: str, component: str, facts: ComponentFacts, name: str, causality: str, unit: Unit | None
+) -> Iterator[Problem]:
+    variable = facts.variables.get(name)
+    article = f"{'an' if causality[0] in 'io' else 'a'} {causality}"
+    if variable is None:
+        near = partial(nearest, name, _of_causality(facts, causality))
+        yield Problem(where, f"{article} of {facts.file}", quoted(name), near)
+    elif not _fits(variable, causality):
+        got = f"the {variable.causality} {component}.{name} ({variable.shape})"
+        yield Problem(where, f"{article} that is one real number", got)
+    elif unit is not None and variable.unit is not None and not agree(variable.unit, unit):
+        got = f"{variable.unit_name} ({component}.{name})"
+        yield Problem(where, f"a variable in {unit.name}", got, "Contacts take SI units only.")
+
+
+def _of_causality(facts: ComponentFacts, causality: str) -> list[str]:
+    return [name for name, variable in facts.variables.items() if _fits(variable, causality)]
+
+
+def _fits(variable: VariableFacts, causality: str) -> bool:
+    allowed = ("output", "local") if causality == "output" else (causality,)
+    return variable.causality in allowed and variable.type in ("Real", "Float64") and variable.scalar
+
+
+def _stops_answer_with_a_force(draft: GeneralDraft, place: int, table: StopContactTable) -> Iterator[Problem]:
+    facts = _facts(draft, table.stop)
+    if facts is None:
+        return
+    where = key_path(("contact", place, "stop"))
+    if not facts.restorable:
+        hint = (
+            "A stop is asked for its force along the way of the body. Use an ImpactStop, or connect this one by "
+            "[[connection]] with a small macro_step."
+        )
+        got = f"{facts.file}, which does not have canGetAndSetFMUState"
+        yield Problem(where, "an FMU whose state can be kept and restored", got, hint)
+    if _is_rigid(draft, table, facts):
+        hint = (
+            'A body of another tool takes forces only: parameters = { law = "kelvin_voigt", stiffness = ..., '
+            "damping = ... }, hertz or hunt_crossley."
+        )
+        yield Problem(where, "a stop that yields", f"{table.stop} with the law restitution", hint)
+    own = SIDE in facts.variables
+    if own and table.side is not None:
+        hint = f"Give it to the component: parameters = {{ side = {quoted(table.side)} }}."
+        where = key_path(("contact", place, SIDE))
+        yield Problem(where, "no side beside a stop that has a parameter side", quoted(table.side), hint)
+    elif not own and table.side is None:
+        hint = 'Use "upper" for a stop above the body, "lower" for one below it.'
+        yield Problem(key_path(("contact", place, SIDE)), '"upper" or "lower"', "nothing", hint)
+
+
+def _is_rigid(draft: GeneralDraft, table: StopContactTable, facts: ComponentFacts) -> bool:
+    """Does a stop of ours answer with a coefficient of restitution? Its law is that unless another is given."""
+    law = facts.variables.get(LAW)
+    if (
+        law is None
+        or law.items.get("restitution") != RESTITUTION
+        or "applied_restitution" not in facts.variables
+    ):
+        return False
+    swept = draft.document.get("sweep")
+    if isinstance(swept, dict) and f"{table.stop}.{LAW}" in swept:
+        return False  # each point says it for itself
+    return (draft.components[table.stop].parameters or {}).get(LAW, RESTITUTION) == RESTITUTION
+
+
+def _bodies_say_their_mass(draft: GeneralDraft, place: int, table: StopContactTable) -> Iterator[Problem]:
+    facts = _facts(draft, table.body)
+    if facts is None or facts.restorable or table.mass is not None or _sweeps_mass(draft, place):
+        return
+    hint = f"{facts.file} does not have canGetAndSetFMUState, and no trial step can find it."
+    yield Problem(key_path(("contact", place, "mass")), "the effective mass, a number > 0", "nothing", hint)
+
+
+def _sweeps_mass(draft: GeneralDraft, place: int) -> bool:
+    swept = draft.document.get("sweep")
+    return isinstance(swept, dict) and any(mass_place(key) == place for key in swept)
+
+
+def _inputs_are_free(draft: GeneralDraft, place: int, table: StopContactTable) -> Iterator[Problem]:
+    """An input of a stop has one source; the forces of contacts on one input add up, and nothing else feeds it."""
+    for number, connection in enumerate(draft.connections, start=1):
+        if connection is None:
+            continue
+        target = component_variable(connection.target)
+        if target == (table.body, table.force) or target in _stop_inputs(draft, table):
+            key = "force" if target[0] == table.body else "stop"
+            got = f"{quoted(connection.target)}, which connection[{number}] feeds already"
+            where = key_path(("contact", place, key))
+            yield Problem(where, "an input that the contact alone feeds", got, "Remove the connection.")
+    for number, other in enumerate(draft.contacts[:place], start=1):
+        if other is not None and other.stop == table.stop:
+            got = f"{quoted(table.stop)}, which contact[{number}] has already"
+            hint = "Make a component for each contact."
+            yield Problem(key_path(("contact", place, "stop")), "a stop of its own", got, hint)
+
+
+def _stop_inputs(draft: GeneralDraft, table: StopContactTable) -> set[tuple[str, str]]:
+    names = (table.stop_displacement, velocity_input(draft, table))
+    return {(table.stop, name) for name in names if name is not None}
