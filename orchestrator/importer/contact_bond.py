@@ -18,21 +18,18 @@ from collections.abc import Sequence
 from ctypes import c_void_p
 from dataclasses import dataclass
 
-from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.importer.asked_stop import DEEPER, LOWER_SIDE, depth_that_stops
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
 #: The law by which a body follows the force of another FMU; the number of `contact[k].law`.
 EXTERNAL_FORCE = 6
-LOWER_SIDE = 2
 #: What a body's contact port must have, beside the inputs.
 PORT_OUTPUTS = ("displacement", "velocity")
 FORCE, STIFFNESS, DAMPING = "applied_force", "applied_stiffness", "applied_damping"
 #: A body on the surface is there within this times its displacement and the stop's position.
 SURFACE_ROUNDING = 1e-15
-#: Steps in a contact, where the importer is told nothing else.
-CONTACT_STEPS = 30
 #: A step longer than its limit by more than this factor, as its end shows, is repeated.
 SLACK = 1.5
 #: A straight line that misses the stop's answer by less than this, relative to the largest force, hits it.
@@ -44,13 +41,6 @@ SHORTEST = 1e-9
 NEAR_SURFACE = 0.5
 #: A force this close to a straight line through the surface, relative, is one.
 STRAIGHT = 1e-9
-#: Search for the depth that stops a body: evaluations, and the misfit of the energy (logarithm) that ends it.
-PROBES = 40
-PROBE_MISFIT = 0.2
-#: The energy of a spring grows with the depth to the power 2, of an elastic contact of two bodies 2.5.
-ENERGY_EXPONENT = 2.25
-#: How the search goes deeper where the stop does not answer yet.
-DEEPER = 16.0
 
 
 @dataclass(slots=True)
@@ -357,17 +347,7 @@ class ContactBond:
         depth = start.rate * size if self._depth is None else self._depth
         instance = self.stop.instance
         instance.save(self._probe_state)
-        found = None
-        for _ in range(PROBES):
-            force = self._force_at(depth, start.rate, time, size)
-            if not force > 0.0:
-                depth *= DEEPER
-                continue
-            misfit = math.log(energy / (force * depth))
-            depth *= math.exp(misfit / ENERGY_EXPONENT)
-            if abs(misfit) <= PROBE_MISFIT:
-                found = depth
-                break
+        found = depth_that_stops(lambda at: self._force_at(at, start.rate, time, size), energy, depth)
         instance.restore(self._probe_state)
         self._write_inputs(start.penetration, start.rate)
         instance.time = time
@@ -411,72 +391,3 @@ class ContactBond:
         """Give back its saved state, before the stop is freed."""
         if self._probe_state and not self.stop.instance.is_fatal:
             self.stop.instance.free_state(self._probe_state)
-
-
-class ContactBonds:
-    """All contacts of an importer whose stops may yield.
-
-    Attributes
-    ----------
-    active : bool
-        Any of them is closed in the step under way.
-    """
-
-    def __init__(
-        self,
-        components: dict[str, Component],
-        transfers: Sequence[Transfer],
-        connections: Sequence[ConnectionSpec],
-        steps: float,
-    ) -> None:
-        if not steps > 0.0:
-            raise ComponentError(f"contact_steps: expected a number > 0, got {steps!r}.")
-        self._steps = steps
-        self.all = [
-            ContactBond(components, transfers, c)
-            for c in connections
-            if _is_contact_force(components[c.target[0]], c.target[1])
-        ]
-        self._following: list[ContactBond] = []
-        self.active = False
-
-    def begin(self) -> None:
-        """Start a run."""
-        for bond in self.all:
-            bond.begin()
-        self._following = [bond for bond in self.all if bond.follows]
-        self.active = False
-
-    def begin_step(self, time: float, target: float) -> float:
-        """Look at all contacts before a step; returns where it should end, s."""
-        for bond in self._following:
-            target = bond.begin_step(time, target, self._steps)
-        self.active = any(bond.active for bond in self._following)
-        return target
-
-    def apply(self) -> None:
-        """Give the bodies the slopes that their stops do not."""
-        for bond in self._following:
-            bond.apply()
-
-    def revised_end(self, time: float, end: float) -> float | None:
-        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
-        found = [bond.revised_end(time, end) for bond in self._following]
-        return min((e for e in found if e is not None), default=None)
-
-    def end_step(self, size: float) -> None:
-        """The step, of `size` s, counts."""
-        for bond in self._following:
-            bond.end_step(size)
-
-    def free(self) -> None:
-        """Give back what they have saved."""
-        for bond in self.all:
-            bond.free()
-
-
-def _is_contact_force(body: Component, variable: str) -> bool:
-    """Is this input the force of a contact port that can follow a stop which yields?"""
-    port, _, last = variable.rpartition(".")
-    needed = (*PORT_OUTPUTS, "law", "side", "position", "mass", STIFFNESS, DAMPING)
-    return last == FORCE and all(f"{port}.{name}" in body.variables for name in needed)

@@ -5,7 +5,8 @@ A force that is held over a step is not the force that the other side has: over 
 that connection, in joule; exact coupling has none.
 
 At a contact with a stop that yields the body follows a force that is a straight line in penetration and rate; the
-residual is the integral of (that force - the force that the stop's law has on the body's way) * velocity.
+residual is the integral of (that force - the force that the stop's law has on the body's way) * velocity. A body
+that holds its force has it from its bond (`held_force`).
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from vibroimpact.orchestrator.importer.component import description_of
 from vibroimpact.orchestrator.importer.contact_bond import ContactBond
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
-from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, StopContactSpec
+from vibroimpact.orchestrator.importer.step_path import POINTS, WEIGHTS
 from vibroimpact.orchestrator.importer.wiring import connection_name
 
 #: Inputs that are forces, by the last part of their name, with the displacement that they do work on.
@@ -37,26 +39,18 @@ def conjugate_displacement(variables: Container[str], variable: str) -> str | No
 
 
 def force_connections(
-    components: Sequence[ComponentSpec], connections: Sequence[ConnectionSpec]
+    components: Sequence[ComponentSpec],
+    connections: Sequence[ConnectionSpec],
+    contacts: Sequence[StopContactSpec] = (),
 ) -> tuple[str, ...]:
-    """Return the names of the connections whose energy residual is summed."""
+    """Return the names of the connections whose energy residual is summed, and of the contacts behind them."""
     variables = {c.name: {v.name for v in description_of(c.fmu).modelVariables} for c in components}
-    return tuple(
+    forces = [
         connection_name(c) for c in connections if conjugate_displacement(variables[c.target[0]], c.target[1])
-    )
+    ]
+    return (*forces, *(contact.name for contact in contacts))
 
 
-def _points_of_a_way() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points of a way, as fractions of it, and their weights: Gauss's in s, at u = s^2 (3 - 2 s).
-
-    Where a contact begins or ends at an end of the way, a force like penetration^1.5 is smooth in s, not in u.
-    """
-    points, weights = np.polynomial.legendre.leggauss(8)
-    s = 0.5 * (points + 1.0)
-    return s * s * (3.0 - 2.0 * s), 3.0 * s * (1.0 - s) * weights
-
-
-_POINTS, _WEIGHTS = _points_of_a_way()
 #: Where a body separates within a step is found to this fraction of it.
 SEPARATION = 1e-12
 
@@ -122,7 +116,7 @@ class _Contact:
             parts = [(a, b) for a, b in pairwise(kinks) if b > a]
             ways = [self._way(time, begin, finish) for begin, finish in parts]
         for (begin, finish), way in zip(parts, ways, strict=True):
-            self.residual += (finish - begin) * float(np.sum(_WEIGHTS * self._power(time, end, way)))
+            self.residual += (finish - begin) * float(np.sum(WEIGHTS * self._power(time, end, way)))
 
     def _kinks(self, time: float, size: float) -> list[float]:
         """Seconds into the step at which the body lets go of the stop, and at which it is back at its surface."""
@@ -149,7 +143,7 @@ class _Contact:
 
     def _way(self, time: float, begin: float, finish: float) -> NDArray[np.float64]:
         """Seconds from the start, displacement, velocity and force felt at the points of a part; one row each."""
-        return np.array([self._felt(time, begin + float(u) * (finish - begin)) for u in _POINTS])
+        return np.array([self._felt(time, begin + float(u) * (finish - begin)) for u in POINTS])
 
     def _felt(self, time: float, size: float) -> tuple[float, float, float, float]:
         self._bond.body.step_from_start(time, size)
@@ -176,16 +170,16 @@ class _Contact:
 
 
 class InterfaceEnergy:
-    """Sums the energy residual of every force-displacement connection of an importer.
+    """Sums the energy residual of every force-displacement connection of an importer, and of its contacts.
 
     Attributes
     ----------
     names : tuple of str
-        The connections, `component.output -> component.input`.
+        The connections, `component.output -> component.input`; then the contacts with a held force, likewise.
     """
 
     def __init__(self, importer: Importer, connections: Sequence[ConnectionSpec]) -> None:
-        bonds = {f"{bond.name}.applied_force": bond for bond in importer.contacts.all}
+        bonds = {f"{bond.name}.applied_force": bond for bond in importer.contacts.ports}
         found: list[tuple[ConnectionSpec, _Connection | _Contact]] = []
         for connection in connections:
             target = importer.components[connection.target[0]]
@@ -195,7 +189,11 @@ class InterfaceEnergy:
                 found.append((connection, _Contact(bond)))
             elif displacement is not None:
                 found.append((connection, _Connection(importer, connection, displacement)))
-        self.names = tuple(connection_name(connection) for connection, _ in found)
+        self._held = importer.contacts.held
+        self.names = (
+            *(connection_name(connection) for connection, _ in found),
+            *(bond.name for bond in self._held),
+        )
         self._connections = [watched for _, watched in found]
         self._specs = [connection for connection, _ in found]
         if found:
@@ -209,7 +207,7 @@ class InterfaceEnergy:
 
     def residuals(self) -> NDArray[np.float64]:
         """Residual of each connection so far, J."""
-        return np.array([watched.residual for watched in self._connections])
+        return np.array([watched.residual for watched in (*self._connections, *self._held)])
 
     def _before(self, time: float) -> None:
         for watched in self._connections:

@@ -12,11 +12,8 @@ from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
 from vibroimpact.orchestrator.importer.beginning import settle_connections
 from vibroimpact.orchestrator.importer.component import SAME_INSTANT, Component, Value
-from vibroimpact.orchestrator.importer.contact_bond import (
-    CONTACT_STEPS,
-    MOST_REPETITIONS,
-    ContactBonds,
-)
+from vibroimpact.orchestrator.importer.contact_bond import MOST_REPETITIONS
+from vibroimpact.orchestrator.importer.contacts import CONTACT_STEPS, ContactBonds
 from vibroimpact.orchestrator.importer.events import (
     Event,
     EventMode,
@@ -26,7 +23,13 @@ from vibroimpact.orchestrator.importer.events import (
 )
 from vibroimpact.orchestrator.importer.order import fresh_inputs, stepping_order
 from vibroimpact.orchestrator.importer.revision import Watch
-from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec, Exchange
+from vibroimpact.orchestrator.importer.specification import (
+    ComponentSpec,
+    ConnectionSpec,
+    EventSpec,
+    Exchange,
+    StopContactSpec,
+)
 from vibroimpact.orchestrator.importer.wiring import (
     LoopSolver,
     equal_values,
@@ -53,6 +56,8 @@ class Importer:
         Outputs to inputs.
     events : sequence of EventSpec
         Watched variables; their components run without event mode and early return.
+    contacts : sequence of StopContactSpec
+        Bodies that hold a force over a step, and the stops that they meet.
     exchange : str
         `jacobi`: all inputs are those of the start of a step. `gauss_seidel`: each component gets the newest
         outputs of those stepped before it. `iterated`: steps are repeated until the inputs at their end agree.
@@ -85,6 +90,7 @@ class Importer:
         components: Sequence[ComponentSpec],
         connections: Sequence[ConnectionSpec] = (),
         events: Sequence[EventSpec] = (),
+        contacts: Sequence[StopContactSpec] = (),
         *,
         exchange: Exchange = "gauss_seidel",
         macro_step: float = math.inf,
@@ -94,6 +100,7 @@ class Importer:
     ) -> None:
         self.components: dict[str, Component] = {}
         watched = {event.component for event in events}
+        connections = [*connections, *(c for contact in contacts for c in contact.connections)]
         for spec in components:
             self.components[spec.name] = Component(
                 spec,
@@ -107,9 +114,10 @@ class Importer:
         order = order_of(connections, self.components)
         self.transfers = transfers_of(order, self.components)
         self.loops = LoopSolver(order.loops, self.components)
-        self.contacts = ContactBonds(self.components, self.transfers, connections, contact_steps)
+        self.contacts = ContactBonds(self.components, self.transfers, connections, contacts, contact_steps)
+        fed = [*(c.target for c in connections), *((c.body, c.force) for c in contacts)]
         for name, component in self.components.items():
-            component.watch_inputs(c.target[1] for c in connections if c.target[0] == name)
+            component.watch_inputs(variable for owner, variable in fed if owner == name)
         self._looping = [t for t in self.transfers if order.loops_back(t.connections[0])]
         self._order = stepping_order(self.components, connections)
         self._plan()
@@ -142,7 +150,7 @@ class Importer:
         self._moves_after_loops = moves_of(t for t in behind if t not in self._looping)
         paths = [(c, moves_of(self._fresh[c.name]) or None, self._bare_step(c)) for c in self._order]
         # a step may be repeated: those that cannot go back wait for the last repetition
-        repeats = self._iterates or bool(self.contacts.all)
+        repeats = self._iterates or bool(self.contacts)
         self._paths = [path for path in paths if path[0].has_states or not repeats]
         self._stateless_paths = [path for path in paths if not path[0].has_states and repeats]
         self._event_mode = EventMode(self._order, self.transfers, behind)
@@ -242,11 +250,11 @@ class Importer:
     def _step(self, time: float, target: float, made: int | None = None) -> None:
         """Make a step; `made` is the status of the first component's step where it is made already."""
         contacts = self.contacts
-        if contacts.all:
+        if contacts:
             target = contacts.begin_step(time, target)
         if self._start_moves is not None:
             self._start_moves()
-        if contacts.active:
+        if contacts:
             contacts.apply()
         if self._prepares or self.keeps_start or contacts.active:
             self._prepare(time)
@@ -259,9 +267,10 @@ class Importer:
         if contacts.active:
             self._settle_contacts(time)
         if self._stateless_paths and self._reached > time:
+            contacts.agree(time, self._reached)
             self._step_stateless(time, self._reached)
-        if contacts.active:
-            contacts.end_step(self._reached - time)
+        if contacts:
+            self._at_event += contacts.end_step(self._reached - time)
         end = self._reached
         if end > time:
             self._standstill = 0

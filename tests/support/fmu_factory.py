@@ -19,7 +19,14 @@ from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suf
 
 SOURCES = Path(__file__).with_name("fmus")
 #: The C file of each model; those with a description of a version can be made in that version.
-MODELS = {"BouncingBall": "ball.c", "Faulty": "faulty.c", "Gain": "gain.c", "SteppedBall": "stepped_ball.c"}
+MODELS = {
+    "BouncingBall": "ball.c",
+    "Faulty": "faulty.c",
+    "Gain": "gain.c",
+    "Mass": "mass.c",
+    "StatelessMass": "stateless_mass.c",
+    "SteppedBall": "stepped_ball.c",
+}
 MADE = tuple((name, fmi) for name in MODELS for fmi in ("2.0", "3.0") if (name, fmi) != ("Gain", "3.0"))
 
 
@@ -47,6 +54,15 @@ def faulty(folder: Path, fmi: str = "3.0") -> Path:
 def gain(folder: Path) -> Path:
     """Write y = k u + b in FMI 2.0: direct feedthrough, and no state that can be saved."""
     return _write("Gain", "2.0", folder)
+
+
+def mass(folder: Path, fmi: str = "3.0", *, states: bool = True) -> Path:
+    """Write a mass on a spring that knows nothing of contacts, with states that can be kept or without.
+
+    Outputs `x` (m), `v` (m/s); input `f` (N), held over a step; parameters `m`, `k`, `load`, and `scheme` with
+    `inner_step`: how it integrates.
+    """
+    return _write("Mass" if states else "StatelessMass", fmi, folder)
 
 
 def _write(name: str, fmi: str, folder: Path) -> Path:

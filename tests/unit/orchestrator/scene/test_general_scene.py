@@ -444,7 +444,7 @@ def test_a_component_has_a_plain_name(name: str) -> None:
 def test_a_scene_has_one_form() -> None:
     (problem,) = problems_of(COUPLED + "[body]\nmass = 1\n[[stop]]\n[[event]]\n")
     assert problem == (
-        "component: expected [component.NAME], [[connection]] and [[event]], "
+        "component: expected [component.NAME], [[connection]], [[contact]] and [[event]], "
         "or [body], [forcing] and [[stop]], got [component], [connection], [event] beside [body], [stop]. "
         'Remove those of one form; the body of the short form is fmu = "Oscillator" in the general one.'
     )

@@ -1,0 +1,153 @@
+"""A stop that is asked for its force at motions that nobody has made, from a saved state and without a trace."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from ctypes import c_void_p
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.specification import StopContactSpec
+
+LOWER_SIDE = 2
+#: The number of ImpactStop's law that answers a coefficient of restitution, and no force.
+RESTITUTION = 1
+#: Search for the depth that stops a body: evaluations, and the misfit of the energy (logarithm) that ends it.
+PROBES = 40
+PROBE_MISFIT = 0.2
+#: The energy of a spring grows with the depth to the power 2, of an elastic contact of two bodies 2.5.
+ENERGY_EXPONENT = 2.25
+#: How the search goes deeper where the stop does not answer yet.
+DEEPER = 16.0
+
+
+def depth_that_stops(force_at: Callable[[float], float], energy: float, guess: float) -> float | None:
+    """Return a depth at which force times depth is about an energy, m; None where the stop does not answer so.
+
+    Parameters
+    ----------
+    force_at : callable
+        The stop's force (N) at a depth (m).
+    energy : float
+        mass * speed^2, J; > 0.
+    guess : float
+        A first depth, m; > 0.
+
+    Examples
+    --------
+    >>> depth = depth_that_stops(lambda depth: 1e4 * depth, 1.0, 1e-3)
+    >>> 0.8 < 1e4 * depth**2 < 1.25
+    True
+    """
+    depth = guess
+    for _ in range(PROBES):
+        force = force_at(depth)
+        if not force > 0.0:
+            depth *= DEEPER
+            continue
+        misfit = math.log(energy / (force * depth))
+        depth *= math.exp(misfit / ENERGY_EXPONENT)
+        if abs(misfit) <= PROBE_MISFIT:
+            return depth
+    return None
+
+
+class AskedStop:
+    """The stop of a contact, in the direction into it: displacements grow on the way in.
+
+    Attributes
+    ----------
+    sign : float
+        1 for a stop above the body, -1 for one below: displacement into it = sign * displacement.
+    surface : float or None
+        Where its force begins, in that direction, m; None while nobody knows.
+    """
+
+    def __init__(self, component: Component, spec: StopContactSpec) -> None:
+        self.component = component
+        self._spec = spec
+        names = [name for name in (spec.stop_displacement, spec.stop_velocity) if name is not None]
+        self._inputs = component.group("Float64", names)
+        self._answer = component.group("Float64", [spec.stop_force])
+        own = spec.side is None
+        self._side = component.group("Int64", ["side"]) if own else None
+        self._position = (
+            component.group("Float64", ["position"]) if own and "position" in component.variables else None
+        )
+        known = "law" in component.variables and "applied_restitution" in component.variables
+        self._law = component.group("Int64", ["law"]) if known else None
+        self._start, self._now = c_void_p(), c_void_p()
+
+    def begin(self) -> None:
+        """Start a run: the parameters are set.
+
+        Raises
+        ------
+        ComponentError
+            It answers with a coefficient of restitution.
+        """
+        if self._law is not None and int(self._law.get()[0]) == RESTITUTION:
+            raise ComponentError(
+                f"{self._spec.stop}.law: expected a law with a force for {self._spec.body}, whose velocity nobody can "
+                "set, got restitution. Use kelvin_voigt, hertz or hunt_crossley.",
+                instance=self._spec.stop,
+            )
+        lower = self._spec.side == "lower" if self._side is None else int(self._side.get()[0]) == LOWER_SIDE
+        self.sign = -1.0 if lower else 1.0
+        self.surface = None if self._position is None else self.sign * float(self._position.get()[0])
+
+    def mark(self, time: float) -> None:
+        """Take its present state for that at the start of a step, at `time`, s."""
+        self.component.instance.save(self._start)
+        self._time = time
+
+    @contextmanager
+    def asking(self) -> Iterator[None]:
+        """Leave what is asked inside without a trace."""
+        instance = self.component.instance
+        instance.save(self._now)
+        kept = (instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end)
+        flagged = instance.is_flagged
+        try:
+            yield
+        finally:
+            if not instance.is_fatal:
+                instance.restore(self._now)
+            instance.time, instance.needs_event_mode, instance.returned_early, instance.wants_to_end = kept
+            instance.is_flagged = flagged
+
+    def force(self, displacement: float, velocity: float, size: float) -> float:
+        """Return its force `size` s after the start of the step, for this motion into it, N."""
+        instance = self.component.instance
+        instance.restore(self._start)
+        self.show(displacement, velocity)
+        instance.step_undiscarded(self._time, size)
+        return float(self._answer.get()[0])
+
+    def show(self, displacement: float, velocity: float) -> None:
+        """Give it this motion into it."""
+        values = self._inputs.values
+        values[0] = self.sign * displacement
+        if len(values) > 1:
+            values[1] = self.sign * velocity
+        self._inputs.set()
+
+    def find_surface(self, free: float, inside: float, velocity: float, size: float) -> None:
+        """Find where its force begins between a displacement without force and one with it, to rounding."""
+        while True:
+            middle = 0.5 * (free + inside)
+            if not min(free, inside) < middle < max(free, inside):
+                break
+            if self.force(middle, velocity, size) > 0.0:
+                inside = middle
+            else:
+                free = middle
+        self.surface = free
+
+    def free(self) -> None:
+        """Give back its saved states, before it is freed."""
+        for slot in (self._start, self._now):
+            if slot and not self.component.instance.is_fatal:
+                self.component.instance.free_state(slot)

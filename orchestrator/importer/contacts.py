@@ -1,0 +1,115 @@
+"""The contacts of an importer with stops that yield: of our bodies' contact ports, and of any other body."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.contact_bond import (
+    DAMPING,
+    FORCE,
+    PORT_OUTPUTS,
+    STIFFNESS,
+    ContactBond,
+)
+from vibroimpact.orchestrator.importer.held_force import ForceInput, HeldForceBond
+from vibroimpact.orchestrator.importer.specification import ConnectionSpec, StopContactSpec
+from vibroimpact.orchestrator.importer.wiring import Transfer
+
+#: Steps in a contact, where the importer is told nothing else.
+CONTACT_STEPS = 30
+
+
+class ContactBonds:
+    """All contacts of an importer whose stops may yield.
+
+    Attributes
+    ----------
+    ports : list of ContactBond
+        Those of a body's contact port, which follows the force and slopes of a stop.
+    held : list of HeldForceBond
+        Those of any other body, which holds a force over a step.
+    active : bool
+        Any of them is closed in the step under way, or may have to be repeated.
+    """
+
+    def __init__(
+        self,
+        components: dict[str, Component],
+        transfers: Sequence[Transfer],
+        connections: Sequence[ConnectionSpec],
+        contacts: Sequence[StopContactSpec],
+        steps: float,
+    ) -> None:
+        if not steps > 0.0:
+            raise ComponentError(f"contact_steps: expected a number > 0, got {steps!r}.")
+        self._steps = steps
+        self.ports = [
+            ContactBond(components, transfers, c)
+            for c in connections
+            if _is_contact_force(components[c.target[0]], c.target[1])
+        ]
+        inputs: dict[tuple[str, str], ForceInput] = {}
+        self.held = [HeldForceBond(components, contact, inputs) for contact in contacts]
+        self._following: list[ContactBond | HeldForceBond] = []
+        self.active = False
+
+    def _all(self) -> list[ContactBond | HeldForceBond]:
+        return [*self.ports, *self.held]
+
+    def __bool__(self) -> bool:
+        """Is there any contact?"""
+        return bool(self.ports or self.held)
+
+    def take_masses(self, contacts: Sequence[StopContactSpec]) -> None:
+        """Take the masses of `contacts`, which are the same ones otherwise, for the next run."""
+        for bond, contact in zip(self.held, contacts, strict=True):
+            bond.given_mass = contact.mass
+
+    def begin(self) -> None:
+        """Start a run."""
+        for bond in self._all():
+            bond.begin()
+        self._following = [*(bond for bond in self.ports if bond.follows), *self.held]
+        self.active = False
+
+    def begin_step(self, time: float, target: float) -> float:
+        """Look at all contacts before a step; returns where it should end, s."""
+        for bond in self._following:
+            target = bond.begin_step(time, target, self._steps)
+        self.active = any(bond.active for bond in self._following)
+        return target
+
+    def apply(self) -> None:
+        """Give the bodies their forces, or the slopes that their stops do not."""
+        for bond in self._following:
+            bond.apply()
+
+    def revised_end(self, time: float, end: float) -> float | None:
+        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        found = [bond.revised_end(time, end) for bond in self._following]
+        return min((e for e in found if e is not None), default=None)
+
+    def agree(self, time: float, end: float) -> None:
+        """Before the bodies without states make their step: it ends at `end`, s."""
+        for bond in self.held:
+            bond.agree(time, end)
+
+    def end_step(self, size: float) -> list[Component]:
+        """The step, of `size` s, counts; returns the bodies that have come to a stop at its end, without event mode."""
+        for bond in self._following:
+            bond.end_step(size)
+        return [bond.body for bond in self.held if bond.arrived]
+
+    def free(self) -> None:
+        """Give back what they have saved."""
+        for bond in self._all():
+            bond.free()
+
+
+def _is_contact_force(body: Component, variable: str) -> bool:
+    """Is this input the force of a contact port that can follow a stop which yields?"""
+    port, _, last = variable.rpartition(".")
+    needed = (*PORT_OUTPUTS, "law", "side", "position", "mass", STIFFNESS, DAMPING)
+    return last == FORCE and all(f"{port}.{name}" in body.variables for name in needed)

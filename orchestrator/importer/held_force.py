@@ -1,0 +1,491 @@
+"""A contact of any body with a stop that yields: the force that is held over each step, so that energy is closed.
+
+A body of another tool takes a force and holds it over a step. The one force that does over the step the work of the
+stop's law is that work over the way, `force = integral of law * velocity / displacement`; where the way turns within
+the step, it is the mean of the elastic part over the displacement (Gonzalez, J. Nonlinear Sci. 6, 1996: a discrete
+gradient) and of the rest over time. It depends on where the step ends, and so on itself:
+
+- a motion with constant accelerations is foreseen, from the effective mass and the step before;
+- where the body can go back, the step is repeated with the force that its true end asks for, until both agree.
+
+Steps begin where the body reaches the surface (step revision; foreseen where it cannot go back) and end where the
+force falls to 0.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from ctypes import c_void_p
+from itertools import pairwise
+
+import numpy as np
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.importer.asked_stop import AskedStop, depth_that_stops
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.revision import PRECISION, Bracket, refine
+from vibroimpact.orchestrator.importer.specification import StopContactSpec
+from vibroimpact.orchestrator.importer.step_path import POINTS, WEIGHTS, StepPath, last_true
+
+#: Points of a way, as fractions of it, with their weights.
+NODES = tuple(zip(POINTS.tolist(), WEIGHTS.tolist(), strict=True))
+
+#: A body on the surface is there within this times its displacement and the surface's.
+SURFACE_ROUNDING = 4.0 * np.finfo(float).eps
+#: A force this close to the one that the step asks for, relative to the largest of the contact, is the one.
+FORCE_TOLERANCE = 1e-12
+#: Iterations of a foreseen step, and rounds in which it is made shorter.
+FORESIGHTS, SHORTENINGS = 12, 6
+#: A step longer than its limit by more than this factor, as its end shows, is made shorter.
+SLACK = 1.5
+#: A way out of the stop shorter than this, times the limit of a step, is none: the body has left.
+LEFT = 1e-9
+#: Part of a step within which a force that has fallen to 0 fell at the end of it.
+AT_END = 1e-6
+#: A step shorter than this times the one before says too little of accelerations.
+TELLING = 0.05
+#: Trial step: part of the communication step, change of the velocity relative to it, and rounds to get there.
+TRIAL_STEP, TRIAL_CHANGE, TRIALS = 1e-3, 1e-3, 40
+#: Change of the velocity, relative, that rounding does not blur.
+VISIBLE = 1e-9
+
+
+class ForceInput:
+    """An input that takes the sum of the forces of one or several contacts.
+
+    Attributes
+    ----------
+    parts : dict of str to float
+        The force of each contact, along the displacement, N.
+    """
+
+    def __init__(self, body: Component, name: str) -> None:
+        self._group = body.group("Float64", [name])
+        self.parts: dict[str, float] = {}
+
+    def write(self, more: float = 0.0) -> None:
+        """Give the body the sum, and `more` N."""
+        self._group.values[0] = sum(self.parts.values()) + more
+        self._group.set()
+
+
+class HeldForceBond:
+    """One contact of a body that holds its force over a step.
+
+    Attributes
+    ----------
+    name : str
+        `stop.output -> body.input`.
+    body : Component
+        The body.
+    revisable : bool
+        Its steps can be repeated.
+    active : bool
+        The step under way may have to be repeated, or the contact is closed in it.
+    closed : bool
+        The contact is closed in the step under way.
+    arrived : bool
+        The step just made has ended at the surface.
+    mass : float or None
+        Effective mass of the contact point, kg; None until a trial step finds it.
+    residual : float
+        Energy that the body was given beyond the law of the stop, J.
+    """
+
+    def __init__(
+        self,
+        components: Mapping[str, Component],
+        spec: StopContactSpec,
+        inputs: dict[tuple[str, str], ForceInput],
+    ) -> None:
+        self.name = spec.name
+        self.body = components[spec.body]
+        self._spec = spec
+        self._stop = AskedStop(components[spec.stop], spec)
+        self._outputs = self.body.group("Float64", [spec.displacement, spec.velocity])
+        self._input = inputs.setdefault((spec.body, spec.force), ForceInput(self.body, spec.force))
+        self._trial_state = c_void_p()
+        self.revisable = self.body.has_states
+        self.given_mass = spec.mass
+        self.active = self.closed = self.arrived = False
+        self.residual = 0.0
+
+    def begin(self) -> None:
+        """Start a run: the parameters are set."""
+        self._stop.begin()
+        self._input.parts[self._spec.stop] = 0.0
+        self.mass = self.given_mass
+        self.active = self.closed = self.arrived = False
+        self.residual = 0.0
+        self._other, self._other_slope = 0.0, 0.0
+        self._told: tuple[float, float, float] | None = None
+        self._agreed = -math.inf
+        self._depth: float | None = None
+        self._limit = math.inf
+        self._largest = 0.0
+
+    # ---- a step ----
+
+    def begin_step(self, time: float, target: float, steps: float) -> float:
+        """Look at the contact before a step; returns where the step should end, s."""
+        self._steps, self._time = steps, time
+        self._start = self._look()
+        self._stop.mark(time)
+        self._force = 0.0
+        self._last_try: tuple[float, float] | None = None
+        was_closed, self.arrived = self.closed, False
+        size = target - time
+        with self._stop.asking():
+            self.closed = self._touches(*self._start, size)
+            if self.closed:
+                if not was_closed:
+                    self._begin_contact(size)
+                size = self._foresee(min(size, self._limit))
+            elif not self.revisable:
+                size = self._foreseen_arrival(size)
+        self.active = self.closed or self.revisable
+        self._planned = size
+        return target if size == target - time else time + size
+
+    def apply(self) -> None:
+        """Give the body its force."""
+        self._input.parts[self._spec.stop] = -self._stop.sign * self._force
+        self._input.write()
+
+    def revised_end(self, time: float, end: float) -> float | None:
+        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        if not self.revisable:
+            return None
+        path = self._path(end - time)
+        with self._stop.asking():
+            if not self.closed:
+                return self._arrival(time, end, path)
+            scale = self._time_scale(path)
+            if path.size > SLACK * scale:
+                self._last_try = None
+                return time + self._foresee(scale)
+            wanted = self._mean_force(path)
+        return end if self._corrects(wanted) else None
+
+    def agree(self, time: float, end: float) -> None:
+        """Before the step of a body that cannot repeat it: the step ends at `end`, s, wherever it was to end."""
+        if not self.revisable and self.closed and end - time != self._planned:
+            with self._stop.asking():
+                self._force = self._foreseen_force(end - time)
+            self.apply()
+
+    def end_step(self, size: float) -> None:
+        """The step of `size` s counts: sum its residual, and learn from it."""
+        if not size > 0.0:
+            return
+        path = self._path(size)
+        with self._stop.asking():
+            touches = self._touches(path.end, path.end_velocity, size)
+            if self.closed or touches or (not self.revisable and self._inside(path) is not None):
+                moved = path.end - path.start
+                self.residual += self._work(path) - self._force * moved
+        if touches and not self.closed:
+            self.arrived = True
+        self._learn(path)
+        self._stop.show(path.end, path.end_velocity)
+
+    def _look(self) -> tuple[float, float]:
+        displacement, velocity = (float(v) for v in self._outputs.get())
+        return self._stop.sign * displacement, self._stop.sign * velocity
+
+    def _path(self, size: float) -> StepPath:
+        return StepPath(*self._start, *self._look(), size)
+
+    def _learn(self, path: StepPath) -> None:
+        """What accelerates the body beside this contact, now and on the way to the next step."""
+        if self.mass is None:
+            if self.closed:
+                return
+            contact = 0.0
+        else:
+            contact = self._force / self.mass
+        middle = self._time + 0.5 * path.size
+        other = (path.end_velocity - path.start_velocity) / path.size + contact
+        if self._told is not None:
+            if path.size < TELLING * self._told[2]:
+                return
+            self._other_slope = (other - self._told[1]) / (middle - self._told[0])
+        self._told, self._other = (middle, other, path.size), other
+
+    # ---- touching, arriving ----
+
+    def _touches(self, displacement: float, velocity: float, size: float) -> bool:
+        """Is the body in the stop's force, or on the surface and on its way in?"""
+        surface = self._stop.surface
+        if surface is not None:
+            rounding = SURFACE_ROUNDING * (abs(displacement) + abs(surface))
+            if displacement < surface - rounding:
+                return False
+            if displacement <= surface + rounding and velocity >= 0.0:
+                return True
+        return self._stop.force(displacement, velocity, size) > 0.0
+
+    def _arrival(self, time: float, end: float, path: StepPath) -> float | None:
+        """Return the instant at which a free body has come to the surface within the step just made, s."""
+        if abs(end - self._agreed) <= PRECISION * (1.0 + abs(time)):
+            return None
+        inside = self._inside(path)
+        if inside is None:
+            return None
+        precision = PRECISION * (1.0 + abs(time))
+        size = self._time_of_arrival(time, path, inside, precision)
+        if size is None or size + precision >= path.size:
+            self._agreed = end
+            return None
+        self._agreed = time + size + precision
+        return self._agreed
+
+    def _inside(self, path: StepPath) -> float | None:
+        """Seconds into a free step at which the body is in the stop; None where it is nowhere."""
+        if self._touches(path.end, path.end_velocity, path.size):
+            if self._stop.surface is None:
+                self._stop.find_surface(path.start, path.end, abs(path.end_velocity), path.size)
+            return path.size
+        turn = path.turn
+        if turn is None:
+            return None
+        deepest = path.at(turn)[0]
+        if self._stop.surface is not None:
+            return turn * path.size if deepest > self._stop.surface else None
+        if not self._stop.force(deepest, 0.0, path.size) > 0.0:
+            return None
+        self._stop.find_surface(path.start, deepest, 0.0, path.size)
+        return turn * path.size
+
+    def _time_of_arrival(self, time: float, path: StepPath, inside: float, precision: float) -> float | None:
+        """Search the body's own way; None where it is not inside there after all."""
+        surface = self._stop.surface
+        assert surface is not None
+
+        def gap(size: float) -> float:
+            self.body.step_from_start(time, size)
+            return surface - self._look()[0]
+
+        with self.body.taken_back():
+            if path.start < surface:
+                if inside < path.size and gap(inside) > 0.0:
+                    return None
+                return refine(Bracket(0.0, surface - path.start, inside), gap, precision)
+
+            def is_free(u: float) -> bool:
+                self.body.step_from_start(time, u * inside)
+                return not self._stop.force(*self._look(), u * inside) > 0.0
+
+            return last_true(is_free) * inside  # it had let go within the stop, and is back on the law
+
+    def _foreseen_arrival(self, size: float) -> float:
+        """Seconds to the surface at the accelerations of the step before; `size` where it is farther."""
+        surface, (displacement, velocity) = self._stop.surface, self._start
+        if surface is None or displacement >= surface:
+            return size
+        gap, other = surface - displacement, self._other_after(size)
+        square = velocity * velocity + 2.0 * other * gap
+        if square < 0.0 or not velocity + math.sqrt(square) > 0.0:
+            return size
+        return min(size, 2.0 * gap / (velocity + math.sqrt(square)))
+
+    # ---- the beginning of a contact ----
+
+    def _begin_contact(self, size: float) -> None:
+        """Find what a step in this contact may be: a part of the time that the contact takes."""
+        displacement, velocity = self._start
+        if self.mass is None:
+            self.mass = self._found_mass(size)
+        self._largest, self._limit = 0.0, math.inf
+        surface = self._stop.surface
+        if surface is None:
+            surface = self._stop.surface = displacement  # it began in the stop: nobody has seen it free
+        if velocity > 0.0:
+            energy = self.mass * velocity * velocity
+            guess = velocity * size if self._depth is None else self._depth
+            origin = surface
+            depth = depth_that_stops(
+                lambda depth: self._stop.force(origin + depth, velocity, size), energy, guess
+            )
+            if depth is not None:
+                self._depth, self._limit = depth, math.pi * depth / velocity / self._steps
+
+    def _found_mass(self, size: float) -> float:
+        """The effective mass of the contact point, by steps with and without a small force, kg."""
+        instance = self.body.instance
+        instance.save(self._trial_state)
+        force, trial, mass = 1.0, TRIAL_STEP * size, math.nan
+        for _ in range(TRIALS):
+            reached, changed = self._trial(trial, force)
+            wanted = TRIAL_CHANGE * max(abs(self._start[1]), abs(reached))
+            if abs(changed) <= VISIBLE * abs(reached):
+                force *= 1e6
+                if changed == 0.0:
+                    trial = min(2.0 * trial, size)
+                continue
+            mass = force * trial / changed
+            if abs(changed) <= 2.0 * wanted or wanted == 0.0:
+                break
+            force *= wanted / abs(changed)
+        instance.restore(self._trial_state)
+        self._input.write()
+        instance.time = self._time
+        instance.returned_early = instance.needs_event_mode = instance.wants_to_end = False
+        instance.is_flagged = False
+        if not (mass > 0.0 and math.isfinite(mass)):
+            got = "one that does not change" if math.isnan(mass) else f"an effective mass of {mass:.3g} kg"
+            raise ComponentError(
+                f"{self._spec.body}.{self._spec.velocity}: expected a velocity that grows with the force "
+                f"{self._spec.force}, got {got} in a trial step at time {self._time:.12g}. "
+                "Look at the variables and signs of [[contact]], or give its mass.",
+                instance=self._spec.body,
+                time=self._time,
+            )
+        return mass
+
+    def _trial(self, size: float, force: float) -> tuple[float, float]:
+        """Velocity after a step with a force more, and what the force has added to it, m/s."""
+        instance, found = self.body.instance, []
+        for more in (0.0, force):
+            instance.restore(self._trial_state)
+            self._input.write(more)
+            instance.step_undiscarded(self._time, size)
+            found.append(float(self._outputs.get()[1]))
+        return found[1], found[1] - found[0]
+
+    # ---- the force ----
+
+    def _other_after(self, size: float) -> float:
+        """Mean acceleration of the body in the next `size` s by all but this contact, into the stop, m/s^2."""
+        if self._told is None:
+            return 0.0
+        return self._other + self._other_slope * (self._time + 0.5 * size - self._told[0])
+
+    def _foreseen_path(self, size: float, force: float) -> StepPath:
+        assert self.mass is not None
+        displacement, velocity = self._start
+        acceleration = self._other_after(size) - force / self.mass
+        end = displacement + size * (velocity + 0.5 * acceleration * size)
+        return StepPath(displacement, velocity, end, velocity + acceleration * size, size)
+
+    def _foreseen_force(self, size: float) -> float:
+        """The force that agrees with the way that it is foreseen to lead to, N."""
+        force = previous = max(0.0, self._stop.force(*self._start, size))
+        answer = earlier = math.nan
+        for turn in range(FORESIGHTS):
+            answer = self._mean_force(self._foreseen_path(size, force))
+            self._largest = max(self._largest, answer)
+            if abs(answer - force) <= FORCE_TOLERANCE * self._largest:
+                break
+            following = _secant(force, answer, (previous, earlier) if turn else None)
+            previous, earlier, force = force, answer, following
+        return force
+
+    def _foresee(self, size: float) -> float:
+        """Choose the step and its force; returns the size of the step, s."""
+        whole = size
+        for _ in range(SHORTENINGS):
+            self._force = self._foreseen_force(size)
+            path = self._foreseen_path(size, self._force)
+            scale = self._time_scale(path)
+            if size > SLACK * scale:
+                size = scale
+                continue
+            leaves = self._leaves(path)
+            if leaves is None:
+                break
+            if leaves * size <= LEFT * min(whole, self._limit):
+                self.closed, self._force = False, 0.0
+                return whole
+            size *= leaves
+        return size
+
+    def _time_scale(self, path: StepPath) -> float:
+        """Half a period of the mass on the stiffness that a step has met, divided into the steps, s."""
+        assert self.mass is not None
+        moved = path.end - path.start
+        if moved == 0.0:
+            return math.inf
+        risen = self._stop.force(path.end, 0.0, path.size) - self._stop.force(path.start, 0.0, path.size)
+        stiffness = risen / moved
+        return math.pi * math.sqrt(self.mass / stiffness) / self._steps if stiffness > 0.0 else math.inf
+
+    def _leaves(self, path: StepPath) -> float | None:
+        """Fraction of a step at which the force has fallen to 0; None where it has not, or at its end."""
+
+        def is_pressed(u: float) -> bool:
+            return self._stop.force(*path.at(u), path.size) > 0.0
+
+        if is_pressed(1.0) or is_pressed(1.0 - AT_END) or not is_pressed(AT_END):
+            return None
+        return last_true(is_pressed, AT_END)
+
+    def _mean_force(self, path: StepPath) -> float:
+        """The force that does over a step the work of the stop's law, N."""
+        moved = path.end - path.start
+        if path.start_velocity * path.end_velocity >= 0.0 and moved != 0.0:
+            return max(0.0, self._work(path) / moved)
+        mean = 0.0
+        for u, weight in NODES:
+            displacement, velocity = path.at(u)
+            elastic = self._stop.force(path.start + u * moved, 0.0, path.size)
+            whole = self._stop.force(displacement, velocity, u * path.size)
+            mean += weight * (elastic + whole - self._stop.force(displacement, 0.0, u * path.size))
+        return max(0.0, mean)
+
+    def _work(self, path: StepPath) -> float:
+        """Work that the law of the stop takes from the body on a way, J."""
+        work = 0.0
+        for begin, finish in pairwise(self._marks(path)):
+            for u, weight in NODES:
+                at = begin + u * (finish - begin)
+                displacement, velocity = path.at(at)
+                power = self._stop.force(displacement, velocity, at * path.size) * velocity
+                work += weight * power * (finish - begin) * path.size
+        return work
+
+    def _marks(self, path: StepPath) -> list[float]:
+        """Fractions of a step between which the force is smooth: where it begins and ends."""
+
+        def is_pressed(u: float) -> bool:
+            return self._stop.force(*path.at(u), path.size) > 0.0
+
+        def is_free(u: float) -> bool:
+            return not is_pressed(u)
+
+        first, last = is_pressed(AT_END), is_pressed(1.0 - AT_END)
+        if first and not last:
+            return [0.0, last_true(is_pressed, AT_END)]
+        if last and not first:
+            return [last_true(is_free), 1.0]
+        turn = path.turn
+        if turn is None or first or not is_pressed(turn):
+            return [0.0, 1.0]
+        return [last_true(is_free, 0.0, turn), turn, last_true(is_pressed, turn)]
+
+    def _corrects(self, wanted: float) -> bool:
+        """Take the force that the end of a step asks for; returns whether it is another one."""
+        force = self._force
+        self._largest = max(self._largest, wanted)
+        if abs(wanted - force) <= FORCE_TOLERANCE * self._largest:
+            return False
+        self._force = _secant(force, wanted, self._last_try)
+        self._last_try = force, wanted
+        return self._force != force
+
+    def free(self) -> None:
+        """Give back its saved states, before its components are freed."""
+        self._stop.free()
+        if self._trial_state and not self.body.instance.is_fatal:
+            self.body.instance.free_state(self._trial_state)
+
+
+def _secant(force: float, answer: float, before: tuple[float, float] | None) -> float:
+    """Where a straight line through two answers equals its argument; without a second one the answer itself."""
+    if before is None or force == before[0]:
+        return answer
+    slope = (answer - before[1]) / (force - before[0])
+    if not abs(slope) < 0.9:  # no contraction: rounding, or a kink
+        return max(0.0, answer)
+    return max(0.0, force + (answer - force) / (1.0 - slope))

@@ -1,0 +1,87 @@
+/* A mass on a spring of its own that knows nothing of contacts: displacement and velocity out, a force in, which is
+ * held over a step.
+ *
+ * mass x'' + stiffness x = f + load, on its exact flow or by Euler steps. */
+#include <math.h>
+
+#include "model.h"
+
+enum { X = 1, V, F, MASS, STIFFNESS, LOAD, SCHEME, INNER_STEP };
+enum { EXACT, SYMPLECTIC_EULER, EXPLICIT_EULER };
+
+#ifndef HAS_STATE
+#define HAS_STATE true
+#endif
+
+const bool model_has_state = HAS_STATE;
+const bool model_has_event_mode = false;
+
+void model_start(model *m)
+{
+    *m = (model){.value = {[MASS] = 1.0}};
+}
+
+bool model_begin(model *m, void *instance)
+{
+    (void)instance;
+    return m->value[MASS] > 0.0 && m->value[STIFFNESS] >= 0.0;
+}
+
+void model_calculate(model *m)
+{
+    (void)m;
+}
+
+static void flow(double *x, double size)
+{
+    const double force = x[F] + x[LOAD];
+    if (x[STIFFNESS] == 0.0) {
+        const double acceleration = force / x[MASS];
+        x[X] += size * (x[V] + 0.5 * acceleration * size);
+        x[V] += acceleration * size;
+        return;
+    }
+    const double w = sqrt(x[STIFFNESS] / x[MASS]), rest = force / x[STIFFNESS];
+    const double c = cos(w * size), s = sin(w * size), from_rest = x[X] - rest, speed = x[V];
+    x[X] = rest + c * from_rest + s * speed / w;
+    x[V] = c * speed - w * s * from_rest;
+}
+
+static void euler(double *x, double size)
+{
+    const double acceleration = (x[F] + x[LOAD] - x[STIFFNESS] * x[X]) / x[MASS];
+    if (x[SCHEME] == EXPLICIT_EULER) {
+        x[X] += size * x[V];
+        x[V] += size * acceleration;
+    } else {
+        x[V] += size * acceleration;
+        x[X] += size * x[V];
+    }
+}
+
+step_answer model_step(model *m, double size, void *instance)
+{
+    double *x = m->value;
+    (void)instance;
+    if (x[SCHEME] == EXACT) {
+        flow(x, size);
+        return STEP_DONE;
+    }
+    const double parts = x[INNER_STEP] > 0.0 ? ceil(size / x[INNER_STEP]) : 1.0;
+    for (double part = 0.0; part < parts; part += 1.0) {
+        euler(x, size / parts);
+    }
+    return STEP_DONE;
+}
+
+bool model_update(model *m)
+{
+    (void)m;
+    return false;
+}
+
+step_answer model_at(model *m, occasion where, void *instance)
+{
+    (void)m, (void)where, (void)instance;
+    return STEP_DONE;
+}
