@@ -9,10 +9,17 @@ from xml.parsers import expat
 from vibroimpact.fmus.errors import ComponentFileError
 
 
-def root_of(content: bytes, where: str) -> Element:
+def root_of(content: bytes, where: str, *, namespaces: bool = False) -> Element:
     """Parse a document and return its root; messages begin with `where`.
 
     The parser itself reports declarations, so they are found in every encoding it reads.
+
+    Parameters
+    ----------
+    content : bytes
+    where : str
+    namespaces : bool
+        Put the namespace in braces before each name that has one, whatever its prefix: `{http://...}System`.
 
     Raises
     ------
@@ -20,9 +27,11 @@ def root_of(content: bytes, where: str) -> Element:
         It is not well-formed, or it declares a document type or an entity.
     """
     builder = TreeBuilder()
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = builder.start
-    parser.EndElementHandler = builder.end
+    parser = expat.ParserCreate(namespace_separator="}" if namespaces else None)
+    parser.StartElementHandler = lambda name, attributes: builder.start(
+        _braced(name), {_braced(key): value for key, value in attributes.items()}
+    )
+    parser.EndElementHandler = lambda name: builder.end(_braced(name))
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = _refuse_doctype
     parser.EntityDeclHandler = _refuse_entity
@@ -35,6 +44,11 @@ def root_of(content: bytes, where: str) -> Element:
             f"{where}: expected XML without {error}, got one with it. It was not read."
         ) from None
     return builder.close()
+
+
+def _braced(name: str) -> str:
+    # without namespaces no name of XML has a brace
+    return f"{{{name}" if "}" in name else name
 
 
 class _DeclarationError(Exception):

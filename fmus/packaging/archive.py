@@ -7,23 +7,27 @@ outside its folder, fill the disk, or expand entities. Everything here raises `C
 from __future__ import annotations
 
 import hashlib
-import lzma
-import os
 import shutil
 import stat
-import struct
 import tempfile
 import time
 import zipfile
-import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass
-from io import BufferedReader
 from pathlib import Path, PurePosixPath
 
 from vibroimpact.fmus.errors import ComponentFileError
 from vibroimpact.fmus.file_state import FileState, file_state, is_settled
 from vibroimpact.fmus.packaging.platform_names import architecture, binary_folder, library_suffix
+from vibroimpact.fmus.packaging.zip_members import (
+    DAMAGE,
+    EXPANSION_LIMIT,
+    checked_members,
+    cut,
+    damaged,
+    is_folder,
+    opened,
+    zip_in,
+)
 from vibroimpact.fmus.private_folder import (
     CACHE_VARIABLE,
     UnsafeFolderError,
@@ -33,14 +37,6 @@ from vibroimpact.fmus.private_folder import (
 )
 from vibroimpact.fmus.safe_xml import root_of
 
-#: Most bytes that an archive may expand to, and most members: far above any real FMU.
-EXPANSION_LIMIT = 1 << 30
-MEMBER_LIMIT = 10_000
-#: Most folders that a member may lie in, and most characters of its name that messages show.
-DEEPEST = 50
-LONGEST_NAME = 100
-#: Characters of a library's reason in a message.
-LONGEST_REASON = 200
 #: Most bytes of a model identifier: with an ending it is the name of a file.
 LONGEST_IDENTIFIER = 240
 #: Age after which the temporary folder of a process that was killed is swept, s.
@@ -53,11 +49,6 @@ PARSED_XML = (
     "terminalsAndIcons/terminalsAndIcons.xml",
 )
 BLOCK = 1 << 20
-#: What the libraries that expand members raise on damaged ones, and on those of kinds they do not know.
-DAMAGE = (
-    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error, EOFError, NotImplementedError),
-    *(ValueError, RuntimeError, MemoryError),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +84,7 @@ class UnpackedFmu:
 
 def content_hash(path: Path) -> str:
     """Return the SHA-256 of a file, as hexadecimal text."""
-    with _opened(path) as file:
+    with opened(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
@@ -111,10 +102,10 @@ def unpack(path: Path, *, limit: int = EXPANSION_LIMIT) -> UnpackedFmu:
         2.0 or 3.0.
     """
     path = Path(path)
-    with _opened(path) as file, _archive(path, file) as archive:
+    with opened(path) as file, zip_in(path, file) as archive:
         file.seek(0)
         digest = hashlib.file_digest(file, "sha256").hexdigest()
-        members = _checked_members(path, archive, limit)
+        members = checked_members(path, archive, limit)
         folder = _cache(path) / digest
         if not _is_intact(folder, archive, members):
             _unpack_into_place(path, archive, members, folder)
@@ -147,104 +138,6 @@ def platforms(fmu: UnpackedFmu) -> tuple[str, ...]:
     return tuple(sorted(p.name for p in fmu.folder.glob("binaries/*") if p.is_dir()))
 
 
-def _opened(path: Path) -> BufferedReader:
-    try:
-        # opening a pipe would wait for somebody who writes into it
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise ComponentFileError(f"{path}: expected an FMU file, got a folder or a device.")
-        return path.open("rb")
-    except OSError as error:
-        raise ComponentFileError(f"{path}: expected an FMU file, got: {error.strerror}.") from error
-    except ValueError as error:  # a zero byte
-        raise ComponentFileError(f"{str(path)!r}: expected the path of an FMU file, got: {error}.") from error
-
-
-def _archive(path: Path, file: BufferedReader) -> zipfile.ZipFile:
-    try:
-        return zipfile.ZipFile(file)
-    except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError) as error:
-        raise ComponentFileError(
-            f"{path}: expected an FMU (a zip archive), got a file with: {error}."
-        ) from error
-
-
-def _checked_members(path: Path, archive: zipfile.ZipFile, limit: int) -> list[zipfile.ZipInfo]:
-    members = archive.infolist()
-    problems = [f"member {_shown(m)} {problem}" for m in members for problem in _problems(m)]
-    if len(members) > MEMBER_LIMIT:
-        problems.append(f"{len(members)} members, limit {MEMBER_LIMIT}")
-    size = sum(member.file_size for member in members)
-    if size > limit:
-        problems.append(f"{size} bytes when unpacked, limit {limit}")
-    if not any(_place(member) == ("modelDescription.xml",) for member in members if not _is_folder(member)):
-        problems.append("no modelDescription.xml")
-    # only names that are short and few are worth comparing
-    problems = problems or list(_clashes(members))
-    if problems:
-        raise ComponentFileError(
-            f"{path}: expected a safe FMU, got: {'; '.join(problems[:5])}. It was not unpacked."
-        )
-    return members
-
-
-def _is_folder(member: zipfile.ZipInfo) -> bool:
-    return member.filename.endswith("/")
-
-
-def _place(member: zipfile.ZipInfo) -> tuple[str, ...]:
-    """Return where a member lies, one way for `a/b`, `./a/b` and `a//b`; as the file system compares names."""
-    return PurePosixPath(os.path.normcase(member.filename).replace(os.sep, "/")).parts
-
-
-def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[str]:
-    """Yield what members would overwrite: others at their place, and files where others need a folder."""
-    places = [_place(member) for member in members]
-    contents: dict[tuple[str, ...], tuple[bool, int, int]] = {}
-    for member, place in zip(members, places, strict=True):
-        # the same member twice, as builds write it that list a folder twice; bytes are compared once unpacked
-        content = (_is_folder(member), member.file_size, member.CRC)
-        if contents.setdefault(place, content) != content:
-            yield f"two members have the same name, {_cut('/'.join(place))}"
-            break
-    folders = {place[:end] for place in places for end in range(len(place))}
-    blocking = [m for m, place in zip(members, places, strict=True) if place in folders and not _is_folder(m)]
-    if blocking:
-        yield f"member {_shown(blocking[0])} is a file and a folder"
-
-
-def _shown(member: zipfile.ZipInfo) -> str:
-    return _cut(member.orig_filename)
-
-
-def _cut(text: object) -> str:
-    """Return what stands in a file as messages show it."""
-    return _shortened(repr(text), LONGEST_NAME)
-
-
-def _shortened(text: str, longest: int) -> str:
-    return text if len(text) <= longest else text[:longest] + "..."
-
-
-def _problems(member: zipfile.ZipInfo) -> Iterator[str]:
-    # orig_filename: zipfile replaces backslashes on Windows and cuts names at a zero byte
-    name = member.orig_filename
-    if not name:
-        yield "has no name"
-    if "\\" in name or "\0" in name:
-        yield "has a backslash or a zero byte in its name"
-    if name.startswith("/") or ":" in name.split("/")[0]:
-        yield "has an absolute path"
-    if ".." in PurePosixPath(name).parts:
-        yield "leads out of the archive"
-    if len(PurePosixPath(name).parts) > DEEPEST:
-        yield f"lies deeper than {DEEPEST} folders"
-    kind = stat.S_IFMT(member.external_attr >> 16)
-    if member.create_system == 3 and kind not in {0, stat.S_IFREG, stat.S_IFDIR}:
-        yield "is a link or a device, not a file"
-    if member.flag_bits & 0x1:
-        yield "is encrypted"
-
-
 def _cache(path: Path) -> Path:
     try:
         return private_folder("fmus")
@@ -268,7 +161,7 @@ def _is_intact(folder: Path, archive: zipfile.ZipFile, members: list[zipfile.Zip
         refuse_unsafe(folder)
         seen = [_appearance(folder / member.filename, member) for member in members]
         if _compared.get(folder) != seen:
-            if not all(_is_folder(member) or _is_equal(folder, archive, member) for member in members):
+            if not all(is_folder(member) or _is_equal(folder, archive, member) for member in members):
                 return False
             if all(is_settled(state) for state in seen if state):
                 _compared[folder] = seen
@@ -282,10 +175,10 @@ def _is_intact(folder: Path, archive: zipfile.ZipFile, members: list[zipfile.Zip
 
 def _appearance(path: Path, member: zipfile.ZipInfo) -> FileState:
     status = path.lstat()
-    expected = stat.S_IFDIR if _is_folder(member) else stat.S_IFREG
+    expected = stat.S_IFDIR if is_folder(member) else stat.S_IFREG
     if stat.S_IFMT(status.st_mode) != expected:
         raise FileNotFoundError(path)
-    return () if _is_folder(member) else file_state(status)
+    return () if is_folder(member) else file_state(status)
 
 
 def _is_equal(folder: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> bool:
@@ -324,7 +217,7 @@ def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo
     try:
         for member in members:
             target = folder / member.filename
-            if _is_folder(member):
+            if is_folder(member):
                 target.mkdir(parents=True, exist_ok=True)
                 continue
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -333,18 +226,12 @@ def _extract(path: Path, archive: zipfile.ZipFile, members: list[zipfile.ZipInfo
                 shutil.copyfileobj(source, file, BLOCK)
     except OSError as error:
         if error.errno is None:  # bz2 says so that its data are damaged
-            raise _damaged(path, error) from error
+            raise damaged(path, error) from error
         raise ComponentFileError(
             f"{path}: could not be unpacked into {folder.parent}: {error.strerror}."
         ) from error
     except DAMAGE as error:
-        raise _damaged(path, error) from error
-
-
-def _damaged(path: Path, error: Exception) -> ComponentFileError:
-    """Return the refusal of an archive that a library finds damaged; its reason may quote names of any length."""
-    reason = _shortened(str(error), LONGEST_REASON)
-    return ComponentFileError(f"{path}: expected an intact FMU, got a damaged one: {reason}.")
+        raise damaged(path, error) from error
 
 
 def _check_xml(path: Path, folder: Path) -> None:
@@ -394,13 +281,13 @@ def _described(path: Path, folder: Path, digest: str) -> UnpackedFmu:
     if not (known and token and identifiers and all(identifiers)):
         raise ComponentFileError(
             f"{path}: modelDescription.xml: expected FMI 2.0 or 3.0 with a token and a model identifier, "
-            f"got version {_cut(version)}, token {_cut(token)}, identifiers {_cut(identifiers)}."
+            f"got version {cut(version)}, token {cut(token)}, identifiers {cut(identifiers)}."
         )
     if any(
         PurePosixPath(name).name != name or len(name.encode()) > LONGEST_IDENTIFIER for name in identifiers
     ):
         raise ComponentFileError(
             f"{path}: modelDescription.xml: modelIdentifier: expected a plain name of at most {LONGEST_IDENTIFIER} "
-            f"bytes, got {_cut(identifiers)}."
+            f"bytes, got {cut(identifiers)}."
         )
     return UnpackedFmu(path, folder, digest, version, token, identifiers)

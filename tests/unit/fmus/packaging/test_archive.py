@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vibroimpact.fmus.errors import ComponentFileError
-from vibroimpact.fmus.packaging import archive
+from vibroimpact.fmus.packaging import archive, zip_members
 from vibroimpact.fmus.packaging.archive import binary_path, platforms, unpack
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 from vibroimpact.fmus.packaging.platform_names import binary_folder, library_suffix
@@ -330,7 +330,7 @@ def test_a_zip_bomb_that_lies_about_its_size_is_not_expanded(tmp_path: Path, cac
 
 
 def test_a_crowd_of_members_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(archive, "MEMBER_LIMIT", 3)
+    monkeypatch.setattr(zip_members, "MEMBER_LIMIT", 3)
     assert "5 members, limit 3" in refusal(written(tmp_path / "M.fmu", {f"r/{k}": b"" for k in range(4)}))
 
 
