@@ -93,6 +93,8 @@ class ComponentFacts:
         It can be run by scheduled execution.
     event_mode : bool
         It handles events in event mode when it steps itself.
+    step : float or None
+        Communication step that it proposes, s.
     """
 
     file: str
@@ -101,6 +103,7 @@ class ComponentFacts:
     restorable: bool
     scheduled: bool
     event_mode: bool
+    step: float | None = None
 
 
 def component_facts(path: Path) -> ComponentFacts:
@@ -127,7 +130,15 @@ def _facts(sha256: str, path: Path) -> ComponentFacts:
         restorable=stepped is not None and stepped.canGetAndSetFMUstate,
         scheduled=description.scheduledExecution is not None,
         event_mode=stepped is not None and bool(getattr(stepped, "hasEventMode", False)),
+        step=_proposed_step(description),
     )
+
+
+def _proposed_step(description: ModelDescription) -> float | None:
+    experiment = description.defaultExperiment
+    text = None if experiment is None else experiment.stepSize
+    step = None if text is None else float(text)
+    return step if step is not None and math.isfinite(step) and step > 0.0 else None
 
 
 def _unit(definition: Any) -> Unit | None:

@@ -1,0 +1,131 @@
+"""An SSP archive, opened safely: its XML, and the members that a system names."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import zipfile
+from contextlib import ExitStack
+from pathlib import Path, PurePosixPath
+from types import TracebackType
+from typing import Self
+from urllib.parse import unquote, urlsplit
+from xml.etree.ElementTree import Element
+
+from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.packaging.zip_members import (
+    DAMAGE,
+    checked_members,
+    damaged,
+    is_folder,
+    opened,
+    place_of,
+    zip_in,
+)
+from vibroimpact.fmus.safe_xml import root_of
+from vibroimpact.orchestrator.scene.problems import quoted
+from vibroimpact.orchestrator.ssp.names import SSD_FILE
+from vibroimpact.orchestrator.ssp.refusal import RefusalError
+
+LARGEST_XML = 1 << 24
+"""Bytes of an XML file; that of a system of thousands of connections is below a million."""
+_BLOCK = 1 << 20
+_DRIVE = re.compile(r"[A-Za-z]:")
+
+
+class SspArchive:
+    """An archive whose members are safe to read.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    ComponentFileError
+        It is missing, no zip, unsafe, or has no `SystemStructure.ssd`.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with ExitStack() as stack:
+            file = stack.enter_context(opened(path, "SSP"))
+            self._zip = stack.enter_context(zip_in(path, file, "SSP"))
+            members = checked_members(path, self._zip, needed=SSD_FILE, kind="SSP")
+            self._members = {"/".join(place_of(m)): m for m in members if not is_folder(m)}
+            self._stack = stack.pop_all()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stack.close()
+
+    def xml(self, member: str) -> Element:
+        """Return the root of an XML member.
+
+        Raises
+        ------
+        ComponentFileError
+            It is too large, damaged, not well-formed, or declares entities.
+        """
+        info = self._members[member]
+        if info.file_size > LARGEST_XML:
+            raise ComponentFileError(
+                f"{self.path}: {member}: expected XML of at most {LARGEST_XML} bytes, got {info.file_size}."
+            )
+        return root_of(self._content(info), f"{self.path}: {member}", namespaces=True)
+
+    def member(self, uri: str, where: str) -> str:
+        """Return the member that a `source` names.
+
+        Raises
+        ------
+        RefusalError
+            It leads out of the archive, or there is no such member.
+        """
+        parts = urlsplit(uri)
+        name = unquote(parts.path)
+        path = PurePosixPath(name)
+        leaves = parts.scheme or parts.netloc or path.is_absolute() or ".." in path.parts or "\\" in name
+        if leaves or _DRIVE.match(name):
+            raise RefusalError(
+                where, "a file of the archive", quoted(uri), "Pack the file into its resources folder."
+            )
+        if parts.fragment or parts.query or uri.startswith("#"):
+            hint = "References into a file are not available in this version: write the part out."
+            raise RefusalError(where, "a whole file of the archive", quoted(uri), hint)
+        member = str(path)
+        if member not in self._members:
+            hint = "Pack it, or correct the source in SystemStructure.ssd."
+            raise RefusalError(where, "a file of the archive", f"{quoted(uri)}, which it does not have", hint)
+        return member
+
+    def copy(self, member: str, target: Path) -> None:
+        """Write a member to a file.
+
+        Raises
+        ------
+        ComponentFileError
+            It is damaged.
+        OSError
+            The file cannot be written.
+        """
+        with target.open("xb") as file:
+            try:
+                with self._zip.open(self._members[member]) as source:
+                    shutil.copyfileobj(source, file, _BLOCK)
+            except OSError as error:
+                if error.errno is None:  # bz2 says so that its data are damaged
+                    raise damaged(self.path, error, "SSP") from error
+                raise
+            except DAMAGE as error:
+                raise damaged(self.path, error, "SSP") from error
+
+    def _content(self, info: zipfile.ZipInfo) -> bytes:
+        try:
+            return self._zip.read(info)
+        except (OSError, *DAMAGE) as error:
+            raise damaged(self.path, error, "SSP") from error

@@ -1,0 +1,80 @@
+"""From a general scene to an SSP archive: other tools run it, and it comes back as the scene that it was."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.packaging.cross import Note
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.shipped import FOLDERS
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.ssp.members import component_members
+from vibroimpact.orchestrator.ssp.names import SSD_FILE, VERSIONS
+from vibroimpact.orchestrator.ssp.writing import description, parameter_set
+
+
+def export_system(
+    scene: Scene,
+    output: str | os.PathLike[str],
+    *,
+    ssp: str = "1.0",
+    fmi: str | None = None,
+    platform: str | None = None,
+    note: Note = lambda _: None,
+) -> Path:
+    """Write a scene of components as an SSP archive.
+
+    Parameters
+    ----------
+    scene : Scene
+        With components. What it sweeps has its first value in other tools.
+    output : path
+        File to write.
+    ssp : str
+        Version of the description, `1.0` or `2.0`.
+    fmi : str, optional
+        Version of the FMUs of this package's components in the archive, `2.0` or `3.0`. By default 2.0, the version
+        that SSP 1.0 knows, and in SSP 2.0 that of the scene.
+    platform, note
+        As `vibroimpact.fmus.export` has them.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    UsageError
+        The scene has one body and no components, a connection that this version of SSP has no word for, or the file
+        cannot be written.
+    ComponentError
+        There is no library for a platform, and nothing to compile it with.
+    """
+    general = scene.general
+    if general is None:
+        raise UsageError(
+            f"{scene.source}: expected a scene of components, got one of a body. "
+            "`vibroimpact fmu export` makes an FMU of it."
+        )
+    for given, known, what in ((ssp, VERSIONS, "ssp"), (fmi or "2.0", tuple(FOLDERS), "fmi")):
+        if given not in known:
+            raise UsageError(f"{what}: expected {' or '.join(known)}, got {given!r}.")
+    duration = scene.record.transient_time + scene.record.recorded_time
+    fmi = fmi or ("2.0" if ssp == "1.0" else None)
+    with ScratchFolder("ssp") as folder:
+        parts = component_members(general, Path(folder.name), fmi, duration, platform, note)
+        members = {part.member: part.content for part in parts.values()}
+    for part in parts.values():
+        if part.values:
+            members[part.values_member] = parameter_set(part, ssp)
+    try:
+        members[SSD_FILE] = description(scene, general, parts, ssp, duration)
+    except SceneError as error:
+        raise UsageError(str(error)) from None
+    target = Path(output)
+    write_fmu(target, members)
+    return target

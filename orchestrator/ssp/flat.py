@@ -1,0 +1,261 @@
+"""A nested system as components beside each other: who feeds whom by which gain, and which start values each has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from vibroimpact.fmus.units import Unit, agree, gain_unit_between
+from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
+from vibroimpact.orchestrator.scene.problems import quoted
+from vibroimpact.orchestrator.ssp.names import GIVING, TAKING
+from vibroimpact.orchestrator.ssp.refusal import RefusalError
+from vibroimpact.orchestrator.ssp.structure import Component, Connection, System
+from vibroimpact.orchestrator.ssp.values import Parameter, converted, start_value
+
+Path = tuple[str, ...]
+"""Names of systems, from the outermost, and of the element; empty for the outermost system."""
+
+
+class Node(NamedTuple):
+    """A connector of an element."""
+
+    element: Path
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A component's input that another's output feeds: gain times it."""
+
+    source: Node
+    target: Node
+    gain: float = 1.0
+    gain_unit: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Edge:
+    source: Node
+    target: Node
+    connection: Connection
+
+
+class FlatSystem:
+    """A system without the systems in it.
+
+    Parameters
+    ----------
+    system : System
+    facts : mapping of Path to ComponentFacts
+        Of each component.
+
+    Attributes
+    ----------
+    components : dict of Path to Component
+        In the order of the file.
+    ignored : list of str
+        Parameters that no variable takes, as SSP wants it.
+
+    Raises
+    ------
+    RefusalError
+        A connection leads from or to nothing, or cannot be a gain.
+    """
+
+    def __init__(self, system: System, facts: Mapping[Path, ComponentFacts]) -> None:
+        self.components = dict(components_of(system))
+        self.ignored: list[str] = []
+        self._facts = facts
+        self._systems = dict(_systems(system, ()))
+        self._edges: dict[Node, _Edge] = {}
+        self._leaving: dict[Node, list[_Edge]] = {}
+        for path, inner in self._systems.items():
+            for connection in inner.connections:
+                self._add(self._directed(path, connection))
+
+    def links(self) -> list[Link]:
+        """Return what feeds the components' inputs, in the order of the file."""
+        ends = (target for target in self._edges if target.element in self.components)
+        return [link for link in map(self._link, ends) if link is not None]
+
+    def start_values(self) -> dict[Path, dict[str, StartValue]]:
+        """Return the start values of each component: those of an outer system go before those of an inner one."""
+        values: dict[Path, dict[str, StartValue]] = {path: {} for path in self.components}
+        elements: list[tuple[Path, Component | System]] = [*self.components.items(), *self._inner_first()]
+        for path, element in elements:
+            for binding in element.bindings:
+                for parameter in binding.parameters:
+                    self.apply(parameter, path, values)
+        return values
+
+    def apply(
+        self, parameter: Parameter, path: Path, values: dict[Path, dict[str, StartValue]]
+    ) -> list[Node]:
+        """Give a parameter of an element to the variables that it names; return these."""
+        taken = [
+            node
+            for node, value in self._meant(path, parameter.name, parameter, frozenset())
+            if self._give(node, value, values)
+        ]
+        if not taken:
+            self.ignored.append(".".join((*path, parameter.name)))
+        return taken
+
+    def _give(self, node: Node, parameter: Parameter, values: dict[Path, dict[str, StartValue]]) -> bool:
+        variable = self._facts[node.element].variables.get(node.name)
+        if variable is None or not variable.settable or not variable.scalar:
+            return False
+        where = ".".join((*node.element, node.name))[:100]
+        values[node.element][node.name] = start_value(variable, parameter, where)
+        return True
+
+    def _meant(
+        self, path: Path, name: str, parameter: Parameter, seen: frozenset[Node]
+    ) -> Iterator[tuple[Node, Parameter]]:
+        """Yield each variable of a component that a name means in an element, with the value that it gets."""
+        if path in self.components:
+            yield Node(path, name), parameter
+            return
+        system, node = self._systems[path], Node(path, name)
+        if name in system.connectors and node not in seen:
+            own = system.connectors[name].unit
+            inner = Parameter(name, _in_unit(parameter, own, name), own or parameter.unit)
+            for edge in self._leaving.get(node, ()):
+                given = _along(inner, edge.connection, self._unit(edge.target))
+                yield from self._meant(edge.target.element, edge.target.name, given, seen | {node})
+        for element in system.elements:
+            if name.startswith(f"{element}."):
+                yield from self._meant((*path, element), name[len(element) + 1 :], parameter, seen)
+
+    def _inner_first(self) -> list[tuple[Path, System]]:
+        return sorted(self._systems.items(), key=lambda item: -len(item[0]))
+
+    def _add(self, edge: _Edge) -> None:
+        other = self._edges.setdefault(edge.target, edge)
+        if other is not edge:
+            expected = "an input of its own for each connection"
+            raise RefusalError(
+                edge.connection.where, expected, f"one that {other.connection.where} feeds already"
+            )
+        self._leaving.setdefault(edge.source, []).append(edge)
+
+    def _directed(self, path: Path, connection: Connection) -> _Edge:
+        """Return a connection from the end that gives to the one that takes."""
+        start, end = (self._end(path, place, connection) for place in (connection.start, connection.end))
+        for source, target in ((start, end), (end, start)):
+            if source[1] in _giving(source[0], path) and target[1] in _taking(target[0], path):
+                return _Edge(source[0], target[0], connection)
+        got = f"{start[1] or 'none'} and {end[1] or 'none'}"
+        raise RefusalError(connection.where, "an end that gives a value and one that takes it", quoted(got))
+
+    def _end(self, path: Path, place: tuple[str | None, str], connection: Connection) -> tuple[Node, str]:
+        element = path if place[0] is None else (*path, place[0])
+        owner = self.components.get(element) or self._systems.get(element)
+        if owner is None:
+            raise RefusalError(connection.where, "an element of its system", quoted(place[0]))
+        if place[1] not in owner.connectors:
+            raise RefusalError(connection.where, f"a connector of {owner.name[:60]}", quoted(place[1]))
+        return Node(element, place[1]), owner.connectors[place[1]].kind
+
+    def _unit(self, node: Node) -> Unit | None:
+        """Return the unit of a connector: an FMU knows its own best."""
+        if node.element in self.components:
+            variable = self._facts[node.element].variables.get(node.name)
+            if variable is not None and variable.unit is not None:
+                return variable.unit
+            return self.components[node.element].connectors[node.name].unit
+        return self._systems[node.element].connectors[node.name].unit
+
+    def _link(self, target: Node) -> Link | None:
+        """Return what feeds an input; None where that is a connector of the whole system, which nothing feeds."""
+        edges = [self._edges[target]]
+        while edges[-1].source.element not in self.components:
+            before = self._edges.get(edges[-1].source)
+            if before is None:
+                return None
+            if before in edges:
+                raise RefusalError(before.connection.where, "a value that comes from a component", "a circle")
+            edges.append(before)
+        return self._gain(edges[::-1])
+
+    def _gain(self, edges: list[_Edge]) -> Link:
+        """Return the edges from an output to an input as one gain."""
+        gain, noted, source = 1.0, None, self._unit(edges[0].source)
+        unit = source
+        for edge in edges:
+            connection, after = edge.connection, self._unit(edge.target)
+            where, noted = connection.where, connection.gain_unit
+            if connection.offset:
+                hint = "Constant offsets are not available in this version."
+                raise RefusalError(where, "a transformation without offset", f"{connection.offset:g}", hint)
+            changes = connection.suppressed or noted is not None
+            gain *= 1.0 if changes else _conversion(unit, after, connection)
+            gain *= 1.0 if connection.factor is None else connection.factor
+            unit = after or unit
+        target = self._unit(edges[-1].target)
+        if noted is None and source is not None and target is not None and not agree(source, target):
+            noted = gain_unit_between(source, target)
+            if noted is None:
+                got = f"{source.name} to {target.name}"
+                raise RefusalError(edges[-1].connection.where, "units whose ratio is one of SI symbols", got)
+        return Link(edges[0].source, edges[-1].target, gain, noted)
+
+
+def components_of(system: System, path: Path = ()) -> Iterator[tuple[Path, Component]]:
+    """Yield the components of a system and of those in it, with their paths."""
+    for name, element in system.elements.items():
+        if isinstance(element, Component):
+            yield (*path, name), element
+        else:
+            yield from components_of(element, (*path, name))
+
+
+def _systems(system: System, path: Path) -> Iterator[tuple[Path, System]]:
+    yield path, system
+    for name, element in system.elements.items():
+        if isinstance(element, System):
+            yield from _systems(element, (*path, name))
+
+
+def _giving(node: Node, path: Path) -> frozenset[str]:
+    """Return the kinds of connectors that give a value within a system: of itself what it takes from outside."""
+    return TAKING if node.element == path else GIVING
+
+
+def _taking(node: Node, path: Path) -> frozenset[str]:
+    return GIVING if node.element == path else TAKING
+
+
+def _conversion(before: Unit | None, after: Unit | None, connection: Connection) -> float:
+    """Return by what a number grows from one unit to the next."""
+    if before is None or after is None or agree(before, after):
+        return 1.0
+    got = f"{before.name or '1'} to {after.name or '1'}"
+    if before.exponents != after.exponents:
+        if connection.factor is not None:
+            return 1.0  # the factor is the gain, whatever its unit
+        hint = "Give it a LinearTransformation, and suppressUnitConversion."
+        raise RefusalError(connection.where, "units of one kind, or a gain", got, hint)
+    if before.offset != after.offset:
+        raise RefusalError(connection.where, "units with one zero", got, "Offsets are not available.")
+    return before.factor / after.factor
+
+
+def _in_unit(parameter: Parameter, unit: Unit | None, where: str) -> StartValue:
+    if isinstance(parameter.value, str | bool):
+        return parameter.value
+    return converted(float(parameter.value), parameter.unit, unit, where) if unit else parameter.value
+
+
+def _along(parameter: Parameter, connection: Connection, unit: Unit | None) -> Parameter:
+    """Return a parameter behind a connection."""
+    if isinstance(parameter.value, str | bool):
+        return parameter
+    if connection.factor is None and not connection.suppressed:
+        return parameter
+    after = None if connection.suppressed else unit
+    value = _in_unit(parameter, after, connection.where)
+    factor = 1.0 if connection.factor is None else connection.factor
+    return Parameter(parameter.name, factor * float(value) + connection.offset, after or None)

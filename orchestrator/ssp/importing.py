@@ -1,0 +1,245 @@
+"""From an SSP archive to a scene: its FMUs are laid beside it, and what is wrong with it is one line each."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+from pathlib import PurePosixPath
+from typing import Any
+
+import tomli_w
+
+from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.fmus import components, fmu_path
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.shipped import FOLDERS
+from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
+from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, component_facts
+from vibroimpact.orchestrator.scene.problems import quoted
+from vibroimpact.orchestrator.ssp.archive import SspArchive
+from vibroimpact.orchestrator.ssp.flat import FlatSystem, Path, components_of
+from vibroimpact.orchestrator.ssp.parameter_sets import read_sets, with_sets
+from vibroimpact.orchestrator.ssp.reading import read_structure
+from vibroimpact.orchestrator.ssp.refusal import RefusalError
+from vibroimpact.orchestrator.ssp.scene_tables import scene_tables
+from vibroimpact.orchestrator.ssp.structure import Component
+
+ENDING = ".ssp"
+_PLAIN = re.compile(r"[^A-Za-z0-9_.-]")
+_scratch: list[ScratchFolder] = []
+"""Folders of systems that run from their archives; they go at the end of the process."""
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """A system as a scene.
+
+    Attributes
+    ----------
+    scene : Scene
+        Its FMUs lie in a folder that goes at the end of the process.
+    notes : tuple of str
+        What was chosen where the system does not say it.
+    """
+
+    scene: Scene
+    notes: tuple[str, ...]
+
+
+def opened_scene(path: FilePath, changes: Sequence[str] = ()) -> Scene:
+    """Return the scene of a file: a scene file (TOML) or a system (SSP).
+
+    Raises
+    ------
+    SceneError, ComponentFileError
+        What is wrong with it.
+    """
+    if path.suffix.lower() == ENDING:
+        return load_system(path, changes).scene
+    return load_scene(path, changes)
+
+
+def load_system(
+    path: FilePath, changes: Sequence[str] = (), parameters: Sequence[FilePath] = (), name: str = "system"
+) -> Imported:
+    """Read an SSP archive as a scene.
+
+    Parameters
+    ----------
+    path : Path
+        The archive.
+    changes : sequence of str
+        `KEY=VALUE`, made before the scene is checked.
+    parameters : sequence of Path
+        Parameter sets (SSV), files or members of the archive: one is applied, several become a sweep.
+    name : str
+        What the scene's file is to be called; its FMUs lie in `NAME_fmus` beside it.
+
+    Raises
+    ------
+    SceneError
+        With what is wrong with the system, or with the scene that it makes.
+    ComponentFileError
+        The archive, or an FMU in it, is unsafe or damaged.
+    UsageError
+        The parameter sets make no sweep.
+    """
+    folder = ScratchFolder("ssp")
+    place = FilePath(folder.name)
+    source = str(place / f"{name}.toml")
+    try:
+        with _told_of(path, source), SspArchive(path) as archive:
+            tables, notes = _read(archive, place / f"{name}_fmus", parameters)
+            scene = parse_scene(tomli_w.dumps(tables), source, changes)
+    except BaseException:
+        folder.cleanup()
+        raise
+    _scratch.append(folder)
+    return Imported(scene, tuple(notes))
+
+
+def import_system(
+    path: FilePath,
+    output: FilePath,
+    changes: Sequence[str] = (),
+    parameters: Sequence[FilePath] = (),
+    *,
+    force: bool = False,
+) -> Imported:
+    """Write an SSP archive as a scene file, with its FMUs in a folder beside it.
+
+    Parameters
+    ----------
+    path, changes, parameters
+        As `load_system` has them.
+    output : Path
+        The scene file to write (TOML); the folder is called as it is, with `_fmus` in place of the ending.
+    force : bool
+        Whether files that are there and hold something else are overwritten.
+
+    Raises
+    ------
+    SceneError, ComponentFileError, UsageError
+        As `load_system`; or a file is there, or cannot be written.
+    """
+    imported = load_system(path, changes, parameters, output.stem)
+    fmus = f"{output.stem}_fmus"
+    made = {output.parent / fmus / file.name: file.read_bytes() for file in _files(imported.scene, fmus)}
+    made[output] = imported.scene.text.encode("utf-8")
+    for file, content in made.items():
+        _refuse_another(file, content, force)
+    for file, content in made.items():
+        try:
+            file.parent.mkdir(exist_ok=True)
+            write_atomically(file, content)
+        except OSError as error:
+            raise UsageError(
+                f"{file}: expected a file that can be written, got: {error.strerror}."
+            ) from error
+    return imported
+
+
+def _files(scene: Scene, fmus: str) -> list[FilePath]:
+    folder = FilePath(scene.source).parent / fmus
+    return sorted(folder.iterdir()) if folder.is_dir() else []
+
+
+def _refuse_another(file: FilePath, content: bytes, force: bool) -> None:
+    if force or not file.exists() or (file.is_file() and file.read_bytes() == content):
+        return
+    raise UsageError(
+        f"{file}: expected a new file, or one that holds the same, got one that holds something else. "
+        "Choose another name, or overwrite it with --force."
+    )
+
+
+@contextmanager
+def _told_of(path: FilePath, source: str) -> Iterator[None]:
+    """Let messages name the archive, not the place where it was unpacked."""
+    try:
+        yield
+    except RefusalError as refusal:
+        raise SceneError([refusal.problem.line(str(path))]) from None
+    except SceneError as error:
+        place = str(FilePath(source).parent)
+        lines = (line.replace(source, str(path)).replace(f"{place}/", "") for line in error.problems)
+        raise SceneError(list(lines)) from None
+
+
+def _read(
+    archive: SspArchive, folder: FilePath, parameters: Sequence[FilePath]
+) -> tuple[dict[str, Any], list[str]]:
+    structure = read_structure(archive)
+    each = dict(components_of(structure.system))
+    if not each:
+        raise RefusalError("SystemStructure.ssd", "a system with components", "none")
+    fmus, facts, notes = _fmus(archive, each, folder)
+    flat = FlatSystem(structure.system, facts)
+    tables, more = scene_tables(structure, flat, fmus, facts)
+    if parameters:
+        with_sets(tables, flat, facts, read_sets(archive, parameters))
+    return tables, [*notes, *more]
+
+
+def _fmus(
+    archive: SspArchive, each: Mapping[Path, Component], folder: FilePath
+) -> tuple[dict[Path, tuple[str, str | None]], dict[Path, ComponentFacts], list[str]]:
+    """Lay the FMUs into a folder; return what a scene calls each, and what their descriptions say."""
+    folder.mkdir()
+    files: dict[str, FilePath] = {}
+    fmus: dict[Path, tuple[str, str | None]] = {}
+    facts: dict[Path, ComponentFacts] = {}
+    notes: list[str] = []
+    for path, component in each.items():
+        file = files.get(component.source)
+        if file is None:
+            file = files[component.source] = folder / _file_name(component.source, folder)
+            archive.copy(component.source, file)
+        own = _own(component, file, path, notes)
+        if own is None:
+            fmus[path] = f"{folder.name}/{file.name}", None
+            facts[path] = component_facts(file)
+        else:
+            fmus[path] = component.fmu, None if component.fmi == "3.0" else component.fmi
+            facts[path] = component_facts(own)
+    used = {FilePath(file).name for file, _ in fmus.values()}
+    for file in files.values():
+        if file.name not in used:
+            file.unlink()
+    return fmus, facts, notes
+
+
+def _own(component: Component, file: FilePath, path: Path, notes: list[str]) -> FilePath | None:
+    """Return the shipped FMU of a component that was exported of it; None for any other, also one put in its place."""
+    if not component.fmu:
+        return None
+    where = f"SystemStructure.ssd: {'.'.join(path)[:60]}"
+    if component.fmu not in components() or component.fmi not in FOLDERS:
+        got = f"{quoted(component.fmu)}, FMI {quoted(component.fmi)}"
+        hint = "Take the annotation out, and the FMU of the archive is used."
+        raise RefusalError(f"{where}: annotation", f"one of {', '.join(components())}", got, hint)
+    shipped = fmu_path(component.fmu, component.fmi)
+    inside, own = unpack(file), unpack(shipped)
+    if inside.identifiers[0] != own.identifiers[0]:
+        return None
+    if inside.token != own.token:
+        notes.append(
+            f"{'.'.join(path)}: its {component.fmu} is of another version of this package; the one installed is used"
+        )
+    return shipped
+
+
+def _file_name(member: str, folder: FilePath) -> str:
+    """Return a name for a member that no other has, on any system."""
+    stem = _PLAIN.sub("_", PurePosixPath(member).stem)[:100].lstrip(".") or "fmu"
+    there = {file.name.lower() for file in folder.iterdir()}
+    name, count = f"{stem}.fmu", 1
+    while name.lower() in there:
+        count += 1
+        name = f"{stem}_{count}.fmu"
+    return name

@@ -1,0 +1,181 @@
+"""The FMUs that travel: this package's own as other tools take them, those of others as they are."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from vibroimpact.fmus.packaging.build import read_components
+from vibroimpact.fmus.packaging.cross import Note
+from vibroimpact.fmus.packaging.description import ComponentDescription
+from vibroimpact.fmus.packaging.export import LEAN_COUNTS, export_fmu
+from vibroimpact.fmus.shipped import FOLDERS, package_folder
+from vibroimpact.orchestrator.importer.specification import ComponentSpec
+from vibroimpact.orchestrator.scene.general.component_facts import (
+    ComponentFacts,
+    StartValue,
+    component_facts,
+)
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A component in the archive.
+
+    Attributes
+    ----------
+    name : str
+        Its name in the scene.
+    member : str
+        Its FMU's.
+    content : bytes
+        The FMU.
+    facts : ComponentFacts
+        What the FMU in the archive says of itself.
+    values : mapping of str to number, bool or str
+        Start values.
+    fmu, fmi : str
+        The component of this package that it is, and the version that the scene runs; empty for any other.
+    """
+
+    name: str
+    member: str
+    content: bytes
+    facts: ComponentFacts
+    values: Mapping[str, StartValue]
+    fmu: str = ""
+    fmi: str = ""
+
+    @property
+    def values_member(self) -> str:
+        """The member with its start values."""
+        return f"resources/{self.name}.ssv"
+
+
+def component_members(
+    general: GeneralScene,
+    folder: Path,
+    fmi: str | None,
+    stop_time: float,
+    platform: str | None,
+    note: Note,
+) -> dict[str, Part]:
+    """Return the components of a scene as they travel, by name.
+
+    Parameters
+    ----------
+    general : GeneralScene
+    folder : Path
+        Where FMUs may be written.
+    fmi : str or None
+        Version of this package's own; None: as the scene has it.
+    stop_time : float
+        When a run of them ends, s.
+    platform, note
+        As `vibroimpact.fmus.export` has them.
+    """
+    described = {component.name: component for component in read_components()}
+    taken: dict[str, str] = {}
+    parts = {}
+    for spec in general.components:
+        own = _own(spec.fmu)
+        if own is None:
+            content = spec.fmu.read_bytes()
+            member = _member(spec.fmu.name, content, taken)
+            parts[spec.name] = Part(
+                spec.name, member, content, component_facts(spec.fmu), dict(spec.parameters)
+            )
+            continue
+        component, version = described[own[0]], own[1]
+        file = _exported(
+            component, spec, _used(general, spec), folder, fmi or version, stop_time, platform, note
+        )
+        content = file.read_bytes()
+        member = _member(file.name, content, taken)
+        values = dict(spec.parameters)
+        parts[spec.name] = Part(spec.name, member, content, component_facts(file), values, *own)
+    return parts
+
+
+def _own(fmu: Path) -> tuple[str, str] | None:
+    """Return name and version of a component of the package; None for the file of another."""
+    versions = {folder: version for version, folder in FOLDERS.items()}
+    own = fmu.is_relative_to(package_folder()) and fmu.parent.name in versions
+    return (fmu.stem, versions[fmu.parent.name]) if own else None
+
+
+def _used(general: GeneralScene, spec: ComponentSpec) -> set[str]:
+    """Return the variables of a component that the system cannot do without."""
+    ends = (end for connection in general.connections for end in (connection.source, connection.target))
+    return {variable for component, variable in ends if component == spec.name} | set(spec.parameters)
+
+
+def _exported(
+    component: ComponentDescription,
+    spec: ComponentSpec,
+    used: set[str],
+    folder: Path,
+    fmi: str,
+    stop_time: float,
+    platform: str | None,
+    note: Note,
+) -> Path:
+    """Export a component with what the system uses of it, and no more; it starts as the scene says."""
+    ports = set(_ports(component, spec, used))
+    # else an export that is given no motion would start with some of its own
+    still = {v.name: v.start for v in component.variables if v.name in component.start_of_export}
+    starts = {name: value for name, value in still.items() if value is not None} | dict(spec.parameters)
+    counts = {} if "importer" in ports else _counts(component, used)
+    return export_fmu(
+        component.name,
+        folder / f"{spec.name}.fmu",
+        contacts=counts.get("contact"),
+        sensors=counts.get("sensor"),
+        fmi=fmi,
+        starts={name: value for name, value in starts.items() if isinstance(value, int | float)},
+        full="importer" in ports,
+        external="external" in ports,
+        stop_time=stop_time,
+        platform=platform,
+        note=note,
+    )
+
+
+def _ports(component: ComponentDescription, spec: ComponentSpec, used: set[str]) -> Iterator[str]:
+    items = {e.name: {item.value: item.ports for item in e.items} for e in component.enumerations}
+    for variable in component.variables:
+        if variable.name in used:
+            yield "importer" if variable.dimensions else variable.ports
+            if variable.enumeration:
+                value = spec.parameters.get(variable.name)
+                yield next(
+                    (ports for item, ports in items[variable.enumeration].items() if item == value), ""
+                )
+
+
+def _counts(component: ComponentDescription, used: set[str]) -> dict[str, int]:
+    """Return how many contacts and sensors are used, but no fewer than a lean description has."""
+    counts = {
+        block: min(count, component.repeats[block])
+        for block, count in LEAN_COUNTS.items()
+        if block in component.repeats
+    }
+    for variable in component.variables:
+        if variable.name in used and variable.repeat in counts:
+            counts[variable.repeat] = max(counts[variable.repeat], variable.repeat_index)
+    return counts
+
+
+def _member(name: str, content: bytes, taken: dict[str, str]) -> str:
+    """Return the member for a file: the same for the same content, of its own, also where cases are one, for others."""
+    digest = hashlib.sha256(content).hexdigest()
+    stem = "".join(c if c.isascii() and (c.isalnum() or c in "_.-") else "_" for c in Path(name).stem)[:100]
+    stem = stem.lstrip(".") or "fmu"
+    member, count = f"resources/{stem}.fmu", 1
+    while taken.setdefault(member.lower(), digest) != digest:
+        count += 1
+        member = f"resources/{stem}_{count}.fmu"
+    return member

@@ -1,0 +1,49 @@
+"""The words of SSP: its namespaces, its types of files, and the annotations of this package and of others."""
+
+from __future__ import annotations
+
+SSD_FILE = "SystemStructure.ssd"
+VERSIONS = ("1.0", "2.0")
+
+_BASE = "http://ssp-standard.org/SSP1/SystemStructure"
+#: Namespaces by the prefixes that other tools expect: some read the prefix instead of the namespace.
+NAMESPACES = {
+    "ssd": f"{_BASE}Description",
+    "ssc": f"{_BASE}Common",
+    "ssv": f"{_BASE}ParameterValues",
+    "ssm": f"{_BASE}ParameterMapping",
+    "ssb": f"{_BASE}SignalDictionary",
+    "osp": "http://opensimulationplatform.com/SSP/OSPAnnotations",
+    "oms": "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd",
+    "vibroimpact": "urn:vibroimpact:ssp",
+}
+#: What the annotations of this package say they are.
+ANNOTATION = "vibroimpact"
+#: The annotation in which libcosim looks for its step.
+OSP_ANNOTATION = "com.opensimulationplatform"
+
+FMU_TYPE = "application/x-fmu-sharedlibrary"
+PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"
+MAPPING_TYPE = "application/x-ssp-parameter-mapping"
+
+#: Kinds of connectors of an element that give a value, and those that take one; of a system, seen from inside, the
+#: other way round.
+GIVING = frozenset({"output", "calculatedParameter", "local", "constant"})
+TAKING = frozenset({"input", "parameter", "structuralParameter"})
+
+REAL_TYPES = frozenset({"Real", "Float64", "Float32"})
+INTEGER_TYPES = frozenset(
+    {"Integer", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"}
+)
+
+
+def tag(name: str) -> str:
+    """Return the name of an element as the parser gives it.
+
+    Examples
+    --------
+    >>> tag("ssd:System")
+    '{http://ssp-standard.org/SSP1/SystemStructureDescription}System'
+    """
+    prefix, _, local = name.partition(":")
+    return f"{{{NAMESPACES[prefix]}}}{local}"

@@ -1,0 +1,124 @@
+"""Parameter sets from outside of a system: one changes its start values, several are the points of a sweep."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path as FilePath
+from typing import Any
+
+from vibroimpact.fmus.errors import ComponentFileError, UsageError
+from vibroimpact.fmus.packaging.zip_members import opened
+from vibroimpact.fmus.safe_xml import root_of
+from vibroimpact.fmus.wording import option
+from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
+from vibroimpact.orchestrator.ssp.archive import LARGEST_XML, SspArchive
+from vibroimpact.orchestrator.ssp.flat import FlatSystem, Path
+from vibroimpact.orchestrator.ssp.scene_tables import names_of
+from vibroimpact.orchestrator.ssp.values import Parameter, read_parameter_set
+
+Sets = Mapping[str, tuple[Parameter, ...]]
+
+
+def read_sets(archive: SspArchive, files: Sequence[FilePath]) -> dict[str, tuple[Parameter, ...]]:
+    """Return parameter sets by the names of their files; one that is no file is a member of the archive."""
+    sets: dict[str, tuple[Parameter, ...]] = {}
+    for file in files:
+        name = str(file)
+        if file.exists():
+            with opened(file, "SSV") as stream:
+                content = stream.read(LARGEST_XML + 1)
+            if len(content) > LARGEST_XML:
+                raise ComponentFileError(f"{file}: expected XML of at most {LARGEST_XML} bytes, got more.")
+            root = root_of(content, name, namespaces=True)
+        else:
+            root = archive.xml(archive.member(file.as_posix(), option("parameters")))
+        sets[name] = read_parameter_set(root, name)
+    return sets
+
+
+def with_sets(
+    tables: dict[str, Any], flat: FlatSystem, facts: Mapping[Path, ComponentFacts], sets: Sets
+) -> None:
+    """Put parameter sets into the tables of a scene: one as start values, several as its sweep.
+
+    Raises
+    ------
+    UsageError
+        A set has no parameter of the system, or several sets are not the points of a grid.
+    """
+    names = names_of(list(flat.components))
+    points = [_point(name, parameters, flat, facts, names) for name, parameters in sets.items()]
+    if len(points) == 1:
+        for key, value in points[0].items():
+            _give(tables, key, value)
+        return
+    tables["sweep"] = {key: {"values": values} for key, values in _axes(points).items()}
+    for key, value in points[0].items():
+        if key not in tables["sweep"]:
+            _give(tables, key, value)
+
+
+def _point(
+    name: str,
+    parameters: tuple[Parameter, ...],
+    flat: FlatSystem,
+    facts: Mapping[Path, ComponentFacts],
+    names: Mapping[Path, str],
+) -> dict[str, StartValue]:
+    """Return the start values that a set gives, by key of the scene."""
+    values: dict[Path, dict[str, StartValue]] = {path: {} for path in flat.components}
+    taken = [node for parameter in parameters for node in flat.apply(parameter, (), values)]
+    if not taken:
+        raise UsageError(
+            f"{name}: expected a parameter of this system such as {_example(facts, names)}, got none."
+        )
+    point = {}
+    for path, variable in dict.fromkeys(taken):
+        value = values[path][variable]
+        items = facts[path].variables[variable].items
+        point[f"{names[path]}.{variable}"] = items.get(value, value) if isinstance(value, str) else value
+    return point
+
+
+def _example(facts: Mapping[Path, ComponentFacts], names: Mapping[Path, str]) -> str:
+    path, first = next(iter(facts.items()))
+    settable = (variable.name for variable in first.variables.values() if variable.settable)
+    return f"{names[path]}.{next(settable, 'parameter')}"
+
+
+def _axes(points: list[dict[str, StartValue]]) -> dict[str, list[StartValue]]:
+    """Return the values of each key in which points differ, where the points are all combinations of them."""
+    keys = dict.fromkeys(key for point in points for key in point)
+    lacking = next((key for key in keys if any(key not in point for point in points)), None)
+    if lacking is not None:
+        raise UsageError(
+            f"{option('parameters')}: expected sets of the same parameters, got some without {lacking}. "
+            "Write it into each."
+        )
+    values = {key: list(dict.fromkeys(point[key] for point in points)) for key in keys}
+    axes = {key: several for key, several in values.items() if len(several) > 1}
+    different = {tuple(point[key] for key in axes) for point in points}
+    if len(different) != len(points):
+        raise UsageError(f"{option('parameters')}: expected sets that differ, got two that say the same.")
+    if math.prod(map(len, axes.values())) != len(points):
+        raise UsageError(
+            f"{option('parameters')}: expected sets that differ in one number, or all combinations of several, got "
+            f"{len(points)} sets of {', '.join(axes)}. Import each set by itself."
+        )
+    wrong = next((key for key, several in axes.items() if not all(map(_is_number, several))), None)
+    if wrong is not None:
+        raise UsageError(
+            f"{option('parameters')}: expected sets that differ in numbers, got different {wrong}. "
+            "Import each set by itself."
+        )
+    return axes
+
+
+def _is_number(value: StartValue) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _give(tables: dict[str, Any], key: str, value: StartValue) -> None:
+    component, _, variable = key.partition(".")
+    tables["component"][component].setdefault("parameters", {})[variable] = value

@@ -1,0 +1,233 @@
+"""From the XML of an SSD to a `Structure`; what this package cannot run is refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element
+
+from vibroimpact.fmus.units import Unit
+from vibroimpact.orchestrator.scene.problems import quoted
+from vibroimpact.orchestrator.ssp.archive import SspArchive
+from vibroimpact.orchestrator.ssp.names import (
+    ANNOTATION,
+    FMU_TYPE,
+    MAPPING_TYPE,
+    OSP_ANNOTATION,
+    PARAMETER_SET_TYPE,
+    SSD_FILE,
+    tag,
+)
+from vibroimpact.orchestrator.ssp.refusal import RefusalError
+from vibroimpact.orchestrator.ssp.structure import Component, Connection, Connector, Structure, System
+from vibroimpact.orchestrator.ssp.values import (
+    Binding,
+    Mapped,
+    Parameter,
+    Units,
+    binding,
+    expect,
+    number,
+    read_mapping,
+    read_parameter_set,
+    read_transformation,
+    read_units,
+    refuse_version,
+    truth,
+)
+
+DEEPEST = 50
+"""Systems in each other."""
+
+
+def read_structure(archive: SspArchive) -> Structure:
+    """Read the default SSD of an archive.
+
+    Raises
+    ------
+    RefusalError
+        It is no SSD, or has what this package cannot run.
+    ComponentFileError
+        An XML file is damaged or unsafe.
+    """
+    root = archive.xml(SSD_FILE)
+    expect(root, "ssd:SystemStructureDescription", SSD_FILE)
+    refuse_version(root, SSD_FILE)
+    top = root.find(tag("ssd:System"))
+    if top is None:
+        raise RefusalError(SSD_FILE, "one <System>", "none")
+    reader = _Reader(archive, read_units(root, SSD_FILE))
+    experiment = root.find(tag("ssd:DefaultExperiment"))
+    return Structure(
+        name=root.get("name", ""),
+        system=reader.system(top, 1),
+        start_time=_time(experiment, "startTime"),
+        stop_time=_time(experiment, "stopTime"),
+        step=_step(experiment),
+        tables="".join(element.text or "" for element in _noted(root, "vibroimpact:Scene")),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Reader:
+    archive: SspArchive
+    units: Units
+
+    def system(self, element: Element, depth: int) -> System:
+        where = f"{SSD_FILE}: {element.get('name', '')[:60]}"
+        if depth > DEEPEST:
+            raise RefusalError(where, f"at most {DEEPEST} systems in each other", "more")
+        if element.find(tag("ssd:SignalDictionaries")) is not None:
+            raise RefusalError(where, "a system without signal dictionaries", "one with them", _DICTIONARY)
+        inner = element.find(tag("ssd:Elements"))
+        return System(
+            element.get("name", ""),
+            self._connectors(element, where),
+            self._bindings(element, where),
+            self._elements(() if inner is None else tuple(inner), where, depth),
+            tuple(
+                map(self._connection, element.iterfind(f"{tag('ssd:Connections')}/{tag('ssd:Connection')}"))
+            ),
+        )
+
+    def _elements(
+        self, elements: tuple[Element, ...], where: str, depth: int
+    ) -> Mapping[str, Component | System]:
+        found: dict[str, Component | System] = {}
+        for element in elements:
+            name = element.get("name", "")
+            if not name or name in found:
+                raise RefusalError(where, "a name of its own for each element", quoted(name))
+            if element.tag == tag("ssd:Component"):
+                found[name] = self._component(element, name)
+            elif element.tag == tag("ssd:System"):
+                found[name] = self.system(element, depth + 1)
+            else:
+                kind = element.tag.rpartition("}")[2][:60]
+                hint = _DICTIONARY if kind == "SignalDictionaryReference" else ""
+                raise RefusalError(f"{SSD_FILE}: {name[:60]}", "a component or a system", kind, hint)
+        return found
+
+    def _component(self, element: Element, name: str) -> Component:
+        where = f"{SSD_FILE}: {name[:60]}"
+        kind = element.get("type", FMU_TYPE)
+        if kind != FMU_TYPE:
+            hint = "Other kinds of components are not available in this version: put its elements into the system."
+            raise RefusalError(f"{where}: type", FMU_TYPE, quoted(kind), hint)
+        implementation = element.get("implementation", "any")
+        if implementation not in ("any", "CoSimulation"):
+            hint = "Export the FMU for co-simulation."
+            raise RefusalError(f"{where}: implementation", "CoSimulation", quoted(implementation), hint)
+        source = self.archive.member(element.get("source", ""), f"{where}: source")
+        own = next(_noted(element, "vibroimpact:Component"), Element("none"))
+        return Component(
+            name,
+            source,
+            self._connectors(element, where),
+            self._bindings(element, where),
+            own.get("fmu", ""),
+            own.get("fmi", ""),
+        )
+
+    def _connectors(self, element: Element, where: str) -> dict[str, Connector]:
+        found: dict[str, Connector] = {}
+        for connector in element.iterfind(f"{tag('ssd:Connectors')}/{tag('ssd:Connector')}"):
+            name = connector.get("name", "")
+            if name in found:
+                raise RefusalError(where, "each connector once", quoted(name))
+            found[name] = Connector(name, connector.get("kind", ""), self._unit(connector))
+        return found
+
+    def _unit(self, connector: Element) -> Unit | None:
+        names = (child.get("unit", "") for child in connector)
+        return next((self.units[name] for name in names if name in self.units), None)
+
+    def _connection(self, element: Element) -> Connection:
+        ends = [
+            (element.get(f"{end}Element"), element.get(f"{end}Connector", "")) for end in ("start", "end")
+        ]
+        connection = Connection(ends[0], ends[1])
+        where = f"{SSD_FILE}: {connection.where}"
+        if element.get("startIndices") or element.get("endIndices"):
+            raise RefusalError(where, "a connection of single numbers", "elements of an array")
+        factor, offset = read_transformation(element, where) or (None, 0.0)
+        own = next(_noted(element, "vibroimpact:Connection"), Element("none"))
+        return Connection(
+            ends[0],
+            ends[1],
+            factor,
+            offset,
+            truth(element.get("suppressUnitConversion", "false"), where),
+            own.get("gain_unit"),
+        )
+
+    def _bindings(self, element: Element, where: str) -> tuple[Binding, ...]:
+        each = element.iterfind(f"{tag('ssd:ParameterBindings')}/{tag('ssd:ParameterBinding')}")
+        return tuple(self._binding(one, where) for one in each)
+
+    def _binding(self, element: Element, where: str) -> Binding:
+        self._refuse_other(element, PARAMETER_SET_TYPE, f"{where}: parameter binding")
+        mapped = element.find(tag("ssd:ParameterMapping"))
+        return binding(
+            self._parameters(element, where),
+            None if mapped is None else self._mapping(mapped, where),
+            element.get("prefix", ""),
+        )
+
+    def _parameters(self, element: Element, where: str) -> tuple[Parameter, ...]:
+        source = element.get("source")
+        if source is not None:
+            member = self.archive.member(source, f"{where}: parameter binding")
+            return read_parameter_set(self.archive.xml(member), member)
+        inline = element.find(f"{tag('ssd:ParameterValues')}/{tag('ssv:ParameterSet')}")
+        if inline is None:
+            raise RefusalError(f"{where}: parameter binding", "a source or values", "neither")
+        return read_parameter_set(inline, f"{where}: parameter set", self.units)
+
+    def _mapping(self, element: Element, where: str) -> tuple[Mapped, ...]:
+        where = f"{where}: parameter mapping"
+        self._refuse_other(element, MAPPING_TYPE, where)
+        source = element.get("source")
+        if source is not None:
+            member = self.archive.member(source, where)
+            return read_mapping(self.archive.xml(member), member)
+        inline = element.find(tag("ssm:ParameterMapping"))
+        if inline is None:
+            raise RefusalError(where, "a source or entries", "neither")
+        return read_mapping(inline, where)
+
+    def _refuse_other(self, element: Element, kind: str, where: str) -> None:
+        given = element.get("type", kind)
+        if given != kind:
+            raise RefusalError(f"{where}: type", kind, quoted(given))
+        if element.get("sourceBase", "SSD") != "SSD":
+            hint = "Copy the file out of the FMU into the archive."
+            raise RefusalError(f"{where}: sourceBase", "SSD", quoted(element.get("sourceBase")), hint)
+
+
+_DICTIONARY = "Signal dictionaries are not available in this version: connect its signals one by one."
+
+
+def _annotations(element: Element | None, kind: str) -> Iterator[Element]:
+    """Yield what annotations of one type hold."""
+    if element is not None:
+        for annotation in element.iterfind(f"{tag('ssd:Annotations')}/{tag('ssc:Annotation')}"):
+            if annotation.get("type") == kind:
+                yield from annotation
+
+
+def _noted(element: Element, name: str) -> Iterator[Element]:
+    return (note for note in _annotations(element, ANNOTATION) if note.tag == tag(name))
+
+
+def _time(experiment: Element | None, key: str) -> float | None:
+    text = None if experiment is None else experiment.get(key)
+    return None if text is None else number(text, f"{SSD_FILE}: DefaultExperiment: {key}")
+
+
+def _step(experiment: Element | None) -> float | None:
+    """Return the step of a fixed-step master, as libcosim's annotation has it."""
+    for algorithm in _annotations(experiment, OSP_ANNOTATION):
+        for fixed in algorithm.iterfind(tag("osp:FixedStepAlgorithm")):
+            return number(fixed.get("baseStepSize", ""), f"{SSD_FILE}: FixedStepAlgorithm: baseStepSize")
+    return None

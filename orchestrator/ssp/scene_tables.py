@@ -1,0 +1,155 @@
+"""From a flat system to the tables of a scene, with notes on what was chosen where the system does not say it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.orchestrator.scene.general.component_facts import NUMERIC_KINDS, ComponentFacts
+from vibroimpact.orchestrator.scene.problems import quoted
+from vibroimpact.orchestrator.ssp.flat import FlatSystem, Link, Node, Path
+from vibroimpact.orchestrator.ssp.names import SSD_FILE
+from vibroimpact.orchestrator.ssp.refusal import RefusalError
+from vibroimpact.orchestrator.ssp.structure import Structure
+
+SAMPLES = 1000
+"""Samples of each output where nobody says what to record."""
+MOST_RECORDED = 100
+OWN_TABLES = ("component", "connection")
+"""Tables of a scene that SSP has words for."""
+_NOT_OF_A_NAME = re.compile(r"[^A-Za-z0-9_]")
+
+
+def names_of(paths: Sequence[Path]) -> dict[Path, str]:
+    """Return a name for each component that a scene takes.
+
+    Examples
+    --------
+    >>> names_of([("rig", "body"), ("stop 1",), ("rig_body",)])
+    {('rig', 'body'): 'rig_body', ('stop 1',): 'stop_1', ('rig_body',): 'rig_body_2'}
+    """
+    names: dict[Path, str] = {}
+    for path in paths:
+        plain = _NOT_OF_A_NAME.sub("_", "_".join(path))
+        plain = f"_{plain}" if plain[0].isdigit() else plain
+        taken, name, count = set(names.values()), plain, 1
+        while name in taken:
+            count += 1
+            name = f"{plain}_{count}"
+        names[path] = name
+    return names
+
+
+def noted_tables(structure: Structure) -> dict[str, Any]:
+    """Return the tables that this package has noted in a system; none in one from elsewhere."""
+    where = f"{SSD_FILE}: annotation"
+    try:
+        tables = parse_toml(structure.tables)
+    except ValueError as error:
+        raise RefusalError(where, "TOML", f"an error: {error}", "Take the annotation out.") from None
+    for name in OWN_TABLES:
+        if name in tables:
+            raise RefusalError(where, f"a scene without {name}", "one", "The system itself says it.")
+    return tables
+
+
+def scene_tables(
+    structure: Structure,
+    flat: FlatSystem,
+    fmus: Mapping[Path, tuple[str, str | None]],
+    facts: Mapping[Path, ComponentFacts],
+) -> tuple[dict[str, Any], list[str]]:
+    """Return the tables of a scene, and notes for a person.
+
+    Parameters
+    ----------
+    structure : Structure
+    flat : FlatSystem
+    fmus : mapping of Path to tuple of str and str or None
+        What a scene has for `fmu` and `fmi` of each component.
+    facts : mapping of Path to ComponentFacts
+    """
+    names, values = names_of(list(flat.components)), flat.start_values()
+    tables, notes = noted_tables(structure), []
+    if flat.ignored:
+        more = f" and {len(flat.ignored) - 5} more" if len(flat.ignored) > 5 else ""
+        notes.append(f"parameters of no variable, which were left out: {', '.join(flat.ignored[:5])}{more}")
+    tables.setdefault("scene", {"title": structure.name, "units": "SI"})
+    tables["component"] = {name: _component(fmus[path], values[path]) for path, name in names.items()}
+    links = flat.links()
+    if links:
+        tables["connection"] = [_connection(link, names) for link in links]
+    notes += _times(tables, structure, facts.values(), connected=bool(links))
+    notes += _record(tables, flat, names, facts)
+    return tables, notes
+
+
+def _component(fmu: tuple[str, str | None], values: Mapping[str, Any]) -> dict[str, Any]:
+    file, fmi = fmu
+    table: dict[str, Any] = {"fmu": file}
+    if fmi:
+        table["fmi"] = fmi
+    return {**table, "parameters": dict(values)} if values else table
+
+
+def _connection(link: Link, names: Mapping[Path, str]) -> dict[str, Any]:
+    table: dict[str, Any] = {"from": _reference(link.source, names), "to": _reference(link.target, names)}
+    if link.gain != 1.0 or link.gain_unit is not None:
+        table["gain"] = link.gain
+    return table if link.gain_unit is None else {**table, "gain_unit": link.gain_unit}
+
+
+def _reference(node: Node, names: Mapping[Path, str]) -> str:
+    return f"{names[node.element]}.{node.name}"
+
+
+def _times(tables: dict[str, Any], structure: Structure, facts: Any, *, connected: bool) -> Iterator[str]:
+    """Fill in how long to record and how often to exchange."""
+    if structure.start_time:
+        hint = "A scene begins at 0: shift what depends on time."
+        raise RefusalError(f"{SSD_FILE}: startTime", "0", f"{structure.start_time:g}", hint)
+    record, execution = _table(tables, "record"), _table(tables, "execution")
+    if "recorded_time" not in record and structure.stop_time is not None:
+        record["recorded_time"] = structure.stop_time
+    if "macro_step" in execution or not connected:
+        return
+    own = [one.step for one in facts if one.step is not None]
+    step = structure.step or (min(own) if own else None)
+    if step is not None:
+        execution["macro_step"] = step
+        if structure.step is None:
+            yield f"execution.macro_step = {step:g} s, the smallest step that an FMU proposes"
+
+
+def _record(
+    tables: dict[str, Any], flat: FlatSystem, names: Mapping[Path, str], facts: Mapping[Path, ComponentFacts]
+) -> Iterator[str]:
+    """Record all outputs that the system names, where nobody says what to record."""
+    record = tables["record"]
+    duration = record.get("recorded_time")
+    if len(record) > 1 or not isinstance(duration, int | float) or duration <= 0.0:
+        return
+    outputs = [
+        f"{names[path]}.{name}"
+        for path, component in flat.components.items()
+        for name, connector in component.connectors.items()
+        if connector.kind == "output" and _is_number(facts[path], name)
+    ]
+    if outputs:
+        record |= {"variables": outputs[:MOST_RECORDED], "rate": SAMPLES / duration}
+        count = len(outputs[:MOST_RECORDED])
+        yield f"record.variables are the {count} outputs that the system names, {SAMPLES} samples of each"
+
+
+def _is_number(facts: ComponentFacts, name: str) -> bool:
+    variable = facts.variables.get(name)
+    return variable is not None and variable.scalar and variable.kind in NUMERIC_KINDS
+
+
+def _table(tables: dict[str, Any], name: str) -> dict[str, Any]:
+    table = tables.setdefault(name, {})
+    if not isinstance(table, dict):
+        raise RefusalError(f"{SSD_FILE}: annotation: {name}", "a table", quoted(table))
+    return table

@@ -1,0 +1,242 @@
+"""Parameter values (SSV) and their mappings (SSM): read, renamed and turned into start values of variables."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from xml.etree.ElementTree import Element
+
+from vibroimpact.fmus.units import BASE_UNITS, Unit, agree, declared_unit
+from vibroimpact.orchestrator.scene.general.component_facts import (
+    Misfit,
+    StartValue,
+    VariableFacts,
+    typed_value,
+)
+from vibroimpact.orchestrator.scene.problems import quoted
+from vibroimpact.orchestrator.ssp.names import INTEGER_TYPES, REAL_TYPES, VERSIONS, tag
+from vibroimpact.orchestrator.ssp.refusal import RefusalError
+
+Units = Mapping[str, Unit]
+TRANSFORMATIONS = (
+    "BooleanMappingTransformation",
+    "IntegerMappingTransformation",
+    "EnumerationMappingTransformation",
+)
+
+_VERSION = re.compile(r"1\.[0-9]{1,3}(-.*)?|2\.[0-9]{1,3}")
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A value with its name; `unit` is None where it is not said."""
+
+    name: str
+    value: StartValue
+    unit: Unit | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mapped:
+    """An entry of a mapping: `target` is factor times `source` plus offset."""
+
+    source: str
+    target: str
+    factor: float = 1.0
+    offset: float = 0.0
+    suppressed: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Binding:
+    """Parameters of an element by the names that they have there."""
+
+    parameters: tuple[Parameter, ...]
+
+
+def binding(parameters: tuple[Parameter, ...], mapping: tuple[Mapped, ...] | None, prefix: str) -> Binding:
+    """Return the parameters of a binding as they are applied: only the mapped ones where there is a mapping."""
+    named = {prefix + parameter.name: parameter for parameter in parameters}
+    if mapping is None:
+        return Binding(tuple(replace(parameter, name=name) for name, parameter in named.items()))
+    applied = (_mapped(named[entry.source], entry) for entry in mapping if entry.source in named)
+    return Binding(tuple(applied))
+
+
+def _mapped(parameter: Parameter, entry: Mapped) -> Parameter:
+    value, unit = parameter.value, None if entry.suppressed else parameter.unit
+    if (entry.factor, entry.offset) == (1.0, 0.0):
+        return Parameter(entry.target, value, unit)
+    if isinstance(value, str | bool):
+        got = f"{quoted(value)} of {parameter.name[:60]}"
+        raise RefusalError("parameter mapping", "a number where there is a linear transformation", got)
+    return Parameter(entry.target, entry.factor * value + entry.offset, unit)
+
+
+def read_units(root: Element, where: str) -> dict[str, Unit]:
+    """Return the units that a file defines, by name."""
+    for parent in root:
+        if parent.tag.endswith("}Units"):
+            return dict(_unit(element, where) for element in parent.findall(tag("ssc:Unit")))
+    return {}
+
+
+def _unit(element: Element, where: str) -> tuple[str, Unit]:
+    name, base = element.get("name", ""), element.find(tag("ssc:BaseUnit"))
+    where = f"{where}: unit {name[:60]}"
+    attributes = {} if base is None else base.attrib
+    exponents = {key: whole(attributes.get(key, "0"), f"{where}: {key}") for key in BASE_UNITS}
+    factor = number(attributes.get("factor", "1"), f"{where}: factor")
+    offset = number(attributes.get("offset", "0"), f"{where}: offset")
+    if factor == 0.0 or any(abs(power) > 99 for power in exponents.values()):
+        raise RefusalError(where, "exponents of at most 99 and a factor other than 0", "others")
+    return name, declared_unit(name, exponents, factor, offset)
+
+
+def read_parameter_set(root: Element, where: str, units: Units | None = None) -> tuple[Parameter, ...]:
+    """Return the parameters of a parameter set.
+
+    Parameters
+    ----------
+    root : Element
+        `ssv:ParameterSet`.
+    where : str
+        What messages begin with.
+    units : mapping of str to Unit, optional
+        Those of the file around it.
+    """
+    expect(root, "ssv:ParameterSet", where)
+    refuse_version(root, where)
+    known = {**(units or {}), **read_units(root, where)}
+    found: dict[str, Parameter] = {}
+    for element in root.iterfind(f"{tag('ssv:Parameters')}/{tag('ssv:Parameter')}"):
+        parameter = _parameter(element, where, known)
+        if parameter.name in found:
+            raise RefusalError(where, "each parameter once", quoted(parameter.name))
+        found[parameter.name] = parameter
+    return tuple(found.values())
+
+
+def _parameter(element: Element, where: str, units: Units) -> Parameter:
+    name = element.get("name", "")
+    where = f"{where}: {name[:100]}"
+    for child in element:
+        kind, text = child.tag.rpartition("}")[2], child.get("value", "")
+        if kind in _READ or kind in REAL_TYPES or kind in INTEGER_TYPES:
+            read = _READ.get(kind, number if kind in REAL_TYPES else whole)
+            return Parameter(name, read(text, where), units.get(child.get("unit", "")))
+        if kind in ("Binary", "Dimension"):
+            break
+    got = ", ".join(child.tag.rpartition("}")[2][:60] for child in element) or "none"
+    raise RefusalError(where, "one number, truth value, text or enumeration item", got)
+
+
+def read_mapping(root: Element, where: str) -> tuple[Mapped, ...]:
+    """Return the entries of a parameter mapping, `ssm:ParameterMapping`."""
+    expect(root, "ssm:ParameterMapping", where)
+    refuse_version(root, where)
+    return tuple(_entry(element, where) for element in root.iterfind(tag("ssm:MappingEntry")))
+
+
+def _entry(element: Element, where: str) -> Mapped:
+    source, target = element.get("source", ""), element.get("target", "")
+    where = f"{where}: {source[:60]} -> {target[:60]}"
+    factor, offset = read_transformation(element, where) or (1.0, 0.0)
+    suppressed = truth(element.get("suppressUnitConversion", "false"), where)
+    return Mapped(source, target, factor, offset, suppressed)
+
+
+def read_transformation(element: Element, where: str) -> tuple[float, float] | None:
+    """Return factor and offset of a linear transformation; None where there is no transformation."""
+    for child in element:
+        kind = child.tag.rpartition("}")[2]
+        if kind in TRANSFORMATIONS:
+            hint = "A mapping of values is not available in this version: take it out."
+            raise RefusalError(where, "a linear transformation, or none", kind, hint)
+        if kind == "LinearTransformation":
+            return number(child.get("factor", "1"), where), number(child.get("offset", "0"), where)
+    return None
+
+
+def start_value(variable: VariableFacts, parameter: Parameter, where: str) -> StartValue:
+    """Return the value of a parameter as its variable takes it, in its unit.
+
+    Raises
+    ------
+    RefusalError
+        It is of another type, or out of range.
+    """
+    value = parameter.value
+    if variable.kind == "real" and not isinstance(value, bool | str):
+        value = converted(float(value), parameter.unit, variable.unit, where)
+    if variable.kind in ("integer", "enumeration") and isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if variable.kind in ("integer", "enumeration") and isinstance(value, str) and value.isdecimal():
+        value = int(value)
+    fitted = typed_value(variable, value)
+    if isinstance(fitted, Misfit):
+        raise RefusalError(where, fitted.expected, quoted(value), fitted.hint)
+    if variable.kind == "enumeration":
+        return next((name for name, item in variable.items.items() if item == fitted), fitted)
+    return fitted
+
+
+def converted(value: float, given: Unit | None, taken: Unit | None, where: str) -> float:
+    """Return a number in another unit; as it is where one of them is not known, or both mean the same."""
+    if given is None or taken is None or agree(given, taken):
+        return value
+    if given.exponents != taken.exponents:
+        raise RefusalError(where, f"a value in {taken.name or '1'}", f"one in {given.name or '1'}")
+    return (value * given.factor + given.offset - taken.offset) / taken.factor
+
+
+def expect(root: Element, name: str, where: str) -> None:
+    """Refuse an element of another name."""
+    if root.tag != tag(name):
+        raise RefusalError(where, f"<{name}>", f"<{root.tag.rpartition('}')[2][:60]}>")
+
+
+def refuse_version(root: Element, where: str) -> None:
+    """Refuse a file of a version that is not known."""
+    version = root.get("version", "")
+    if not _VERSION.fullmatch(version):
+        raise RefusalError(f"{where}: version", " or ".join(VERSIONS), quoted(version))
+
+
+def number(text: str, where: str) -> float:
+    """Read a finite number."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise RefusalError(where, "a finite number", quoted(text))
+    return value
+
+
+def whole(text: str, where: str) -> int:
+    """Read a whole number."""
+    try:
+        return int(text)
+    except ValueError:
+        raise RefusalError(where, "a whole number", quoted(text)) from None
+
+
+def truth(text: str, where: str) -> bool:
+    """Read a truth value as XML writes it."""
+    if text.strip() not in ("true", "1", "false", "0"):
+        raise RefusalError(where, "true or false", quoted(text))
+    return text.strip() in ("true", "1")
+
+
+def _text(text: str, _: str) -> str:
+    return text
+
+
+_READ: Mapping[str, Callable[[str, str], StartValue]] = {
+    "Boolean": truth,
+    "String": _text,
+    "Enumeration": _text,
+}

@@ -1,0 +1,191 @@
+"""The XML of an archive: the description of the system (SSD) and the start values of its components (SSV)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from importlib import metadata
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+import tomli_w
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.fmus.units import BASE_UNITS, Unit, agree
+from vibroimpact.orchestrator.importer.specification import ConnectionSpec
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.general.component_facts import NUMERIC_KINDS, StartValue, VariableFacts
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
+from vibroimpact.orchestrator.ssp.members import Part
+from vibroimpact.orchestrator.ssp.names import ANNOTATION, FMU_TYPE, NAMESPACES, OSP_ANNOTATION
+from vibroimpact.orchestrator.ssp.scene_tables import OWN_TABLES
+
+START_VALUES = "start"
+"""Name of the parameter set of each component."""
+KINDS = {
+    "1.0": frozenset({"input", "output", "parameter", "calculatedParameter"}),
+    "2.0": frozenset({"input", "output", "parameter", "calculatedParameter", "local"}),
+}
+GIVING = frozenset({"output", "calculatedParameter", "local"})
+_TYPES = {
+    "real": "Real",
+    "integer": "Integer",
+    "enumeration": "Integer",
+    "boolean": "Boolean",
+    "text": "String",
+}
+"""Types of connectors; of an enumeration its numbers, which every tool sets."""
+
+
+def description(
+    scene: Scene, general: GeneralScene, parts: Mapping[str, Part], ssp: str, duration: float
+) -> bytes:
+    """Return the SSD of a scene.
+
+    Raises
+    ------
+    UsageError
+        A connection comes from what this version of SSP has no word for.
+    """
+    root = _root("ssd:SystemStructureDescription", ssp, ("ssc", "ssv", "ssm", "osp", "vibroimpact"))
+    root.set("name", scene.title or "system")
+    system = SubElement(root, "ssd:System", name="system")
+    elements = SubElement(system, "ssd:Elements")
+    shown = {part.name: _shown(part, general, scene, ssp) for part in parts.values()}
+    for part in parts.values():
+        _component(elements, part, shown[part.name])
+    if general.connections:
+        joined = SubElement(system, "ssd:Connections")
+        for connection in general.connections:
+            _connection(joined, connection, parts)
+    _units(root, [variable for variables in shown.values() for variable in variables])
+    experiment = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(duration))
+    if general.connections:
+        algorithm = SubElement(_annotation(experiment, OSP_ANNOTATION), "osp:Algorithm")
+        SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(general.macro_step))
+    tables = {name: table for name, table in parse_toml(scene.text).items() if name not in OWN_TABLES}
+    SubElement(_annotation(root, ANNOTATION), "vibroimpact:Scene").text = tomli_w.dumps(tables)
+    return _written(root)
+
+
+def parameter_set(part: Part, ssp: str) -> bytes:
+    """Return the SSV of a component's start values."""
+    root = _root("ssv:ParameterSet", ssp, ("ssc",))
+    root.set("name", START_VALUES)
+    parameters = SubElement(root, "ssv:Parameters")
+    for name, value in part.values.items():
+        kind, text = _value(part.facts.variables[name], value)
+        SubElement(SubElement(parameters, "ssv:Parameter", name=name), f"ssv:{kind}", value=text)
+    return _written(root)
+
+
+def _root(name: str, ssp: str, prefixes: tuple[str, ...]) -> Element:
+    own = name.partition(":")[0]
+    spaces = {f"xmlns:{prefix}": NAMESPACES[prefix] for prefix in (own, *prefixes)}
+    tool = f"vibroimpact {metadata.version('vibroimpact')}"
+    return Element(name, {**spaces, "version": ssp, "generationTool": tool})
+
+
+def _written(root: Element) -> bytes:
+    ElementTree.indent(root)
+    text = ElementTree.tostring(root, encoding="unicode")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
+
+
+def _annotation(parent: Element, kind: str) -> Element:
+    return SubElement(SubElement(parent, "ssd:Annotations"), "ssc:Annotation", type=kind)
+
+
+def _shown(part: Part, general: GeneralScene, scene: Scene, ssp: str) -> list[VariableFacts]:
+    """Return the variables that are connectors: what is connected, and the outputs that are recorded."""
+    names: dict[str, None] = {}
+    for number, connection in enumerate(general.connections, start=1):
+        for end, (component, name) in (("from", connection.source), ("to", connection.target)):
+            if component == part.name:
+                names[name] = None
+                _refuse_no_connector(
+                    scene, f"connection[{number}].{end}", end, part.facts.variables[name], ssp
+                )
+    recorded = (component_variable(reference) for reference in general.variables)
+    for component, name in recorded:
+        variable = part.facts.variables.get(name) if component == part.name else None
+        if variable is not None and variable.causality in KINDS[ssp] and variable.kind in NUMERIC_KINDS:
+            names[name] = None
+    return [part.facts.variables[name] for name in names]
+
+
+def _refuse_no_connector(scene: Scene, where: str, end: str, variable: VariableFacts, ssp: str) -> None:
+    if variable.causality in KINDS[ssp] and (end == "to" or variable.causality in GIVING):
+        return
+    hint = (
+        "Export SSP 2.0, which has such connectors."
+        if variable.causality == "local"
+        else "Give its value to the input, in the parameters of its component."
+    )
+    got = f"the {variable.causality} {variable.name}"
+    raise UsageError(f"{scene.source}: {where}: expected an output in SSP {ssp}, got {got}. {hint}")
+
+
+def _component(elements: Element, part: Part, variables: list[VariableFacts]) -> None:
+    component = SubElement(
+        elements,
+        "ssd:Component",
+        name=part.name,
+        type=FMU_TYPE,
+        source=part.member,
+        implementation="CoSimulation",
+    )
+    if variables:
+        connectors = SubElement(component, "ssd:Connectors")
+        for variable in variables:
+            connector = SubElement(connectors, "ssd:Connector", name=variable.name, kind=variable.causality)
+            kind = SubElement(connector, f"ssc:{_TYPES[variable.kind]}")
+            if variable.kind == "real" and variable.unit is not None:
+                kind.set("unit", variable.unit_name)
+    if part.values:
+        bindings = SubElement(component, "ssd:ParameterBindings")
+        SubElement(bindings, "ssd:ParameterBinding", source=part.values_member)
+    if part.fmu:
+        SubElement(_annotation(component, ANNOTATION), "vibroimpact:Component", fmu=part.fmu, fmi=part.fmi)
+
+
+def _connection(joined: Element, spec: ConnectionSpec, parts: Mapping[str, Part]) -> None:
+    units = [parts[name].facts.variables[variable].unit for name, variable in (spec.source, spec.target)]
+    differ = units[0] is not None and units[1] is not None and not agree(units[0], units[1])
+    connection = SubElement(
+        joined,
+        "ssd:Connection",
+        startElement=spec.source[0],
+        startConnector=spec.source[1],
+        endElement=spec.target[0],
+        endConnector=spec.target[1],
+    )
+    if differ or spec.gain_unit is not None:
+        connection.set("suppressUnitConversion", "true")  # the gain is all that happens to the number
+    if spec.gain != 1.0 or differ:
+        # some tools take 0 for an attribute that is left out
+        SubElement(connection, "ssc:LinearTransformation", factor=repr(spec.gain), offset="0.0")
+    if spec.gain_unit is not None:
+        SubElement(_annotation(connection, ANNOTATION), "vibroimpact:Connection", gain_unit=spec.gain_unit)
+
+
+def _units(root: Element, variables: list[VariableFacts]) -> None:
+    units = {v.unit_name: v.unit for v in variables if v.kind == "real" and v.unit is not None}
+    if units:
+        parent = SubElement(root, "ssd:Units")
+        for name, unit in units.items():
+            base = {key: str(unit.exponents[key]) for key in BASE_UNITS if key in unit.exponents}
+            base |= {k: repr(v) for k, v, usual in _scale(unit) if v != usual}
+            SubElement(SubElement(parent, "ssc:Unit", name=name), "ssc:BaseUnit", base)
+
+
+def _scale(unit: Unit) -> Iterator[tuple[str, float, float]]:
+    yield "factor", unit.factor, 1.0
+    yield "offset", unit.offset, 0.0
+
+
+def _value(variable: VariableFacts, value: StartValue) -> tuple[str, str]:
+    kind = _TYPES[variable.kind]
+    if kind == "Boolean":
+        return kind, "true" if value else "false"
+    return kind, repr(float(value)) if kind == "Real" else str(value)
