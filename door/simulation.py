@@ -22,6 +22,7 @@ from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
 from vibroimpact.orchestrator.replay.replaying import replay_scene
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.ssp import opened_scene
 
 SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
 PathLike = str | os.PathLike[str]
@@ -255,7 +256,7 @@ def _scene(given: SceneLike) -> Scene:
             "scene: expected the path of a file, got text of several lines. Scene.from_text reads it."
         )
     if isinstance(given, str | os.PathLike):
-        return Scene.from_file(given)
+        return opened_scene(given)
     raise UsageError(
         f"scene: expected a Scene, the path of one or its tables, got {type(given).__name__}. "
         "Scene.from_text reads TOML text."

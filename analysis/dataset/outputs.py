@@ -26,6 +26,7 @@ FILE_ENDINGS = (
     ".json",
     ".toml",
     ".fmu",
+    ".ssp",
 )
 """Endings that no folder is given on purpose."""
 LONGEST_NAME = 200

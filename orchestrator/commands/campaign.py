@@ -13,7 +13,8 @@ from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignRepor
 from vibroimpact.orchestrator.campaign.cluster import refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.failures import counted, outcome_lines
-from vibroimpact.orchestrator.scene import Scene, load_scene
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.ssp import opened_scene
 
 
 def run_to_folder(
@@ -21,7 +22,7 @@ def run_to_folder(
 ) -> None:
     """Run a scene's sweep into the folder of a campaign and say what was done."""
     refuse_two_kinds_of_workers(workers, scheduler)
-    loaded = load_scene(scene, changes)
+    loaded = opened_scene(scene, changes)
     refuse_folder(output)
     compute(loaded, output, workers, scheduler)
 

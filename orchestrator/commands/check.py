@@ -20,8 +20,9 @@ from vibroimpact.orchestrator.campaign.check import (
 from vibroimpact.orchestrator.campaign.cluster import processor_count
 from vibroimpact.orchestrator.commands.failures import FAILED, counted
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
-from vibroimpact.orchestrator.scene import Scene, load_scene
+from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.summary import effects, engine, laws
+from vibroimpact.orchestrator.ssp import opened_scene
 
 _WIDTH = 10
 _DURATIONS = (
@@ -43,7 +44,7 @@ def check_scene(path: Path, changes: Sequence[str]) -> None:
     typer.Exit
         The point failed.
     """
-    scene = load_scene(path, changes)
+    scene = opened_scene(path, changes)
     say(f"{path}: no problems")
     _say_aligned(_what_runs(scene))
     cost = cost_of(scene)

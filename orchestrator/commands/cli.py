@@ -34,7 +34,7 @@ PANELS = {
     "Simulate": ("check", "run", "campaign", "demo"),
     "Look": ("plot", "describe"),
     "Measure and compare": ("import", "replay", "estimate", "spikes"),
-    "Exchange": ("fmu",),
+    "Exchange": ("fmu", "ssp"),
 }
 """The commands as `--help` shows them, in the order in which they are used; those of other packages come last."""
 DEBUG = "--debug"

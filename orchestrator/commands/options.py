@@ -13,7 +13,7 @@ import typer
 from vibroimpact.analysis.commands.shared_options import FigureFile, Force
 from vibroimpact.fmus.commands.options import commands as fmu_commands
 
-SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).")]
+SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML), or a system (SSP).")]
 Changes = Annotated[
     list[str] | None,
     typer.Option(
@@ -23,12 +23,17 @@ Changes = Annotated[
     ),
 ]
 
+ssp_commands = typer.Typer(no_args_is_help=True, help="Exchange systems of FMUs with other tools.")
+
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this package to the command line."""
     for command in (check, run, campaign, demo, replay):
         app.command()(command)
     fmu_commands.command()(export)
+    ssp_commands.command("export")(export_ssp)
+    ssp_commands.command("import")(import_ssp)
+    app.add_typer(ssp_commands, name="ssp")
 
 
 def check(scene: SceneFile, changes: Changes = None) -> None:
@@ -60,7 +65,9 @@ def run(
 
 
 def campaign(
-    scene: Annotated[Path, typer.Argument(help="Scene file (TOML) that sweeps something.")],
+    scene: Annotated[
+        Path, typer.Argument(help="Scene file (TOML), or a system (SSP), that sweeps something.")
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the campaign.")],
     changes: Changes = None,
     workers: Annotated[
@@ -191,3 +198,55 @@ def export(
     counts = {"contacts": contacts, "modes": modes, "masses": masses, "sensors": sensors}
     kinds = {"full": full, "external": ports == "external", "enumerations": enumerations}
     export_to_file(component, output, counts, changes, fmi, kinds, platform, law)
+
+
+def export_ssp(
+    scene: Annotated[Path, typer.Argument(help="Scene file (TOML) of components.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Archive to write (.ssp).")] = None,
+    changes: Changes = None,
+    ssp: Annotated[str, typer.Option(help="SSP version, 1.0 or 2.0.")] = "1.0",
+    fmi: Annotated[
+        str | None,
+        typer.Option(
+            help="FMI version of this package's components in the archive, 2.0 or 3.0; by default 2.0, with "
+            "SSP 2.0 as the scene says."
+        ),
+    ] = None,
+    platform: Annotated[
+        str | None, typer.Option(help="Machines it is for, as `vibroimpact fmu export` has them.")
+    ] = None,
+) -> None:
+    """Write a scene of components as a system that other tools run: FMUs, start values, connections.
+
+    What SSP has no words for (events, record, sweep, execution) travels in an annotation, and comes back with it.
+
+    Example: vibroimpact ssp export examples/two_oscillators.toml -o two.ssp
+    """
+    from vibroimpact.orchestrator.commands.ssp import export_to_archive
+
+    export_to_archive(scene, output, changes or (), ssp, fmi, platform)
+
+
+def import_ssp(
+    archive: Annotated[Path, typer.Argument(help="System (.ssp, version 1.0 or 2.0).")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Scene file to write (.toml); FMUs go beside it.")
+    ] = None,
+    changes: Changes = None,
+    parameters: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Parameter set (.ssv), a file or one in the archive; repeated, they are made a sweep."
+        ),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Write a system as a scene file, with its FMUs in a folder beside it. `vibroimpact run` takes the system as it is.
+
+    Example: vibroimpact ssp import two.ssp -o two.toml
+
+    A sweep: vibroimpact ssp import two.ssp --parameters soft.ssv --parameters hard.ssv -o sweep.toml
+    """
+    from vibroimpact.orchestrator.commands.ssp import import_to_scene
+
+    import_to_scene(archive, output, changes or (), parameters or (), force)

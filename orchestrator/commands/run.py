@@ -14,8 +14,8 @@ from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.campaign.manifest import holds_scene
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.failures import FAILED, counted, outcome_lines
-from vibroimpact.orchestrator.scene import load_scene
 from vibroimpact.orchestrator.scene.summary import in_one_line
+from vibroimpact.orchestrator.ssp import opened_scene
 
 
 def run_to_dataset(scene: Path, output: Path, changes: Sequence[str], force: bool) -> None:
@@ -27,7 +27,7 @@ def run_to_dataset(scene: Path, output: Path, changes: Sequence[str], force: boo
         The only run failed.
     """
     began = time.perf_counter()
-    loaded = load_scene(scene, changes)
+    loaded = opened_scene(scene, changes)
     refuse_outputs([scene], output)
     refuse_overwriting(output, force, lambda there: holds_scene(there, loaded))
     with shown_progress() as progress:

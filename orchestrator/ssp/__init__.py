@@ -2,7 +2,25 @@
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.ssp.exporting import export_system
-from vibroimpact.orchestrator.ssp.importing import Imported, import_system, load_system, opened_scene
+from vibroimpact.orchestrator.ssp.opening import opened_scene
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.ssp.exporting import export_system
+    from vibroimpact.orchestrator.ssp.importing import Imported, import_system, load_system
+
+_HOMES = {"export_system": "exporting"} | dict.fromkeys(
+    ("Imported", "import_system", "load_system"), "importing"
+)
 __all__ = ["Imported", "export_system", "import_system", "load_system", "opened_scene"]
+
+
+if not TYPE_CHECKING:  # else every name would be one
+
+    def __getattr__(name: str) -> object:
+        # what reads model descriptions takes time to load, and most scenes are no systems
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        import importlib
+
+        return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -6,19 +6,22 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path as FilePath
 from pathlib import PurePosixPath
 from typing import Any
 
 import tomli_w
+import tomlkit
 
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import FOLDERS
-from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
+from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, component_facts
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.archive import SspArchive
@@ -29,7 +32,6 @@ from vibroimpact.orchestrator.ssp.refusal import RefusalError
 from vibroimpact.orchestrator.ssp.scene_tables import scene_tables
 from vibroimpact.orchestrator.ssp.structure import Component
 
-ENDING = ".ssp"
 _PLAIN = re.compile(r"[^A-Za-z0-9_.-]")
 _scratch: list[ScratchFolder] = []
 """Folders of systems that run from their archives; they go at the end of the process."""
@@ -51,21 +53,11 @@ class Imported:
     notes: tuple[str, ...]
 
 
-def opened_scene(path: FilePath, changes: Sequence[str] = ()) -> Scene:
-    """Return the scene of a file: a scene file (TOML) or a system (SSP).
-
-    Raises
-    ------
-    SceneError, ComponentFileError
-        What is wrong with it.
-    """
-    if path.suffix.lower() == ENDING:
-        return load_system(path, changes).scene
-    return load_scene(path, changes)
-
-
 def load_system(
-    path: FilePath, changes: Sequence[str] = (), parameters: Sequence[FilePath] = (), name: str = "system"
+    path: str | PathLike[str],
+    changes: Sequence[str] = (),
+    parameters: Sequence[str | PathLike[str]] = (),
+    name: str = "system",
 ) -> Imported:
     """Read an SSP archive as a scene.
 
@@ -93,9 +85,9 @@ def load_system(
     place = FilePath(folder.name)
     source = str(place / f"{name}.toml")
     try:
-        with _told_of(path, source), SspArchive(path) as archive:
-            tables, notes = _read(archive, place / f"{name}_fmus", parameters)
-            scene = parse_scene(tomli_w.dumps(tables), source, changes)
+        with _told_of(FilePath(path), source), SspArchive(FilePath(path)) as archive:
+            tables, notes = _read(archive, place / f"{name}_fmus", [FilePath(one) for one in parameters])
+            scene = parse_scene(_text(tables), source, changes)
     except BaseException:
         folder.cleanup()
         raise
@@ -104,10 +96,10 @@ def load_system(
 
 
 def import_system(
-    path: FilePath,
-    output: FilePath,
+    path: str | PathLike[str],
+    output: str | PathLike[str],
     changes: Sequence[str] = (),
-    parameters: Sequence[FilePath] = (),
+    parameters: Sequence[str | PathLike[str]] = (),
     *,
     force: bool = False,
 ) -> Imported:
@@ -127,10 +119,11 @@ def import_system(
     SceneError, ComponentFileError, UsageError
         As `load_system`; or a file is there, or cannot be written.
     """
-    imported = load_system(path, changes, parameters, output.stem)
-    fmus = f"{output.stem}_fmus"
-    made = {output.parent / fmus / file.name: file.read_bytes() for file in _files(imported.scene, fmus)}
-    made[output] = imported.scene.text.encode("utf-8")
+    target = FilePath(output)
+    imported = load_system(path, changes, parameters, target.stem)
+    fmus = f"{target.stem}_fmus"
+    made = {target.parent / fmus / file.name: file.read_bytes() for file in _files(imported.scene, fmus)}
+    made[target] = imported.scene.text.encode("utf-8")
     for file, content in made.items():
         _refuse_another(file, content, force)
     for file, content in made.items():
@@ -142,6 +135,15 @@ def import_system(
                 f"{file}: expected a file that can be written, got: {error.strerror}."
             ) from error
     return imported
+
+
+def _text(tables: Mapping[str, Any]) -> str:
+    """Return the text of a scene as a person would write it; where an odd name is in the way, another that says it."""
+    text = tomlkit.dumps(tables)
+    try:
+        return text if parse_toml(text) == tables else tomli_w.dumps(tables)
+    except ValueError:
+        return tomli_w.dumps(tables)
 
 
 def _files(scene: Scene, fmus: str) -> list[FilePath]:

@@ -72,15 +72,17 @@ def scene_tables(
     facts : mapping of Path to ComponentFacts
     """
     names, values = names_of(list(flat.components)), flat.start_values()
-    tables, notes = noted_tables(structure), []
+    noted, notes = noted_tables(structure), []
     if flat.ignored:
         more = f" and {len(flat.ignored) - 5} more" if len(flat.ignored) > 5 else ""
         notes.append(f"parameters of no variable, which were left out: {', '.join(flat.ignored[:5])}{more}")
-    tables.setdefault("scene", {"title": structure.name, "units": "SI"})
+    head = noted.pop("scene", {"title": structure.name, "units": "SI"})
+    tables: dict[str, Any] = {"scene": head}
     tables["component"] = {name: _component(fmus[path], values[path]) for path, name in names.items()}
     links = flat.links()
     if links:
         tables["connection"] = [_connection(link, names) for link in links]
+    tables |= noted
     notes += _times(tables, structure, facts.values(), connected=bool(links))
     notes += _record(tables, flat, names, facts)
     return tables, notes

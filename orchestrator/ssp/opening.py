@@ -1,0 +1,35 @@
+"""A scene from a file of either kind: a scene file (TOML) or a system (SSP)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from vibroimpact.orchestrator.scene import Scene, load_scene
+
+ENDING = ".ssp"
+
+
+def opened_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:
+    """Return the scene of a file; the FMUs of a system lie unpacked until this process ends.
+
+    Parameters
+    ----------
+    path : path
+        A scene file (TOML), or a system, whose name ends in `.ssp`.
+    changes : sequence of str
+        `KEY=VALUE`, made before anything is checked.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the file, each on one line.
+    ComponentFileError
+        The archive, or an FMU in it, is unsafe or damaged.
+    """
+    if Path(path).suffix.lower() != ENDING:
+        return load_scene(path, changes)
+    from vibroimpact.orchestrator.ssp.importing import load_system
+
+    return load_system(path, changes).scene
