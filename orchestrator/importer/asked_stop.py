@@ -19,6 +19,9 @@ PROBES = 40
 PROBE_MISFIT = 0.2
 #: The energy of a spring grows with the depth to the power 2, of an elastic contact of two bodies 2.5.
 ENERGY_EXPONENT = 2.25
+#: Search for a surface: its first way, times (1 + |displacement|), m, and how often the way is doubled.
+FIRST_WAY = 1e-9
+WAYS = 60
 #: How the search goes deeper where the stop does not answer yet.
 DEEPER = 16.0
 
@@ -134,17 +137,29 @@ class AskedStop:
             values[1] = self.sign * velocity
         self._inputs.set()
 
-    def find_surface(self, free: float, inside: float, velocity: float, size: float) -> None:
-        """Find where its force begins between a displacement without force and one with it, to rounding."""
+    def search_surface(self, displacement: float, velocity: float, size: float) -> None:
+        """Search where its force begins, from this motion on; nothing is found where it never answers.
+
+        Further and further ways are tried, in where it is free and out where it is pressed.
+        """
+        pressed = self.force(displacement, velocity, size) > 0.0
+        way = FIRST_WAY * (1.0 + abs(displacement)) * (-1.0 if pressed else 1.0)
+        for _ in range(WAYS):
+            other = displacement + way
+            if (self.force(other, velocity, size) > 0.0) != pressed:
+                self.surface = self._surface_between(*sorted((displacement, other)), velocity, size)
+                return
+            way *= 2.0
+
+    def _surface_between(self, free: float, inside: float, velocity: float, size: float) -> float:
         while True:
             middle = 0.5 * (free + inside)
-            if not min(free, inside) < middle < max(free, inside):
-                break
+            if not free < middle < inside:
+                return inside
             if self.force(middle, velocity, size) > 0.0:
                 inside = middle
             else:
                 free = middle
-        self.surface = free
 
     def free(self) -> None:
         """Give back its saved states, before it is freed."""

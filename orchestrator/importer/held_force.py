@@ -43,6 +43,11 @@ SLACK = 1.5
 LEFT = 1e-9
 #: Part of a step within which a force that has fallen to 0 fell at the end of it.
 AT_END = 1e-6
+#: Steps are not shorter than this times (1 + |time|), s.
+ROOM = 1e-13
+#: An arrival is foreseen surely where accelerations change the velocity on the way to it by less than this part of
+#: it; else a part of the way is made first.
+SURE, NEARER = 1e-9, 0.75
 #: A step shorter than this times the one before says too little of accelerations.
 TELLING = 0.05
 #: Trial step: part of the communication step, change of the velocity relative to it, and rounds to get there.
@@ -120,6 +125,7 @@ class HeldForceBond:
         self.residual = 0.0
         self._other, self._other_slope = 0.0, 0.0
         self._told: tuple[float, float, float] | None = None
+        self._searched = False
         self._agreed = -math.inf
         self._depth: float | None = None
         self._limit = math.inf
@@ -129,24 +135,29 @@ class HeldForceBond:
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
         """Look at the contact before a step; returns where the step should end, s."""
-        self._steps, self._time = steps, time
+        self._steps, self._time, self._room = steps, time, ROOM * (1.0 + abs(time))
         self._start = self._look()
         self._stop.mark(time)
         self._force = 0.0
         self._last_try: tuple[float, float] | None = None
         was_closed, self.arrived = self.closed, False
         size = target - time
+        if not self.revisable and self._told is None:
+            size *= TRIAL_STEP  # how it is accelerated is not known yet
         with self._stop.asking():
+            if self._stop.surface is None and not self._searched:
+                self._stop.search_surface(*self._start, size)
+                self._searched = True
             self.closed = self._touches(*self._start, size)
             if self.closed:
                 if not was_closed:
                     self._begin_contact(size)
-                size = self._foresee(min(size, self._limit))
+                size = self._foresee(min(size, max(self._limit, self._room)))
             elif not self.revisable:
                 size = self._foreseen_arrival(size)
         self.active = self.closed or self.revisable
-        self._planned = size
-        return target if size == target - time else time + size
+        self._planned = target if size == target - time else time + size
+        return self._planned
 
     def apply(self) -> None:
         """Give the body its force."""
@@ -170,7 +181,7 @@ class HeldForceBond:
 
     def agree(self, time: float, end: float) -> None:
         """Before the step of a body that cannot repeat it: the step ends at `end`, s, wherever it was to end."""
-        if not self.revisable and self.closed and end - time != self._planned:
+        if not self.revisable and self.closed and end != self._planned:
             with self._stop.asking():
                 self._force = self._foreseen_force(end - time)
             self.apply()
@@ -181,12 +192,11 @@ class HeldForceBond:
             return
         path = self._path(size)
         with self._stop.asking():
-            touches = self._touches(path.end, path.end_velocity, size)
-            if self.closed or touches or (not self.revisable and self._inside(path) is not None):
-                moved = path.end - path.start
-                self.residual += self._work(path) - self._force * moved
-        if touches and not self.closed:
-            self.arrived = True
+            if self.closed:
+                self.residual += self._work(path) - self._force * (path.end - path.start)
+            elif self._inside(path) is not None:
+                self.arrived = True
+                self.residual += self._work(path)
         self._learn(path)
         self._stop.show(path.end, path.end_velocity)
 
@@ -245,23 +255,16 @@ class HeldForceBond:
         """Seconds into a free step at which the body is in the stop; None where it is nowhere."""
         if self._touches(path.end, path.end_velocity, path.size):
             if self._stop.surface is None:
-                self._stop.find_surface(path.start, path.end, abs(path.end_velocity), path.size)
+                self._stop.search_surface(path.end, path.end_velocity, path.size)
             return path.size
-        turn = path.turn
-        if turn is None:
-            return None
-        deepest = path.at(turn)[0]
-        if self._stop.surface is not None:
-            return turn * path.size if deepest > self._stop.surface else None
-        if not self._stop.force(deepest, 0.0, path.size) > 0.0:
-            return None
-        self._stop.find_surface(path.start, deepest, 0.0, path.size)
-        return turn * path.size
+        turn, surface = path.turn, self._stop.surface
+        return turn * path.size if turn and surface is not None and path.at(turn)[0] > surface else None
 
     def _time_of_arrival(self, time: float, path: StepPath, inside: float, precision: float) -> float | None:
         """Search the body's own way; None where it is not inside there after all."""
         surface = self._stop.surface
-        assert surface is not None
+        if surface is None:  # its force has no end on the way out
+            return None
 
         def gap(size: float) -> float:
             self.body.step_from_start(time, size)
@@ -288,7 +291,11 @@ class HeldForceBond:
         square = velocity * velocity + 2.0 * other * gap
         if square < 0.0 or not velocity + math.sqrt(square) > 0.0:
             return size
-        return min(size, 2.0 * gap / (velocity + math.sqrt(square)))
+        arrival = 2.0 * gap / (velocity + math.sqrt(square))
+        if arrival >= size:
+            return size
+        blurred = abs(self._other_slope) * arrival**2 > SURE * abs(velocity)
+        return max(self._room, NEARER * arrival if blurred else arrival)
 
     # ---- the beginning of a contact ----
 
@@ -395,7 +402,7 @@ class HeldForceBond:
             leaves = self._leaves(path)
             if leaves is None:
                 break
-            if leaves * size <= LEFT * min(whole, self._limit):
+            if leaves * size <= LEFT * min(whole, self._limit) + self._room:
                 self.closed, self._force = False, 0.0
                 return whole
             size *= leaves
