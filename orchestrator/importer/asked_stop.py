@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from ctypes import c_void_p
+from itertools import pairwise
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
+from vibroimpact.orchestrator.importer.step_path import NODES, StepPath, last_true
 
 LOWER_SIDE = 2
 #: The number of ImpactStop's law that answers a coefficient of restitution, and no force.
@@ -19,6 +21,8 @@ PROBES = 40
 PROBE_MISFIT = 0.2
 #: The energy of a spring grows with the depth to the power 2, of an elastic contact of two bodies 2.5.
 ENERGY_EXPONENT = 2.25
+#: Part of a step within which a force that has fallen to 0 fell at the end of it.
+AT_END = 1e-6
 #: Search for a surface: its first way, times (1 + |displacement|), m, and how often the way is doubled.
 FIRST_WAY = 1e-9
 WAYS = 60
@@ -83,6 +87,11 @@ class AskedStop:
         self._law = component.group("Int64", ["law"]) if known else None
         self._start, self._now = c_void_p(), c_void_p()
 
+    @property
+    def is_rigid(self) -> bool:
+        """Does it answer with a coefficient of restitution, and no force?"""
+        return self._law is not None and int(self._law.get()[0]) == RESTITUTION
+
     def begin(self) -> None:
         """Start a run: the parameters are set.
 
@@ -91,7 +100,7 @@ class AskedStop:
         ComponentError
             It answers with a coefficient of restitution.
         """
-        if self._law is not None and int(self._law.get()[0]) == RESTITUTION:
+        if self.is_rigid:
             raise ComponentError(
                 f"{self._spec.stop}.law: expected a law with a force for {self._spec.body}, whose velocity nobody can "
                 "set, got restitution. Use kelvin_voigt, hertz or hunt_crossley.",
@@ -147,7 +156,9 @@ class AskedStop:
         for _ in range(WAYS):
             other = displacement + way
             if (self.force(other, velocity, size) > 0.0) != pressed:
-                self.surface = self._surface_between(*sorted((displacement, other)), velocity, size)
+                self.surface = self._surface_between(
+                    min(displacement, other), max(displacement, other), velocity, size
+                )
                 return
             way *= 2.0
 
@@ -160,6 +171,46 @@ class AskedStop:
                 inside = middle
             else:
                 free = middle
+
+    def work(self, path: StepPath) -> float:
+        """Work that the law of the stop takes from the body on a way, J."""
+        work = 0.0
+        for begin, finish in pairwise(self._marks(path)):
+            for u, weight in NODES:
+                at = begin + u * (finish - begin)
+                displacement, velocity = path.at(at)
+                power = self.force(displacement, velocity, at * path.size) * velocity
+                work += weight * power * (finish - begin) * path.size
+        return work
+
+    def _marks(self, path: StepPath) -> list[float]:
+        """Fractions of a step between which the force is smooth: where it begins and ends."""
+
+        def is_pressed(u: float) -> bool:
+            return self.force(*path.at(u), path.size) > 0.0
+
+        def is_free(u: float) -> bool:
+            return not is_pressed(u)
+
+        first, last = is_pressed(AT_END), is_pressed(1.0 - AT_END)
+        if first and not last:
+            return [0.0, last_true(is_pressed, AT_END)]
+        if last and not first:
+            return [last_true(is_free), 1.0]
+        turn = path.turn
+        if turn is None or first or not is_pressed(turn):
+            return [0.0, 1.0]
+        return [last_true(is_free, 0.0, turn), turn, last_true(is_pressed, turn)]
+
+    def leaves(self, path: StepPath) -> float | None:
+        """Fraction of a step at which the force has fallen to 0; None where it has not, or at its end."""
+
+        def is_pressed(u: float) -> bool:
+            return self.force(*path.at(u), path.size) > 0.0
+
+        if is_pressed(1.0) or is_pressed(1.0 - AT_END) or not is_pressed(AT_END):
+            return None
+        return last_true(is_pressed, AT_END)
 
     def free(self) -> None:
         """Give back its saved states, before it is freed."""

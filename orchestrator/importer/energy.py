@@ -21,6 +21,7 @@ from vibroimpact.orchestrator.importer.component import description_of
 from vibroimpact.orchestrator.importer.contact_bond import ContactBond
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.plain_contacts import PlainContact, plain_contact
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.step_path import POINTS, WEIGHTS
 from vibroimpact.orchestrator.importer.wiring import connection_name
@@ -46,7 +47,10 @@ def force_connections(
     """Return the names of the connections whose energy residual is summed, and of the contacts behind them."""
     variables = {c.name: {v.name for v in description_of(c.fmu).modelVariables} for c in components}
     forces = [
-        connection_name(c) for c in connections if conjugate_displacement(variables[c.target[0]], c.target[1])
+        connection_name(c)
+        for c in connections
+        if conjugate_displacement(variables[c.target[0]], c.target[1])
+        or plain_contact(variables, connections, c)
     ]
     return (*forces, *(contact.name for contact in contacts))
 
@@ -73,7 +77,7 @@ class _Connection:
         self._gain = gain
         self.residual = 0.0
 
-    def before(self) -> None:
+    def before(self, time: float) -> None:
         self._force_start = self._gain * float(self._source.get()[0])
         self._displacement_start = float(self._displacement.get()[0])
 
@@ -103,7 +107,7 @@ class _Contact:
     def begin(self, gain: float) -> None:
         self.residual = 0.0
 
-    def before(self) -> None:
+    def before(self, time: float) -> None:
         pass
 
     def after(self, time: float, end: float) -> None:
@@ -180,13 +184,19 @@ class InterfaceEnergy:
 
     def __init__(self, importer: Importer, connections: Sequence[ConnectionSpec]) -> None:
         bonds = {f"{bond.name}.applied_force": bond for bond in importer.contacts.ports}
-        found: list[tuple[ConnectionSpec, _Connection | _Contact]] = []
+        found: list[tuple[ConnectionSpec, _Connection | _Contact | PlainContact]] = []
+        self._plain: list[PlainContact] = []
+        variables = {name: component.variables for name, component in importer.components.items()}
         for connection in connections:
             target = importer.components[connection.target[0]]
             displacement = conjugate_displacement(target.variables, connection.target[1])
             bond = bonds.get(".".join(connection.target))
+            contact = plain_contact(variables, connections, connection)
             if bond is not None:
                 found.append((connection, _Contact(bond)))
+            elif contact is not None:
+                self._plain.append(PlainContact(importer.components, connection, contact))
+                found.append((connection, self._plain[-1]))
             elif displacement is not None:
                 found.append((connection, _Connection(importer, connection, displacement)))
         self._held = importer.contacts.held
@@ -209,9 +219,18 @@ class InterfaceEnergy:
         """Residual of each connection so far, J."""
         return np.array([watched.residual for watched in (*self._connections, *self._held)])
 
+    def remarks(self) -> list[str]:
+        """What a reader of the results must know of stops whose forces are plain connections."""
+        return [text for text in (contact.remark() for contact in self._plain) if text]
+
+    def free(self) -> None:
+        """Give back saved states, before the components are freed."""
+        for contact in self._plain:
+            contact.free()
+
     def _before(self, time: float) -> None:
         for watched in self._connections:
-            watched.before()
+            watched.before(time)
 
     def _after(self, time: float, end: float) -> None:
         for watched in self._connections:

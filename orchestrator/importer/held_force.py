@@ -17,7 +17,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from ctypes import c_void_p
-from itertools import pairwise
 
 import numpy as np
 
@@ -26,10 +25,7 @@ from vibroimpact.orchestrator.importer.asked_stop import AskedStop, depth_that_s
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.revision import PRECISION, Bracket, refine
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
-from vibroimpact.orchestrator.importer.step_path import POINTS, WEIGHTS, StepPath, last_true
-
-#: Points of a way, as fractions of it, with their weights.
-NODES = tuple(zip(POINTS.tolist(), WEIGHTS.tolist(), strict=True))
+from vibroimpact.orchestrator.importer.step_path import NODES, StepPath, last_true
 
 #: A body on the surface is there within this times its displacement and the surface's.
 SURFACE_ROUNDING = 4.0 * np.finfo(float).eps
@@ -41,8 +37,6 @@ FORESIGHTS, SHORTENINGS = 12, 6
 SLACK = 1.5
 #: A way out of the stop shorter than this, times the limit of a step, is none: the body has left.
 LEFT = 1e-9
-#: Part of a step within which a force that has fallen to 0 fell at the end of it.
-AT_END = 1e-6
 #: Steps are not shorter than this times (1 + |time|), s.
 ROOM = 1e-13
 #: An arrival is foreseen surely where accelerations change the velocity on the way to it by less than this part of
@@ -193,10 +187,10 @@ class HeldForceBond:
         path = self._path(size)
         with self._stop.asking():
             if self.closed:
-                self.residual += self._work(path) - self._force * (path.end - path.start)
+                self.residual += self._stop.work(path) - self._force * (path.end - path.start)
             elif self._inside(path) is not None:
                 self.arrived = True
-                self.residual += self._work(path)
+                self.residual += self._stop.work(path)
         self._learn(path)
         self._stop.show(path.end, path.end_velocity)
 
@@ -399,7 +393,7 @@ class HeldForceBond:
             if size > SLACK * scale:
                 size = scale
                 continue
-            leaves = self._leaves(path)
+            leaves = self._stop.leaves(path)
             if leaves is None:
                 break
             if leaves * size <= LEFT * min(whole, self._limit) + self._room:
@@ -418,21 +412,11 @@ class HeldForceBond:
         stiffness = risen / moved
         return math.pi * math.sqrt(self.mass / stiffness) / self._steps if stiffness > 0.0 else math.inf
 
-    def _leaves(self, path: StepPath) -> float | None:
-        """Fraction of a step at which the force has fallen to 0; None where it has not, or at its end."""
-
-        def is_pressed(u: float) -> bool:
-            return self._stop.force(*path.at(u), path.size) > 0.0
-
-        if is_pressed(1.0) or is_pressed(1.0 - AT_END) or not is_pressed(AT_END):
-            return None
-        return last_true(is_pressed, AT_END)
-
     def _mean_force(self, path: StepPath) -> float:
         """The force that does over a step the work of the stop's law, N."""
         moved = path.end - path.start
         if path.start_velocity * path.end_velocity >= 0.0 and moved != 0.0:
-            return max(0.0, self._work(path) / moved)
+            return max(0.0, self._stop.work(path) / moved)
         mean = 0.0
         for u, weight in NODES:
             displacement, velocity = path.at(u)
@@ -440,36 +424,6 @@ class HeldForceBond:
             whole = self._stop.force(displacement, velocity, u * path.size)
             mean += weight * (elastic + whole - self._stop.force(displacement, 0.0, u * path.size))
         return max(0.0, mean)
-
-    def _work(self, path: StepPath) -> float:
-        """Work that the law of the stop takes from the body on a way, J."""
-        work = 0.0
-        for begin, finish in pairwise(self._marks(path)):
-            for u, weight in NODES:
-                at = begin + u * (finish - begin)
-                displacement, velocity = path.at(at)
-                power = self._stop.force(displacement, velocity, at * path.size) * velocity
-                work += weight * power * (finish - begin) * path.size
-        return work
-
-    def _marks(self, path: StepPath) -> list[float]:
-        """Fractions of a step between which the force is smooth: where it begins and ends."""
-
-        def is_pressed(u: float) -> bool:
-            return self._stop.force(*path.at(u), path.size) > 0.0
-
-        def is_free(u: float) -> bool:
-            return not is_pressed(u)
-
-        first, last = is_pressed(AT_END), is_pressed(1.0 - AT_END)
-        if first and not last:
-            return [0.0, last_true(is_pressed, AT_END)]
-        if last and not first:
-            return [last_true(is_free), 1.0]
-        turn = path.turn
-        if turn is None or first or not is_pressed(turn):
-            return [0.0, 1.0]
-        return [last_true(is_free, 0.0, turn), turn, last_true(is_pressed, turn)]
 
     def _corrects(self, wanted: float) -> bool:
         """Take the force that the end of a step asks for; returns whether it is another one."""

@@ -21,6 +21,8 @@ def points_of_a_way() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 
 POINTS, WEIGHTS = points_of_a_way()
+#: The same as pairs of numbers.
+NODES = tuple(zip(POINTS.tolist(), WEIGHTS.tolist(), strict=True))
 #: Halvings that find where something changes on a way: to the last bit of a fraction of it.
 HALVINGS = 52
 

@@ -120,7 +120,7 @@ class GeneralRunner:
 
     def _rebuild(self) -> None:
         """Make all components anew."""
-        self._importer.free()
+        self.close()
         self._build()
 
     def _run(self, scene: Scene) -> tuple[Outcome, str]:
@@ -171,6 +171,7 @@ class GeneralRunner:
             for name, component in self._importer.components.items()
             if component.instance.changed_rounding
         ]
+        remarks += self._energy.remarks()
         if self._importer.wants_to_end:
             remarks.append(f"a component asked for the end at time {self._importer.time:.17g}")
             if self._importer.overrun > self._importer.time:
@@ -228,4 +229,5 @@ class GeneralRunner:
 
     def close(self) -> None:
         """Free the components."""
+        self._energy.free()
         self._importer.free()

@@ -1,0 +1,141 @@
+"""Stops whose force goes to a body by plain connections: what such an exchange adds to the energy of their contacts.
+
+A plain force is that of the start of a step, or of the step before, and is held over a step: a lossless contact of n
+steps gains about 5/n of its energy. Nothing of a run shows it but its energy, so it is summed and told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+
+from vibroimpact.orchestrator.importer.asked_stop import AskedStop
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.specification import ConnectionSpec, StopContactSpec
+from vibroimpact.orchestrator.importer.step_path import StepPath
+from vibroimpact.orchestrator.importer.wiring import connection_name
+
+#: What an ImpactStop has beside the force; other components with a force need not be stops.
+FORCE, ANSWER, DISPLACEMENT, VELOCITY = "applied_force", "applied_restitution", "displacement", "velocity"
+#: A part of the energy of its contacts that a connection may add without a word.
+UNTOLD = 1e-6
+
+
+def plain_contact(
+    variables: Mapping[str, Container[str]], connections: Sequence[ConnectionSpec], force: ConnectionSpec
+) -> StopContactSpec | None:
+    """Return the contact that a plain connection of an ImpactStop's force closes; None where it closes none.
+
+    Parameters
+    ----------
+    variables : mapping
+        The names of the variables of each component.
+    connections : sequence of ConnectionSpec
+        All of an importer.
+    force : ConnectionSpec
+        The one in question.
+    """
+    (stop, output), (body, target) = force.source, force.target
+    port = target.rpartition(".")[0]
+    if output != FORCE or ANSWER not in variables[stop] or f"{port}.law" in variables[body]:
+        return None
+    told = {c.target[1]: c for c in connections if c.target[0] == stop and c.source[0] == body}
+    if DISPLACEMENT not in told or any(connection.gain != 1.0 for connection in told.values()):
+        return None
+    velocity = told.get(VELOCITY)
+    return StopContactSpec(
+        body,
+        told[DISPLACEMENT].source[1],
+        told[DISPLACEMENT].source[1] if velocity is None else velocity.source[1],
+        target,
+        stop,
+        stop_velocity=None if velocity is None else VELOCITY,
+    )
+
+
+class PlainContact:
+    """A stop whose force a body gets by a plain connection.
+
+    Attributes
+    ----------
+    residual : float
+        Energy that the body was given beyond the law of the stop, J.
+    """
+
+    def __init__(
+        self, components: Mapping[str, Component], connection: ConnectionSpec, spec: StopContactSpec
+    ) -> None:
+        self._name, self._spec = connection_name(connection), spec
+        self._stop = AskedStop(components[spec.stop], spec)
+        body = components[spec.body]
+        self._motion = body.group("Float64", [spec.displacement, spec.velocity])
+        self._applied = body.group("Float64", [spec.force])
+        self._yields = False
+        self.begin(connection.gain)
+
+    def begin(self, gain: float) -> None:
+        """Start a run with this gain."""
+        self._gain = gain
+        self._begun = False
+        self._work = self._stored = self._energy = 0.0
+        self._steps = self._contacts = 0
+        self.residual = 0.0
+
+    def before(self, time: float) -> None:
+        """Note the start of a step."""
+        if not self._begun:
+            self._yields = not self._stop.is_rigid
+            if self._yields:
+                self._stop.begin()
+            self._begun = True
+        if self._yields:
+            self._start = self._look()
+            self._stop.mark(time)
+
+    def after(self, time: float, end: float) -> None:
+        """Compare the work of the force over the step with that of the law."""
+        if not (self._yields and end > time):
+            return
+        path = StepPath(*self._start, *self._look(), end - time)
+        surface = self._stop.surface
+        if surface is not None and max(path.start, path.end) < surface and path.turn is None:
+            work = 0.0
+        else:
+            with self._stop.asking():
+                work = self._stop.work(path)
+        moved = self._stop.sign * (path.end - path.start)
+        self.residual += float(self._applied.get()[0]) * moved - self._gain * self._stop.sign * work
+        self._count(work)
+
+    def remark(self) -> str:
+        """What a reader of the results must know; empty where there is nothing."""
+        energy = self._energy + self._stored
+        if not abs(self.residual) > UNTOLD * energy:
+            return ""
+        steps = self._steps / max(1, self._contacts)
+        changed = f"{'added' if self.residual > 0.0 else 'taken'} {abs(self.residual):.3g} J"
+        return (
+            f"{self._name}: the force of a stop by a plain connection has {changed}, {abs(self.residual) / energy:.2g} "
+            f"of the energy of its contacts, at about {steps:.0f} steps a contact. Use [[contact]] with "
+            f'body = "{self._spec.body}" and stop = "{self._spec.stop}", which closes it'
+        )
+
+    def free(self) -> None:
+        """Give back its saved states, before its components are freed."""
+        self._stop.free()
+
+    def _look(self) -> tuple[float, float]:
+        displacement, velocity = (float(v) for v in self._motion.get())
+        if self._spec.stop_velocity is None:
+            velocity = 0.0
+        return self._stop.sign * displacement, self._stop.sign * velocity
+
+    def _count(self, work: float) -> None:
+        """Sum the energies that contacts have taken up, steps and contacts."""
+        if work == 0.0:
+            self._energy += self._stored
+            self._work = self._stored = 0.0
+            return
+        self._contacts += self._stored == 0.0 and self._work == 0.0
+        self._steps += 1
+        self._work += work
+        self._stored = max(self._stored, self._work)
