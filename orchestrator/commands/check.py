@@ -21,7 +21,7 @@ from vibroimpact.orchestrator.campaign.cluster import processor_count
 from vibroimpact.orchestrator.commands.failures import FAILED, counted
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.summary import effects, engine, laws
+from vibroimpact.orchestrator.scene.summary import contacts, effects, engine, laws
 from vibroimpact.orchestrator.ssp import opened_scene
 
 _WIDTH = 10
@@ -62,8 +62,11 @@ def _what_runs(scene: Scene) -> Iterator[tuple[str, str]]:
     yield "engine", engine(scene)
     if scene.stops:
         yield "stops", ", ".join(f"{stop} {law}" for stop, law in laws(scene).items())
+    if meeting := contacts(scene):
+        yield "contacts", "; ".join(f"{contact} {what}" for contact, what in meeting.items())
     known = effects(scene)
-    yield "effects", ", ".join(name for name, there in known.items() if there and name != "stops") or "none"
+    told = ("stops", "contacts")
+    yield "effects", ", ".join(name for name, there in known.items() if there and name not in told) or "none"
     yield "without", ", ".join(name for name, there in known.items() if not there)
 
 

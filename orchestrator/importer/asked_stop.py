@@ -61,6 +61,43 @@ def depth_that_stops(force_at: Callable[[float], float], energy: float, guess: f
     return None
 
 
+class ContactWork:
+    """The energy that contacts take up, from the work of each step.
+
+    Attributes
+    ----------
+    steps, contacts : int
+        So far.
+    """
+
+    def __init__(self) -> None:
+        self.steps = self.contacts = 0
+        self._energy = self._largest = self._sum = 0.0
+
+    @property
+    def energy(self) -> float:
+        """Sum of the largest energy that each contact has held, J."""
+        return self._energy + self._largest
+
+    def count(self, work: float) -> None:
+        """Take the work of the stop in a step, J; 0 between contacts."""
+        if work == 0.0:
+            self._energy += self._largest
+            self._largest = self._sum = 0.0
+            return
+        self.contacts += self._sum == 0.0 and self._largest == 0.0
+        self.steps += 1
+        self._sum += work
+        self._largest = max(self._largest, self._sum)
+
+    def share(self, residual: float) -> str:
+        """Return in words what a residual, J, has done to this energy."""
+        word = "added" if residual > 0.0 else "taken"
+        return (
+            f"{word} {abs(residual):.3g} J, {abs(residual) / self.energy:.2g} of the energy of its contacts"
+        )
+
+
 class AskedStop:
     """The stop of a contact, in the direction into it: displacements grow on the way in.
 

@@ -102,6 +102,10 @@ class ContactBonds:
             bond.end_step(size)
         return [bond.body for bond in self.held if bond.arrived]
 
+    def remarks(self) -> list[str]:
+        """What a reader of the results must know of held forces."""
+        return [text for text in (bond.remark() for bond in self.held) if text]
+
     def free(self) -> None:
         """Give back what they have saved."""
         for bond in self._all():

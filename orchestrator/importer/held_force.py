@@ -21,7 +21,7 @@ from ctypes import c_void_p
 import numpy as np
 
 from vibroimpact.fmus.errors import ComponentError
-from vibroimpact.orchestrator.importer.asked_stop import AskedStop, depth_that_stops
+from vibroimpact.orchestrator.importer.asked_stop import AskedStop, ContactWork, depth_that_stops
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.revision import PRECISION, Bracket, refine
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
@@ -37,6 +37,12 @@ FORESIGHTS, SHORTENINGS = 12, 6
 SLACK = 1.5
 #: A way out of the stop shorter than this, times the limit of a step, is none: the body has left.
 LEFT = 1e-9
+#: A way that turns within this part of a step from one of its ends does not turn within it.
+NOT_AT_ONCE = 1e-3
+#: Part of the energy of its contacts that a held force may add without a word.
+UNTOLD = 1e-3
+#: Velocities at the ends of such a step: one is less than this times the other.
+SLOW = 4e-3
 #: Steps are not shorter than this times (1 + |time|), s.
 ROOM = 1e-13
 #: An arrival is foreseen surely where accelerations change the velocity on the way to it by less than this part of
@@ -117,6 +123,7 @@ class HeldForceBond:
         self.mass = self.given_mass
         self.active = self.closed = self.arrived = False
         self.residual = 0.0
+        self._work = ContactWork()
         self._other, self._other_slope = 0.0, 0.0
         self._told: tuple[float, float, float] | None = None
         self._searched = False
@@ -186,13 +193,20 @@ class HeldForceBond:
             return
         path = self._path(size)
         with self._stop.asking():
-            if self.closed:
-                self.residual += self._stop.work(path) - self._force * (path.end - path.start)
-            elif self._inside(path) is not None:
-                self.arrived = True
-                self.residual += self._stop.work(path)
+            touched = self.closed or self._inside(path) is not None
+            work = self._stop.work(path) if touched else 0.0
+        self._work.count(work)
+        self.residual += work - self._force * (path.end - path.start)
+        self.arrived = touched and not self.closed
         self._learn(path)
         self._stop.show(path.end, path.end_velocity)
+
+    def remark(self) -> str:
+        """What a reader of the results must know; empty where there is nothing."""
+        if not abs(self.residual) > UNTOLD * self._work.energy:
+            return ""
+        why = "" if self.revisable else f" of {self._spec.body}, which cannot restore its state,"
+        return f"{self.name}: the held force{why} has {self._work.share(self.residual)}. Use a shorter macro_step"
 
     def _look(self) -> tuple[float, float]:
         displacement, velocity = (float(v) for v in self._outputs.get())
@@ -393,7 +407,10 @@ class HeldForceBond:
             if size > SLACK * scale:
                 size = scale
                 continue
-            leaves = self._stop.leaves(path)
+            turn, leaves = path.turn, self._stop.leaves(path)
+            if turn is not None and NOT_AT_ONCE < turn < 1.0 - NOT_AT_ONCE:
+                size *= turn
+                continue
             if leaves is None:
                 break
             if leaves * size <= LEFT * min(whole, self._limit) + self._room:
@@ -415,7 +432,8 @@ class HeldForceBond:
     def _mean_force(self, path: StepPath) -> float:
         """The force that does over a step the work of the stop's law, N."""
         moved = path.end - path.start
-        if path.start_velocity * path.end_velocity >= 0.0 and moved != 0.0:
+        slow, fast = sorted((path.start_velocity, path.end_velocity), key=abs)
+        if moved != 0.0 and (slow * fast >= 0.0 or abs(slow) <= SLOW * abs(fast)):
             return max(0.0, self._stop.work(path) / moved)
         mean = 0.0
         for u, weight in NODES:

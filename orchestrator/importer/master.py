@@ -149,8 +149,9 @@ class Importer:
         self._start_moves = moves_of(behind) or None
         self._moves_after_loops = moves_of(t for t in behind if t not in self._looping)
         paths = [(c, moves_of(self._fresh[c.name]) or None, self._bare_step(c)) for c in self._order]
-        # a step may be repeated: those that cannot go back wait for the last repetition
-        repeats = self._iterates or bool(self.contacts)
+        repeats = self._iterates or bool(
+            self.contacts
+        )  # those that cannot go back wait for the last repetition
         self._paths = [path for path in paths if path[0].has_states or not repeats]
         self._stateless_paths = [path for path in paths if not path[0].has_states and repeats]
         self._event_mode = EventMode(self._order, self.transfers, behind)
@@ -258,8 +259,7 @@ class Importer:
             contacts.apply()
         if self._prepares or self.keeps_start or contacts.active:
             self._prepare(time)
-        watchers = self.watchers
-        for watcher in watchers:
+        for watcher in self.watchers:
             watcher.before(time)
         overtaken = self._step_all(time, target, made)
         if overtaken is not None or self._iterates:
@@ -272,11 +272,10 @@ class Importer:
         if contacts:
             self._at_event += contacts.end_step(self._reached - time)
         end = self._reached
-        if end > time:
-            self._standstill = 0
-        else:
-            self._count_standstill(time)
-        for watcher in watchers:
+        self._standstill = 0 if end > time else self._standstill + 1
+        if self._standstill > STANDSTILLS:
+            raise standstill_error(self._stopper.instance, STANDSTILLS, time)
+        for watcher in self.watchers:
             watcher.after(time, end)
         self.time = end
         self.steps += 1
@@ -439,11 +438,6 @@ class Importer:
             self._at_event.append(watch.component)
             return target
         return time + located
-
-    def _count_standstill(self, time: float) -> None:
-        self._standstill += 1
-        if self._standstill > STANDSTILLS:
-            raise standstill_error(self._stopper.instance, STANDSTILLS, time)
 
     # ---- events ----
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 
-from vibroimpact.orchestrator.importer.asked_stop import AskedStop
+from vibroimpact.orchestrator.importer.asked_stop import AskedStop, ContactWork
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.step_path import StepPath
@@ -76,8 +76,7 @@ class PlainContact:
         """Start a run with this gain."""
         self._gain = gain
         self._begun = False
-        self._work = self._stored = self._energy = 0.0
-        self._steps = self._contacts = 0
+        self._work = ContactWork()
         self.residual = 0.0
 
     def before(self, time: float) -> None:
@@ -104,19 +103,17 @@ class PlainContact:
                 work = self._stop.work(path)
         moved = self._stop.sign * (path.end - path.start)
         self.residual += float(self._applied.get()[0]) * moved - self._gain * self._stop.sign * work
-        self._count(work)
+        self._work.count(work)
 
     def remark(self) -> str:
         """What a reader of the results must know; empty where there is nothing."""
-        energy = self._energy + self._stored
-        if not abs(self.residual) > UNTOLD * energy:
+        if not abs(self.residual) > UNTOLD * self._work.energy:
             return ""
-        steps = self._steps / max(1, self._contacts)
-        changed = f"{'added' if self.residual > 0.0 else 'taken'} {abs(self.residual):.3g} J"
+        steps = self._work.steps / max(1, self._work.contacts)
         return (
-            f"{self._name}: the force of a stop by a plain connection has {changed}, {abs(self.residual) / energy:.2g} "
-            f"of the energy of its contacts, at about {steps:.0f} steps a contact. Use [[contact]] with "
-            f'body = "{self._spec.body}" and stop = "{self._spec.stop}", which closes it'
+            f"{self._name}: the force of a stop by a plain connection has {self._work.share(self.residual)}, at about "
+            f'{steps:.0f} steps a contact. Use [[contact]] with body = "{self._spec.body}" and '
+            f'stop = "{self._spec.stop}", which closes it'
         )
 
     def free(self) -> None:
@@ -128,14 +125,3 @@ class PlainContact:
         if self._spec.stop_velocity is None:
             velocity = 0.0
         return self._stop.sign * displacement, self._stop.sign * velocity
-
-    def _count(self, work: float) -> None:
-        """Sum the energies that contacts have taken up, steps and contacts."""
-        if work == 0.0:
-            self._energy += self._stored
-            self._work = self._stored = 0.0
-            return
-        self._contacts += self._stored == 0.0 and self._work == 0.0
-        self._steps += 1
-        self._work += work
-        self._stored = max(self._stored, self._work)

@@ -171,7 +171,7 @@ class GeneralRunner:
             for name, component in self._importer.components.items()
             if component.instance.changed_rounding
         ]
-        remarks += self._energy.remarks()
+        remarks += [*self._importer.contacts.remarks(), *self._energy.remarks()]
         if self._importer.wants_to_end:
             remarks.append(f"a component asked for the end at time {self._importer.time:.17g}")
             if self._importer.overrun > self._importer.time:

@@ -46,6 +46,15 @@ def laws(scene: Scene) -> dict[str, str]:
     return {f"stop[{number}]": stop.law for number, stop in enumerate(scene.stops, start=1)}
 
 
+def contacts(scene: Scene) -> dict[str, str]:
+    """Return what meets what in each contact of a general scene, by the key of the contact."""
+    found = () if scene.general is None else scene.general.contacts
+    return {
+        f"contact[{number}]": f"{contact.body}.{contact.displacement} on {contact.stop}, force held over a step"
+        for number, contact in enumerate(found, start=1)
+    }
+
+
 def effects(scene: Scene) -> dict[str, bool]:
     """Return by its name whether a scene calls for an effect, at one of its points at least."""
     common = {
@@ -54,7 +63,11 @@ def effects(scene: Scene) -> dict[str, bool]:
         "guard process": scene.general.guard if scene.general is not None else scene.execution.guard,
     }
     if scene.general is not None:
-        found = {"connections": bool(scene.general.connections), "watched events": bool(scene.general.events)}
+        found = {
+            "connections": bool(scene.general.connections),
+            "contacts": bool(scene.general.contacts),
+            "watched events": bool(scene.general.events),
+        }
         return found | common
     called, series = _called_by_numbers(scene), scene.record.time_series
     followed = not isinstance(scene.body, OscillatorBody) and series is not None
@@ -90,6 +103,6 @@ def _called_by_numbers(scene: Scene) -> set[str]:
 
 def in_one_line(scene: Scene) -> str:
     """Return engine, laws and effects as one line."""
-    stops = [f"{stop} {law}" for stop, law in laws(scene).items()]
-    called = [name for name, there in effects(scene).items() if there and name != "stops"]
+    stops = [f"{key} {what}" for key, what in (laws(scene) | contacts(scene)).items()]
+    called = [name for name, there in effects(scene).items() if there and name not in ("stops", "contacts")]
     return "; ".join(part for part in (engine(scene), ", ".join(stops), ", ".join(called)) if part)

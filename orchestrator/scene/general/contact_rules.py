@@ -15,6 +15,7 @@ from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, 
 #: Variables of a stop that say which law it follows, on which side it is; and the law without a force.
 LAW, SIDE, RESTITUTION = "law", "side", 1
 VELOCITY = "velocity"
+SIDES = {"upper": 1, "lower": 2}
 
 
 def contact_problems(draft: GeneralDraft) -> list[Problem]:
@@ -117,7 +118,7 @@ def _stops_answer_with_a_force(draft: GeneralDraft, place: int, table: StopConta
             "damping = ... }, hertz or hunt_crossley."
         )
         yield Problem(where, "a stop that yields", f"{table.stop} with the law restitution", hint)
-    own = SIDE in facts.variables
+    own = _says_its_side(facts)
     if own and table.side is not None:
         hint = f"Give it to the component: parameters = {{ side = {quoted(table.side)} }}."
         where = key_path(("contact", place, SIDE))
@@ -127,14 +128,18 @@ def _stops_answer_with_a_force(draft: GeneralDraft, place: int, table: StopConta
         yield Problem(key_path(("contact", place, SIDE)), '"upper" or "lower"', "nothing", hint)
 
 
+def _says_its_side(facts: ComponentFacts) -> bool:
+    """Is there a parameter `side` as an ImpactStop has it: upper 1, lower 2, also in a lean export?"""
+    side = facts.variables.get(SIDE)
+    if side is None or side.causality != "parameter":
+        return False
+    return side.items == SIDES if side.items else (side.kind, side.minimum, side.maximum) == ("integer", 1, 2)
+
+
 def _is_rigid(draft: GeneralDraft, table: StopContactTable, facts: ComponentFacts) -> bool:
     """Does a stop of ours answer with a coefficient of restitution? Its law is that unless another is given."""
     law = facts.variables.get(LAW)
-    if (
-        law is None
-        or law.items.get("restitution") != RESTITUTION
-        or "applied_restitution" not in facts.variables
-    ):
+    if law is None or "applied_restitution" not in facts.variables:
         return False
     swept = draft.document.get("sweep")
     if isinstance(swept, dict) and f"{table.stop}.{LAW}" in swept:
