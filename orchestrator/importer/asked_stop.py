@@ -120,8 +120,9 @@ class AskedStop:
         self._position = (
             component.group("Float64", ["position"]) if own and "position" in component.variables else None
         )
-        known = "law" in component.variables and "applied_restitution" in component.variables
-        self._law = component.group("Int64", ["law"]) if known else None
+        # an ImpactStop has no memory and answers at once
+        self._is_ours = "law" in component.variables and "applied_restitution" in component.variables
+        self._law = component.group("Int64", ["law"]) if self._is_ours else None
         self._start, self._now = c_void_p(), c_void_p()
 
     @property
@@ -149,8 +150,10 @@ class AskedStop:
 
     def mark(self, time: float) -> None:
         """Take its present state for that at the start of a step, at `time`, s."""
-        self.component.instance.save(self._start)
+        if not self._is_ours:
+            self.component.instance.save(self._start)
         self._time = time
+        self._last: tuple[StepPath, float] | None = None
 
     @contextmanager
     def asking(self) -> Iterator[None]:
@@ -169,6 +172,9 @@ class AskedStop:
 
     def force(self, displacement: float, velocity: float, size: float) -> float:
         """Return its force `size` s after the start of the step, for this motion into it, N."""
+        if self._is_ours:
+            self.show(displacement, velocity)
+            return float(self._answer.get()[0])
         instance = self.component.instance
         instance.restore(self._start)
         self.show(displacement, velocity)
@@ -210,15 +216,23 @@ class AskedStop:
                 free = middle
 
     def work(self, path: StepPath) -> float:
-        """Work that the law of the stop takes from the body on a way, J."""
-        work = 0.0
-        for begin, finish in pairwise(self._marks(path)):
-            for u, weight in NODES:
-                at = begin + u * (finish - begin)
-                displacement, velocity = path.at(at)
-                power = self.force(displacement, velocity, at * path.size) * velocity
-                work += weight * power * (finish - begin) * path.size
-        return work
+        """Work that its law takes from the body on a way, J."""
+        if self._last is None or self._last[0] != path:
+            powers = self._powers(path, 0.0, 1.0)
+            smooth = all(powers) and self.force(*path.at(1.0 - AT_END), path.size) > 0.0
+            parts = [powers] if smooth else [self._powers(path, *m) for m in pairwise(self._marks(path))]
+            self._last = path, sum(map(sum, parts))
+        return self._last[1]
+
+    def _powers(self, path: StepPath, begin: float, finish: float) -> list[float]:
+        """Parts of the work between two fractions of the step, J; each is 0 only where there is no force."""
+        found, share = [], finish - begin
+        for u, weight in NODES:
+            at = begin + u * share
+            displacement, velocity = path.at(at)
+            force = self.force(displacement, velocity, at * path.size)
+            found.append(weight * share * path.size * force * velocity)
+        return found
 
     def _marks(self, path: StepPath) -> list[float]:
         """Fractions of a step between which the force is smooth: where it begins and ends."""

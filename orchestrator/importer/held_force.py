@@ -173,6 +173,8 @@ class HeldForceBond:
         with self._stop.asking():
             if not self.closed:
                 return self._arrival(time, end, path)
+            if end == self._planned and self._is_foreseen(path):
+                return None
             scale = self._time_scale(path)
             if path.size > SLACK * scale:
                 self._last_try = None
@@ -386,7 +388,7 @@ class HeldForceBond:
 
     def _foreseen_force(self, size: float) -> float:
         """The force that agrees with the way that it is foreseen to lead to, N."""
-        force = previous = max(0.0, self._stop.force(*self._start, size))
+        force = previous = self._force_half_way(size)
         answer = earlier = math.nan
         for turn in range(FORESIGHTS):
             answer = self._mean_force(self._foreseen_path(size, force))
@@ -396,6 +398,21 @@ class HeldForceBond:
             following = _secant(force, answer, (previous, earlier) if turn else None)
             previous, earlier, force = force, answer, following
         return force
+
+    def _is_foreseen(self, path: StepPath) -> bool:
+        """Has the body gone where it was foreseen to go? Then its force is the right one."""
+        foreseen = self._foreseen_path(path.size, self._force)
+        sped = abs(path.start_velocity) + abs(path.end_velocity)
+        return (
+            abs(path.end - foreseen.end) <= FORCE_TOLERANCE * path.size * sped
+            and abs(path.end_velocity - foreseen.end_velocity) <= FORCE_TOLERANCE * sped
+        )
+
+    def _force_half_way(self, size: float) -> float:
+        """A first guess: the force in the middle of a way that begins with the force at its start."""
+        first = self._stop.force(*self._start, size)
+        displacement, velocity = self._foreseen_path(size, first).at(0.5)
+        return max(0.0, self._stop.force(displacement, velocity, size))
 
     def _foresee(self, size: float) -> float:
         """Choose the step and its force; returns the size of the step, s."""
