@@ -41,8 +41,8 @@ LEFT = 1e-9
 NOT_AT_ONCE = 1e-3
 #: Part of the energy of its contacts that a held force may add without a word.
 UNTOLD = 1e-3
-#: Velocities at the ends of such a step: one is less than this times the other.
-SLOW = 4e-3
+#: A step that is to end where the body turns ends at less than this times its other velocity.
+SLOW = 0.2
 #: Steps are not shorter than this times (1 + |time|), s.
 ROOM = 1e-13
 #: An arrival is foreseen surely where accelerations change the velocity on the way to it by less than this part of
@@ -141,6 +141,7 @@ class HeldForceBond:
         self._stop.mark(time)
         self._force = 0.0
         self._last_try: tuple[float, float] | None = None
+        self._settled = False
         was_closed, self.arrived = self.closed, False
         size = target - time
         if not self.revisable and self._told is None:
@@ -173,7 +174,7 @@ class HeldForceBond:
         with self._stop.asking():
             if not self.closed:
                 return self._arrival(time, end, path)
-            if end == self._planned and self._is_foreseen(path):
+            if end == self._planned and self._settled and self._is_foreseen(path):
                 return None
             scale = self._time_scale(path)
             if path.size > SLACK * scale:
@@ -393,7 +394,8 @@ class HeldForceBond:
         for turn in range(FORESIGHTS):
             answer = self._mean_force(self._foreseen_path(size, force))
             self._largest = max(self._largest, answer)
-            if abs(answer - force) <= FORCE_TOLERANCE * self._largest:
+            self._settled = abs(answer - force) <= FORCE_TOLERANCE * self._largest
+            if self._settled:
                 break
             following = _secant(force, answer, (previous, earlier) if turn else None)
             previous, earlier, force = force, answer, following
