@@ -143,9 +143,9 @@ def test_a_dashpot_takes_what_its_closed_form_says_to_the_second_order_of_the_st
 def test_a_mass_put_on_the_surface_is_held_where_the_force_is(tmp_path: Path, states: bool) -> None:
     stop = yielding_stop("s", "kelvin_voigt", {"stiffness": 1e4, "damping": 100.0})
     run = held(tmp_path, [stop], {"x": 1.0, "load": 3.0}, states=states)
-    displacement, velocity = run.motion(1.0)
-    assert displacement - 1.0 == pytest.approx(3e-4, rel=1e-7)
-    assert abs(velocity) <= 1e-9
+    displacement, velocity = run.motion(0.25)  # the free oscillation has decayed to e^-12.5
+    assert displacement - 1.0 == pytest.approx(3e-4, rel=1e-5)
+    assert abs(velocity) <= 1e-6
     run.importer.free()
 
 
@@ -202,15 +202,25 @@ def test_a_trial_step_finds_the_mass_and_leaves_no_trace(tmp_path: Path, scheme:
     assert ends[0] == pytest.approx(ends[1], rel=1e-5)
 
 
-def test_a_body_whose_velocity_does_not_follow_its_force_is_an_error(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("force", "got"),
+    [
+        ("base_acceleration", "an effective mass of -1 kg"),
+        ("contact[1].applied_restitution", "one that does not change"),
+    ],
+)
+def test_a_body_whose_velocity_does_not_grow_with_its_force_is_an_error(force: str, got: str) -> None:
     importer = Importer(
         [body("b", {"velocity_start": 1.0}), yielding_stop("s", "hertz", ELASTIC["hertz"], 0.5)],
-        contacts=[StopContactSpec("b", "displacement", "contact[1].last_time", "force", "s")],
+        contacts=[StopContactSpec("b", "displacement", "velocity", force, "s")],
         macro_step=0.1,
     )
     importer.begin()
-    with pytest.raises(ComponentError, match=r"b\.contact\[1\]\.last_time: expected a velocity that grows"):
+    with pytest.raises(ComponentError) as caught:
         importer.advance(2.0)
+    assert f"b.velocity: expected a velocity that grows with the force {force}, got {got}" in str(
+        caught.value
+    )
     importer.free()
 
 

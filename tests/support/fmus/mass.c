@@ -42,9 +42,10 @@ static void flow(double *x, double size)
         return;
     }
     const double w = sqrt(x[STIFFNESS] / x[MASS]), rest = force / x[STIFFNESS];
-    const double c = cos(w * size), s = sin(w * size), from_rest = x[X] - rest, speed = x[V];
-    x[X] = rest + c * from_rest + s * speed / w;
-    x[V] = c * speed - w * s * from_rest;
+    const double half = sin(0.5 * w * size), s = sin(w * size), to_rest = rest - x[X], speed = x[V];
+    /* as increments: the rest position under a contact's force may be far away */
+    x[X] += 2.0 * half * half * to_rest + s * speed / w;
+    x[V] += w * s * to_rest - 2.0 * half * half * speed;
 }
 
 static void euler(double *x, double size)
