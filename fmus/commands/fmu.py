@@ -80,7 +80,7 @@ def export_component(
     path = output or Path(f"{component_name(component)}.fmu")
     starts = None if changes is None else dict(map(_start, changes))
     return export_fmu(
-        component, path, **counts, starts=starts, fmi=fmi, platform=platform, note=note, **kinds
+        component, path, **counts, starts=starts, fmi=fmi, platform=platform, units=None, note=note, **kinds
     )
 
 

@@ -20,10 +20,12 @@ from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.description import (
     ComponentDescription,
     Number,
+    UnitDefinition,
     Variable,
     lean,
     plural,
     with_starts,
+    with_units,
 )
 from vibroimpact.fmus.packaging.experiment import default_experiment
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
@@ -59,6 +61,7 @@ def export_fmu(
     enumerations: bool = False,
     stop_time: float | None = None,
     platform: str | None = None,
+    units: Mapping[str, UnitDefinition] | None = None,
     note: Note = lambda _: None,
 ) -> Path:
     """Write an FMU of a component of the package.
@@ -90,6 +93,8 @@ def export_fmu(
     platform : str, optional
         `all`, or names with commas between them (`x86_64-windows,x86_64-linux`), for what machines it is; by default
         this one and those whose libraries a release brings along.
+    units : mapping of str to UnitDefinition, optional
+        Units, by variable name, of variables that have none of their own: those of a Gain.
     note : callable
         Told what is compiled for another machine.
 
@@ -131,6 +136,7 @@ def export_fmu(
     if not full:
         edition = edition_of(default_experiment(full_name, _numbers(component), stop_time))
         component = lean(component, external=external, enumerations=enumerations)
+    component = with_units(component, units or {})
     _refuse_starts_beyond(component, own_starts)
     resources = {}
     if own_starts:

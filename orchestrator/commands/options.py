@@ -212,6 +212,13 @@ def export_ssp(
             "SSP 2.0 as the scene says."
         ),
     ] = None,
+    gains: Annotated[
+        str,
+        typer.Option(
+            help="A gain is a transformation of its connection, or a component with units of its own, which is all "
+            "that OMSimulator takes."
+        ),
+    ] = "transformation",
     platform: Annotated[
         str | None, typer.Option(help="Machines it is for, as `vibroimpact fmu export` has them.")
     ] = None,
@@ -224,7 +231,7 @@ def export_ssp(
     """
     from vibroimpact.orchestrator.commands.ssp import export_to_archive
 
-    export_to_archive(scene, output, changes or (), ssp, fmi, platform)
+    export_to_archive(scene, output, changes or (), ssp, fmi, gains, platform)
 
 
 def import_ssp(

@@ -13,13 +13,19 @@ from vibroimpact.orchestrator.ssp import export_system, import_system
 
 
 def export_to_archive(
-    scene: Path, output: Path | None, changes: Sequence[str], ssp: str, fmi: str | None, platform: str | None
+    scene: Path,
+    output: Path | None,
+    changes: Sequence[str],
+    ssp: str,
+    fmi: str | None,
+    gains: str,
+    platform: str | None,
 ) -> None:
     """Write an archive and say where it is."""
     target = output or Path(f"{scene.stem}.ssp")
     refuse_outputs([scene], target, ending=".ssp")
     loaded = load_scene(scene, changes)
-    say(str(export_system(loaded, target, ssp=ssp, fmi=fmi, platform=platform, note=note)))
+    say(str(export_system(loaded, target, ssp=ssp, fmi=fmi, gains=gains, platform=platform, note=note)))
 
 
 def import_to_scene(

@@ -10,10 +10,13 @@ from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 from vibroimpact.fmus.shipped import FOLDERS
+from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.ssp.members import component_members
+from vibroimpact.orchestrator.ssp.members import Travel, component_members
 from vibroimpact.orchestrator.ssp.names import SSD_FILE, VERSIONS
 from vibroimpact.orchestrator.ssp.writing import description, parameter_set
+
+GAINS = ("transformation", "component")
 
 
 def export_system(
@@ -22,6 +25,7 @@ def export_system(
     *,
     ssp: str = "1.0",
     fmi: str | None = None,
+    gains: str = "transformation",
     platform: str | None = None,
     note: Note = lambda _: None,
 ) -> Path:
@@ -38,6 +42,9 @@ def export_system(
     fmi : str, optional
         Version of the FMUs of this package's components in the archive, `2.0` or `3.0`. By default 2.0, the version
         that SSP 1.0 knows, and in SSP 2.0 that of the scene.
+    gains : str
+        How a connection has its gain: as a `transformation` of its value, or as a `component` with units of its own,
+        for tools that take no other.
     platform, note
         As `vibroimpact.fmus.export` has them.
 
@@ -60,13 +67,18 @@ def export_system(
             f"{scene.source}: expected a scene of components, got one of a body. "
             "`vibroimpact fmu export` makes an FMU of it."
         )
-    for given, known, what in ((ssp, VERSIONS, "ssp"), (fmi or "2.0", tuple(FOLDERS), "fmi")):
+    for given, known, what in (
+        (ssp, VERSIONS, "ssp"),
+        (fmi or "2.0", tuple(FOLDERS), "fmi"),
+        (gains, GAINS, "gains"),
+    ):
         if given not in known:
-            raise UsageError(f"{what}: expected {' or '.join(known)}, got {given!r}.")
+            raise UsageError(f"{option(what)}: expected {' or '.join(known)}, got {given!r}.")
     duration = scene.record.transient_time + scene.record.recorded_time
     fmi = fmi or ("2.0" if ssp == "1.0" else None)
     with ScratchFolder("ssp") as folder:
-        parts = component_members(general, Path(folder.name), fmi, duration, platform, note)
+        travel = Travel(Path(folder.name), fmi, duration, gains == "component", platform, note)
+        parts = component_members(general, travel)
         members = {part.member: part.content for part in parts.values()}
     for part in parts.values():
         if part.values:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -50,11 +50,13 @@ class FlatSystem:
     system : System
     facts : mapping of Path to ComponentFacts
         Of each component.
+    gains : collection of Path
+        Components that are gains of connections.
 
     Attributes
     ----------
     components : dict of Path to Component
-        In the order of the file.
+        In the order of the file; without the gains.
     ignored : list of str
         Parameters that no variable takes, as SSP wants it.
 
@@ -64,8 +66,11 @@ class FlatSystem:
         A connection leads from or to nothing, or cannot be a gain.
     """
 
-    def __init__(self, system: System, facts: Mapping[Path, ComponentFacts]) -> None:
-        self.components = dict(components_of(system))
+    def __init__(
+        self, system: System, facts: Mapping[Path, ComponentFacts], gains: Collection[Path] = ()
+    ) -> None:
+        self._all = dict(components_of(system))
+        self.components = {path: one for path, one in self._all.items() if path not in gains}
         self.ignored: list[str] = []
         self._facts = facts
         self._systems = dict(_systems(system, ()))
@@ -74,6 +79,7 @@ class FlatSystem:
         for path, inner in self._systems.items():
             for connection in inner.connections:
                 self._add(self._directed(path, connection))
+        self._values = self._start_values()
 
     def links(self) -> list[Link]:
         """Return what feeds the components' inputs, in the order of the file."""
@@ -82,8 +88,11 @@ class FlatSystem:
 
     def start_values(self) -> dict[Path, dict[str, StartValue]]:
         """Return the start values of each component: those of an outer system go before those of an inner one."""
-        values: dict[Path, dict[str, StartValue]] = {path: {} for path in self.components}
-        elements: list[tuple[Path, Component | System]] = [*self.components.items(), *self._inner_first()]
+        return {path: dict(self._values[path]) for path in self.components}
+
+    def _start_values(self) -> dict[Path, dict[str, StartValue]]:
+        values: dict[Path, dict[str, StartValue]] = {path: {} for path in self._all}
+        elements: list[tuple[Path, Component | System]] = [*self._all.items(), *self._inner_first()]
         for path, element in elements:
             for binding in element.bindings:
                 for parameter in binding.parameters:
@@ -115,7 +124,7 @@ class FlatSystem:
         self, path: Path, name: str, parameter: Parameter, seen: frozenset[Node]
     ) -> Iterator[tuple[Node, Parameter]]:
         """Yield each variable of a component that a name means in an element, with the value that it gets."""
-        if path in self.components:
+        if path in self._all:
             yield Node(path, name), parameter
             return
         system, node = self._systems[path], Node(path, name)
@@ -152,7 +161,7 @@ class FlatSystem:
 
     def _end(self, path: Path, place: tuple[str | None, str], connection: Connection) -> tuple[Node, str]:
         element = path if place[0] is None else (*path, place[0])
-        owner = self.components.get(element) or self._systems.get(element)
+        owner = self._all.get(element) or self._systems.get(element)
         if owner is None:
             raise RefusalError(connection.where, "an element of its system", quoted(place[0]))
         if place[1] not in owner.connectors:
@@ -161,18 +170,20 @@ class FlatSystem:
 
     def _unit(self, node: Node) -> Unit | None:
         """Return the unit of a connector: an FMU knows its own best."""
-        if node.element in self.components:
+        if node.element in self._all:
             variable = self._facts[node.element].variables.get(node.name)
             if variable is not None and variable.unit is not None:
                 return variable.unit
-            return self.components[node.element].connectors[node.name].unit
+            return self._all[node.element].connectors[node.name].unit
         return self._systems[node.element].connectors[node.name].unit
 
     def _link(self, target: Node) -> Link | None:
         """Return what feeds an input; None where that is a connector of the whole system, which nothing feeds."""
         edges = [self._edges[target]]
         while edges[-1].source.element not in self.components:
-            before = self._edges.get(edges[-1].source)
+            source = edges[-1].source
+            # what comes out of a gain has gone into it
+            before = self._edges.get(Node(source.element, "input") if source.element in self._all else source)
             if before is None:
                 return None
             if before in edges:
@@ -186,14 +197,18 @@ class FlatSystem:
         unit = source
         for edge in edges:
             connection, after = edge.connection, self._unit(edge.target)
-            where, noted = connection.where, connection.gain_unit
+            where, noted = connection.where, connection.gain_unit or noted
             if connection.offset:
                 hint = "Constant offsets are not available in this version."
                 raise RefusalError(where, "a transformation without offset", f"{connection.offset:g}", hint)
-            changes = connection.suppressed or noted is not None
+            changes = connection.suppressed or connection.gain_unit is not None
             gain *= 1.0 if changes else _conversion(unit, after, connection)
             gain *= 1.0 if connection.factor is None else connection.factor
             unit = after or unit
+            through = self._all.get(edge.target.element) if edge is not edges[-1] else None
+            if through is not None:
+                gain *= float(self._values[edge.target.element].get("gain", 1.0))
+                unit, noted = self._unit(Node(edge.target.element, "output")), through.gain_unit
         target = self._unit(edges[-1].target)
         if noted is None and source is not None and target is not None and not agree(source, target):
             noted = gain_unit_between(source, target)

@@ -26,6 +26,7 @@ from vibroimpact.orchestrator.scene.general.component_facts import ComponentFact
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.archive import SspArchive
 from vibroimpact.orchestrator.ssp.flat import FlatSystem, Path, components_of
+from vibroimpact.orchestrator.ssp.names import GAIN
 from vibroimpact.orchestrator.ssp.parameter_sets import read_sets, with_sets
 from vibroimpact.orchestrator.ssp.reading import read_structure
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
@@ -181,7 +182,7 @@ def _read(
     if not each:
         raise RefusalError("SystemStructure.ssd", "a system with components", "none")
     fmus, facts, notes = _fmus(archive, each, folder)
-    flat = FlatSystem(structure.system, facts)
+    flat = FlatSystem(structure.system, facts, facts.keys() - fmus.keys())
     tables, more = scene_tables(structure, flat, fmus, facts)
     if parameters:
         with_sets(tables, flat, facts, read_sets(archive, parameters))
@@ -191,7 +192,7 @@ def _read(
 def _fmus(
     archive: SspArchive, each: Mapping[Path, Component], folder: FilePath
 ) -> tuple[dict[Path, tuple[str, str | None]], dict[Path, ComponentFacts], list[str]]:
-    """Lay the FMUs into a folder; return what a scene calls each, and what their descriptions say."""
+    """Lay the FMUs into a folder; return what a scene calls each but gains, and what their descriptions say."""
     folder.mkdir()
     files: dict[str, FilePath] = {}
     fmus: dict[Path, tuple[str, str | None]] = {}
@@ -202,6 +203,9 @@ def _fmus(
         if file is None:
             file = files[component.source] = folder / _file_name(component.source, folder)
             archive.copy(component.source, file)
+        if component.is_gain and unpack(file).identifiers[0] == GAIN:
+            facts[path] = component_facts(file)
+            continue
         own = _own(component, file, path, notes)
         if own is None:
             fmus[path] = f"{folder.name}/{file.name}", None

@@ -9,16 +9,18 @@ from pathlib import Path
 
 from vibroimpact.fmus.packaging.build import read_components
 from vibroimpact.fmus.packaging.cross import Note
-from vibroimpact.fmus.packaging.description import ComponentDescription
+from vibroimpact.fmus.packaging.description import ComponentDescription, UnitDefinition
 from vibroimpact.fmus.packaging.export import LEAN_COUNTS, export_fmu
 from vibroimpact.fmus.shipped import FOLDERS, package_folder
-from vibroimpact.orchestrator.importer.specification import ComponentSpec
+from vibroimpact.fmus.units import parse_unit
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.scene.general.component_facts import (
     ComponentFacts,
     StartValue,
     component_facts,
 )
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
+from vibroimpact.orchestrator.ssp.names import GAIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +41,8 @@ class Part:
         Start values.
     fmu, fmi : str
         The component of this package that it is, and the version that the scene runs; empty for any other.
+    gain_of : ConnectionSpec or None
+        The connection whose gain it is.
     """
 
     name: str
@@ -48,6 +52,7 @@ class Part:
     values: Mapping[str, StartValue]
     fmu: str = ""
     fmi: str = ""
+    gain_of: ConnectionSpec | None = None
 
     @property
     def values_member(self) -> str:
@@ -55,49 +60,106 @@ class Part:
         return f"resources/{self.name}.ssv"
 
 
-def component_members(
-    general: GeneralScene,
-    folder: Path,
-    fmi: str | None,
-    stop_time: float,
-    platform: str | None,
-    note: Note,
-) -> dict[str, Part]:
-    """Return the components of a scene as they travel, by name.
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """How components travel.
 
-    Parameters
+    Attributes
     ----------
-    general : GeneralScene
     folder : Path
         Where FMUs may be written.
     fmi : str or None
         Version of this package's own; None: as the scene has it.
     stop_time : float
         When a run of them ends, s.
+    gains : bool
+        Whether gains are components of their own.
     platform, note
         As `vibroimpact.fmus.export` has them.
     """
+
+    folder: Path
+    fmi: str | None
+    stop_time: float
+    gains: bool = False
+    platform: str | None = None
+    note: Note = lambda _: None
+
+
+def component_members(general: GeneralScene, travel: Travel) -> dict[str, Part]:
+    """Return the components of a scene as they travel, by name; gains come after the others."""
     described = {component.name: component for component in read_components()}
     taken: dict[str, str] = {}
     parts = {}
     for spec in general.components:
-        own = _own(spec.fmu)
-        if own is None:
-            content = spec.fmu.read_bytes()
-            member = _member(spec.fmu.name, content, taken)
-            parts[spec.name] = Part(
-                spec.name, member, content, component_facts(spec.fmu), dict(spec.parameters)
-            )
-            continue
-        component, version = described[own[0]], own[1]
-        file = _exported(
-            component, spec, _used(general, spec), folder, fmi or version, stop_time, platform, note
-        )
+        own, file = _own(spec.fmu), spec.fmu
+        if own is not None:
+            file = _exported(described[own[0]], spec, _used(general, spec), travel.fmi or own[1], travel)
         content = file.read_bytes()
-        member = _member(file.name, content, taken)
-        values = dict(spec.parameters)
-        parts[spec.name] = Part(spec.name, member, content, component_facts(file), values, *own)
+        parts[spec.name] = Part(
+            spec.name,
+            _member(file.name, content, taken),
+            content,
+            component_facts(file),
+            dict(spec.parameters),
+            *(own or ("", "")),
+        )
+    if not travel.gains:
+        return parts
+    for number, connection in enumerate(general.connections, start=1):
+        if connection.gain != 1.0 or connection.gain_unit is not None:
+            gain = _gain(connection, _free_name(f"gain_{number}", parts), parts, taken, travel)
+            parts[gain.name] = gain
     return parts
+
+
+def _gain(
+    connection: ConnectionSpec,
+    name: str,
+    parts: Mapping[str, Part],
+    taken: dict[str, str],
+    travel: Travel,
+) -> Part:
+    """Return the gain of a connection as a component with the units of its ends."""
+    source, target = (
+        parts[component].facts.variables[variable]
+        for component, variable in (connection.source, connection.target)
+    )
+    units = {
+        end: UnitDefinition(
+            variable.unit_name, variable.unit.exponents, variable.unit.factor, variable.unit.offset
+        )
+        for end, variable in (("input", source), ("output", target))
+        if variable.unit is not None
+    }
+    unit = parse_unit(connection.gain_unit) if connection.gain_unit else None
+    if unit is not None and connection.gain_unit:
+        units["gain"] = UnitDefinition(connection.gain_unit, unit.exponents, unit.factor)
+    file = export_fmu(
+        GAIN,
+        travel.folder / f"{name}.fmu",
+        fmi=travel.fmi or "3.0",
+        starts={"gain": connection.gain},
+        stop_time=travel.stop_time,
+        platform=travel.platform,
+        units=units,
+        note=travel.note,
+    )
+    content = file.read_bytes()
+    return Part(
+        name,
+        _member(file.name, content, taken),
+        content,
+        component_facts(file),
+        {"gain": connection.gain},
+        gain_of=connection,
+    )
+
+
+def _free_name(name: str, parts: Mapping[str, Part]) -> str:
+    while name in parts:
+        name += "_"
+    return name
 
 
 def _own(fmu: Path) -> tuple[str, str] | None:
@@ -117,11 +179,8 @@ def _exported(
     component: ComponentDescription,
     spec: ComponentSpec,
     used: set[str],
-    folder: Path,
     fmi: str,
-    stop_time: float,
-    platform: str | None,
-    note: Note,
+    travel: Travel,
 ) -> Path:
     """Export a component with what the system uses of it, and no more; it starts as the scene says."""
     ports = set(_ports(component, spec, used))
@@ -131,16 +190,16 @@ def _exported(
     counts = {} if "importer" in ports else _counts(component, used)
     return export_fmu(
         component.name,
-        folder / f"{spec.name}.fmu",
+        travel.folder / f"{spec.name}.fmu",
         contacts=counts.get("contact"),
         sensors=counts.get("sensor"),
         fmi=fmi,
         starts={name: value for name, value in starts.items() if isinstance(value, int | float)},
         full="importer" in ports,
         external="external" in ports,
-        stop_time=stop_time,
-        platform=platform,
-        note=note,
+        stop_time=travel.stop_time,
+        platform=travel.platform,
+        note=travel.note,
     )
 
 

@@ -31,6 +31,9 @@ MAPPING_TYPE = "application/x-ssp-parameter-mapping"
 GIVING = frozenset({"output", "calculatedParameter", "local", "constant"})
 TAKING = frozenset({"input", "parameter", "structuralParameter"})
 
+#: The component of this package that stands for the gain of a connection.
+GAIN = "Gain"
+
 REAL_TYPES = frozenset({"Real", "Float64", "Float32"})
 INTEGER_TYPES = frozenset(
     {"Integer", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"}

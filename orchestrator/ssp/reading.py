@@ -120,6 +120,7 @@ class _Reader:
             raise RefusalError(f"{where}: implementation", "CoSimulation", quoted(implementation), hint)
         source = self.archive.member(element.get("source", ""), f"{where}: source")
         own = next(_noted(element, "vibroimpact:Component"), Element("none"))
+        gain = next(_noted(element, "vibroimpact:Gain"), None)
         return Component(
             name,
             source,
@@ -127,6 +128,8 @@ class _Reader:
             self._bindings(element, where),
             own.get("fmu", ""),
             own.get("fmi", ""),
+            gain is not None,
+            None if gain is None else gain.get("gain_unit"),
         )
 
     def _connectors(self, element: Element, where: str) -> dict[str, Connector]:

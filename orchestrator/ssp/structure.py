@@ -66,6 +66,10 @@ class Component:
         The member of the archive.
     fmu, fmi : str
         The component of this package that it was exported of, and its version of FMI; empty for any other.
+    is_gain : bool
+        Whether it stands for the gain of a connection.
+    gain_unit : str or None
+        The unit of that gain, where the scene has one.
     """
 
     name: str
@@ -74,6 +78,8 @@ class Component:
     bindings: tuple[Binding, ...] = ()
     fmu: str = ""
     fmi: str = ""
+    is_gain: bool = False
+    gain_unit: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

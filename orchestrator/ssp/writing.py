@@ -56,8 +56,12 @@ def description(
         _component(elements, part, shown[part.name])
     if general.connections:
         joined = SubElement(system, "ssd:Connections")
+        gains = {part.gain_of: part.name for part in parts.values() if part.gain_of is not None}
         for connection in general.connections:
-            _connection(joined, connection, parts)
+            if connection in gains:
+                _through(joined, connection, gains[connection])
+            else:
+                _connection(joined, connection, parts)
     _units(root, [variable for variables in shown.values() for variable in variables])
     experiment = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(duration))
     if general.connections:
@@ -106,6 +110,8 @@ def _shown(part: Part, general: GeneralScene, scene: Scene, ssp: str) -> list[Va
                 _refuse_no_connector(
                     scene, f"connection[{number}].{end}", end, part.facts.variables[name], ssp
                 )
+    if part.gain_of is not None:
+        names |= {"input": None, "output": None}
     recorded = (component_variable(reference) for reference in general.variables)
     for component, name in recorded:
         variable = part.facts.variables.get(name) if component == part.name else None
@@ -145,6 +151,9 @@ def _component(elements: Element, part: Part, variables: list[VariableFacts]) ->
     if part.values:
         bindings = SubElement(component, "ssd:ParameterBindings")
         SubElement(bindings, "ssd:ParameterBinding", source=part.values_member)
+    if part.gain_of is not None:
+        unit = {} if part.gain_of.gain_unit is None else {"gain_unit": part.gain_of.gain_unit}
+        SubElement(_annotation(component, ANNOTATION), "vibroimpact:Gain", unit)
     if part.fmu:
         SubElement(_annotation(component, ANNOTATION), "vibroimpact:Component", fmu=part.fmu, fmi=part.fmi)
 
@@ -167,6 +176,19 @@ def _connection(joined: Element, spec: ConnectionSpec, parts: Mapping[str, Part]
         SubElement(connection, "ssc:LinearTransformation", factor=repr(spec.gain), offset="0.0")
     if spec.gain_unit is not None:
         SubElement(_annotation(connection, ANNOTATION), "vibroimpact:Connection", gain_unit=spec.gain_unit)
+
+
+def _through(joined: Element, spec: ConnectionSpec, gain: str) -> None:
+    """Write a connection whose gain is a component."""
+    for start, end in ((spec.source, (gain, "input")), ((gain, "output"), spec.target)):
+        SubElement(
+            joined,
+            "ssd:Connection",
+            startElement=start[0],
+            startConnector=start[1],
+            endElement=end[0],
+            endConnector=end[1],
+        )
 
 
 def _units(root: Element, variables: list[VariableFacts]) -> None:

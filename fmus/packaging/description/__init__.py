@@ -5,7 +5,7 @@ README come from the same file. Imports the standard library only: the package's
 """
 
 from vibroimpact.fmus.packaging.description.c_header import c_header, header_name
-from vibroimpact.fmus.packaging.description.lean import Edition, Experiment, lean, with_starts
+from vibroimpact.fmus.packaging.description.lean import Edition, Experiment, lean, with_starts, with_units
 from vibroimpact.fmus.packaging.description.model import (
     ComponentDescription,
     Enumeration,
@@ -42,4 +42,5 @@ __all__ = [
     "unit_definitions",
     "with_starts",
     "with_table",
+    "with_units",
 ]

@@ -13,6 +13,7 @@ from vibroimpact.fmus.packaging.description.model import (
     ComponentDescription,
     Enumeration,
     Number,
+    UnitDefinition,
     Variable,
 )
 
@@ -67,6 +68,13 @@ def with_starts(component: ComponentDescription, starts: Mapping[str, Number]) -
     """Return a component with other start values, by variable name."""
     changed = (replace(v, start=starts[v.name]) if v.name in starts else v for v in component.variables)
     return replace(component, variables=tuple(changed))
+
+
+def with_units(component: ComponentDescription, units: Mapping[str, UnitDefinition]) -> ComponentDescription:
+    """Return a component with units, by name, of variables that have none of their own."""
+    known = {unit.name: unit for unit in (*component.units, *units.values())}
+    named = (replace(v, unit=units[v.name].name) if v.name in units else v for v in component.variables)
+    return replace(component, units=tuple(known.values()), variables=tuple(named))
 
 
 def _without(enumeration: Enumeration, left_out: set[str]) -> Enumeration:
