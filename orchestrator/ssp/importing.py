@@ -17,7 +17,7 @@ import tomlkit
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus import components, fmu_path
-from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.errors import ComponentFileError, SceneError, UsageError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import FOLDERS
@@ -164,14 +164,16 @@ def _refuse_another(file: FilePath, content: bytes, force: bool) -> None:
 @contextmanager
 def _told_of(path: FilePath, source: str) -> Iterator[None]:
     """Let messages name the archive, not the place where it was unpacked."""
+    place = str(FilePath(source).parent)
     try:
         yield
     except RefusalError as refusal:
         raise SceneError([refusal.problem.line(str(path))]) from None
     except SceneError as error:
-        place = str(FilePath(source).parent)
         lines = (line.replace(source, str(path)).replace(f"{place}/", "") for line in error.problems)
         raise SceneError(list(lines)) from None
+    except ComponentFileError as error:
+        raise ComponentFileError(str(error).replace(f"{place}/", f"{path}: ")) from None
 
 
 def _read(
