@@ -1,0 +1,157 @@
+"""Archives as SSP wants them, of scenes of every kind; what they cannot say is refused."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fmpy.ssp.ssd import read_ssd, read_ssv
+from lxml import etree
+
+import vibroimpact as vi
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.fmpy_door import read_description
+from vibroimpact.orchestrator.ssp import export_system, load_system
+
+RECORD = {"recorded_time": 2.0, "variables": ["a.displacement", "b.contact[1].count"], "rate": 8}
+TWO: dict[str, Any] = {
+    "scene": {"title": "Two & more <bodies>"},
+    "component": {
+        "a": {"fmu": "Chain", "parameters": {"masses": 3, "displacement_start[1]": 0.5}},
+        "b": {
+            "fmu": "Oscillator",
+            "fmi": "2.0",
+            "parameters": {"contact[1].law": "restitution", "contact[1].position": 0.1, "mass": 2.0},
+        },
+    },
+    "connection": [
+        {"from": "a.displacement", "to": "b.force", "gain": 0.25, "gain_unit": "N/m"},
+        {"from": "b.force", "to": "a.force[2]"},
+    ],
+    "record": RECORD,
+    "sweep": {"b.mass": {"values": [2.0, 3.0]}, "connection[1].gain": {"values": [0.25, 0.5]}},
+    "execution": {"macro_step": 0.125},
+}
+TWO["connection"][1] = {"from": "b.acceleration", "to": "a.base_acceleration"}
+
+
+@pytest.fixture(scope="module", params=["transformation", "component"])
+def system(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return export_system(
+        vi.Scene.from_dict(TWO), tmp_path_factory.mktemp("ssp") / "two.ssp", gains=request.param
+    )
+
+
+def test_an_archive_is_valid_and_fmpy_reads_what_the_scene_says(system: Path) -> None:
+    described = read_ssd(str(system))
+    assert described.name == "Two & more <bodies>"
+    parts = {element.name: element for element in described.system.elements}
+    assert {name for name in parts if not name.startswith("gain_")} == {"a", "b"}
+    assert [(c.name, c.kind) for c in parts["b"].connectors] == [
+        ("force", "input"),
+        ("acceleration", "output"),
+        ("contact[1].count", "output"),
+    ]
+    given = {
+        p.name: (p.type, p.value)
+        for p in read_ssv(str(system), parts["b"].parameterBindings[0].source).parameters
+    }
+    assert given == {
+        "contact[1].law": ("Integer", "1"),
+        "contact[1].position": ("Real", "0.1"),
+        "mass": ("Real", "2.0"),
+    }
+    names = zipfile.ZipFile(system).namelist()
+    assert all(name == "SystemStructure.ssd" or name.startswith("resources/") for name in names)
+
+
+def test_the_scene_comes_back_with_its_sweep_and_gives_the_same_dataset(system: Path) -> None:
+    ours, theirs = vi.Scene.from_dict(TWO), load_system(system).scene
+    assert theirs.sweep == ours.sweep
+    before, after = (vi.run(scene, progress=False) for scene in (ours, theirs))
+    assert before.sizes["mass"] == 2
+    for name in ("a_displacement", "b_contact_1_count", "event_time"):
+        assert np.array_equal(before[name], after[name], equal_nan=True), name
+
+
+def test_every_component_is_self_contained_with_the_start_of_the_scene(system: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(system) as archive:
+        archive.extractall(tmp_path)
+    a, b = (read_description(tmp_path / "resources" / f"{name}.fmu") for name in "ab")
+    assert a.fmiVersion == b.fmiVersion == "2.0"
+    starts = {v.name: v.start for v in a.modelVariables}
+    assert (starts["masses"], float(starts["displacement_start[1]"])) == ("3", 0.5)
+    # b rests in the scene: an export of its own would be displaced, to show motion
+    assert float({v.name: v.start for v in b.modelVariables}["displacement_start"]) == 0.0
+    # the importer's own ports are left out
+    assert not any(v.name.startswith("record.") for v in b.modelVariables)
+
+
+def test_a_gain_as_a_component_has_the_units_of_its_ends(tmp_path: Path) -> None:
+    path = export_system(vi.Scene.from_dict(TWO), tmp_path / "two.ssp", gains="component", fmi="3.0")
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path)
+        tree = etree.fromstring(archive.read("SystemStructure.ssd"))
+    assert not tree.findall(".//{*}LinearTransformation")
+    gain = read_description(tmp_path / "resources" / "gain_1.fmu")
+    assert {v.name: v.unit for v in gain.modelVariables} == {
+        "time": "s",
+        "gain": "N/m",
+        "input": "m",
+        "output": "N",
+    }
+    assert unpack(tmp_path / "resources" / "gain_1.fmu").fmi_version == "3.0"
+
+
+def test_one_file_travels_once_and_names_stay_apart_where_case_does_not_count(tmp_path: Path) -> None:
+    files = {"one/Gain.fmu": 2.0, "two/gain.fmu": 3.0}
+    for name, start in files.items():
+        (tmp_path / name).parent.mkdir()
+        vi.fmus.export("gain", tmp_path / name, starts={"gain": start})
+    tables = {
+        "component": {
+            "a": {"fmu": str(tmp_path / "one/Gain.fmu")},
+            "b": {"fmu": str(tmp_path / "two/gain.fmu")},
+            "c": {"fmu": str(tmp_path / "one/Gain.fmu")},
+        },
+        "record": {"recorded_time": 1.0},
+    }
+    path = export_system(vi.Scene.from_dict(tables), tmp_path / "s.ssp")
+    assert [name for name in zipfile.ZipFile(path).namelist() if name.endswith(".fmu")] == [
+        "resources/Gain.fmu",
+        "resources/gain_2.fmu",
+    ]
+    general = load_system(path).scene.general
+    assert general is not None
+    assert [c.fmu.name for c in general.components] == ["Gain.fmu", "gain_2.fmu", "Gain.fmu"]
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"ssp": "1.1"}, "expected 1.0 or 2.0, got '1.1'"),
+        ({"fmi": "1.0"}, "expected 3.0 or 2.0, got '1.0'"),
+        ({"gains": "none"}, "expected transformation or component"),
+    ],
+)
+def test_other_versions_are_refused(tmp_path: Path, options: dict[str, str], expected: str) -> None:
+    with pytest.raises(UsageError, match=expected):
+        export_system(vi.Scene.from_dict(TWO), tmp_path / "s.ssp", **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scene_of_one_body_is_sent_to_the_other_export(tmp_path: Path) -> None:
+    scene = vi.Scene.from_dict({"body": {"mass": 1.0, "stiffness": 1.0}, "record": {"recorded_time": 1.0}})
+    with pytest.raises(UsageError, match="vibroimpact fmu export"):
+        export_system(scene, tmp_path / "s.ssp")
+
+
+def test_a_connection_from_what_is_no_output_is_refused(tmp_path: Path) -> None:
+    tables = {**TWO, "connection": [{"from": "a.damping[1]", "to": "b.force"}], "sweep": {}}
+    tables["connection"][0]["gain_unit"] = "N.m/(N.s)"
+    with pytest.raises(UsageError, match=r"connection\[1\]\.from: expected an output in SSP 1\.0"):
+        export_system(vi.Scene.from_dict(tables), tmp_path / "s.ssp")
