@@ -35,7 +35,8 @@ def supported(compiler: Sequence[str], sanitizer: str, folder: Path) -> bool:
 
 def options_for(sanitizers: Sequence[str]) -> list[str]:
     """Return the options that the core and the tests are compiled with."""
-    options = [*LANGUAGE, *WARNINGS, "-Werror", "-g", "-O1", f"-I{NATIVE / 'core'}", f"-I{fmi_headers()}"]
+    options = [*LANGUAGE, *WARNINGS, "-Werror", "-g", "-O1"]
+    options += [f"-I{folder}" for folder in (NATIVE / "core", NATIVE / "adapters", fmi_headers())]
     if sanitizers:
         options += [f"-fsanitize={','.join(sanitizers)}", "-fno-sanitize-recover=all"]
     return options
