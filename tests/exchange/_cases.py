@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +108,94 @@ def _replay(fmi: str, path: Path) -> tuple[Path, Rows]:
     slopes = np.where(inside, (np.diff(slow) / np.diff(instants))[segment], 0.0)
     rows = (bridged[now], (np.diff(bridged) * 2.0 * RATE)[now], np.interp(at, instants, slow), slopes)
     return build_replay(signals, path, fmi=fmi), np.column_stack(rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two oscillators with stops that are coupled, by connections that carry what is known at the start of a step.
+
+    Attributes
+    ----------
+    parameters : mapping of str to mapping of str to number
+        Start values of each.
+    connections : sequence of (str, str)
+        From an output to an input.
+    units : str
+        What a connection between different units is multiplied by.
+    """
+
+    parameters: dict[str, dict[str, Any]]
+    connections: tuple[tuple[str, str], ...]
+    units: str = ""
+
+
+UPPER = {"contact[1].law": "restitution", "contact[1].restitution": 0.6}
+LOWER = {
+    "contact[2].law": "kelvin_voigt",
+    "contact[2].side": "lower",
+    "contact[2].stiffness": 2e3,
+    "contact[2].damping": 1.0,
+}
+# the force begins at 0, since FMPy gives inputs 0 in the first step
+FORCED = {"forcing.amplitude": 3.0, "forcing.angular_frequency": 1.7, "forcing.phase": -np.pi / 2}
+PAIRS = {
+    "one rides on the other": Pair(
+        {
+            "a": {
+                "mass": 2.0,
+                "stiffness": 8.0,
+                "damping": 0.2,
+                **FORCED,
+                **UPPER,
+                "contact[1].position": 0.3,
+            },
+            "b": {"stiffness": 30.0, "damping": 0.1, **UPPER, **LOWER, "contact[1].position": 0.05}
+            | {"contact[2].position": -0.04},
+        },
+        (("a.acceleration", "b.base_acceleration"),),
+    ),
+    "a spring between them": Pair(
+        {
+            "a": {
+                "mass": 2.0,
+                "stiffness": 9.0,
+                "damping": 0.2,
+                **FORCED,
+                **UPPER,
+                "contact[1].position": 0.3,
+            },
+            "b": {"stiffness": 4.0, "damping": 0.1, **UPPER, **LOWER, "contact[1].position": 0.05}
+            | {"contact[2].position": -0.04},
+        },
+        (("a.displacement", "b.force"), ("b.displacement", "a.force")),
+        units="N/m",
+    ),
+}
+PAIR_OUTPUTS = tuple(f"{name}.{output}" for name in "ab" for output in OUTPUTS)
+
+
+def made_pair(name: str, fmi: str, folder: Path) -> tuple[dict[str, Path], Rows]:
+    """Return the FMUs of a pair, and what its outputs are after each step of our own importer's Jacobi exchange."""
+    pair = PAIRS[name]
+    gain = {"gain": 1.0, "gain_unit": pair.units} if pair.units else {}
+    scene = Scene.from_dict(
+        {
+            "component": {one: {"fmu": "Oscillator", "parameters": p} for one, p in pair.parameters.items()},
+            "connection": [{"from": source, "to": sink, **gain} for source, sink in pair.connections],
+            "record": {"recorded_time": COUNT / RATE, "variables": list(PAIR_OUTPUTS), "rate": RATE},
+            "execution": {"how": "coupled", "macro_step": 1.0 / RATE, "exchange": "jacobi"},
+        }
+    )
+    run_scene(scene, folder / "pair.nc")
+    samples = open_dataset(folder / "pair.nc").vibroimpact.samples()
+    rows = np.column_stack([samples[output.replace(".", "_")].values for output in PAIR_OUTPUTS])[
+        1 : COUNT + 1
+    ]
+    fmus = {
+        one: export_fmu("oscillator", folder / f"{one}.fmu", fmi=fmi, starts=parameters)
+        for one, parameters in pair.parameters.items()
+    }
+    return fmus, rows
 
 
 def _scene(tables: dict[str, Any]) -> Scene:

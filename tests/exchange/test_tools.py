@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import zipfile
@@ -10,26 +11,61 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exchange._cases import COUNT, NAMES, RATE, difference, made, outputs
-from exchange._tools import TOOLS, Tool, values
+from exchange._cases import (
+    COUNT,
+    NAMES,
+    PAIR_OUTPUTS,
+    PAIRS,
+    RATE,
+    difference,
+    made,
+    made_pair,
+    outputs,
+)
+from exchange._tools import TOOLS, Tool, run, run_coupled
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 
-# programs that are not here are named by `make exchange` alone
-PAIRS = [(tool, fmi) for tool in TOOLS for fmi in tool.versions if tool.package or not tool.missing()]
+# what is no package of the extra exchange is tried by `make exchange` alone
+TRIED = [tool for tool in TOOLS if tool.package and tool.name != "PyFMI"]
+SINGLE = [(tool, fmi) for tool in TRIED for fmi in tool.versions]
+COUPLED = [(tool, fmi) for tool in TRIED for fmi in tool.couples]
+
+
+def skip_where_missing(tool: Tool) -> None:
+    if reason := tool.missing():
+        pytest.skip(reason)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize(("tool", "fmi"), PAIRS, ids=[f"{tool.name}, FMI {fmi}" for tool, fmi in PAIRS])
+@pytest.mark.parametrize(("tool", "fmi"), SINGLE, ids=[f"{tool.name}, FMI {fmi}" for tool, fmi in SINGLE])
 def test_an_export_in_another_tool_is_our_own_run(tmp_path: Path, tool: Tool, fmi: str, name: str) -> None:
-    if reason := tool.missing():
-        pytest.skip(reason)
+    skip_where_missing(tool)
     path, expected = made(name, fmi, tmp_path)
-    rows = np.array(values(tool, path, outputs(name), 1.0 / RATE, COUNT, tmp_path))
+    answer = run(tool, path, outputs(name), 1.0 / RATE, COUNT, tmp_path)
+    rows = np.array(answer.rows)
     assert rows.shape == expected.shape
     assert np.ptp(expected[:, 0]) > 0.0 or name == "impact stop"
     assert difference(rows, expected) <= 1e-9
+    assert not answer.complaints
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PAIRS)
+@pytest.mark.parametrize(("tool", "fmi"), COUPLED, ids=[f"{tool.name}, FMI {fmi}" for tool, fmi in COUPLED])
+def test_two_exports_that_another_tool_couples_are_our_own_run(
+    tmp_path: Path, tool: Tool, fmi: str, name: str
+) -> None:
+    skip_where_missing(tool)
+    fmus, expected = made_pair(name, fmi, tmp_path)
+    answer = run_coupled(tool, fmus, PAIRS[name].connections, PAIR_OUTPUTS, 1.0 / RATE, COUNT, tmp_path)
+    rows = np.array(answer.rows)
+    assert rows.shape == expected.shape
+    jumps = np.abs(np.diff(expected[:, PAIR_OUTPUTS.index("b.velocity")]))
+    assert jumps.max() > 10.0 * np.median(jumps), "b is expected to hit its stops"
+    assert difference(rows, expected) <= 1e-9
+    assert not answer.complaints
 
 
 SYSTEM = """\
@@ -72,3 +108,17 @@ def test_two_exports_of_one_component_are_two_fmus_in_a_system_of_libcosim(tmp_p
     command = [sys.executable, "-c", BOTH_STARTS, str(tmp_path / "pair.ssp"), str(reference)]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
     assert "1.0 2.0" in done.stdout.splitlines()
+
+
+@pytest.mark.parametrize("named", ["", "/no/such/program"])
+def test_a_tool_that_is_not_here_says_where_it_was_looked_for(
+    monkeypatch: pytest.MonkeyPatch, named: str
+) -> None:
+    monkeypatch.setenv("PATH", os.devnull)
+    monkeypatch.setenv("VIBROIMPACT_NOSUCH", named)
+    expected = (
+        "VIBROIMPACT_NOSUCH names /no/such/program, which is no program"
+        if named
+        else "nosuch.linux64 is not on PATH, nor named by VIBROIMPACT_NOSUCH"
+    )
+    assert Tool("X", ("2.0",), program="nosuch.linux64").missing() == expected

@@ -1,0 +1,160 @@
+"""Two FMUs in each tool that couples them: their outputs after each step. Runs in the Python that has the tool."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+from exchange._single import Request, Rows, columns, load_tbb, run_program, value_references
+
+NAMESPACES = {
+    "ssd": "http://ssp-standard.org/SSP1/SystemStructureDescription",
+    "ssc": "http://ssp-standard.org/SSP1/SystemStructureCommon",
+    "oms": "https://openmodelica.org/SSP",
+}
+
+
+def fmpy(asked: Request) -> Rows:
+    """Couple them by FMPy's simulation of an SSP."""
+    from fmpy.ssp.simulation import simulate_ssp
+
+    step, count = asked["step"], asked["count"]
+    # it steps while the sum of its steps is less than the stop time
+    done = simulate_ssp(str(_ssp(asked)), stop_time=step * (count - 0.5), step_size=step)
+    return [[float(row[name]) for name in asked["names"]] for row in done]
+
+
+def libcosim(asked: Request) -> Rows:
+    """Couple them by libcosim's connections."""
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    execution = CosimExecution.from_step_size(round(asked["step"] * 1e9))
+    references = {name: value_references(fmu) for name, fmu in asked["fmus"].items()}
+    slaves = {name: CosimLocalSlave(fmu, name) for name, fmu in asked["fmus"].items()}
+    indices = {name: execution.add_local_slave(slave) for name, slave in slaves.items()}
+    for source, sink in asked["connections"]:
+        (a, output), (b, into) = (end.split(".", 1) for end in (source, sink))
+        execution.connect_real_variables(indices[a], references[a][output], indices[b], references[b][into])
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    wanted = [name.split(".", 1) for name in asked["names"]]
+    rows = []
+    for _ in range(asked["count"]):
+        execution.step()
+        rows.append([observer.last_real_values(indices[a], [references[a][v]])[0] for a, v in wanted])
+    return rows
+
+
+def ecos(asked: Request) -> Rows:
+    """Couple them by Ecos' connections."""
+    load_tbb()
+    from ecospy import EcosSimulation, EcosSimulationStructure
+
+    rows = []
+    with EcosSimulationStructure() as structure:
+        for name, fmu in asked["fmus"].items():
+            structure.add_model(name, fmu)
+        for source, sink in asked["connections"]:
+            structure.make_real_connection(source.replace(".", "::", 1), sink.replace(".", "::", 1))
+        with EcosSimulation(structure=structure, step_size=asked["step"]) as simulation:
+            simulation.init()
+            for _ in range(asked["count"]):
+                simulation.step()
+                rows.append([simulation.get_real(name.replace(".", "::", 1)) for name in asked["names"]])
+    return rows
+
+
+def pyfmi(asked: Request) -> Rows:
+    """Couple them by PyFMI's master."""
+    from pyfmi import load_fmu
+    from pyfmi.master import Master
+
+    step, count = asked["step"], asked["count"]
+    models = {name: load_fmu(fmu, kind="cs") for name, fmu in asked["fmus"].items()}
+    ends = [[*source.split(".", 1), *sink.split(".", 1)] for source, sink in asked["connections"]]
+    master = Master(
+        list(models.values()), [(models[a], output, models[b], into) for a, output, b, into in ends]
+    )
+    options = master.simulate_options()
+    options["step_size"] = step
+    options["result_handling"] = "memory"
+    done = master.simulate(start_time=0.0, final_time=step * count, options=options)
+    wanted = [name.split(".", 1) for name in asked["names"]]
+    return [list(map(float, row)) for row in zip(*(done[models[a]][v] for a, v in wanted), strict=True)][1:]
+
+
+def omsimulator(asked: Request) -> Rows:
+    """Couple them by OMSimulator, from an SSP."""
+    stop = asked["step"] * asked["count"]
+    options = [f"--stopTime={stop!r}", f"--stepSize={asked['step']!r}", "--resultFile=r.csv"]
+    run_program(asked, *options, str(_ssp(asked)))
+    return list(columns(Path("r.csv"), [f"pair.pair.{name}" for name in asked["names"]]))[1:]
+
+
+def _ssp(asked: Request) -> Path:
+    """Write the two and their connections as an SSP."""
+    path = Path("pair.ssp").resolve()
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr(
+            "SystemStructure.ssd", tostring(_structure(asked), encoding="utf-8", xml_declaration=True)
+        )
+        for name, fmu in asked["fmus"].items():
+            archive.write(fmu, f"resources/{name}.fmu")
+    return path
+
+
+def _structure(asked: Request) -> Element:
+    spaces = {f"xmlns:{prefix}": space for prefix, space in NAMESPACES.items()}
+    root = Element("ssd:SystemStructureDescription", {**spaces, "name": "pair", "version": "1.0"})
+    system = SubElement(root, "ssd:System", name="pair")
+    elements = SubElement(system, "ssd:Elements")
+    ports = {(name, "output") for name in asked["names"]}
+    ports |= {
+        (end, kind)
+        for pair in asked["connections"]
+        for end, kind in zip(pair, ("output", "input"), strict=True)
+    }
+    for component in asked["fmus"]:
+        _add_component(elements, component, sorted(ports))
+    connections = SubElement(system, "ssd:Connections")
+    for source, sink in asked["connections"]:
+        (a, output), (b, into) = source.split(".", 1), sink.split(".", 1)
+        ends = {"startElement": a, "startConnector": output, "endElement": b, "endConnector": into}
+        SubElement(connections, "ssd:Connection", ends)
+    _add_master_of_omsimulator(system, asked["step"])
+    return root
+
+
+def _add_component(elements: Element, name: str, ports: Sequence[tuple[str, str]]) -> None:
+    kind = {"type": "application/x-fmu-sharedlibrary", "implementation": "CoSimulation"}
+    element = SubElement(elements, "ssd:Component", {"name": name, "source": f"resources/{name}.fmu", **kind})
+    connectors = SubElement(element, "ssd:Connectors")
+    for port, way in ports:
+        component, variable = port.split(".", 1)
+        if component == name:
+            SubElement(SubElement(connectors, "ssd:Connector", name=variable, kind=way), "ssc:Real")
+
+
+def _add_master_of_omsimulator(system: Element, step: float) -> None:
+    """Add what OMSimulator's program needs to be told in a file: that steps are fixed."""
+    annotations = SubElement(system, "ssd:Annotations")
+    own = SubElement(annotations, "ssc:Annotation", type="org.openmodelica")
+    about = SubElement(SubElement(own, "oms:Annotations"), "oms:SimulationInformation")
+    master = {"description": "oms-ma", "stepSize": repr(step)}
+    SubElement(
+        about, "oms:FixedStepMaster", {**master, "absoluteTolerance": "1e-6", "relativeTolerance": "1e-6"}
+    )
+
+
+DRIVERS: dict[str, Callable[[dict[str, Any]], Rows]] = {
+    "FMPy": fmpy,
+    "libcosim": libcosim,
+    "Ecos": ecos,
+    "PyFMI": pyfmi,
+    "OMSimulator": omsimulator,
+}

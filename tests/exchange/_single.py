@@ -1,0 +1,149 @@
+"""One FMU in each tool: what its outputs are after each step. Runs in the Python that has the tool."""
+
+from __future__ import annotations
+
+import csv
+import ctypes
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+Request = dict[str, Any]
+Rows = list[list[float]]
+
+
+def fmpy(asked: Request) -> Rows:
+    """Run it by FMPy."""
+    from fmpy import simulate_fmu
+
+    step, count = asked["step"], asked["count"]
+    done = simulate_fmu(
+        asked["fmu"],
+        output=asked["names"],
+        step_size=step,
+        output_interval=step,
+        stop_time=step * count,
+    )
+    return [[float(row[name]) for name in asked["names"]] for row in done[1:]]
+
+
+def libcosim(asked: Request) -> Rows:
+    """Run it by libcosim, which knows variables by reference."""
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    references = value_references(asked["fmu"])
+    execution = CosimExecution.from_step_size(round(asked["step"] * 1e9))
+    slave = CosimLocalSlave(asked["fmu"], "body")
+    index = execution.add_local_slave(slave)
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer)
+    wanted = [references[name] for name in asked["names"]]
+    rows = []
+    for _ in range(asked["count"]):
+        execution.step()
+        rows.append([float(value) for value in observer.last_real_values(index, wanted)])
+    return rows
+
+
+def value_references(fmu: str) -> dict[str, int]:
+    """Return the references of an FMU's variables."""
+    from fmpy import read_model_description
+
+    return {v.name: v.valueReference for v in read_model_description(fmu).modelVariables}
+
+
+def ecos(asked: Request) -> Rows:
+    """Run it by Ecos."""
+    load_tbb()
+    from ecospy import EcosSimulation, EcosSimulationStructure
+
+    rows = []
+    with EcosSimulationStructure() as structure:
+        structure.add_model("body", asked["fmu"])
+        with EcosSimulation(structure=structure, step_size=asked["step"]) as simulation:
+            simulation.init()
+            for _ in range(asked["count"]):
+                simulation.step()
+                rows.append([float(simulation.get_real(f"body::{name}")) for name in asked["names"]])
+    return rows
+
+
+def load_tbb() -> None:
+    """Load the library of the package tbb, which that of Ecos needs and does not find by itself."""
+    for library in Path(sys.prefix, "lib").glob("libtbb.so.*"):
+        ctypes.CDLL(str(library), ctypes.RTLD_GLOBAL)
+        break
+
+
+def pyfmi(asked: Request) -> Rows:
+    """Run it by PyFMI."""
+    from pyfmi import load_fmu
+
+    step, count = asked["step"], asked["count"]
+    model = load_fmu(asked["fmu"], kind="cs")
+    model.setup_experiment(start_time=0.0, stop_time=step * count)
+    model.initialize()
+    rows = []
+    for index in range(count):
+        if status := model.do_step(index * step, step):
+            raise RuntimeError(f"PyFMI: do_step gave {status}")
+        rows.append([float(model.get(name)[0]) for name in asked["names"]])
+    return rows
+
+
+def fmusim(asked: Request) -> Rows:
+    """Run it by fmusim of the Reference-FMUs."""
+    step = asked["step"]
+    options = ["--interface-type", "cs", "--stop-time", repr(step * asked["count"]), "--output-file", "f.csv"]
+    options += ["--output-interval", repr(step), "--logging-on"]
+    for name in asked["names"]:
+        options += ["--output-variable", name]
+    run_program(asked, *options, asked["fmu"])
+    return list(columns(Path("f.csv"), asked["names"]))[1:]
+
+
+def omsimulator(asked: Request) -> Rows:
+    """Run it by OMSimulator."""
+    step = asked["step"]
+    options = ["--mode=cs", f"--stopTime={step * asked['count']!r}", f"--stepSize={step!r}"]
+    run_program(asked, *options, "--resultFile=r.csv", asked["fmu"])
+    return list(columns(Path("r.csv"), asked["names"]))[1:]
+
+
+def compliance_checker(asked: Request) -> Rows:
+    """Run it by the FMU Compliance Checker, and hand on its verdict on the description."""
+    step = asked["step"]
+    options = ["-k", "cs", "-h", repr(step), "-s", repr(step * asked["count"]), "-o", "c.csv", "-n", "0"]
+    run_program(asked, *options, asked["fmu"])
+    return list(columns(Path("c.csv"), asked["names"]))[1:]
+
+
+def run_program(asked: Request, *arguments: str) -> None:
+    """Run the tool's program, whose words go where ours go; end where it fails."""
+    if code := subprocess.run([asked["program"], *arguments]).returncode:
+        raise SystemExit(f"exit code {code}")
+
+
+def columns(path: Path, names: Sequence[str]) -> Iterator[list[float]]:
+    """Return the columns of a CSV file by name, one row for each time: the last that was written at it."""
+    with path.open(newline="") as file:
+        header, *lines = csv.reader(file, skipinitialspace=True)
+        places = [header.index(name) for name in names]
+        last_at = {float(line[0]): line for line in lines if line}
+    for line in last_at.values():
+        yield [float(line[place]) for place in places]
+
+
+DRIVERS: dict[str, Callable[[Request], Rows]] = {
+    "FMPy": fmpy,
+    "libcosim": libcosim,
+    "Ecos": ecos,
+    "PyFMI": pyfmi,
+    "fmusim": fmusim,
+    "OMSimulator": omsimulator,
+    "FMU Compliance Checker": compliance_checker,
+}
