@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,8 @@ from exchange._cases import (
     made_pair,
     outputs,
 )
+from exchange._machines import MACHINES, HostFailedError, Machine
+from exchange._reference import BALL, EXAMPLE, VERSIONS, bounces, found, imported, missing
 from exchange._tools import TOOLS, Answer, Tool, ToolFailedError, run, run_coupled
 
 PAGE = ROOT / "docs" / "exchange.md"
@@ -34,7 +36,12 @@ CONSOLE.soft_wrap = True
 
 def main() -> int:
     """Try all, print and write the tables."""
-    bad = [*_write("tools", list(NAMES), _row_of_tool), *_write("pairs", list(PAIRS), _row_of_pair)]
+    bad = [
+        *_of_tools("tools", list(NAMES), _row_of_tool),
+        *_of_tools("pairs", list(PAIRS), _row_of_pair),
+        *_of_reference_fmus(),
+        *_of_machines(),
+    ]
     for line in bad:
         CONSOLE.print(line, style="red", markup=False)
     CONSOLE.print(f"The tables are in {PAGE.relative_to(ROOT)}.")
@@ -45,20 +52,81 @@ Cell = float | str
 Row = Callable[[Tool, str, list[str]], Iterator[Cell]]
 
 
-def _write(table: str, names: list[str], row: Row) -> Iterator[str]:
-    """Write a table into the page; yield what was not as it should be."""
+def _of_tools(table: str, names: list[str], row: Row) -> Iterator[str]:
+    """Write the table of tools or of pairs; yield what was not as it should be."""
     lines = ["| tool | FMI | " + " | ".join(names) + " |", "|---" * (2 + len(names)) + "|"]
     for tool in TOOLS:
         for versions, cells in _cells(tool, table, row):
-            texts = [cell if isinstance(cell, str) else f"{cell:.1g}" for cell in cells]
-            texts += [""] * (len(names) - len(texts))
-            lines.append(
-                f"| {tool.name if tool.missing() else tool.shown()} | {versions} | {' | '.join(texts)} |"
-            )
-            CONSOLE.print(lines[-1], markup=False)
+            shown = tool.name if tool.missing() else tool.shown()
+            lines.append(_line(shown, [versions, *cells, *[""] * (len(names) - len(cells))]))
             tried = [cell for cell in cells if not str(cell).startswith(("not tried", "couples none"))]
             if not all(isinstance(cell, float) and cell <= GOAL for cell in tried):
-                yield f"{tool.name}, FMI {versions}: expected {GOAL:g} at most, got {', '.join(texts)}."
+                yield f"{tool.name}, FMI {versions}: expected {GOAL:g} at most, got {', '.join(map(str, cells))}."
+    _write(table, lines)
+
+
+def _of_reference_fmus() -> Iterator[str]:
+    """Write the table of FMUs in our importer; yield what was not as it should be."""
+    if reason := missing():
+        _write("reference", [f"Not tried: {reason}."])
+        return
+    lines = ["| Reference-FMU | " + " | ".join(f"FMI {fmi}" for fmi in VERSIONS) + " |", "|---|---|---|"]
+    for name, by_version in found().items():
+        cells = {}
+        for fmi, path in by_version.items():
+            with tempfile.TemporaryDirectory() as folder:
+                cells[fmi] = imported(path, Path(folder))
+            if isinstance(cell := cells[fmi], float) and cell > GOAL:
+                yield f"{name}, FMI {fmi}: expected {GOAL:g} at most, got {cell:.1g}."
+        lines.append(_line(name, [cells.get(fmi, "") for fmi in VERSIONS]))
+    counts = []
+    for fmi in VERSIONS:
+        with tempfile.TemporaryDirectory() as folder:
+            path = found().get(BALL, {}).get(fmi)
+            times = bounces(path, Path(folder)) if path else []
+        counts.append(f"{len(times)} bounces, the first at {times[0]:.5f} s" if times else "")
+    lines.append(_line(f"examples/{EXAMPLE}, e = 0.7", counts))
+    _write("reference", lines)
+
+
+def _of_machines() -> Iterator[str]:
+    """Write the table of machines that FMUs are made for; yield what was not as it should be."""
+    lines = ["| made for | FMI | " + " | ".join(NAMES) + " |", "|---" * (2 + len(NAMES)) + "|"]
+    for machine in MACHINES:
+        if reason := machine.missing():
+            lines.append(
+                _line(machine.platform.name, ["2.0, 3.0", f"not tried: {reason}", *[""] * (len(NAMES) - 1)])
+            )
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            host = machine.host(Path(folder))
+            for fmi in VERSIONS:
+                cells = [_cell_of_machine(machine, host, name, fmi, Path(folder)) for name in NAMES]
+                lines.append(_line(machine.shown(), [fmi, *cells]))
+                if not all(isinstance(cell, float) and cell <= GOAL for cell in cells):
+                    yield f"{machine.platform.name}, FMI {fmi}: expected {GOAL:g} at most, got {lines[-1]}."
+            machine.end(host)
+    _write("machines", lines)
+
+
+def _cell_of_machine(machine: Machine, host: Path, name: str, fmi: str, folder: Path) -> Cell:
+    path, expected = made(name, fmi, folder, machine.asked_for)
+    try:
+        rows = machine.run(host, path, outputs(name), 1.0 / RATE, COUNT)
+    except HostFailedError as error:
+        print(error, file=sys.stderr)
+        return "failed"
+    return difference(rows, expected) if rows.shape == expected.shape else f"{len(rows)} steps"
+
+
+def _line(name: str, cells: Sequence[Cell]) -> str:
+    texts = (cell if isinstance(cell, str) else f"{cell:.1g}" for cell in cells)
+    return f"| {name} | {' | '.join(texts)} |"
+
+
+def _write(table: str, lines: list[str]) -> None:
+    """Write a table into the page, and print it."""
+    CONSOLE.print(*lines, sep="\n", markup=False)
     begin, end = f"<!-- {table}: written by make exchange -->", f"<!-- end of {table} -->"
     written = "\n".join((begin, *lines, end))
     text = PAGE.read_text(encoding="utf-8")

@@ -65,7 +65,7 @@ def outputs(name: str) -> tuple[str, ...]:
     return {IMPACT_STOP: ANSWERS, REPLAY: PLAYED}.get(name, OUTPUTS)
 
 
-def made(name: str, fmi: str, folder: Path) -> tuple[Path, Rows]:
+def made(name: str, fmi: str, folder: Path, platform: str | None = None) -> tuple[Path, Rows]:
     """Return the FMU of a case, and what its outputs are after each step by our own run."""
     path = folder / "exported.fmu"
     if name == REPLAY:
@@ -79,12 +79,14 @@ def made(name: str, fmi: str, folder: Path) -> tuple[Path, Rows]:
             "velocity": 0.5,
         }
         answer = [1e4 * 0.01 + 3.0 * 0.5, 1e4, 3.0]
-        return export_fmu("impact_stop", path, fmi=fmi, starts=starts), np.tile(answer, (COUNT, 1))
+        return export_fmu("impact_stop", path, fmi=fmi, starts=starts, platform=platform), np.tile(
+            answer, (COUNT, 1)
+        )
     scene = _scene(BODIES[name])
     run_scene(scene, folder / "run.nc")
     samples = open_dataset(folder / "run.nc").vibroimpact.samples()
     rows = np.column_stack([samples[output].values for output in OUTPUTS])[1 : COUNT + 1]
-    return export_scene(scene, path, fmi=fmi), rows
+    return export_scene(scene, path, fmi=fmi, platform=platform), rows
 
 
 def _replay(fmi: str, path: Path) -> tuple[Path, Rows]:
