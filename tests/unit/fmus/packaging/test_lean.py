@@ -29,6 +29,8 @@ from vibroimpact.fmus.packaging.fmpy_door import read_description, schema_folder
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 
 BODIES = ("Oscillator", "Chain", "Beam")
+SIGNALS = ("Replay", "Gain")
+"""Components without a mass, a stop or a bound."""
 
 
 def description(path: Path) -> ElementTree.Element:
@@ -70,7 +72,7 @@ def test_every_start_value_lies_in_its_range_and_every_unknown_says_its_knowns(
             for bound, sign in ((variable.min, 1.0), (variable.max, -1.0)):
                 ranged += bound is not None
                 assert bound is None or sign * float(variable.start) >= sign * float(bound), variable.name
-    assert ranged or name == "Replay"
+    assert ranged or name in SIGNALS
     root = description(path)
     unknowns = [*root.iter("InitialUnknown"), *root.findall("ModelStructure/InitialUnknowns/Unknown")]
     assert unknowns
@@ -179,6 +181,9 @@ def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
     assert {variable for members in plugs.values() for variable in members.values()} <= names
     if name == "Replay":
         assert plugs["base"] == {"value": "base", "rate": "base_rate"}
+        return
+    if name == "Gain":
+        assert plugs["point"] == {"input": "input", "output": "output"}
         return
     assert "displacement" in plugs["point"]
     if name != "ImpactStop":
