@@ -64,6 +64,17 @@ def component_name(name: str) -> str:
     raise ComponentFileError(f"component: expected one of {', '.join(components())}, got {name!r}.{hint}")
 
 
+def component_folder(name: str) -> Path:
+    """Return the folder of a component's own sources, from its name or its folder's.
+
+    Raises
+    ------
+    ComponentFileError
+        There is no such component; the nearest name is offered.
+    """
+    return package_folder() / "native" / _folders()[component_name(name)]
+
+
 def _folders() -> dict[str, str]:
     described = sorted((package_folder() / "native").glob("*/variables.toml"))
     return dict(_name_and_folder(path, path.stat().st_mtime_ns) for path in described)

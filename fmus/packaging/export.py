@@ -13,6 +13,7 @@ import os
 import re
 import struct
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from vibroimpact.fmus.errors import UsageError
@@ -96,7 +97,7 @@ def export_fmu(
     units : mapping of str to UnitDefinition, optional
         Units, by variable name, of variables that have none of their own: those of a Gain.
     note : callable
-        Told what is compiled for another machine.
+        Told what is compiled for another machine, and what the library warns of.
 
     Returns
     -------
@@ -110,8 +111,8 @@ def export_fmu(
     ComponentError
         There is no library for a platform, and nothing to compile it with.
     UsageError
-        More of them than were compiled in, a component that has none, a start value of no such variable or out of its
-        range, or a file that cannot be written.
+        More of them than were compiled in, a component that has none, a start value of no such variable, out of its
+        range or refused by the library, or a file that cannot be written.
     """
     target = Path(output)
     full_name = component_name(name)
@@ -132,16 +133,19 @@ def export_fmu(
         counts = _lean_counts(original, own_starts) | counts
     component = original.with_repeats(counts)
     component = with_starts(component, own_starts)
+    experiment = default_experiment(full_name, _numbers(component), stop_time)
+    suitable = default_experiment(full_name, _numbers(component))
     edition = None
     if not full:
-        edition = edition_of(default_experiment(full_name, _numbers(component), stop_time))
+        edition = edition_of(experiment)
         component = lean(component, external=external, enumerations=enumerations)
     component = with_units(component, units or {})
     _refuse_starts_beyond(component, own_starts)
     resources = {}
     if own_starts:
         resources[STARTS_MEMBER] = "".join(_start_lines(original, own_starts)).encode("ascii")
-    contents = Contents(original, component, fmi, edition, counts, resources, platform, note)
+    tried = replace(experiment, stop_time=min(experiment.stop_time, suitable.stop_time))
+    contents = Contents(original, component, fmi, edition, tried, counts, resources, platform, note)
     write_fmu(target, members_of(contents))
     return target
 

@@ -1,4 +1,4 @@
-"""What an FMU that is written for others holds: libraries, sources, description, documentation, resources."""
+"""What an FMU that is written for others holds: libraries, sources, description, documentation, resources, a run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import metadata
 
-from vibroimpact.fmus.packaging.build import documentation, read_components
+from vibroimpact.fmus.packaging.build import documentation
 from vibroimpact.fmus.packaging.cross import SHIPPED, Note, chosen_platforms, library_for, members_for
 from vibroimpact.fmus.packaging.description import (
     TERMINALS_MEMBER,
@@ -19,14 +19,21 @@ from vibroimpact.fmus.packaging.description import (
     Experiment,
     model_description,
     plural,
+    read_component,
     terminals,
 )
+from vibroimpact.fmus.packaging.documentation_page import MEMBER as PAGE
+from vibroimpact.fmus.packaging.documentation_page import page
 from vibroimpact.fmus.packaging.platform_names import TARGETS, this_platform
 from vibroimpact.fmus.packaging.sources import c_files, source_members
-from vibroimpact.fmus.shipped import fmu_path
+from vibroimpact.fmus.packaging.trial import FOLDER as REFERENCE
+from vibroimpact.fmus.packaging.trial import MANIFEST, RESULT, Trial, reference_members, tried
+from vibroimpact.fmus.shipped import component_folder, fmu_path
 
 #: The member that says how many of each repeated block the description has: lines such as `modes 8`.
 SIZES_MEMBER = "resources/sizes.txt"
+#: Where the icon is, by the version of FMI.
+ICONS = {"2.0": "model.png", "3.0": "terminalsAndIcons/icon.png"}
 #: The last second that has a year of four digits.
 YEAR_9999 = 253_402_300_799
 #: Digits at a token's end that are an export's own, as instance.h has them.
@@ -45,6 +52,8 @@ class Contents:
         `3.0` or `2.0`.
     edition : Edition or None
         None: a full description, for this package's own importer.
+    experiment : Experiment
+        The run that is tried, and kept as a reference result.
     counts : mapping of str to int
         How many of each repeated block are described, where that is not all.
     resources : mapping of str to bytes
@@ -52,13 +61,14 @@ class Contents:
     platform : str, optional
         As in `export_fmu`.
     note : callable
-        Told what is compiled for another machine.
+        Told what is compiled for another machine, and what the library warns of.
     """
 
     original: ComponentDescription
     component: ComponentDescription
     fmi: str
     edition: Edition | None
+    experiment: Experiment
     counts: Mapping[str, int] = field(default_factory=dict)
     resources: Mapping[str, bytes] = field(default_factory=dict)
     platform: str | None = None
@@ -66,8 +76,14 @@ class Contents:
 
 
 def component_of(name: str) -> ComponentDescription:
-    """Return a component as it is compiled in, by its full name."""
-    return next(component for component in read_components() if component.name == name)
+    """Return a component as it is compiled in, by its name.
+
+    Raises
+    ------
+    ComponentFileError
+        There is no such component.
+    """
+    return read_component(component_folder(name) / "variables.toml")
 
 
 def edition_of(experiment: Experiment, *, dated: bool = True) -> Edition:
@@ -86,25 +102,62 @@ def members_of(contents: Contents) -> dict[str, bytes]:
     ComponentFileError
         The component was not built.
     ComponentError
-        There is no library for a platform, and nothing to compile it with.
+        There is no library for a platform, and nothing to compile it with; or a trial of it ended without an answer.
+    UsageError
+        The library refuses the start values.
     """
     original, fmi = contents.original, contents.fmi
     with zipfile.ZipFile(fmu_path(original.name, fmi)) as archive:
         members = {member: archive.read(member) for member in archive.namelist()}
-    if contents.platform is not None or SHIPPED.is_dir():
-        members = _for_platforms(members, contents)
+    own = next(content for member, content in members.items() if member.startswith("binaries/"))
     resources = dict(contents.resources)
     if contents.counts:
         lines = (f"{plural(block)} {count}\n" for block, count in contents.counts.items())
         resources[SIZES_MEMBER] = "".join(lines).encode("ascii")
     component = replace(contents.component, token=_own_token(original.token, resources))
+    trial = tried(component, own, resources, contents.experiment)
+    for warning in trial.warnings:
+        contents.note(f"{component.name}: {warning}")
+    if contents.platform is not None or SHIPPED.is_dir():
+        members = _for_platforms(members, contents)
     if contents.edition is not None:
         members |= source_members(original, fmi)
-        if fmi == "3.0":
-            members[TERMINALS_MEMBER] = terminals(component).encode("utf-8")
     text = model_description(component, fmi, contents.edition, c_files(members))
-    members["modelDescription.xml"] = text.encode("utf-8")
-    return members | documentation(component) | resources
+    members |= {"modelDescription.xml": text.encode("utf-8"), **documentation(component)}
+    if contents.edition is not None:
+        members |= _for_people(component, fmi, contents.edition, trial)
+    return members | resources
+
+
+def _for_people(
+    component: ComponentDescription, fmi: str, edition: Edition, trial: Trial
+) -> dict[str, bytes]:
+    """Return the members that a person looks at in a tool: icon, terminals, page, reference result."""
+    members = reference_members(trial) if trial.rows else {}
+    icon = ICONS[fmi]
+    members[icon] = component.source.with_name("icon.png").read_bytes()
+    further = [
+        ("README.md", "Read me: the same in plain text, with all variables that the component has"),
+        ("licenses/license.txt", "Licence"),
+    ]
+    if fmi == "3.0":
+        members[TERMINALS_MEMBER] = terminals(component, icon=True).encode("utf-8")
+        further.append((f"../{TERMINALS_MEMBER}", "Terminals: which variables a tool may connect at once"))
+    if trial.rows:
+        further += [
+            (
+                f"../{REFERENCE}/{RESULT}",
+                "Reference result: what the outputs are in a run where nothing is set",
+            ),
+            (f"../{REFERENCE}/{MANIFEST}", "What the reference result is, after FMI-LS-REF"),
+        ]
+    readme, equations = (
+        component.source.with_name(name).read_text(encoding="utf-8")
+        for name in ("README.md", "equations.html")
+    )
+    text = page(component, readme, equations, edition, f"../{icon}", further)
+    members[PAGE] = text.encode("utf-8")
+    return members
 
 
 def _own_token(token: str, resources: Mapping[str, bytes]) -> str:

@@ -113,10 +113,17 @@ def build_replay(
         raise UsageError("\n".join(f"replay: {problem}" for problem in problems))
     original = component_of(REPLAY)
     # without a date: a dataset knows by its hash which signals were played
-    edition = edition_of(_experiment(arrays), dated=False)
-    counts = {"channel": len(arrays)}
+    experiment = _experiment(arrays)
     contents = Contents(
-        original, _described(original, arrays), fmi, edition, counts, _signal_files(arrays), platform, note
+        original,
+        _described(original, arrays),
+        fmi,
+        edition_of(experiment, dated=False),
+        experiment,
+        {"channel": len(arrays)},
+        _signal_files(arrays),
+        platform,
+        note,
     )
     write_fmu(output, members_of(contents))
     return output

@@ -15,7 +15,7 @@ from vibroimpact.fmus.packaging.description.model import (
     Variable,
     plural,
 )
-from vibroimpact.fmus.packaging.description.model_xml import model_description, unit_definitions
+from vibroimpact.fmus.packaging.description.model_xml import literal, model_description, unit_definitions
 from vibroimpact.fmus.packaging.description.reading import read_component
 from vibroimpact.fmus.packaging.description.readme_table import readme_table, with_table
 from vibroimpact.fmus.packaging.description.terminals import MEMBER as TERMINALS_MEMBER
@@ -34,6 +34,7 @@ __all__ = [
     "c_header",
     "header_name",
     "lean",
+    "literal",
     "model_description",
     "plural",
     "read_component",

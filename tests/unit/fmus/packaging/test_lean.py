@@ -121,7 +121,7 @@ def test_start_values_of_an_export_are_those_of_the_description_and_of_the_binar
     starts = {
         "mass": 2.0,
         "contact[1].law": "restitution",
-        "contact[1].position": 0.1,
+        "contact[1].position": -0.1,
         "contact[1].side": "lower",
         "impact_limit": 12,
         "velocity_start": -1e-300,
@@ -218,6 +218,27 @@ def test_a_start_value_that_cannot_be_is_refused(tmp_path: Path, starts: dict[st
         export_fmu("oscillator", tmp_path / "o.fmu", starts=starts)
     assert said in str(caught.value)
     assert not (tmp_path / "o.fmu").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "starts", "said"),
+    [
+        ("oscillator", {"mass": 0.0}, "Oscillator: mass: expected a finite number > 0, got 0."),
+        ("impact_stop", {"law": "hertz"}, "ImpactStop: stiffness: expected a finite number > 0, got 0."),
+        ("chain", {"contact[1].law": 1, "contact[1].position": -1.0}, "Chain: displacement_start: "),
+        ("beam", {"length": 1e-300}, "Beam: "),
+    ],
+)
+@pytest.mark.parametrize("full", [False, True])
+def test_start_values_that_the_library_refuses_are_not_written(
+    tmp_path: Path, name: str, starts: dict[str, Any], said: str, full: bool
+) -> None:
+    with pytest.raises(UsageError) as caught:
+        export_fmu(name, tmp_path / "x.fmu", starts=starts, full=full)
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(said)
+    assert line.endswith("Nothing was written.")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_start_value_beyond_the_number_that_was_asked_for_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,161 @@
+"""An export is tried before it is written: start values that its library refuses are told, and the run is kept.
+
+The run is the export's reference result, after the layered standard FMI-LS-REF (1.0.0-alpha.1): a file of the role
+`result`, which the manifest names.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import subprocess
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from vibroimpact.fmus.errors import ComponentError, UsageError
+from vibroimpact.fmus.packaging.description import ComponentDescription, Experiment, literal
+from vibroimpact.fmus.packaging.platform_names import library_suffix
+from vibroimpact.fmus.packaging.trial_run import INSTANCE
+from vibroimpact.fmus.python_child import ending, python_command
+
+#: Where the files of the layered standard are.
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+MANIFEST, RESULT = "fmi-ls-manifest.xml", "result.csv"
+NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
+#: Steps of a reference result.
+INTERVALS = 200
+#: Longest time that a run may take, s.
+LIMIT = 120.0
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A run of an export's library.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The real outputs.
+    rows : sequence of sequence of float
+        At each communication point the time, s, and their values.
+    ended : str
+        Why it ends before its time; empty where it does not.
+    warnings : tuple of str
+        What the library warned of at the start.
+    """
+
+    names: tuple[str, ...]
+    rows: Sequence[Sequence[float]]
+    ended: str
+    warnings: tuple[str, ...]
+
+
+def tried(
+    component: ComponentDescription,
+    library: bytes,
+    resources: Mapping[str, bytes],
+    experiment: Experiment,
+) -> Trial:
+    """Run a component as it is described; nothing is set but what its resources say.
+
+    Parameters
+    ----------
+    component : ComponentDescription
+        As it is described.
+    library : bytes
+        That of this machine.
+    resources : mapping of str to bytes
+        Members below `resources/`.
+    experiment : Experiment
+        When the run starts and stops.
+
+    Raises
+    ------
+    UsageError
+        The library refuses the start values; with its own words.
+    ComponentError
+        Its process ended without an answer.
+    """
+    chosen = [v for v in component.variables_of(3) if v.causality == "output" and v.type == "Float64"]
+    chosen = [v for v in chosen if v.variability == "continuous" and not v.dimensions]
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        path = folder / f"library{library_suffix()}"
+        path.write_bytes(library)
+        for member, content in resources.items():
+            (folder / member).parent.mkdir(parents=True, exist_ok=True)
+            (folder / member).write_bytes(content)
+        facts = {
+            "library": str(path),
+            "token": component.token,
+            "resources": str(folder / "resources"),
+            "event_mode": component.event_mode,
+            "start": experiment.start_time,
+            "stop": experiment.stop_time,
+            "intervals": INTERVALS,
+            "references": [v.value_reference for v in chosen],
+        }
+        answer = _answer(component.name, facts)
+    if answer["refusal"]:
+        raise UsageError(f"{component.name}: {_said(answer['refusal'])}. Nothing was written.")
+    names = tuple(v.name for v in chosen)
+    return Trial(names, answer["rows"], _said(answer["ended"]), tuple(map(_said, answer["warnings"])))
+
+
+def _said(message: str) -> str:
+    """Return what a library logged, without the names of instance and function."""
+    return message.split(": ", 2)[-1] if message.startswith(f"{INSTANCE}: ") else message
+
+
+def _answer(name: str, facts: Mapping[str, object]) -> dict[str, Any]:
+    command = python_command("-m", "vibroimpact.fmus.packaging.trial_run", json.dumps(facts))
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+    except subprocess.TimeoutExpired as error:
+        raise ComponentError(f"{name}: expected a run within {LIMIT:g} s, got no answer.") from error
+    if done.returncode != 0:
+        last = done.stderr.strip().splitlines()[-1:] or ["no message"]
+        raise ComponentError(
+            f"{name}: expected a run of its library, which {ending(done.returncode)}: {last[0]}"
+        )
+    answer: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return answer
+
+
+def reference_members(trial: Trial) -> dict[str, bytes]:
+    """Return the members of an FMU that hold a run as its reference result."""
+    table = io.StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow(["time", *trial.names])
+    writer.writerows([repr(value) for value in row] for row in trial.rows)
+    content = table.getvalue().encode("utf-8")
+    first, last = trial.rows[0][0], trial.rows[-1][0]
+    told = f"Outputs from {literal(first)} s to {literal(last)} s at {len(trial.rows)} points, nothing set"
+    root = ElementTree.Element(
+        "fmiReferences",
+        {
+            f"{{{NAMESPACE}}}fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
+            f"{{{NAMESPACE}}}fmi-ls-version": "1.0.0-alpha.1",
+            f"{{{NAMESPACE}}}fmi-ls-description": "Layered Standard providing information on related files included in"
+            " an FMU.",
+        },
+    )
+    ElementTree.SubElement(
+        root,
+        "Related",
+        type="text/csv",
+        source=RESULT,
+        role="result",
+        description=told + (f"; ended there: {trial.ended}" if trial.ended else ""),
+        checksum=hashlib.sha3_256(content).hexdigest().upper(),
+    )
+    ElementTree.register_namespace("fmi-ls", NAMESPACE)
+    ElementTree.indent(root)
+    text = '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+    return {f"{FOLDER}/{MANIFEST}": text.encode("utf-8"), f"{FOLDER}/{RESULT}": content}
