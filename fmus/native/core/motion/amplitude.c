@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "motion/magnitude.h"
+
 /* The law is a first-order one: beyond these it says nothing. */
 static const double LEAST_FREQUENCY = 0.1, MOST_ADDED_RATIO = 1.0;
 
@@ -12,7 +14,7 @@ bool vi_amplitude_acts(const vi_amplitude_law *law)
 
 double vi_amplitude_of(double displacement, double velocity, double natural)
 {
-    return hypot(displacement, velocity / natural);
+    return vi_magnitude(displacement, velocity / natural);
 }
 
 double vi_amplitude_natural(const vi_amplitude_law *law, double natural, double amplitude)

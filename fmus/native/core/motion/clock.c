@@ -3,6 +3,8 @@
 #include <float.h>
 #include <math.h>
 
+#include "motion/magnitude.h"
+
 static const double TWO_PI = 6.283185307179586232;
 static const double TWO_PI_LOW = 2.449293598294706414e-16;
 static const double MOST_PERIODS = 9007199254740992.0; /* 2^53: beyond, a double cannot count them */
@@ -32,7 +34,7 @@ bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, dou
     if (angular_frequency > 0.0) {
         start_forced(clock, angular_frequency, phase);
     } else {
-        clock->period = natural > 0.0 ? exp2(rint(log2(TWO_PI / natural))) : 1.0;
+        clock->period = natural > 0.0 ? vi_nearest_power_of_two(TWO_PI / natural) : 1.0;
         clock->period_low = clock->origin = clock->origin_low = 0.0;
     }
     return clock->period >= DBL_MIN && clock->period <= DBL_MAX;

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "motion/magnitude.h"
+
 /* The steady response may be this many times larger than the motion before the split loses too many digits. */
 static const double LARGEST_SPLIT = 8.0;
 /* A stiff dashpot may cost more than this many units of 1 / fastest rate to follow by series; then the split is taken
@@ -26,7 +28,7 @@ static void start_steady(vi_mode *mode)
     const double w = mode->angular_frequency;
     const double detuning = (mode->natural - w) * (mode->natural + w);
     const double drag = 2.0 * mode->decay * w;
-    const double size = hypot(detuning, drag);
+    const double size = vi_magnitude(detuning, drag);
     mode->steady_exists = size > 0.0 && mode->force != 0.0;
     mode->steady_cos = mode->steady_sin = mode->steady_amplitude = 0.0;
     if (mode->steady_exists) {
