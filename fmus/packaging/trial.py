@@ -28,8 +28,8 @@ from vibroimpact.fmus.python_child import ending, python_command
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 MANIFEST, RESULT = "fmi-ls-manifest.xml", "result.csv"
 NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
-#: Steps of a reference result.
-INTERVALS = 200
+#: Steps of a reference result, and how many numbers it has at most where there are many outputs.
+MOST_INTERVALS, LEAST_INTERVALS, MOST_NUMBERS = 200, 20, 6000
 #: Longest time that a run may take, s.
 LIMIT = 120.0
 
@@ -98,7 +98,7 @@ def tried(
             "event_mode": component.event_mode,
             "start": experiment.start_time,
             "stop": experiment.stop_time,
-            "intervals": INTERVALS,
+            "intervals": min(MOST_INTERVALS, max(LEAST_INTERVALS, MOST_NUMBERS // (len(chosen) or 1))),
             "references": [v.value_reference for v in chosen],
         }
         answer = _answer(component.name, facts)
