@@ -1,0 +1,218 @@
+"""A body of another tool in contact with a stop that yields: energy of one elastic contact, and what an impact costs.
+
+The body is a mass that holds a force over a step (`tests/support/fmus/mass.c`), free or on a spring of its own, with
+states that can be kept and without. Its contact by a plain connection of the stop's force, and by `[[contact]]`, over
+the steps per contact; then microseconds per impact beside a body of ours whose law is another FMU's, and fused. For
+each law a dataset and a figure are left.
+
+Run with `python tests/benchmarks/bench_foreign_bodies.py [FOLDER]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from support.compliant_parts import FREE, contact_time, follows, yielding_contact, yielding_stop
+from support.coupled_parts import body, link, part, values
+from support.fmu_factory import mass
+from support.held_parts import held
+
+from vibroimpact.analysis.landmarks import observed_order
+from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
+from vibroimpact.orchestrator.importer.master import Importer
+
+STEPS = np.array([8, 15, 30, 60, 120, 240])
+STIFFNESS = {"kelvin_voigt": 1e4, "hertz": 1e6}
+SPRING, WAY, SPEED = 100.0, 0.1, 2.0
+"""Stiffness of the body's own spring, N/m; where the stop is, m; speed at 0, m/s."""
+METHODS = ("plain", "free", "free_stateless", "spring", "spring_stateless")
+DEFAULT_STEPS, GOAL = 30, 1e-6
+"""Energy error that a contact may have at so many steps."""
+ROUNDING = 1e-11
+"""An error below this is rounding and written as 0: it has no order."""
+REPETITIONS = 5
+
+
+def error_and_residual(law: str, method: str, steps: int, folder: Path) -> tuple[float, float]:
+    """Return the energy gained in one contact and the residual reported, relative."""
+    spring = SPRING if method.startswith("spring") else 0.0
+    start = {"v": SPEED, "k": spring}
+    stop = yielding_stop("s", law, {"stiffness": STIFFNESS[law]}, WAY)
+    step = contact_time(law, STIFFNESS[law]) * (SPEED**-0.2 if law == "hertz" else 1.0) / steps
+    if method == "plain":
+        links = [
+            link("b.x", "s.displacement"),
+            link("b.v", "s.velocity"),
+            link("s.applied_force", "b.f", -1.0),
+        ]
+        importer = Importer([part("b", mass(folder), **start), stop], links, macro_step=step)
+        energy = InterfaceEnergy(importer, links)
+        importer.begin()
+        energy.begin(links)
+    else:
+        run = held(
+            folder,
+            [stop],
+            start,
+            states=not method.endswith("stateless"),
+            macro_step=step if spring else 1.0,
+            contact_steps=float(steps),
+        )
+        importer, energy = run.importer, run.energy
+    importer.advance(2.0 * WAY / SPEED)
+    displacement, velocity = values(importer, "b", "x", "v")
+    importer.free()
+    before = 0.5 * SPEED**2
+    return (
+        0.5 * (velocity**2 + spring * displacement**2) / before - 1.0,
+        float(energy.residuals().sum()) / before,
+    )
+
+
+def ladder(law: str, folder: Path) -> xr.Dataset:
+    """Measure all methods on the ladder of steps."""
+    found = np.array([[error_and_residual(law, m, int(n), folder) for n in STEPS] for m in METHODS])
+    energies = np.where(np.abs(found[:, :, 0]) > ROUNDING, found[:, :, 0], 0.0)
+    axes = ("exchange", "macro_step")
+    words = {
+        "error": (SPEED * (np.sqrt(1.0 + energies) - 1.0), "m/s", "error of the speed after the contact"),
+        "energy_drift": (energies, "1", "energy gained, relative"),
+        "interface_residual": (found[:, :, 1], "1", "energy residual as reported, relative"),
+    }
+    dataset = xr.Dataset(
+        {name: (axes, data, {"units": u, "long_name": text}) for name, (data, u, text) in words.items()},
+        coords={
+            "exchange": ("exchange", list(METHODS), {"long_name": "body and how its force is given"}),
+            "macro_step": (
+                "macro_step",
+                1.0 / STEPS,
+                {"units": "1", "long_name": "step / contact time"},
+            ),
+        },
+        attrs={
+            "title": f"One elastic contact of a foreign mass, {law}",
+            "Conventions": "CF-1.11",
+            "source": f"vibroimpact {versions()['vibroimpact']}, tests/benchmarks/bench_foreign_bodies.py",
+            "versions": json.dumps(versions()),
+            "git_commit": git_commit(),
+        },
+    )
+    orders = [observed_order(1.0 / STEPS, dataset["energy_drift"].values[i]) for i in range(len(METHODS))]
+    dataset["energy_drift_order"] = ("exchange", orders, {"units": "1", "long_name": "observed order"})
+    return dataset
+
+
+def table(law: str, dataset: xr.Dataset) -> None:
+    """Print the ladder of one law."""
+    print(f"\n{law}: relative energy error of one elastic contact (residual reported)")
+    print("  steps   " + "".join(f"{method:>24}" for method in METHODS))
+    for i, n in enumerate(STEPS):
+        cells = [
+            f"{dataset['energy_drift'].values[k, i]:10.1e} ({dataset['interface_residual'].values[k, i]:8.1e})"
+            for k in range(len(METHODS))
+        ]
+        print(f"  {n:<8d}" + "".join(f"{cell:>24}" for cell in cells))
+
+
+def draw(dataset: xr.Dataset, figure: Path) -> None:
+    """Leave the figure of errors over the step, where figures can be drawn."""
+    try:
+        from vibroimpact.analysis.figures import convergence, save
+    except ImportError as error:
+        print(f"  no figure: {error}")
+        return
+    save(convergence(dataset), figure)
+    print(f"  figure: {figure}")
+
+
+# ---- microseconds per impact ----
+
+CONTACTS = 40
+"""Contacts of a mass that goes to and fro between two springs at -1 and 1 m."""
+CYCLE = 4.0 + 2.0 * math.pi / 100.0
+
+
+def shuttle(kind: str, folder: Path) -> Callable[[], None]:
+    """Return what runs the contacts once."""
+    sides = (("high", 1.0, "upper"), ("low", -1.0, "lower"))
+    stops = [yielding_stop(n, "kelvin_voigt", {"stiffness": 1e4}, p, side) for n, p, side in sides]
+    if kind == "fused":
+        inside = {
+            f"contact[{k}].{name}": value
+            for k, (_, position, side) in enumerate(sides, 1)
+            for name, value in (
+                ("law", "kelvin_voigt"),
+                ("position", position),
+                ("side", side),
+                ("stiffness", 1e4),
+            )
+        }
+        importer = Importer([body("b", {**FREE, **inside})])
+    elif kind == "ours":
+        own = {**FREE, **follows(1.0), **follows(-1.0, "lower", k=2)}
+        links = [*yielding_contact("b", "high", 1), *yielding_contact("b", "low", 2)]
+        importer = Importer([body("b", own), *stops], links)
+    else:
+        importer = held(folder, stops, {"v": 1.0}, states=kind == "foreign, states", macro_step=10.0).importer
+
+    def run() -> None:
+        importer.begin()
+        importer.advance(0.5 * CONTACTS * CYCLE)
+
+    return run
+
+
+def impact_table(folder: Path) -> None:
+    """Print microseconds per impact."""
+    kinds = ("fused", "ours", "foreign, states", "foreign, no states")
+    tasks = {kind: shuttle(kind, folder) for kind in kinds}
+    seconds: dict[str, list[float]] = {kind: [] for kind in kinds}
+    for _ in range(REPETITIONS):
+        for kind, task in tasks.items():
+            began = time.perf_counter()
+            task()
+            seconds[kind].append((time.perf_counter() - began) / CONTACTS)
+    print(f"\ncontact with a spring over {DEFAULT_STEPS} steps     median      min  us per impact")
+    for kind, found in seconds.items():
+        print(f"  {kind:34}{statistics.median(found) * 1e6:10.1f}{min(found) * 1e6:10.1f}")
+
+
+def main() -> None:
+    """Measure, print, leave datasets and figures."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
+    folder = parser.parse_args().folder
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as made:
+        for law in STIFFNESS:
+            dataset = ladder(law, Path(made))
+            table(law, dataset)
+            path = folder / f"foreign_bodies_{law}.nc"
+            dataset.to_netcdf(path)
+            print(f"  dataset: {path}")
+            draw(dataset, path.with_suffix(".png"))
+            worst = float(np.abs(dataset["energy_drift"].values[1:, list(STEPS).index(DEFAULT_STEPS)]).max())
+            verdict = "met" if worst <= GOAL else "MISSED"
+            print(
+                f"  [[contact]] at {DEFAULT_STEPS} steps: {worst:.1e} of the energy; goal <= {GOAL:g}: {verdict}"
+            )
+        impact_table(Path(made))
+
+
+if __name__ == "__main__":
+    main()
