@@ -32,7 +32,10 @@ SURFACE_ROUNDING = 4.0 * np.finfo(float).eps
 #: A force this close to the one that the step asks for, relative to the largest of the contact, is the one.
 FORCE_TOLERANCE = 1e-12
 #: Iterations of a foreseen step, and rounds in which it is made shorter.
-FORESIGHTS, SHORTENINGS = 12, 6
+FORESIGHTS, SHORTENINGS = 12, 12
+MOST_SHORTENED = 3.0
+#: Misfit of a foreseen force, relative to the largest, beyond which its step is far too long.
+LOST = 0.1
 #: A step longer than its limit by more than this factor, as its end shows, is made shorter.
 SLACK = 1.5
 #: A way out of the stop shorter than this, times the limit of a step, is none: the body has left.
@@ -141,7 +144,7 @@ class HeldForceBond:
         self._stop.mark(time)
         self._force = 0.0
         self._last_try: tuple[float, float] | None = None
-        self._settled = False
+        self._misfit = math.inf
         was_closed, self.arrived = self.closed, False
         size = target - time
         if not self.revisable and self._told is None:
@@ -174,12 +177,12 @@ class HeldForceBond:
         with self._stop.asking():
             if not self.closed:
                 return self._arrival(time, end, path)
-            if end == self._planned and self._settled and self._is_foreseen(path):
+            if end == self._planned and self._is_foreseen(path):
                 return None
             scale = self._time_scale(path)
             if path.size > SLACK * scale:
                 self._last_try = None
-                return time + self._foresee(scale)
+                return time + self._foresee(max(scale, path.size / MOST_SHORTENED))
             wanted = self._mean_force(path)
         return end if self._corrects(wanted) else None
 
@@ -394,8 +397,8 @@ class HeldForceBond:
         for turn in range(FORESIGHTS):
             answer = self._mean_force(self._foreseen_path(size, force))
             self._largest = max(self._largest, answer)
-            self._settled = abs(answer - force) <= FORCE_TOLERANCE * self._largest
-            if self._settled:
+            self._misfit = abs(answer - force)
+            if self._misfit <= FORCE_TOLERANCE * self._largest:
                 break
             following = _secant(force, answer, (previous, earlier) if turn else None)
             previous, earlier, force = force, answer, following
@@ -406,7 +409,8 @@ class HeldForceBond:
         foreseen = self._foreseen_path(path.size, self._force)
         sped = abs(path.start_velocity) + abs(path.end_velocity)
         return (
-            abs(path.end - foreseen.end) <= FORCE_TOLERANCE * path.size * sped
+            self._misfit <= FORCE_TOLERANCE * self._largest
+            and abs(path.end - foreseen.end) <= FORCE_TOLERANCE * path.size * sped
             and abs(path.end_velocity - foreseen.end_velocity) <= FORCE_TOLERANCE * sped
         )
 
@@ -423,8 +427,10 @@ class HeldForceBond:
             self._force = self._foreseen_force(size)
             path = self._foreseen_path(size, self._force)
             scale = self._time_scale(path)
-            if size > SLACK * scale:
-                size = scale
+            if size > SLACK * scale or self._misfit > LOST * self._largest:
+                size = max(
+                    min(scale, size / SLACK), size / MOST_SHORTENED
+                )  # a step far too long says little of the right one
                 continue
             turn, leaves = path.turn, self._stop.leaves(path)
             if turn is not None and NOT_AT_ONCE < turn < 1.0 - NOT_AT_ONCE:
@@ -436,6 +442,8 @@ class HeldForceBond:
                 self.closed, self._force = False, 0.0
                 return whole
             size *= leaves
+        else:
+            self._force = self._foreseen_force(size)
         return size
 
     def _time_scale(self, path: StepPath) -> float:
