@@ -21,7 +21,7 @@ from vibroimpact.orchestrator.importer.component import description_of
 from vibroimpact.orchestrator.importer.contact_bond import ContactBond
 from vibroimpact.orchestrator.importer.events import StepWatcher
 from vibroimpact.orchestrator.importer.master import Importer
-from vibroimpact.orchestrator.importer.plain_contacts import PlainContact, plain_contact
+from vibroimpact.orchestrator.importer.plain_contacts import ForceThatBegins, PlainContact, plain_contact
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.step_path import POINTS, WEIGHTS
 from vibroimpact.orchestrator.importer.wiring import connection_name
@@ -186,6 +186,11 @@ class InterfaceEnergy:
         bonds = {f"{bond.name}.applied_force": bond for bond in importer.contacts.ports}
         found: list[tuple[ConnectionSpec, _Connection | _Contact | PlainContact]] = []
         self._plain: list[PlainContact] = []
+        self._begun = [
+            ForceThatBegins(importer.components, connection)
+            for connection in connections
+            if ForceThatBegins.is_one(importer.components, connections, connection)
+        ]
         variables = {name: component.variables for name, component in importer.components.items()}
         for connection in connections:
             target = importer.components[connection.target[0]]
@@ -206,7 +211,7 @@ class InterfaceEnergy:
         )
         self._connections = [watched for _, watched in found]
         self._specs = [connection for connection, _ in found]
-        if found:
+        if found or self._begun:
             importer.watchers.append(StepWatcher(self._before, self._after))
 
     def begin(self, connections: Sequence[ConnectionSpec]) -> None:
@@ -214,6 +219,8 @@ class InterfaceEnergy:
         gains = {connection.target: connection.gain for connection in connections}
         for spec, watched in zip(self._specs, self._connections, strict=True):
             watched.begin(gains[spec.target])
+        for force in self._begun:
+            force.begin()
 
     def residuals(self) -> NDArray[np.float64]:
         """Residual of each connection so far, J."""
@@ -221,7 +228,8 @@ class InterfaceEnergy:
 
     def remarks(self) -> list[str]:
         """What a reader of the results must know of stops whose forces are plain connections."""
-        return [text for text in (contact.remark() for contact in self._plain) if text]
+        found = [*(c.remark() for c in self._plain), *(f.remark() for f in self._begun)]
+        return [text for text in found if text]
 
     def free(self) -> None:
         """Give back saved states, before the components are freed."""
@@ -235,3 +243,5 @@ class InterfaceEnergy:
     def _after(self, time: float, end: float) -> None:
         for watched in self._connections:
             watched.after(time, end)
+        for force in self._begun:
+            force.look()

@@ -16,6 +16,8 @@ from vibroimpact.orchestrator.importer.wiring import connection_name
 
 #: What an ImpactStop has beside the force; other components with a force need not be stops.
 FORCE, ANSWER, DISPLACEMENT, VELOCITY = "applied_force", "applied_restitution", "displacement", "velocity"
+#: What a lossless contact of n steps gains of its energy by a plain connection, times n (docs/coupling.md).
+GAIN = 5.0
 #: A part of the energy of its contacts that a connection may add without a word.
 UNTOLD = 1e-6
 
@@ -125,3 +127,62 @@ class PlainContact:
         if self._spec.stop_velocity is None:
             velocity = 0.0
         return self._stop.sign * displacement, self._stop.sign * velocity
+
+
+class ForceThatBegins:
+    """A force from a component of another tool that is moved by one body alone, and perhaps its stop.
+
+    It is one where the force begins or ends in a run; nobody knows its law then, and the error is told by its rule.
+    """
+
+    def __init__(self, components: Mapping[str, Component], connection: ConnectionSpec) -> None:
+        self._connection = connection
+        self._force = components[connection.source[0]].group("Float64", [connection.source[1]])
+        self.begin()
+
+    @staticmethod
+    def is_one(
+        components: Mapping[str, Component], connections: Sequence[ConnectionSpec], force: ConnectionSpec
+    ) -> bool:
+        """May this connection be that of a stop?"""
+        (source, output), (body, target) = force.source, force.target
+        inward = [c for c in connections if c.target[0] == source]
+        at_a_port = f"{target.rpartition('.')[0]}.law" in components[body].variables
+        return (
+            not at_a_port
+            and ANSWER not in components[source].variables
+            and _unit(components[source], output) == "N"
+            and any(_unit(components[source], c.target[1]) == "m" for c in inward)
+            and all(c.source[0] == body for c in inward)
+        )
+
+    def begin(self) -> None:
+        """Start a run."""
+        self._pressed: bool | None = None
+        self._steps = self._contacts = self._ended = 0
+
+    def look(self) -> None:
+        """Look at the force after a step."""
+        pressed = float(self._force.get()[0]) != 0.0
+        self._contacts += pressed and self._pressed is not True
+        self._steps += pressed
+        self._ended += self._pressed is True and not pressed
+        self._pressed = pressed
+
+    def remark(self) -> str:
+        """What a reader of the results must know; empty where there is nothing."""
+        if not self._ended:
+            return ""
+        steps = self._steps / self._contacts
+        (stop, _), (body, _) = self._connection.source, self._connection.target
+        return (
+            f"{connection_name(self._connection)}: a force that begins and ends, as a stop's, by a plain connection: "
+            f"at about {steps:.0f} steps a contact it adds about {min(1.0, GAIN / steps):.2g} of the energy of each. "
+            f'Use [[contact]] with body = "{body}" and stop = "{stop}", which closes it'
+        )
+
+
+def _unit(component: Component, name: str) -> str:
+    variable = component.variables[name]
+    declared = variable.declaredType.unit if variable.declaredType is not None else None
+    return str(variable.unit or declared or "")

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support import fmu_factory
 from support.compliant_parts import LAWS, yielding_stop
-from support.coupled_parts import EXCHANGES, VERSIONS, body, values
+from support.coupled_parts import EXCHANGES, VERSIONS, body, part, values
 from support.held_parts import foreign_contact, held
 
 from vibroimpact.fmus.errors import ComponentError
@@ -182,6 +183,22 @@ def test_the_surface_of_a_stop_that_does_not_say_it_is_found_by_asking(tmp_path:
     _, velocity = run.motion(2.0)
     assert velocity**2 == pytest.approx(1.0, abs=1e-9)
     assert run.events[0].time == pytest.approx(1.0, abs=1e-11)
+    run.importer.free()
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_stop_of_another_tool_is_a_stop_too(tmp_path: Path, version: str) -> None:
+    stop = part("s", fmu_factory.buffer(tmp_path, version), gap=1.0, c=20.0)
+    contact = foreign_contact(
+        side="upper", stop_displacement="d", stop_velocity="u", stop_force="push", mass=None
+    )
+    run = held(tmp_path, [stop], ROLLS, contacts=[contact], version=version, contact_steps=60.0)
+    _, velocity = run.motion(1.5)
+    ratio = 0.1
+    exact = math.exp(-2.0 * ratio * math.acos(ratio) / math.sqrt(1.0 - ratio**2))
+    assert velocity == pytest.approx(-exact, rel=1e-4)
+    assert run.energy.names == ("s.push -> b.f",)
+    assert abs(run.residual()) <= 1e-11
     run.importer.free()
 
 

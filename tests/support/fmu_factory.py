@@ -21,6 +21,7 @@ SOURCES = Path(__file__).with_name("fmus")
 #: The C file of each model; those with a description of a version can be made in that version.
 MODELS = {
     "BouncingBall": "ball.c",
+    "Buffer": "buffer.c",
     "Faulty": "faulty.c",
     "Gain": "gain.c",
     "Mass": "mass.c",
@@ -44,6 +45,14 @@ def stepped_ball(folder: Path, fmi: str = "3.0") -> Path:
     Outputs `h` (m), `v` (m/s), `bounces`; parameters `g`, `e`.
     """
     return _write("SteppedBall", fmi, folder)
+
+
+def buffer(folder: Path, fmi: str = "3.0") -> Path:
+    """Write a spring and a dashpot that begin at a position and never pull; it answers at the end of a step.
+
+    Inputs `d` (m), `u` (m/s); output `push` (N); parameters `k`, `c`, `gap`.
+    """
+    return _write("Buffer", fmi, folder)
 
 
 def faulty(folder: Path, fmi: str = "3.0") -> Path:

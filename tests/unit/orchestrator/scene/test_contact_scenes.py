@@ -226,6 +226,18 @@ def test_a_stop_that_is_connected_plainly_says_what_it_adds(folder: Path, states
     assert 'Use [[contact]] with body = "mass" and stop = "stop"' in record.message
 
 
+def test_a_plain_stop_of_another_tool_is_known_by_its_force(folder: Path) -> None:
+    fmu_factory.buffer(folder)
+    text = PLAIN.replace('"ImpactStop"', '"Buffer.fmi3.fmu"').replace("stop.displacement", "stop.d")
+    text = text.replace("stop.velocity", "stop.u").replace("stop.applied_force", "stop.push")
+    text = text.replace('{ law = "kelvin_voigt", stiffness = 1e4, position = 0.1 }', "{ gap = 0.1 }")
+    runner = GeneralRunner(scene_of(folder, text))
+    message = runner.run({}).message
+    runner.close()
+    assert message.startswith("stop.push -> mass.f: a force that begins and ends, as a stop's, by a plain ")
+    assert "at about 31 steps a contact it adds about 0.16 of the energy of each. Use [[contact]]" in message
+
+
 def test_a_plain_connection_that_never_touches_says_nothing(folder: Path) -> None:
     runner = GeneralRunner(scene_of(folder, PLAIN.replace("position = 0.1", "position = 10.0")))
     record = runner.run({})
