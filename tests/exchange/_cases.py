@@ -69,7 +69,7 @@ def made(name: str, fmi: str, folder: Path, platform: str | None = None) -> tupl
     """Return the FMU of a case, and what its outputs are after each step by our own run."""
     path = folder / "exported.fmu"
     if name == REPLAY:
-        return _replay(fmi, path)
+        return _replay(fmi, path, platform)
     if name == IMPACT_STOP:
         starts = {
             "law": "kelvin_voigt",
@@ -79,9 +79,8 @@ def made(name: str, fmi: str, folder: Path, platform: str | None = None) -> tupl
             "velocity": 0.5,
         }
         answer = [1e4 * 0.01 + 3.0 * 0.5, 1e4, 3.0]
-        return export_fmu("impact_stop", path, fmi=fmi, starts=starts, platform=platform), np.tile(
-            answer, (COUNT, 1)
-        )
+        export_fmu("impact_stop", path, fmi=fmi, starts=starts, platform=platform)
+        return path, np.tile(answer, (COUNT, 1))
     scene = _scene(BODIES[name])
     run_scene(scene, folder / "run.nc")
     samples = open_dataset(folder / "run.nc").vibroimpact.samples()
@@ -89,7 +88,7 @@ def made(name: str, fmi: str, folder: Path, platform: str | None = None) -> tupl
     return export_scene(scene, path, fmi=fmi, platform=platform), rows
 
 
-def _replay(fmi: str, path: Path) -> tuple[Path, Rows]:
+def _replay(fmi: str, path: Path, platform: str | None) -> tuple[Path, Rows]:
     """Return an FMU of noise at twice the rate with a gap, and of a slow channel on instants of its own."""
     random = np.random.default_rng(13)
     times = np.arange(2 * COUNT + 2) / (2.0 * RATE)
@@ -109,7 +108,7 @@ def _replay(fmi: str, path: Path) -> tuple[Path, Rows]:
     segment = np.clip(np.searchsorted(instants, at, "right") - 1, 0, len(instants) - 2)
     slopes = np.where(inside, (np.diff(slow) / np.diff(instants))[segment], 0.0)
     rows = (bridged[now], (np.diff(bridged) * 2.0 * RATE)[now], np.interp(at, instants, slow), slopes)
-    return build_replay(signals, path, fmi=fmi), np.column_stack(rows)
+    return build_replay(signals, path, fmi=fmi, platform=platform), np.column_stack(rows)
 
 
 @dataclass(frozen=True, slots=True)
