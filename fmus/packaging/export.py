@@ -1,8 +1,8 @@
 """Writes an FMU for another tool: a lean description, with start values of one's own; needs no compiler.
 
 The binary is the one that was built: it knows its maxima, and reads from the FMU's resources how many its
-description has, and which start values. Contacts that no description mentions keep the law `none`. Value references
-stay as they are.
+description has, and which start values. Contacts that no description mentions keep the law `none`. The value references
+of FMI 2.0 stay as they are; in FMI 3.0 they are places in the description, and a list in the resources says whose.
 """
 
 from __future__ import annotations

@@ -32,6 +32,8 @@ from vibroimpact.fmus.shipped import component_folder, fmu_path
 
 #: The member that says how many of each repeated block the description has: lines such as `modes 8`.
 SIZES_MEMBER = "resources/sizes.txt"
+#: The member with the value references that a description's, which count from 1 on, stand for; as resources.h has it.
+REFERENCES_MEMBER = "resources/references.txt"
 #: Where the icon is, by the version of FMI.
 ICONS = {"2.0": "model.png", "3.0": "terminalsAndIcons/icon.png"}
 #: The last second that has a year of four digits.
@@ -114,8 +116,13 @@ def members_of(contents: Contents) -> dict[str, bytes]:
     if contents.counts:
         lines = (f"{plural(block)} {count}\n" for block, count in contents.counts.items())
         resources[SIZES_MEMBER] = "".join(lines).encode("ascii")
-    component = replace(contents.component, token=_own_token(original.token, resources))
-    trial = tried(component, own, resources, contents.experiment)
+    component = contents.component
+    if fmi == "3.0" and (contents.edition is not None or resources):
+        resources[REFERENCES_MEMBER], component = _numbered(component)
+    # a trial runs by FMI 3.0, where the token of an export says that it has a list of references
+    trial_token = original.token if fmi == "2.0" else _own_token(original.token, resources)
+    trial = tried(replace(component, token=trial_token), own, resources, contents.experiment)
+    component = replace(component, token=_own_token(original.token, resources))
     for warning in trial.warnings:
         contents.note(f"{component.name}: {warning}")
     if contents.platform is not None or SHIPPED.is_dir():
@@ -158,6 +165,17 @@ def _for_people(
     text = page(component, readme, equations, edition, f"../{icon}", further)
     members[PAGE] = text.encode("utf-8")
     return members
+
+
+def _numbered(component: ComponentDescription) -> tuple[bytes, ComponentDescription]:
+    """Return the list of value references, and the component whose are the places of its variables, from 1 on.
+
+    OMSimulator takes the references in FMI 3.0's dependencies for places, and refuses those beyond the last.
+    """
+    variables = component.variables_of(3)
+    lines = (f"{variable.value_reference}\n" for variable in variables)
+    placed = tuple(replace(variable, value_reference=place) for place, variable in enumerate(variables, 1))
+    return "".join(lines).encode("ascii"), replace(component, variables=placed)
 
 
 def _own_token(token: str, resources: Mapping[str, bytes]) -> str:

@@ -91,7 +91,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         instance->environment = functions != NULL ? functions->componentEnvironment : NULL;
         instance->logging = loggingOn != fmi2False;
         char folder[VI_PATH_LENGTH];
-        if (!vi_instance_describe(instance, "fmi2Instantiate", vi_folder_of_uri(fmuResourceLocation, folder))) {
+        if (!vi_instance_describe(instance, "fmi2Instantiate", vi_folder_of_uri(fmuResourceLocation, folder), false)) {
             vi_instance_free(instance);
             return NULL;
         }

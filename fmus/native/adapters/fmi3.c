@@ -84,7 +84,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
             log_message(instance, fmi3Warning, "logStatusWarning",
                         "fmi3InstantiateCoSimulation: intermediate variables are not available in this component");
         }
-        if (!vi_instance_describe(instance, "fmi3InstantiateCoSimulation", resourcePath)) {
+        if (!vi_instance_describe(instance, "fmi3InstantiateCoSimulation", resourcePath,
+                                  vi_token_is_of_export(instantiationToken))) {
             vi_instance_free(instance);
             return NULL;
         }

@@ -21,6 +21,11 @@ bool vi_token_fits(const char *token)
            && strncmp(token, component->token, length - (sizeof own - 1)) == 0;
 }
 
+bool vi_token_is_of_export(const char *token)
+{
+    return strcmp(token, component->token) != 0;
+}
+
 vi_instance *vi_instance_new(const char *name)
 {
     vi_instance *instance = calloc(1, sizeof(vi_instance));
@@ -49,6 +54,7 @@ void vi_instance_free(vi_instance *instance)
         free(instance->self);
         free(instance->name);
         free(instance->starts);
+        free(instance->references);
         free(instance);
     }
 }
@@ -121,8 +127,23 @@ static void warn(const vi_instance *instance, const char *function, const char *
     va_end(arguments);
 }
 
-bool vi_instance_describe(vi_instance *instance, const char *function, const char *folder)
+static bool number(vi_instance *instance, const char *function, const char *folder)
 {
+    instance->references = calloc(component->variable_count, sizeof *instance->references);
+    if (instance->references == NULL) {
+        return vi_instance_fail(instance, function, "out of memory");
+    }
+    instance->reference_count = vi_references_read(folder, instance->references, component->variable_count);
+    return instance->reference_count > 0
+           || vi_instance_fail(instance, function, "expected the FMU's folder of resources with references.txt, got %s",
+                               folder != NULL ? folder : "none");
+}
+
+bool vi_instance_describe(vi_instance *instance, const char *function, const char *folder, bool numbered)
+{
+    if (numbered && !number(instance, function, folder)) {
+        return false;
+    }
     vi_sizes_read(folder, &instance->sizes);
     instance->starts = calloc(component->variable_count, sizeof(vi_start));
     if (instance->starts == NULL) {
@@ -188,12 +209,17 @@ bool vi_instance_initialize(vi_instance *instance, const char *function)
 
 static const vi_variable *find(vi_instance *instance, const char *function, int type, uint32_t reference)
 {
-    if (reference >= component->variable_count || component->variables[reference].type != type) {
+    size_t own = reference;
+    if (instance->references != NULL) {
+        const bool described = reference >= 1 && reference <= instance->reference_count;
+        own = described ? instance->references[reference - 1] : component->variable_count;
+    }
+    if (own >= component->variable_count || component->variables[own].type != type) {
         vi_instance_fail(instance, function, "value reference %lu is not a variable of this type",
                          (unsigned long)reference);
         return NULL;
     }
-    return &component->variables[reference];
+    return &component->variables[own];
 }
 
 static void refresh_outputs(vi_instance *instance)
@@ -261,7 +287,7 @@ bool vi_instance_set(vi_instance *instance, const char *function, int type, cons
             return vi_instance_fail(instance, function, "expected more than %lu values", (unsigned long)value_count);
         }
         convert((char *)instance->self + variable->offset, (void *)(uintptr_t)values, first, variable->count);
-        component->was_set(instance->self, references[i]);
+        component->was_set(instance->self, (uint32_t)(variable - component->variables));
         first += variable->count;
     }
     instance->outputs_stale = true;

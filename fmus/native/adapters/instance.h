@@ -41,6 +41,8 @@ struct vi_instance {
     vi_sizes sizes;          /* of the description */
     vi_start *starts;        /* of the description, where they are not the component's own */
     size_t start_count;
+    uint32_t *references;    /* the component's, of the description's 1, 2, ...; NULL: they are the same */
+    size_t reference_count;
     void *resources;         /* what the component has opened; NULL for most */
 };
 
@@ -53,8 +55,12 @@ void vi_instance_free(vi_instance *instance);
 void vi_instance_reset(vi_instance *instance);
 
 /* Take sizes and start values of the description from the folder of resources, now and after each reset; NULL: the
- * component's own. Return false, after logging, when memory is out or the component cannot use its resources. */
-bool vi_instance_describe(vi_instance *instance, const char *function, const char *folder);
+ * component's own. `numbered`: the description of an export's token has value references of its own, which must be
+ * there. Return false, after logging, when they are not, memory is out or the component cannot use its resources. */
+bool vi_instance_describe(vi_instance *instance, const char *function, const char *folder, bool numbered);
+
+/* Is a token that fits an export's? */
+bool vi_token_is_of_export(const char *token);
 
 /* Log an error `function: text` and return false. */
 bool vi_instance_fail(vi_instance *instance, const char *function, const char *format, ...);

@@ -57,6 +57,20 @@ size_t vi_starts_read(const char *folder, vi_start starts[], size_t most)
     return count;
 }
 
+size_t vi_references_read(const char *folder, uint32_t references[], size_t most)
+{
+    FILE *file = vi_resource_open(folder, "references.txt");
+    if (file == NULL) {
+        return 0;
+    }
+    size_t count = 0;
+    while (count < most && fscanf(file, "%9" SCNu32, &references[count]) == 1) { /* the width is that of a number */
+        count += 1;
+    }
+    (void)fclose(file);
+    return count;
+}
+
 static bool hexadecimal(char c)
 {
     return c != '\0' && strchr("0123456789abcdefABCDEF", c) != NULL;

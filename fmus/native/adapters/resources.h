@@ -3,6 +3,8 @@
  * sizes.txt: how many of each repeated block of variables the model description has, such as `modes 8`.
  * starts.txt: start values that are not the component's own, such as `17 4000000000000000`: value reference, then the
  * 64 bits of the number in hexadecimal digits, which no locale reads in another way.
+ * references.txt (FMI 3.0): the component's value references of the variables of the description, which numbers them
+ * from 1 on in their order: OMSimulator takes the references in its dependencies for places.
  */
 #ifndef VIBROIMPACT_RESOURCES_H
 #define VIBROIMPACT_RESOURCES_H
@@ -33,6 +35,9 @@ void vi_sizes_read(const char *folder, vi_sizes *sizes);
 
 /* Read at most `most` start values, and return how many there are. 0 when the folder is NULL, or has no such file. */
 size_t vi_starts_read(const char *folder, vi_start starts[], size_t most);
+
+/* Read at most `most` value references of the component, and return how many there are; 0 likewise. */
+size_t vi_references_read(const char *folder, uint32_t references[], size_t most);
 
 /* Open a file of the folder of resources to be read, byte by byte; NULL when the folder is, or there is no such file. */
 FILE *vi_resource_open(const char *folder, const char *name);

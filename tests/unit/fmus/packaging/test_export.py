@@ -1,5 +1,6 @@
 """Exports have just the contacts, modes, masses and sensors asked for, and their binary knows it."""
 
+import zipfile
 from ctypes import byref
 from pathlib import Path
 from typing import Any
@@ -11,12 +12,14 @@ from support.command_line import in_this_process
 from support.component_fmu import LOGGER2, VERSIONS, ComponentFmu
 
 from vibroimpact.fmus import fmu_path
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
 from vibroimpact.fmus.packaging.check import check_fmu
 from vibroimpact.fmus.packaging.export import STARTS_MEMBER, export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
-from vibroimpact.fmus.packaging.members import SIZES_MEMBER
+from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.packaging.members import REFERENCES_MEMBER, SIZES_MEMBER
+from vibroimpact.orchestrator.fmi.instance3 import Instance3
 
 pytestmark = pytest.mark.slow
 
@@ -184,3 +187,34 @@ def test_a_damaged_file_of_sizes_does_no_harm(tmp_path: Path, text: bytes, modes
     folder.mkdir()
     (folder / "sizes.txt").write_bytes(text)
     assert modes_for(fmu, folder.as_uri().encode()) == modes
+
+
+@pytest.mark.parametrize("name", ["oscillator", "chain", "beam", "impact_stop"])
+def test_value_references_of_fmi_3_are_places_in_the_description(tmp_path: Path, name: str) -> None:
+    # OMSimulator takes those in dependencies for places, and refused a chain and a beam
+    path = export_fmu(name, tmp_path / "x.fmu")
+    references = [variable.valueReference for variable in read_description(path).modelVariables]
+    assert references == list(range(1, len(references) + 1))
+    assert check_fmu(path) == ()
+
+
+@pytest.mark.parametrize("text", [None, b"", b"words", b"\xff\x00", b"-1\n", b"999999999\n" * 9999, b"1\n"])
+def test_an_export_whose_list_of_references_is_gone_or_damaged_does_no_harm(
+    tmp_path: Path, text: bytes | None
+) -> None:
+    path = export_fmu("impact_stop", tmp_path / "whole.fmu")
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    last = len(read_description(path).modelVariables)
+    del members[REFERENCES_MEMBER]
+    write_fmu(tmp_path / "x.fmu", members | ({} if text is None else {REFERENCES_MEMBER: text}))
+    with pytest.raises(ComponentError, match=r"with references\.txt|not a variable of this type"):
+        Instance3(unpack(tmp_path / "x.fmu"), "x").group("Float64", [last]).get()
+
+
+def test_references_out_of_the_description_are_none_of_the_binarys(tmp_path: Path) -> None:
+    path = export_fmu("impact_stop", tmp_path / "x.fmu")
+    instance = Instance3(unpack(path), "x")
+    for reference in (0, len(read_description(path).modelVariables) + 1, 2**32 - 1):
+        with pytest.raises(ComponentError, match="not a variable of this type"):
+            instance.group("Float64", [reference]).get()
