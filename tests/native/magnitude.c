@@ -8,7 +8,8 @@
 
 static double any_number(uint64_t *seed)
 {
-    static const double special[] = {0.0, -0.0, 1.0, 3.0, 4.0, DBL_MIN, DBL_TRUE_MIN, DBL_MAX / 2.0, -1e-308, 1e154, 1e-162};
+    static const double special[] = {0.0,          -0.0,          1.0,     3.0,   4.0,   DBL_MIN,
+                                     DBL_TRUE_MIN, DBL_MAX / 2.0, -1e-308, 1e154, 1e-162};
     if (choice(seed, 8) == 0) {
         return special[choice(seed, sizeof special / sizeof special[0])];
     }
@@ -23,8 +24,8 @@ static void the_length_is_that_of_the_library(uint64_t *seed)
         const double y = i % 2 == 0 ? any_number(seed) : x * uniform(seed, -3.0, 3.0);
         const double found = vi_magnitude(x, y), expected = hypot(x, y);
         others += found != expected;
-        CHECK(found == expected || fabs(found - expected) <= fmax(expected * DBL_EPSILON, DBL_TRUE_MIN), "%.17g, %.17g: %.17g, not %.17g", x,
-              y, found, expected);
+        CHECK(found == expected || fabs(found - expected) <= fmax(expected * DBL_EPSILON, DBL_TRUE_MIN),
+              "%.17g, %.17g: %.17g, not %.17g", x, y, found, expected);
     }
     CHECK(others < 3000, "%d of 300000 differ in the last place", others);
 }

@@ -58,14 +58,16 @@ static bool has_length(FILE *file, int64_t count)
 static double *read_numbers(vi_reader *reader, const char *name, int64_t count)
 {
     if (count > reader->room) {
-        vi_complain(reader->message, "resources/%s: expected at most %d numbers in all files, got more", name, MOST_NUMBERS);
+        vi_complain(reader->message, "resources/%s: expected at most %d numbers in all files, got more", name,
+                    MOST_NUMBERS);
         return NULL;
     }
     reader->room -= count;
     FILE *file = vi_resource_open(reader->folder, name);
     if (file == NULL || !has_length(file, count)) {
-        vi_complain(reader->message, "resources/%s: expected %" PRId64 " bytes, %" PRId64 " little-endian float64, got %s",
-                    name, count * (int64_t)sizeof(double), count, file == NULL ? "no file" : "another size");
+        vi_complain(reader->message,
+                    "resources/%s: expected %" PRId64 " bytes, %" PRId64 " little-endian float64, got %s", name,
+                    count * (int64_t)sizeof(double), count, file == NULL ? "no file" : "another size");
         if (file != NULL) {
             (void)fclose(file);
         }
@@ -73,7 +75,8 @@ static double *read_numbers(vi_reader *reader, const char *name, int64_t count)
     }
     double *numbers = malloc((size_t)count * sizeof(double));
     if (numbers == NULL || fread(numbers, sizeof(double), (size_t)count, file) != (size_t)count) {
-        vi_complain(reader->message, "resources/%s: expected room in memory and a file that can be read, got none", name);
+        vi_complain(reader->message, "resources/%s: expected room in memory and a file that can be read, got none",
+                    name);
         free(numbers);
         numbers = NULL;
     } else {
@@ -119,8 +122,8 @@ static bool add_axis(vi_reader *reader, bool even, int64_t count)
     axis->interval = numbers[1];
     free(numbers);
     if (!isfinite(axis->start) || !(axis->interval > 0.0) || !isfinite(axis->start + axis->interval * (double)count)) {
-        vi_complain(reader->message, "resources/%s: expected a finite start and an interval > 0 s, got %.17g, %.17g", name,
-                    axis->start, axis->interval);
+        vi_complain(reader->message, "resources/%s: expected a finite start and an interval > 0 s, got %.17g, %.17g",
+                    name, axis->start, axis->interval);
         return false;
     }
     return true;
@@ -173,8 +176,8 @@ static bool add_channel(vi_reader *reader, const char *channel, int axis)
     reader->recording->signal_count += 1;
     signal->axis = axis;
     if (!values_are_good(signal->values, count)) {
-        vi_complain(reader->message, "resources/%s: expected finite numbers, NaN in gaps only, got infinity or no number"
-                                     " at all", name);
+        vi_complain(reader->message,
+                    "resources/%s: expected finite numbers, NaN in gaps only, got infinity or no number at all", name);
         return false;
     }
     signal->gap_count = find_gaps(signal->values, count, NULL);
@@ -224,11 +227,11 @@ static bool read_line(vi_reader *reader, const char *line, int number)
     }
     if (whole && strcmp(word, "channel") == 0 && is_name(name) && count >= 1
         && count <= reader->recording->axis_count) {
-        return has_room(reader, reader->recording->signal_count, number)
-               && add_channel(reader, name, (int)count - 1);
+        return has_room(reader, reader->recording->signal_count, number) && add_channel(reader, name, (int)count - 1);
     }
-    vi_complain(reader->message, "resources/%s: line %d: expected `axis even COUNT` or `axis listed COUNT` with 2"
-                                 " samples or more, or `channel NAME AXIS` with the number of an axis above, got another",
+    vi_complain(reader->message,
+                "resources/%s: line %d: expected `axis even COUNT` or `axis listed COUNT` with 2"
+                " samples or more, or `channel NAME AXIS` with the number of an axis above, got another",
                 LIST, number);
     return false;
 }

@@ -85,8 +85,9 @@ static void check_channels(const replay *it, char *message)
 {
     const int count = channel_count(it);
     if (count == 0) {
-        vi_complain(message, "resources/signals: expected the signal files of a recording, got none. Make an FMU of one: "
-                             "vibroimpact fmu replay recording.nc -o replay.fmu");
+        vi_complain(message,
+                    "resources/signals: expected the signal files of a recording, got none. Make an FMU of one: "
+                    "vibroimpact fmu replay recording.nc -o replay.fmu");
     } else if (it->described >= 0 && it->described != count) {
         vi_complain(message, "resources/signals/signals.txt: expected the %d channels of the model description, got %d",
                     it->described, count);
