@@ -11,7 +11,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Polygon, Rectangle
 
 NATIVE = Path(__file__).resolve().parents[2] / "fmus" / "native"
 #: Width and height, pixels; the drawing's own coordinates go from 0 to 10.
@@ -94,7 +94,14 @@ def replay(axes: Axes) -> None:
     axes.plot(x[8:], y[8:], color=BLUE, lw=LINE * 0.75, marker="o", ms=4.0)
 
 
-ICONS = (oscillator, chain, beam, impact_stop, replay)
+def gain(axes: Axes) -> None:
+    """The triangle of an amplifier between two lines."""
+    axes.plot([0.8, 9.2], [5.0, 5.0], color=DARK, lw=LINE * 0.75)
+    corners = [(2.8, 1.9), (2.8, 8.1), (7.8, 5.0)]
+    axes.add_patch(Polygon(corners, facecolor=BLUE, edgecolor=DARK, lw=LINE * 0.75, joinstyle="round", zorder=3))
+
+
+ICONS = (oscillator, chain, beam, impact_stop, replay, gain)
 
 
 def main() -> None:
