@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import c_void_p
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError
-from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.archive import UnpackedFmu, unpack
 from vibroimpact.fmus.packaging.fmpy_door import ModelDescription, ModelVariable, read_description
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.instance2 import Instance2
@@ -61,6 +61,8 @@ class Component:
         It can go back to a saved state.
     event_mode : bool
         It handles events in event mode and may return early.
+    refuses_events : bool
+        It declares an event mode, and made an instance only without.
     event_times : VariableGroup or None
         FMI 2.0: the variables that report the first event of the last step.
     """
@@ -86,8 +88,9 @@ class Component:
         version = 3 if description.fmiVersion.startswith("3") else 2
         self.event_mode = events and version == 3 and bool(interface.hasEventMode)
         fmu = unpack(spec.fmu)
+        self.refuses_events = False
         self.instance: Instance2 | Instance3 = (
-            Instance3(fmu, spec.name, event_mode=self.event_mode, log=log, wrap=wrap)
+            self._instance3(fmu, log, wrap)
             if version == 3
             else Instance2(fmu, spec.name, log=log, wrap=wrap, reuse=_loses_memory(description))
         )
@@ -97,6 +100,21 @@ class Component:
         self._start_groups: dict[str, VariableGroup] = {}
         self._inputs: list[VariableGroup] = []
         self.event_times = self._event_time_group() if version == 2 and self.has_states else None
+
+    def _instance3(self, fmu: UnpackedFmu, log: LogTail | None, wrap: Wrapper | None) -> Instance3:
+        """Make an instance with event mode where that is declared; some FMUs refuse what they declare."""
+        make = partial(Instance3, fmu, self.name, log=log, wrap=wrap)
+        try:
+            return make(event_mode=self.event_mode)
+        except ComponentError as refusal:
+            if not self.event_mode:
+                raise
+            try:
+                instance = make()
+            except ComponentError:
+                raise refusal from None
+        self.event_mode, self.refuses_events = False, True
+        return instance
 
     def _event_time_group(self) -> VariableGroup | None:
         names = [

@@ -172,6 +172,11 @@ class GeneralRunner:
             if component.instance.changed_rounding
         ]
         remarks += [*self._importer.contacts.remarks(), *self._energy.remarks()]
+        remarks += [
+            f"{name} made no instance with the event mode that it declares, and ran without"
+            for name, component in self._importer.components.items()
+            if component.refuses_events
+        ]
         if self._importer.wants_to_end:
             remarks.append(f"a component asked for the end at time {self._importer.time:.17g}")
             if self._importer.overrun > self._importer.time:

@@ -70,7 +70,7 @@ def imported(path: Path, folder: Path) -> float | str:
         # the FMU's own words come last
         return f"refused: {str(error).splitlines()[0].rpartition(': ')[2]}"
     if not compared:
-        return "runs; its result is of arrays"
+        return "runs; nothing to compare"
     wanted = expected[:, [0, *(names.index(name) for name in compared)]]
     # an FMU may ask for the end before its experiment's; of a sample at an event both sides are right
     ours = {round(time, 9): row for time, *row in rows if not np.any(np.abs(events - time) <= 1e-9)}

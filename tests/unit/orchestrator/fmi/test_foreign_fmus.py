@@ -92,6 +92,37 @@ macro_step = 0.01
     np.testing.assert_allclose(record.events[:, 0], bounces_of_the_rule(0.7, 2.0), rtol=0, atol=1e-9)
 
 
+def test_an_fmu_that_refuses_the_event_mode_it_declares_runs_without_and_says_so(
+    folder: Path, tmp_path: Path
+) -> None:
+    # Roberts of the Reference-FMUs does it
+    declared = tmp_path / "Declared.fmu"
+    with zipfile.ZipFile(folder / "BouncingBall.fmi3.fmu") as archive, zipfile.ZipFile(declared, "w") as copy:
+        for member in archive.namelist():
+            content = archive.read(member)
+            if member == "modelDescription.xml":
+                assert content.count(b'hasEventMode="false"') == 1
+                content = content.replace(b'hasEventMode="false"', b'hasEventMode="true"')
+            copy.writestr(archive.getinfo(member), content)
+    text = """
+[scene]
+units = "SI"
+[component.ball]
+fmu = "{}"
+[record]
+recorded_time = 0.4
+variables = ["ball.h"]
+rate = 100
+[execution]
+macro_step = 0.01
+"""
+    plain = run(text.format("BouncingBall.fmi3.fmu"), folder)
+    record = run(text.format(declared), folder)
+    assert record.message == "ball made no instance with the event mode that it declares, and ran without"
+    assert record.outcome is Outcome.ok
+    np.testing.assert_array_equal(record.samples, plain.samples)
+
+
 def test_a_watch_on_a_body_whose_contact_another_component_answers_is_refused_with_the_reason(
     folder: Path,
 ) -> None:
