@@ -112,8 +112,8 @@ static void run3(char **given, double step, long steps, const unsigned int refer
     const fmi3Instance instance = ((fmi3InstantiateCoSimulationTYPE *)find("fmi3InstantiateCoSimulation"))(
         "host", given[3], given[4], false, false, false, false, NULL, 0, NULL, say3, NULL);
     expect(instance == NULL, "fmi3InstantiateCoSimulation");
-    expect((int)((fmi3EnterInitializationModeTYPE *)find("fmi3EnterInitializationMode"))(instance, false, 0.0, 0.0, false,
-                                                                                         0.0),
+    expect((int)((fmi3EnterInitializationModeTYPE *)find("fmi3EnterInitializationMode"))(instance, false, 0.0, 0.0,
+                                                                                         false, 0.0),
            "fmi3EnterInitializationMode");
     expect((int)((fmi3ExitInitializationModeTYPE *)find("fmi3ExitInitializationMode"))(instance),
            "fmi3ExitInitializationMode");

@@ -179,19 +179,20 @@ static void the_longest_message_fits(void)
     vi_instance_free(NULL);
 }
 
-static void write_starts(const char *folder, const char *text)
+static void write_member(const char *folder, const char *name, const char *text)
 {
     char path[VI_PATH_LENGTH];
-    (void)snprintf(path, sizeof path, "%s/starts.txt", folder);
+    (void)snprintf(path, sizeof path, "%s/%s", folder, name);
     FILE *file = fopen(path, "w");
     CHECK(file != NULL && fputs(text, file) >= 0 && fclose(file) == 0, "%s", path);
 }
 
 static void start_values_are_there_after_each_reset(const char *folder)
 {
-    write_starts(folder, "1 4000000000000000\n4 1\n0 3ff0000000000000\n5 1\n77 1\n4294967295 7\n1 no number");
+    write_member(folder, "starts.txt",
+                 "1 4000000000000000\n4 1\n0 3ff0000000000000\n5 1\n77 1\n4294967295 7\n1 no number");
     vi_instance *instance = vi_instance_new("thing");
-    CHECK(instance != NULL && vi_instance_describe(instance, "instantiate", folder), "%s", "memory");
+    CHECK(instance != NULL && vi_instance_describe(instance, "instantiate", folder, false), "%s", "memory");
     const thing *t = instance->self;
     for (int n = 0; n < 2; ++n) {
         CHECK(t->parameter == 2.0 && t->flag == 1, "%g, %d", t->parameter, (int)t->flag);
@@ -211,10 +212,53 @@ static void any_start_values_do_no_harm(uint64_t *seed, const char *folder)
             text[i] = characters[choice(seed, sizeof characters - 1)];
         }
         text[sizeof text - 1] = '\0';
-        write_starts(folder, text);
+        write_member(folder, "starts.txt", text);
         vi_instance *instance = vi_instance_new("thing");
-        CHECK(instance != NULL && vi_instance_describe(instance, "instantiate", folder), "%s", "memory");
+        CHECK(instance != NULL && vi_instance_describe(instance, "instantiate", folder, false), "%s", "memory");
         CHECK(instance->start_count <= VARIABLES, "%d", (int)instance->start_count);
+        vi_instance_free(instance);
+    }
+}
+
+static void described_references_are_places_in_the_list(const char *folder)
+{
+    write_member(folder, "references.txt", "3\n0\n999999999\n999\n1\n");
+    vi_instance *instance = vi_instance_new("thing");
+    instance->log = count_lines;
+    CHECK(vi_instance_describe(instance, "instantiate", folder, true), "%s", "five references");
+    CHECK(vi_instance_initialize(instance, "initialize"), "%s", "good");
+    instance->mode = VI_MODE_INSTANTIATED;
+    const double value = 7.5;
+    const uint32_t parameter = 5;
+    CHECK(vi_instance_set(instance, "set", VI_FLOAT64, &parameter, 1, &value, 1, take_doubles), "%s", "the fifth");
+    CHECK(((thing *)instance->self)->parameter == value, "%g", ((thing *)instance->self)->parameter);
+    const uint32_t none[] = {0, 3, 4, 6, UINT32_MAX};
+    for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
+        double got = 0.0;
+        CHECK(!vi_instance_get(instance, "get", VI_FLOAT64, &none[i], 1, &got, 1, move_doubles), "%lu",
+              (unsigned long)none[i]);
+    }
+    vi_instance_free(instance);
+}
+
+static void any_references_do_no_harm(uint64_t *seed, const char *folder)
+{
+    static const char characters[] = "0123456789x- \n\n";
+    for (int n = 0; n < 300; ++n) {
+        char text[100];
+        for (size_t i = 0; i + 1 < sizeof text; ++i) {
+            text[i] = characters[choice(seed, sizeof characters - 1)];
+        }
+        text[sizeof text - 1] = '\0';
+        write_member(folder, "references.txt", n > 0 ? text : "");
+        vi_instance *instance = vi_instance_new("thing");
+        instance->log = count_lines;
+        const bool described = vi_instance_describe(instance, "instantiate", folder, true);
+        CHECK(described == (instance->reference_count > 0) && instance->reference_count <= VARIABLES, "%s", text);
+        for (uint32_t reference = 0; described && reference < 2 * VARIABLES; ++reference) {
+            double got[8] = {0};
+            (void)vi_instance_get(instance, "get", VI_FLOAT64, &reference, 1, got, 8, move_doubles);
+        }
         vi_instance_free(instance);
     }
 }
@@ -228,6 +272,8 @@ int main(int count, char *arguments[])
     uint64_t seed = 5;
     start_values_are_there_after_each_reset(folder);
     any_start_values_do_no_harm(&seed, folder);
+    described_references_are_places_in_the_list(folder);
+    any_references_do_no_harm(&seed, folder);
     random_references_and_sizes_are_errors_or_right(&seed);
     states_come_back_and_damaged_ones_do_not(&seed);
     the_longest_message_fits();
