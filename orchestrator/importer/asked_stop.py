@@ -88,14 +88,13 @@ class ContactWork:
         self.contacts += self._sum == 0.0 and self._largest == 0.0
         self.steps += 1
         self._sum += work
-        self._largest = max(self._largest, self._sum)
+        self._largest = max(self._largest, abs(self._sum))  # one that begins pressed in gives energy back
 
     def share(self, residual: float) -> str:
         """Return in words what a residual, J, has done to this energy."""
-        word = "added" if residual > 0.0 else "taken"
-        return (
-            f"{word} {abs(residual):.3g} J, {abs(residual) / self.energy:.2g} of the energy of its contacts"
-        )
+        word, size = "added" if residual > 0.0 else "taken", abs(residual)
+        part = size / max(self.energy, size)
+        return f"{word} {size:.3g} J, {part:.2g} of the energy of its contacts"
 
 
 class AskedStop:

@@ -171,7 +171,7 @@ class HeldForceBond:
 
     def revised_end(self, time: float, end: float) -> float | None:
         """Return where a step just made must be repeated to, s; None when it may stay as it is."""
-        if not self.revisable:
+        if not (self.revisable and end > time):
             return None
         path = self._path(end - time)
         with self._stop.asking():

@@ -307,3 +307,32 @@ def test_a_body_of_ours_may_be_a_foreign_one(tmp_path: Path) -> None:
     assert energy.names == ("s.applied_force -> b.force",)
     assert abs(energy.residuals()[0]) <= 1e-9
     importer.free()
+
+
+def test_a_body_that_starts_pressed_in_takes_the_energy_of_the_spring_with_it(tmp_path: Path) -> None:
+    stop = yielding_stop("s", "kelvin_voigt", ELASTIC["kelvin_voigt"])
+    run = held(tmp_path, [stop], {"x": 1.01}, macro_step=0.01)
+    _, velocity = run.motion(0.1)
+    assert velocity == pytest.approx(-1.0, rel=1e-9)  # 1e4 * .01^2 = 1
+    assert run.importer.contacts.remarks() == []
+    run.importer.free()
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("stall", "expected steps that advance, got 100 without progress at time 0.04"),
+        ("error", "fmi3DoStep returned error at time 0.04"),
+    ],
+)
+def test_a_body_that_fails_in_a_contact_says_where(tmp_path: Path, fault: str, said: str) -> None:
+    # y' = u is displacement and velocity at once: pressed from the start
+    faulty = part("b", fmu_factory.faulty(tmp_path), fault=fault, fault_time=0.05)
+    stop = yielding_stop("s", "kelvin_voigt", {"stiffness": 100.0, "damping": 0.1}, -0.5)
+    contact = StopContactSpec("b", "y", "y", "u", "s", 1.0)
+    importer = Importer([faulty, stop], contacts=[contact], macro_step=0.01)
+    importer.begin()
+    with pytest.raises(ComponentError) as caught:
+        importer.advance(0.3)
+    assert said in str(caught.value)
+    importer.free()
