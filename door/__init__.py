@@ -56,6 +56,8 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.simulation import campaign as campaign
     from vibroimpact.simulation import cost_of as cost_of
     from vibroimpact.simulation import export_fmu as export_fmu
+    from vibroimpact.simulation import export_ssp as export_ssp
+    from vibroimpact.simulation import import_ssp as import_ssp
     from vibroimpact.simulation import replay as replay
     from vibroimpact.simulation import run as run
 
@@ -81,7 +83,7 @@ _NAMES = {
     "fmus.errors": ("VibroimpactError",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
     "orchestrator.scene": ("Scene",),
-    "simulation": ("campaign", "cost_of", "export_fmu", "replay", "run"),
+    "simulation": ("campaign", "cost_of", "export_fmu", "export_ssp", "import_ssp", "replay", "run"),
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}
 _ROOMS = {"figures": "analysis.figures", "fmus": "fmus"}

@@ -22,7 +22,13 @@ from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
 from vibroimpact.orchestrator.replay.replaying import replay_scene
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.ssp import opened_scene
+from vibroimpact.orchestrator.ssp import (
+    export_system,
+    import_system,
+    load_system,
+    opened_scene,
+    refuse_system_elsewhere,
+)
 
 SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
 PathLike = str | os.PathLike[str]
@@ -36,7 +42,7 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
     Parameters
     ----------
     scene : Scene, path or mapping
-        A scene, the file of one, or its tables.
+        A scene, the file of one or of a system (SSP), or its tables.
     path : path, optional
         The dataset to write as well, whole or not at all; one that is there is replaced.
     progress : bool
@@ -118,6 +124,8 @@ def campaign(
     if workers is not None and (not isinstance(workers, int) or workers < 1):
         raise UsageError(f"workers: expected a whole number of 1 or more, got {workers!r}.")
     refuse_two_kinds_of_workers(workers, scheduler)
+    if isinstance(scene, str | os.PathLike):
+        refuse_system_elsewhere(scene, scheduler)
     with _shown(progress) as shown:
         report = run_campaign(
             _scene(scene), _path(folder), workers=workers, scheduler=scheduler, progress=shown
@@ -244,6 +252,92 @@ def export_fmu(
         enumerations=enumerations,
         platform=platform,
     )
+
+
+def export_ssp(
+    scene: SceneLike,
+    path: PathLike,
+    *,
+    ssp: str = "1.0",
+    fmi: str | None = None,
+    gains: str = "transformation",
+    platform: str | None = None,
+) -> Path:
+    """Write a scene of components as a system (SSP) that other tools run; `import_ssp` gives it back.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        With components.
+    path : path
+        The file to write.
+    ssp : str
+        `1.0` or `2.0`.
+    fmi : str, optional
+        Version of FMI of this package's components in the archive; by default 2.0, in SSP 2.0 that of the scene.
+    gains : str
+        How a connection has its gain: as a `transformation`, or as a `component` with units of its own.
+    platform : str, optional
+        As `vibroimpact.fmus.export` has it.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+    UsageError
+        The scene has no components, or the file cannot be written.
+    ComponentError
+        There is no library for a platform, and nothing to compile it with.
+
+    Examples
+    --------
+    >>> export_ssp("two_oscillators.toml", "two.ssp")    # doctest: +SKIP
+    """
+    return export_system(_scene(scene), _path(path), ssp=ssp, fmi=fmi, gains=gains, platform=platform)
+
+
+def import_ssp(
+    path: PathLike, output: PathLike | None = None, *, parameters: PathLike | Sequence[PathLike] = ()
+) -> Scene:
+    """Read a system (SSP 1.0 or 2.0) as a scene; `run`, `campaign` and `cost_of` take its path as it is.
+
+    Parameters
+    ----------
+    path : path
+        The archive.
+    output : path, optional
+        The scene file to write as well (.toml), with the FMUs in a folder beside it; files that are there and hold
+        something else are refused. Without one the FMUs lie unpacked until this process ends.
+    parameters : path or sequence of path
+        Parameter sets (.ssv), files or ones in the archive: one is applied, several become a sweep.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        What is wrong with the system, or with the scene that it makes.
+    ComponentFileError
+        The archive, or an FMU in it, is unsafe or damaged.
+    UsageError
+        The parameter sets make no sweep, or a file cannot be written.
+
+    Examples
+    --------
+    >>> import_ssp("two.ssp").with_sweep({"a.mass": [1.0, 2.0]})    # doctest: +SKIP
+    """
+    sets = _paths(parameters)
+    if output is None:
+        return load_system(_path(path), (), sets).scene
+    import_system(_path(path), _path(output), (), sets)
+    return Scene.from_file(output)
 
 
 def _scene(given: SceneLike) -> Scene:

@@ -14,7 +14,7 @@ from vibroimpact.orchestrator.campaign.cluster import refuse_two_kinds_of_worker
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.failures import counted, outcome_lines
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.ssp import opened_scene
+from vibroimpact.orchestrator.ssp import opened_scene, refuse_system_elsewhere
 
 
 def run_to_folder(
@@ -22,6 +22,7 @@ def run_to_folder(
 ) -> None:
     """Run a scene's sweep into the folder of a campaign and say what was done."""
     refuse_two_kinds_of_workers(workers, scheduler)
+    refuse_system_elsewhere(scene, scheduler)
     loaded = opened_scene(scene, changes)
     refuse_folder(output)
     compute(loaded, output, workers, scheduler)

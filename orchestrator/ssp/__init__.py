@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from vibroimpact.orchestrator.ssp.opening import opened_scene
+from vibroimpact.orchestrator.ssp.opening import is_system, opened_scene, refuse_system_elsewhere
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -12,7 +12,15 @@ if TYPE_CHECKING:
 _HOMES = {"export_system": "exporting"} | dict.fromkeys(
     ("Imported", "import_system", "load_system"), "importing"
 )
-__all__ = ["Imported", "export_system", "import_system", "load_system", "opened_scene"]
+__all__ = [
+    "Imported",
+    "export_system",
+    "import_system",
+    "is_system",
+    "load_system",
+    "opened_scene",
+    "refuse_system_elsewhere",
+]
 
 
 if not TYPE_CHECKING:  # else every name would be one

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene import Scene, load_scene
 
 ENDING = ".ssp"
@@ -28,8 +30,27 @@ def opened_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scen
     ComponentFileError
         The archive, or an FMU in it, is unsafe or damaged.
     """
-    if Path(path).suffix.lower() != ENDING:
+    if not is_system(path):
         return load_scene(path, changes)
     from vibroimpact.orchestrator.ssp.importing import load_system
 
     return load_system(path, changes).scene
+
+
+def is_system(path: str | PathLike[str]) -> bool:
+    """Return whether a file is called as a system is."""
+    return Path(path).suffix.lower() == ENDING
+
+
+def refuse_system_elsewhere(path: str | PathLike[str], scheduler: object) -> None:
+    """Refuse a system for workers that may be on other machines, where its FMUs do not lie.
+
+    Raises
+    ------
+    UsageError
+    """
+    if scheduler is not None and is_system(path):
+        raise UsageError(
+            f"{option('scheduler')}: expected a scene file with its FMUs where all workers see them, got {path}. "
+            "Import the system first: vibroimpact ssp import."
+        )

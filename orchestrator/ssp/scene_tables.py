@@ -76,15 +76,18 @@ def scene_tables(
     if flat.ignored:
         more = f" and {len(flat.ignored) - 5} more" if len(flat.ignored) > 5 else ""
         notes.append(f"parameters of no variable, which were left out: {', '.join(flat.ignored[:5])}{more}")
-    head = noted.pop("scene", {"title": structure.name, "units": "SI"})
-    tables: dict[str, Any] = {"scene": head}
+    ours = bool(noted)
+    if not ours:
+        noted["scene"] = {"title": structure.name, "units": "SI"}
+    tables: dict[str, Any] = {name: noted.pop(name) for name in ("scene",) if name in noted}
     tables["component"] = {name: _component(fmus[path], values[path]) for path, name in names.items()}
     links = flat.links()
     if links:
         tables["connection"] = [_connection(link, names) for link in links]
     tables |= noted
     notes += _times(tables, structure, facts.values(), connected=bool(links))
-    notes += _record(tables, flat, names, facts)
+    if not ours:
+        notes += _record(tables, flat, names, facts)
     return tables, notes
 
 

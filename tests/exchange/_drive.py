@@ -1,4 +1,4 @@
-"""Drives one tool with one FMU, or with two that it couples, in its own Python: `python -m exchange._drive REQUEST`."""
+"""Drives one tool, in its own Python, with an FMU, two that it couples, or a system: `python -m exchange._drive REQUEST`."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import json
 import sys
 from pathlib import Path
 
-from exchange import _couple, _single
+from exchange import _couple, _single, _system
 
 if __name__ == "__main__":
     request = json.loads(sys.argv[1])
-    drivers = _couple.DRIVERS if "fmus" in request else _single.DRIVERS
-    Path(request["answer"]).write_text(json.dumps(drivers[request["tool"]](request)))
+    kind = _system if "system" in request else _couple if "fmus" in request else _single
+    Path(request["answer"]).write_text(json.dumps(kind.DRIVERS[request["tool"]](request)))

@@ -8,10 +8,12 @@ import re
 import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from support.places import ROOT
 
@@ -164,6 +166,18 @@ def run_coupled(
 ) -> Answer:
     """Return what a tool makes of FMUs that it couples: `names` and `connections` are of `component.variable`."""
     asked = {"fmus": {name: str(path) for name, path in fmus.items()}, "connections": list(connections)}
+    return _asked(tool, {**asked, "names": list(names), "step": step, "count": count}, folder)
+
+
+def run_system(
+    tool: Tool, system: Path, names: Sequence[str], step: float, count: int, folder: Path
+) -> Answer:
+    """Return what a tool makes of a system (SSP), with the step that it proposes; `names` are `component.variable`."""
+    with zipfile.ZipFile(system) as archive:
+        inside = [name for name in archive.namelist() if name.endswith(".fmu")]
+        fmus = {Path(name).stem: archive.extract(name, folder) for name in inside}
+        description = ElementTree.fromstring(archive.read("SystemStructure.ssd"))
+    asked = {"system": str(system), "model": description.get("name"), "fmus": fmus}
     return _asked(tool, {**asked, "names": list(names), "step": step, "count": count}, folder)
 
 

@@ -1,0 +1,29 @@
+"""A scene of components as an SSP archive in other tools: its own run to 1e-9, with nothing set and nothing edited."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from exchange._systems import COUNT, PAIRS, made
+from exchange._cases import difference
+from exchange._tools import Tool, run_system
+from exchange._systems import NAMES, STEP
+
+HERE = [pair for pair in PAIRS if pair[0].package or not pair[0].missing()]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("tool", "fmi", "gains"), HERE, ids=[f"{tool.name}, FMI {fmi}" for tool, fmi, _ in HERE]
+)
+def test_a_system_in_another_tool_is_our_own_run(tmp_path: Path, tool: Tool, fmi: str, gains: str) -> None:
+    if reason := tool.missing():
+        pytest.skip(reason)
+    system, expected = made(tmp_path, fmi, gains)
+    rows = np.array(run_system(tool, system, NAMES, STEP, COUNT, tmp_path).rows)
+    assert rows.shape == expected.shape == (COUNT, 2)
+    assert np.ptp(expected[:, 1]) > 0.9
+    assert difference(rows, expected) <= 1e-9
