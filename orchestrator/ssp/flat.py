@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,6 +15,7 @@ from vibroimpact.orchestrator.ssp.refusal import RefusalError
 from vibroimpact.orchestrator.ssp.structure import Component, Connection, System
 from vibroimpact.orchestrator.ssp.values import Parameter, converted, start_value
 
+_DOT = re.compile(r"\.")
 Path = tuple[str, ...]
 """Names of systems, from the outermost, and of the element; empty for the outermost system."""
 
@@ -134,9 +136,10 @@ class FlatSystem:
             for edge in self._leaving.get(node, ()):
                 given = _along(inner, edge.connection, self._unit(edge.target))
                 yield from self._meant(edge.target.element, edge.target.name, given, seen | {node})
-        for element in system.elements:
-            if name.startswith(f"{element}."):
-                yield from self._meant((*path, element), name[len(element) + 1 :], parameter, seen)
+        # a dot may be part of an element's name
+        for dot in (match.start() for match in _DOT.finditer(name)):
+            if name[:dot] in system.elements:
+                yield from self._meant((*path, name[:dot]), name[dot + 1 :], parameter, seen)
 
     def _inner_first(self) -> list[tuple[Path, System]]:
         return sorted(self._systems.items(), key=lambda item: -len(item[0]))

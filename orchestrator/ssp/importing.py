@@ -22,17 +22,19 @@ from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import FOLDERS
 from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.file import LARGEST_FILE
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, component_facts
 from vibroimpact.orchestrator.scene.problems import quoted
 from vibroimpact.orchestrator.ssp.archive import SspArchive
 from vibroimpact.orchestrator.ssp.flat import FlatSystem, Path, components_of
-from vibroimpact.orchestrator.ssp.names import GAIN
+from vibroimpact.orchestrator.ssp.names import GAIN, SSD_FILE
 from vibroimpact.orchestrator.ssp.parameter_sets import read_sets, with_sets
 from vibroimpact.orchestrator.ssp.reading import read_structure
 from vibroimpact.orchestrator.ssp.refusal import RefusalError
 from vibroimpact.orchestrator.ssp.scene_tables import scene_tables
 from vibroimpact.orchestrator.ssp.structure import Component
 
+MOST_COMPONENTS = 1000
 _PLAIN = re.compile(r"[^A-Za-z0-9_.-]")
 _scratch: list[ScratchFolder] = []
 """Folders of systems that run from their archives; they go at the end of the process."""
@@ -140,11 +142,16 @@ def import_system(
 
 def _text(tables: Mapping[str, Any]) -> str:
     """Return the text of a scene as a person would write it; where an odd name is in the way, another that says it."""
+    plain = tomli_w.dumps(tables)
+    if len(plain) > LARGEST_FILE:
+        raise RefusalError(
+            SSD_FILE, "a system that is a scene of 1 MiB at most", f"one of {len(plain)} bytes"
+        )
     text = tomlkit.dumps(tables)
     try:
-        return text if parse_toml(text) == tables else tomli_w.dumps(tables)
+        return text if parse_toml(text) == tables else plain
     except ValueError:
-        return tomli_w.dumps(tables)
+        return plain
 
 
 def _files(scene: Scene, fmus: str) -> list[FilePath]:
@@ -182,7 +189,9 @@ def _read(
     structure = read_structure(archive)
     each = dict(components_of(structure.system))
     if not each:
-        raise RefusalError("SystemStructure.ssd", "a system with components", "none")
+        raise RefusalError(SSD_FILE, "a system with components", "none")
+    if len(each) > MOST_COMPONENTS:
+        raise RefusalError(SSD_FILE, f"at most {MOST_COMPONENTS} components", f"{len(each)}")
     fmus, facts, notes = _fmus(archive, each, folder)
     flat = FlatSystem(structure.system, facts, facts.keys() - fmus.keys())
     tables, more = scene_tables(structure, flat, fmus, facts)
@@ -226,7 +235,7 @@ def _own(component: Component, file: FilePath, path: Path, notes: list[str]) -> 
     """Return the shipped FMU of a component that was exported of it; None for any other, also one put in its place."""
     if not component.fmu:
         return None
-    where = f"SystemStructure.ssd: {'.'.join(path)[:60]}"
+    where = f"{SSD_FILE}: {'.'.join(path)[:60]}"
     if component.fmu not in components() or component.fmi not in FOLDERS:
         got = f"{quoted(component.fmu)}, FMI {quoted(component.fmi)}"
         hint = "Take the annotation out, and the FMU of the archive is used."

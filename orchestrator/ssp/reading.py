@@ -63,7 +63,7 @@ def read_structure(archive: SspArchive) -> Structure:
         system=reader.system(top, 1),
         start_time=_time(experiment, "startTime"),
         stop_time=_time(experiment, "stopTime"),
-        step=_step(experiment),
+        step=_step(experiment, root),
         tables="".join(element.text or "" for element in _noted(root, "vibroimpact:Scene")),
     )
 
@@ -147,7 +147,8 @@ class _Reader:
 
     def _connection(self, element: Element) -> Connection:
         ends = [
-            (element.get(f"{end}Element"), element.get(f"{end}Connector", "")) for end in ("start", "end")
+            (element.get(f"{end}Element") or None, element.get(f"{end}Connector", ""))
+            for end in ("start", "end")
         ]
         connection = Connection(ends[0], ends[1])
         where = f"{SSD_FILE}: {connection.where}"
@@ -228,9 +229,11 @@ def _time(experiment: Element | None, key: str) -> float | None:
     return None if text is None else number(text, f"{SSD_FILE}: DefaultExperiment: {key}")
 
 
-def _step(experiment: Element | None) -> float | None:
-    """Return the step of a fixed-step master, as libcosim's annotation has it."""
+def _step(experiment: Element | None, root: Element) -> float | None:
+    """Return the step of a fixed-step master, as annotations of libcosim and OMSimulator have it."""
     for algorithm in _annotations(experiment, OSP_ANNOTATION):
         for fixed in algorithm.iterfind(tag("osp:FixedStepAlgorithm")):
             return number(fixed.get("baseStepSize", ""), f"{SSD_FILE}: FixedStepAlgorithm: baseStepSize")
+    for master in root.iter(tag("oms:FixedStepMaster")):
+        return number(master.get("stepSize", ""), f"{SSD_FILE}: FixedStepMaster: stepSize")
     return None

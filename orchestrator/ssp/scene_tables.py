@@ -30,16 +30,16 @@ def names_of(paths: Sequence[Path]) -> dict[Path, str]:
     >>> names_of([("rig", "body"), ("stop 1",), ("rig_body",)])
     {('rig', 'body'): 'rig_body', ('stop 1',): 'stop_1', ('rig_body',): 'rig_body_2'}
     """
-    names: dict[Path, str] = {}
+    names: dict[str, Path] = {}
     for path in paths:
         plain = _NOT_OF_A_NAME.sub("_", "_".join(path))
-        plain = f"_{plain}" if plain[0].isdigit() else plain
-        taken, name, count = set(names.values()), plain, 1
-        while name in taken:
+        plain = name = f"_{plain}" if plain[0].isdigit() else plain
+        count = 1
+        while name in names:
             count += 1
             name = f"{plain}_{count}"
-        names[path] = name
-    return names
+        names[name] = path
+    return {path: name for name, path in names.items()}
 
 
 def noted_tables(structure: Structure) -> dict[str, Any]:

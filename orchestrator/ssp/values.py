@@ -26,6 +26,7 @@ TRANSFORMATIONS = (
     "EnumerationMappingTransformation",
 )
 
+LONGEST_NAME = 2000
 _VERSION = re.compile(r"1\.[0-9]{1,3}(-.*)?|2\.[0-9]{1,3}")
 
 
@@ -113,15 +114,16 @@ def read_parameter_set(root: Element, where: str, units: Units | None = None) ->
     found: dict[str, Parameter] = {}
     for element in root.iterfind(f"{tag('ssv:Parameters')}/{tag('ssv:Parameter')}"):
         parameter = _parameter(element, where, known)
-        if parameter.name in found:
-            raise RefusalError(where, "each parameter once", quoted(parameter.name))
-        found[parameter.name] = parameter
+        if found.setdefault(parameter.name, parameter) != parameter:
+            raise RefusalError(where, "one value of each parameter", f"two of {quoted(parameter.name)}")
     return tuple(found.values())
 
 
 def _parameter(element: Element, where: str, units: Units) -> Parameter:
     name = element.get("name", "")
     where = f"{where}: {name[:100]}"
+    if len(name) > LONGEST_NAME:
+        raise RefusalError(where, f"a name of at most {LONGEST_NAME} characters", f"{len(name)}")
     for child in element:
         kind, text = child.tag.rpartition("}")[2], child.get("value", "")
         if kind in _READ or kind in REAL_TYPES or kind in INTEGER_TYPES:

@@ -83,6 +83,8 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
         "connect its signals one by one",
     ),
     "too deep": (ssd(nested(60)), "at most 50 systems in each other"),
+    "a crowd": (ssd("".join(part(f"n{k}") for k in range(1001))), "at most 1000 components"),
+    "a long name": (ssd(part(bindings=values({"a." * 5000: real(1.0)}))), "a name of at most"),
     "a name twice": (ssd(part() + part()), "a name of its own for each element"),
     "another version": (ssd(part(), version="3.0"), 'got "3.0"'),
     "no system": ("<a/>", "expected <ssd:SystemStructureDescription>"),
@@ -238,7 +240,7 @@ def test_values_out_of_an_archive_that_are_no_values_are_refused(tmp_path: Path,
         (
             "twice.ssv",
             ssv({"body.mass": real(1.0)}).replace("<ssv:Parameters>", "<ssv:Parameters>" + TWICE),
-            "once",
+            "one value of each parameter",
         ),
         ("../absent.ssv", None, "expected a file of the archive"),
     ):

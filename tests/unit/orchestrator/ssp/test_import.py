@@ -184,6 +184,14 @@ def test_the_step_is_that_of_the_master_or_the_smallest_that_an_fmu_proposes(
     elements = body() + component("law", "resources/plain.fmu", GAIN)
     joined = connection("body.displacement", "law.input")
     assert read(tmp_path, fmus, ssd(elements, joined, step=0.25)).macro_step == 0.25
+    # an empty name of an element is that of the system, as older versions of OMSimulator write it
+    oms = 'xmlns:oms="https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"'
+    note = f'<ssd:Annotations><ssc:Annotation type="org.openmodelica"><oms:FixedStepMaster {oms} stepSize="0.0625"/>'
+    note += "</ssc:Annotation></ssd:Annotations>"
+    push = '<ssd:Connection startElement="" startConnector="push" endElement="body" endConnector="force"/>'
+    outer = ssd(elements, joined + push, connectors=connector("push", "input"), step=None, more=note)
+    general = read(tmp_path, fmus, outer)
+    assert (general.macro_step, len(general.connections)) == (0.0625, 1)
     imported = load_system(archive(tmp_path / "t.ssp", ssd(elements, joined, step=None), fmus))
     assert imported.scene.general is not None
     assert 0.0 < imported.scene.general.macro_step < 1.0
