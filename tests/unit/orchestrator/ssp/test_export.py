@@ -69,6 +69,7 @@ def test_an_archive_is_valid_and_fmpy_reads_what_the_scene_says(system: Path) ->
     assert all(name == "SystemStructure.ssd" or name.startswith("resources/") for name in names)
 
 
+@pytest.mark.slow
 def test_the_scene_comes_back_with_its_sweep_and_gives_the_same_dataset(system: Path) -> None:
     ours, theirs = vi.Scene.from_dict(TWO), load_system(system).scene
     assert theirs.sweep == ours.sweep
@@ -155,3 +156,23 @@ def test_a_connection_from_what_is_no_output_is_refused(tmp_path: Path) -> None:
     tables["connection"][0]["gain_unit"] = "N.m/(N.s)"
     with pytest.raises(UsageError, match=r"connection\[1\]\.from: expected an output in SSP 1\.0"):
         export_system(vi.Scene.from_dict(tables), tmp_path / "s.ssp")
+
+
+def test_a_system_in_python_is_a_scene_with_its_own_fmus(tmp_path: Path) -> None:
+    vi.fmus.export("oscillator", tmp_path / "body.fmu", starts={"displacement_start": 0.5})
+    tables = {
+        "component": {"body": {"fmu": str(tmp_path / "body.fmu")}},
+        "record": {"recorded_time": 1.0, "variables": ["body.displacement"], "rate": 4},
+        "execution": {"guard": False},
+    }
+    path = vi.export_ssp(tables, tmp_path / "s.ssp", ssp="2.0")
+    swept = vi.import_ssp(path).with_sweep({"body.mass": [1.0, 2.0]})
+    assert swept.runs == 2
+    written = vi.import_ssp(path, tmp_path / "back.toml")
+    assert written.source == str(tmp_path / "back.toml")
+    expected = vi.run(tables, progress=False).body_displacement.values
+    assert expected[0] == 0.5
+    for scene in (path, written, swept.with_sweep({})):
+        assert np.array_equal(vi.run(scene, progress=False).body_displacement.values, expected)
+    with pytest.raises(UsageError, match="scheduler"):
+        vi.campaign(path, tmp_path / "campaign", scheduler="tcp://127.0.0.1:9")
