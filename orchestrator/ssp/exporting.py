@@ -9,13 +9,17 @@ from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.packaging.cross import Note
 from vibroimpact.fmus.packaging.fmu_zip import write_fmu
+from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import FOLDERS
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp.members import Travel, component_members
 from vibroimpact.orchestrator.ssp.names import SSD_FILE, VERSIONS
+from vibroimpact.orchestrator.ssp.scene_tables import OWN_TABLES
 from vibroimpact.orchestrator.ssp.writing import description, parameter_set
 
+ABOUT_A_RUN = ("scene", "record", "sweep", "execution")
+"""Tables of a scene that say how it is run, not what it is."""
 GAINS = ("transformation", "component")
 
 
@@ -45,8 +49,10 @@ def export_system(
     gains : str
         How a connection has its gain: as a `transformation` of its value, or as a `component` with units of its own,
         for tools that take no other.
-    platform, note
-        As `vibroimpact.fmus.export` has them.
+    platform
+        As `vibroimpact.fmus.export` has it.
+    note : callable
+        Told what is compiled for another machine, and what other tools leave out.
 
     Returns
     -------
@@ -89,4 +95,6 @@ def export_system(
         raise UsageError(str(error)) from None
     target = Path(output)
     write_fmu(target, members)
+    for name in parse_toml(scene.text).keys() - {*OWN_TABLES, *ABOUT_A_RUN}:
+        note(f"[[{name}]] travels in an annotation: other tools run the system without it")
     return target

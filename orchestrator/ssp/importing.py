@@ -19,6 +19,7 @@ from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus import components, fmu_path
 from vibroimpact.fmus.errors import ComponentFileError, SceneError, UsageError
 from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.members import OWN_DIGITS
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import FOLDERS
 from vibroimpact.orchestrator.scene import Scene, parse_scene
@@ -244,7 +245,7 @@ def _own(component: Component, file: FilePath, path: Path, notes: list[str]) -> 
     inside, own = unpack(file), unpack(shipped)
     if inside.identifiers[0] != own.identifiers[0]:
         return None
-    if inside.token != own.token:
+    if inside.token[: -OWN_DIGITS - 1] != own.token[: -OWN_DIGITS - 1]:
         notes.append(
             f"{'.'.join(path)}: its {component.fmu} is of another version of this package; the one installed is used"
         )

@@ -21,6 +21,8 @@ NAMESPACES = {
 ANNOTATION = "vibroimpact"
 #: The annotation in which libcosim looks for its step.
 OSP_ANNOTATION = "com.opensimulationplatform"
+#: The annotation without which OMSimulator's program takes no system, and in which it looks for its step.
+OMS_ANNOTATION = "org.openmodelica"
 
 FMU_TYPE = "application/x-fmu-sharedlibrary"
 PARAMETER_SET_TYPE = "application/x-ssp-parameter-set"

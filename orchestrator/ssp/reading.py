@@ -36,6 +36,7 @@ from vibroimpact.orchestrator.ssp.values import (
     truth,
 )
 
+_TABLES = tag("vibroimpact:Tables")
 DEEPEST = 50
 """Systems in each other."""
 
@@ -56,7 +57,7 @@ def read_structure(archive: SspArchive) -> Structure:
     top = root.find(tag("ssd:System"))
     if top is None:
         raise RefusalError(SSD_FILE, "one <System>", "none")
-    reader = _Reader(archive, read_units(root, SSD_FILE))
+    reader = _Reader(archive, read_units(root, SSD_FILE), _notes(root))
     experiment = root.find(tag("ssd:DefaultExperiment"))
     return Structure(
         name=root.get("name", ""),
@@ -64,7 +65,7 @@ def read_structure(archive: SspArchive) -> Structure:
         start_time=_time(experiment, "startTime"),
         stop_time=_time(experiment, "stopTime"),
         step=_step(experiment, root),
-        tables="".join(element.text or "" for element in _noted(root, "vibroimpact:Scene")),
+        tables="".join(element.text or "" for note in _noted(root) for element in note.iterfind(_TABLES)),
     )
 
 
@@ -72,6 +73,7 @@ def read_structure(archive: SspArchive) -> Structure:
 class _Reader:
     archive: SspArchive
     units: Units
+    notes: Mapping[tuple[str, str], Element]
 
     def system(self, element: Element, depth: int) -> System:
         where = f"{SSD_FILE}: {element.get('name', '')[:60]}"
@@ -86,7 +88,8 @@ class _Reader:
             self._bindings(element, where),
             self._elements(() if inner is None else tuple(inner), where, depth),
             tuple(
-                map(self._connection, element.iterfind(f"{tag('ssd:Connections')}/{tag('ssd:Connection')}"))
+                self._connection(connection, depth)
+                for connection in element.iterfind(f"{tag('ssd:Connections')}/{tag('ssd:Connection')}")
             ),
         )
 
@@ -99,7 +102,7 @@ class _Reader:
             if not name or name in found:
                 raise RefusalError(where, "a name of its own for each element", quoted(name))
             if element.tag == tag("ssd:Component"):
-                found[name] = self._component(element, name)
+                found[name] = self._component(element, name, depth)
             elif element.tag == tag("ssd:System"):
                 found[name] = self.system(element, depth + 1)
             else:
@@ -108,7 +111,7 @@ class _Reader:
                 raise RefusalError(f"{SSD_FILE}: {name[:60]}", "a component or a system", kind, hint)
         return found
 
-    def _component(self, element: Element, name: str) -> Component:
+    def _component(self, element: Element, name: str, depth: int) -> Component:
         where = f"{SSD_FILE}: {name[:60]}"
         kind = element.get("type", FMU_TYPE)
         if kind != FMU_TYPE:
@@ -119,15 +122,15 @@ class _Reader:
             hint = "Export the FMU for co-simulation."
             raise RefusalError(f"{where}: implementation", "CoSimulation", quoted(implementation), hint)
         source = self.archive.member(element.get("source", ""), f"{where}: source")
-        own = next(_noted(element, "vibroimpact:Component"), Element("none"))
-        gain = next(_noted(element, "vibroimpact:Gain"), None)
+        own = self._note("Component", name, depth)
+        gain = self._note("Gain", name, depth)
         return Component(
             name,
             source,
             self._connectors(element, where),
             self._bindings(element, where),
-            own.get("fmu", ""),
-            own.get("fmi", ""),
+            "" if own is None else own.get("fmu", ""),
+            "" if own is None else own.get("fmi", ""),
             gain is not None,
             None if gain is None else gain.get("gain_unit"),
         )
@@ -145,7 +148,7 @@ class _Reader:
         names = (child.get("unit", "") for child in connector)
         return next((self.units[name] for name in names if name in self.units), None)
 
-    def _connection(self, element: Element) -> Connection:
+    def _connection(self, element: Element, depth: int) -> Connection:
         ends = [
             (element.get(f"{end}Element") or None, element.get(f"{end}Connector", ""))
             for end in ("start", "end")
@@ -155,15 +158,19 @@ class _Reader:
         if element.get("startIndices") or element.get("endIndices"):
             raise RefusalError(where, "a connection of single numbers", "elements of an array")
         factor, offset = read_transformation(element, where) or (None, 0.0)
-        own = next(_noted(element, "vibroimpact:Connection"), Element("none"))
+        own = self._note("Connection", f"{ends[1][0]}.{ends[1][1]}", depth)
         return Connection(
             ends[0],
             ends[1],
             factor,
             offset,
             truth(element.get("suppressUnitConversion", "false"), where),
-            own.get("gain_unit"),
+            None if own is None else own.get("gain_unit"),
         )
+
+    def _note(self, kind: str, name: str, depth: int) -> Element | None:
+        """Return what this package has noted of an element of the outermost system."""
+        return self.notes.get((kind, name)) if depth == 1 else None
 
     def _bindings(self, element: Element, where: str) -> tuple[Binding, ...]:
         each = element.iterfind(f"{tag('ssd:ParameterBindings')}/{tag('ssd:ParameterBinding')}")
@@ -213,15 +220,25 @@ _DICTIONARY = "Signal dictionaries are not available in this version: connect it
 
 
 def _annotations(element: Element | None, kind: str) -> Iterator[Element]:
-    """Yield what annotations of one type hold."""
+    """Yield what annotations of one type hold, of an element and of those in it."""
     if element is not None:
-        for annotation in element.iterfind(f"{tag('ssd:Annotations')}/{tag('ssc:Annotation')}"):
+        for annotation in element.iter(tag("ssc:Annotation")):
             if annotation.get("type") == kind:
                 yield from annotation
 
 
-def _noted(element: Element, name: str) -> Iterator[Element]:
-    return (note for note in _annotations(element, ANNOTATION) if note.tag == tag(name))
+def _noted(root: Element) -> Iterator[Element]:
+    return (note for note in _annotations(root, ANNOTATION) if note.tag == tag("vibroimpact:Scene"))
+
+
+def _notes(root: Element) -> dict[tuple[str, str], Element]:
+    """Return the notes on elements by kind and name; a connection's name is that of the input at its end."""
+    found: dict[tuple[str, str], Element] = {}
+    for scene in _noted(root):
+        for note in scene:
+            name = note.get("name") or f"{note.get('endElement')}.{note.get('endConnector')}"
+            found[note.tag.rpartition("}")[2], name] = note
+    return found
 
 
 def _time(experiment: Element | None, key: str) -> float | None:
@@ -234,6 +251,7 @@ def _step(experiment: Element | None, root: Element) -> float | None:
     for algorithm in _annotations(experiment, OSP_ANNOTATION):
         for fixed in algorithm.iterfind(tag("osp:FixedStepAlgorithm")):
             return number(fixed.get("baseStepSize", ""), f"{SSD_FILE}: FixedStepAlgorithm: baseStepSize")
-    for master in root.iter(tag("oms:FixedStepMaster")):
-        return number(master.get("stepSize", ""), f"{SSD_FILE}: FixedStepMaster: stepSize")
+    for master in root.iter():
+        if master.tag.endswith("}FixedStepMaster"):  # its namespace has changed from version to version
+            return number(master.get("stepSize", ""), f"{SSD_FILE}: FixedStepMaster: stepSize")
     return None

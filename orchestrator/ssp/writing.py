@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from importlib import metadata
 from xml.etree import ElementTree
@@ -17,7 +18,13 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.general.component_facts import NUMERIC_KINDS, StartValue, VariableFacts
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
 from vibroimpact.orchestrator.ssp.members import Part
-from vibroimpact.orchestrator.ssp.names import ANNOTATION, FMU_TYPE, NAMESPACES, OSP_ANNOTATION
+from vibroimpact.orchestrator.ssp.names import (
+    ANNOTATION,
+    FMU_TYPE,
+    NAMESPACES,
+    OMS_ANNOTATION,
+    OSP_ANNOTATION,
+)
 from vibroimpact.orchestrator.ssp.scene_tables import OWN_TABLES
 
 START_VALUES = "start"
@@ -26,6 +33,7 @@ KINDS = {
     "1.0": frozenset({"input", "output", "parameter", "calculatedParameter"}),
     "2.0": frozenset({"input", "output", "parameter", "calculatedParameter", "local"}),
 }
+_NO_IDENTIFIER = re.compile(r"^(?=[0-9])|[^A-Za-z0-9_]")
 GIVING = frozenset({"output", "calculatedParameter", "local"})
 _TYPES = {
     "real": "Real",
@@ -47,8 +55,10 @@ def description(
     UsageError
         A connection comes from what this version of SSP has no word for.
     """
-    root = _root("ssd:SystemStructureDescription", ssp, ("ssc", "ssv", "ssm", "osp", "vibroimpact"))
-    root.set("name", scene.title or "system")
+    root = _root("ssd:SystemStructureDescription", ssp, ("ssc", "ssv", "ssm", "osp", "oms", "vibroimpact"))
+    # OMSimulator makes a model of this name
+    root.set("name", _NO_IDENTIFIER.sub("_", scene.title) or "model")
+    root.set("description", scene.title)
     system = SubElement(root, "ssd:System", name="system")
     elements = SubElement(system, "ssd:Elements")
     shown = {part.name: _shown(part, general, scene, ssp) for part in parts.values()}
@@ -62,13 +72,20 @@ def description(
                 _through(joined, connection, gains[connection])
             else:
                 _connection(joined, connection, parts)
+    _master(system, general)
     _units(root, [variable for variables in shown.values() for variable in variables])
     experiment = SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(duration))
+    annotations = SubElement(experiment, "ssd:Annotations")  # OMSimulator takes none of the whole description
     if general.connections:
-        algorithm = SubElement(_annotation(experiment, OSP_ANNOTATION), "osp:Algorithm")
+        step = SubElement(annotations, "ssc:Annotation", type=OSP_ANNOTATION)
+        algorithm = SubElement(step, "osp:Algorithm")
         SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(general.macro_step))
     tables = {name: table for name, table in parse_toml(scene.text).items() if name not in OWN_TABLES}
-    SubElement(_annotation(root, ANNOTATION), "vibroimpact:Scene").text = tomli_w.dumps(tables)
+    own = SubElement(annotations, "ssc:Annotation", type=ANNOTATION)
+    noted = SubElement(own, "vibroimpact:Scene")
+    SubElement(noted, "vibroimpact:Tables").text = tomli_w.dumps(tables)
+    for name, attributes in _notes(general, parts):
+        SubElement(noted, f"vibroimpact:{name}", attributes)
     return _written(root)
 
 
@@ -83,6 +100,23 @@ def parameter_set(part: Part, ssp: str) -> bytes:
     return _written(root)
 
 
+def _notes(general: GeneralScene, parts: Mapping[str, Part]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield what SSP has no words for, element by element; OMSimulator takes no annotations of elements."""
+    for part in parts.values():
+        if part.fmu:
+            yield "Component", {"name": part.name, "fmu": part.fmu, "fmi": part.fmi}
+        elif part.gain_of is not None:
+            yield "Gain", {"name": part.name} | _unit(part.gain_of)
+    for connection in general.connections:
+        element, connector = connection.target
+        if connection.gain_unit is not None:
+            yield "Connection", {"endElement": element, "endConnector": connector} | _unit(connection)
+
+
+def _unit(connection: ConnectionSpec) -> dict[str, str]:
+    return {} if connection.gain_unit is None else {"gain_unit": connection.gain_unit}
+
+
 def _root(name: str, ssp: str, prefixes: tuple[str, ...]) -> Element:
     own = name.partition(":")[0]
     spaces = {f"xmlns:{prefix}": NAMESPACES[prefix] for prefix in (own, *prefixes)}
@@ -94,10 +128,6 @@ def _written(root: Element) -> bytes:
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
-
-
-def _annotation(parent: Element, kind: str) -> Element:
-    return SubElement(SubElement(parent, "ssd:Annotations"), "ssc:Annotation", type=kind)
 
 
 def _shown(part: Part, general: GeneralScene, scene: Scene, ssp: str) -> list[VariableFacts]:
@@ -151,11 +181,6 @@ def _component(elements: Element, part: Part, variables: list[VariableFacts]) ->
     if part.values:
         bindings = SubElement(component, "ssd:ParameterBindings")
         SubElement(bindings, "ssd:ParameterBinding", source=part.values_member)
-    if part.gain_of is not None:
-        unit = {} if part.gain_of.gain_unit is None else {"gain_unit": part.gain_of.gain_unit}
-        SubElement(_annotation(component, ANNOTATION), "vibroimpact:Gain", unit)
-    if part.fmu:
-        SubElement(_annotation(component, ANNOTATION), "vibroimpact:Component", fmu=part.fmu, fmi=part.fmi)
 
 
 def _connection(joined: Element, spec: ConnectionSpec, parts: Mapping[str, Part]) -> None:
@@ -174,8 +199,6 @@ def _connection(joined: Element, spec: ConnectionSpec, parts: Mapping[str, Part]
     if spec.gain != 1.0 or differ:
         # some tools take 0 for an attribute that is left out
         SubElement(connection, "ssc:LinearTransformation", factor=repr(spec.gain), offset="0.0")
-    if spec.gain_unit is not None:
-        SubElement(_annotation(connection, ANNOTATION), "vibroimpact:Connection", gain_unit=spec.gain_unit)
 
 
 def _through(joined: Element, spec: ConnectionSpec, gain: str) -> None:
@@ -189,6 +212,16 @@ def _through(joined: Element, spec: ConnectionSpec, gain: str) -> None:
             endElement=end[0],
             endConnector=end[1],
         )
+
+
+def _master(system: Element, general: GeneralScene) -> None:
+    """Say how OMSimulator is to step: as often as values are exchanged, and as they are sampled."""
+    step = general.macro_step if general.rate is None else min(general.macro_step, 1.0 / general.rate)
+    annotations = SubElement(system, "ssd:Annotations")
+    own = SubElement(SubElement(annotations, "ssc:Annotation", type=OMS_ANNOTATION), "oms:Annotations")
+    about = SubElement(own, "oms:SimulationInformation")
+    tolerances = {"absoluteTolerance": "1e-6", "relativeTolerance": "1e-6"}
+    SubElement(about, "oms:FixedStepMaster", {"description": "oms-ma", "stepSize": repr(step), **tolerances})
 
 
 def _units(root: Element, variables: list[VariableFacts]) -> None:

@@ -1,4 +1,4 @@
-"""Drives one tool, in its own Python, with an FMU, two that it couples, or a system: `python -m exchange._drive REQUEST`."""
+"""Drives one tool, in its own Python, with an FMU, a pair or a system: `python -m exchange._drive REQUEST`."""
 
 from __future__ import annotations
 

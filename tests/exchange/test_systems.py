@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exchange._systems import COUNT, PAIRS, made
 from exchange._cases import difference
+from exchange._systems import COUNT, NAMES, PAIRS, STEP, made
 from exchange._tools import Tool, run_system
-from exchange._systems import NAMES, STEP
 
 HERE = [pair for pair in PAIRS if pair[0].package or not pair[0].missing()]
 

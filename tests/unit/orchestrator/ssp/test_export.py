@@ -48,7 +48,7 @@ def system(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFact
 
 def test_an_archive_is_valid_and_fmpy_reads_what_the_scene_says(system: Path) -> None:
     described = read_ssd(str(system))
-    assert described.name == "Two & more <bodies>"
+    assert described.name == "Two___more__bodies_"
     parts = {element.name: element for element in described.system.elements}
     assert {name for name in parts if not name.startswith("gain_")} == {"a", "b"}
     assert [(c.name, c.kind) for c in parts["b"].connectors] == [

@@ -49,8 +49,8 @@ def nested(depth: int) -> str:
     return part() if depth == 0 else system(f"s{depth}", nested(depth - 1))
 
 
-def noted(text: str) -> str:
-    note = f'<v:Scene xmlns:v="urn:vibroimpact:ssp">{text}</v:Scene>'
+def noted(text: str, more: str = "") -> str:
+    note = f'<v:Scene xmlns:v="urn:vibroimpact:ssp"><v:Tables>{text}</v:Tables>{more}</v:Scene>'
     return f'<ssd:Annotations><ssc:Annotation type="vibroimpact">{note}</ssc:Annotation></ssd:Annotations>'
 
 
@@ -141,13 +141,7 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
     ),
     "a note of another body": (ssd(part(), more=noted("[body]\nmass = 1")), "component: expected"),
     "a component that we have not": (
-        ssd(
-            part().replace(
-                "</ssd:Component>",
-                '<ssd:Annotations><ssc:Annotation type="vibroimpact"><v:Component xmlns:v="urn:vibroimpact:ssp" '
-                'fmu="../Oscillator" fmi="3.0"/></ssc:Annotation></ssd:Annotations></ssd:Component>',
-            )
-        ),
+        ssd(part(), more=noted("", '<v:Component name="body" fmu="../Oscillator" fmi="3.0"/>')),
         "the FMU of the archive is used",
     ),
 }
