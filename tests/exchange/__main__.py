@@ -1,6 +1,6 @@
 """`make exchange`: every export in every tool that is here, into docs/exchange.md; exit code 1 where one differs.
 
-`python -m exchange machines` makes one of its tables: tools, pairs, reference, machines.
+`python -m exchange machines` makes one of its tables: tools, pairs, systems, reference, machines.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from rich.console import Console
 from support.places import ROOT
 
+from exchange import _systems
 from exchange._cases import (
     COUNT,
     NAMES,
@@ -29,7 +30,7 @@ from exchange._cases import (
 )
 from exchange._machines import MACHINES, HostFailedError, Machine
 from exchange._reference import BALL, EXAMPLE, VERSIONS, bounces, found, imported, missing
-from exchange._tools import TOOLS, Answer, Tool, ToolFailedError, run, run_coupled
+from exchange._tools import TOOLS, Answer, Tool, ToolFailedError, run, run_coupled, run_system
 
 PAGE = ROOT / "docs" / "exchange.md"
 GOAL = 1e-9
@@ -42,6 +43,7 @@ def main() -> int:
     tables = {
         "tools": lambda: _of_tools("tools", list(NAMES), _row_of_tool),
         "pairs": lambda: _of_tools("pairs", list(PAIRS), _row_of_pair),
+        "systems": _of_systems,
         "reference": _of_reference_fmus,
         "machines": _of_machines,
     }
@@ -67,6 +69,23 @@ def _of_tools(table: str, names: list[str], row: Row) -> Iterator[str]:
             if not all(isinstance(cell, float) and cell <= GOAL for cell in tried):
                 yield f"{tool.name}, FMI {versions}: expected {GOAL:g} at most, got {', '.join(map(str, cells))}."
     _write(table, lines)
+
+
+def _of_systems() -> Iterator[str]:
+    """Write the table of systems; yield what was not as it should be."""
+    lines = ["| tool | FMI | gains | two oscillators with a spring |", "|---|---|---|---|"]
+    for tool, fmi, gains in _systems.PAIRS:
+        if reason := tool.missing():
+            lines.append(_line(tool.name, [fmi, gains, f"not tried: {reason}"]))
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            system, expected = _systems.made(Path(folder), fmi, gains)
+            steps = (_systems.STEP, _systems.COUNT, Path(folder))
+            cell = _cell(run_system, expected, tool, system, _systems.NAMES, *steps)
+        lines.append(_line(tool.shown(), [fmi, gains, cell]))
+        if not isinstance(cell, float) or cell > GOAL:
+            yield f"{tool.name}, FMI {fmi}, a system: expected {GOAL:g} at most, got {cell}."
+    _write("systems", lines)
 
 
 def _of_reference_fmus() -> Iterator[str]:
