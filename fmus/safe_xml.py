@@ -28,10 +28,13 @@ def root_of(content: bytes, where: str, *, namespaces: bool = False) -> Element:
     """
     builder = TreeBuilder()
     parser = expat.ParserCreate(namespace_separator="}" if namespaces else None)
-    parser.StartElementHandler = lambda name, attributes: builder.start(
-        _braced(name), {_braced(key): value for key, value in attributes.items()}
-    )
-    parser.EndElementHandler = lambda name: builder.end(_braced(name))
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    if namespaces:
+        parser.StartElementHandler = lambda name, attributes: builder.start(
+            _braced(name), {_braced(key): value for key, value in attributes.items()}
+        )
+        parser.EndElementHandler = lambda name: builder.end(_braced(name))
     parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = _refuse_doctype
     parser.EntityDeclHandler = _refuse_entity
@@ -47,7 +50,7 @@ def root_of(content: bytes, where: str, *, namespaces: bool = False) -> Element:
 
 
 def _braced(name: str) -> str:
-    # without namespaces no name of XML has a brace
+    # a name in no namespace has no brace
     return f"{{{name}" if "}" in name else name
 
 
