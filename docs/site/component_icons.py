@@ -98,7 +98,9 @@ def gain(axes: Axes) -> None:
     """The triangle of an amplifier between two lines."""
     axes.plot([0.8, 9.2], [5.0, 5.0], color=DARK, lw=LINE * 0.75)
     corners = [(2.8, 1.9), (2.8, 8.1), (7.8, 5.0)]
-    axes.add_patch(Polygon(corners, facecolor=BLUE, edgecolor=DARK, lw=LINE * 0.75, joinstyle="round", zorder=3))
+    axes.add_patch(
+        Polygon(corners, facecolor=BLUE, edgecolor=DARK, lw=LINE * 0.75, joinstyle="round", zorder=3)
+    )
 
 
 ICONS = (oscillator, chain, beam, impact_stop, replay, gain)
