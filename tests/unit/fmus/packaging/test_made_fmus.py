@@ -18,8 +18,11 @@ from vibroimpact.fmus.packaging.check import check_fmu
 
 WRITERS = {
     "BouncingBall": fmu_factory.bouncing_ball,
+    "Buffer": fmu_factory.buffer,
     "Faulty": fmu_factory.faulty,
     "Gain": lambda folder, _: fmu_factory.gain(folder),
+    "Mass": fmu_factory.mass,
+    "StatelessMass": lambda folder, fmi: fmu_factory.mass(folder, fmi, states=False),
     "SteppedBall": fmu_factory.stepped_ball,
 }
 GRAVITY, RESTITUTION, HEIGHT = 9.81, 0.7, 1.0
