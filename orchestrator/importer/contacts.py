@@ -1,4 +1,5 @@
-"""The contacts of an importer with stops that yield: of our bodies' contact ports, and of any other body."""
+"""The contacts of an importer with stops that yield: of our bodies' contact ports, and of any other body;
+and its pairs of bodies."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ from vibroimpact.orchestrator.importer.contact_bond import (
     ContactBond,
 )
 from vibroimpact.orchestrator.importer.held_force import ForceInput, HeldForceBond
-from vibroimpact.orchestrator.importer.specification import ConnectionSpec, StopContactSpec
+from vibroimpact.orchestrator.importer.pairs import Pair, Pairs
+from vibroimpact.orchestrator.importer.specification import ConnectionSpec, PairSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
 #: Steps in a contact, where the importer is told nothing else.
@@ -30,6 +32,8 @@ class ContactBonds:
         Those of a body's contact port, which follows the force and slopes of a stop.
     held : list of HeldForceBond
         Those of any other body, which holds a force over a step.
+    pairs : Pairs
+        Those of two bodies that hit each other.
     active : bool
         Any of them is closed in the step under way, or may have to be repeated.
     """
@@ -40,6 +44,7 @@ class ContactBonds:
         transfers: Sequence[Transfer],
         connections: Sequence[ConnectionSpec],
         contacts: Sequence[StopContactSpec],
+        pairs: Sequence[PairSpec],
         steps: float,
     ) -> None:
         if not steps > 0.0:
@@ -52,7 +57,8 @@ class ContactBonds:
         ]
         inputs: dict[tuple[str, str], ForceInput] = {}
         self.held = [HeldForceBond(components, contact, inputs) for contact in contacts]
-        self._following: list[ContactBond | HeldForceBond] = []
+        self.pairs = Pairs(components, pairs)
+        self._following: list[ContactBond | HeldForceBond | Pair] = []
         self.active = False
 
     def _all(self) -> list[ContactBond | HeldForceBond]:
@@ -60,18 +66,19 @@ class ContactBonds:
 
     def __bool__(self) -> bool:
         """Is there any contact?"""
-        return bool(self.ports or self.held)
+        return bool(self.ports or self.held or self.pairs.pairs)
 
     def take_masses(self, contacts: Sequence[StopContactSpec]) -> None:
         """Take the masses of `contacts`, which are the same ones otherwise, for the next run."""
         for bond, contact in zip(self.held, contacts, strict=True):
             bond.given_mass = contact.mass
 
-    def begin(self) -> None:
-        """Start a run."""
+    def begin(self, time: float) -> None:
+        """Start a run at `time`, s: initialization has ended."""
         for bond in self._all():
             bond.begin()
-        self._following = [*(bond for bond in self.ports if bond.follows), *self.held]
+        self.pairs.begin(time)
+        self._following = [*(bond for bond in self.ports if bond.follows), *self.held, *self.pairs.pairs]
         self.active = False
 
     def begin_step(self, time: float, target: float) -> float:

@@ -28,6 +28,7 @@ from vibroimpact.orchestrator.importer.specification import (
     ConnectionSpec,
     EventSpec,
     Exchange,
+    PairSpec,
     StopContactSpec,
 )
 from vibroimpact.orchestrator.importer.wiring import (
@@ -58,6 +59,8 @@ class Importer:
         Watched variables; their components run without event mode and early return.
     contacts : sequence of StopContactSpec
         Bodies that hold a force over a step, and the stops that they meet.
+    pairs : sequence of PairSpec
+        Bodies that hit each other.
     exchange : str
         `jacobi`: all inputs are those of the start of a step. `gauss_seidel`: each component gets the newest
         outputs of those stepped before it. `iterated`: steps are repeated until the inputs at their end agree.
@@ -91,6 +94,7 @@ class Importer:
         connections: Sequence[ConnectionSpec] = (),
         events: Sequence[EventSpec] = (),
         contacts: Sequence[StopContactSpec] = (),
+        pairs: Sequence[PairSpec] = (),
         *,
         exchange: Exchange = "gauss_seidel",
         macro_step: float = math.inf,
@@ -114,7 +118,7 @@ class Importer:
         order = order_of(connections, self.components)
         self.transfers = transfers_of(order, self.components)
         self.loops = LoopSolver(order.loops, self.components)
-        self.contacts = ContactBonds(self.components, self.transfers, connections, contacts, contact_steps)
+        self.contacts = ContactBonds(self.components, self.transfers, connections, contacts, pairs, contact_steps)
         fed = [*(c.target for c in connections), *((c.body, c.force) for c in contacts)]
         for name, component in self.components.items():
             component.watch_inputs(variable for owner, variable in fed if owner == name)
@@ -195,7 +199,8 @@ class Importer:
         for watch in self.watches:
             watch.begin()
         self.wants_to_end = self._event_mode.begin_run(start_time)
-        self.contacts.begin()
+        self.contacts.begin(start_time)
+        self._hit()
 
     # ---- advancing ----
 
@@ -288,6 +293,8 @@ class Importer:
                 self.wants_to_end = True
         elif end < target and self.on_pause is not None:
             self.on_pause()
+        if contacts.pairs:
+            self._hit()
 
     def _prepare(self, time: float) -> None:
         """What the rarer kinds of step need: loops solved, inputs noted, states saved."""
@@ -443,9 +450,18 @@ class Importer:
 
     def _note_events(self, note: Callable[[Event], None]) -> None:
         for component in self._at_event:
-            self._event_index = self._event_index + 1 if self.time == self._event_time else 0
-            self._event_time = self.time
-            note(Event(self.time, self._event_index, component.name))
+            note(self._event_of(component.name))
+
+    def _event_of(self, component: str) -> Event:
+        self._event_index = self._event_index + 1 if self.time == self._event_time else 0
+        self._event_time = self.time
+        return Event(self.time, self._event_index, component)
+
+    def _hit(self) -> None:
+        """Resolve the impacts between bodies at this instant."""
+        for name in self.contacts.pairs.resolve(self.time):
+            if self.on_event is not None:
+                self.on_event(self._event_of(name))
 
     # ---- repeated steps ----
 

@@ -118,3 +118,24 @@ class StopContactSpec:
         return tuple(
             ConnectionSpec((self.body, output), (self.stop, name)) for output, name in inputs.items() if name
         )
+
+
+@dataclass(frozen=True, slots=True)
+class PairSpec:
+    """Two of our bodies that hit each other.
+
+    Attributes
+    ----------
+    lower, upper : tuple of str
+        Component and contact port (`contact[k]`, of the law `pair`) of each: their gap is
+        `clearance + displacement of upper - displacement of lower`.
+    restitution : float
+        Coefficient of restitution, 0 to 1.
+    clearance : float
+        Gap where both displacements are 0, m.
+    """
+
+    lower: tuple[str, str]
+    upper: tuple[str, str]
+    restitution: float = 1.0
+    clearance: float = 0.0

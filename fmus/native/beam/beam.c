@@ -348,6 +348,7 @@ static void update_outputs(void *self)
     beam *b = self;
     b->time = vi_structure_component_time(&b->body);
     if (b->body.inputs_changed) {
+        vi_structure_component_take_impulses(&b->body);
         hold_inputs(b);
     }
     const vi_structure_component *body = &b->body;
@@ -407,6 +408,7 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
         return VI_STEP_ERROR;
     }
     if (!vi_structure_component_continues(&b->body)) {
+        vi_structure_component_take_impulses(&b->body);
         if (b->depends_on_amplitude) {
             follow_amplitudes(b);
         }

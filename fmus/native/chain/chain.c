@@ -168,6 +168,7 @@ static void update_outputs(void *self)
     chain *c = self;
     c->time = vi_structure_component_time(&c->body);
     if (c->body.inputs_changed) {
+        vi_structure_component_take_impulses(&c->body);
         hold_inputs(c);
     }
     const double base = vi_structure_component_base_acceleration(&c->body);
@@ -225,6 +226,7 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
         return VI_STEP_ERROR;
     }
     if (!vi_structure_component_continues(&c->body)) {
+        vi_structure_component_take_impulses(&c->body);
         hold_inputs(c);
     }
     const vi_step_result result = vi_structure_component_advance(&c->body, target, request, message);

@@ -2,6 +2,8 @@
 
 #include <math.h>
 
+#include "body/modal/structure_impact.h"
+
 bool oscillator_yields(const oscillator *o)
 {
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
@@ -95,6 +97,16 @@ void oscillator_follow_amplitude(oscillator *o)
     } else {
         vi_mode_start(&o->body.mode, o->mass, 2.0 * ratio * natural * o->mass, now * now * o->mass, amplitude(o),
                       o->forcing_angular_frequency);
+    }
+}
+
+void oscillator_take_impulses(oscillator *o)
+{
+    if (o->yields) {
+        const vi_structure s = parts(o);
+        vi_structure_take_impulses(&s);
+    } else {
+        vi_body_take_impulses(&o->body);
     }
 }
 

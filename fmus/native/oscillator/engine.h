@@ -18,6 +18,9 @@ void oscillator_start(oscillator *o, vi_instant now);
 /* Spring and dashpot as they are at the present amplitude, until the next step; nothing where they do not depend on it. */
 void oscillator_follow_amplitude(oscillator *o);
 
+/* Give the mass the impulses of its contacts, once. */
+void oscillator_take_impulses(oscillator *o);
+
 /* Give the inputs to the body from now on. */
 void oscillator_hold(oscillator *o);
 

@@ -68,13 +68,13 @@ static void check_contact(char *message, const oscillator *o, int k)
 {
     const vi_contact *contact = &o->body.contacts[k];
     const int n = k + 1;
-    if (contact->law.law == VI_LAW_NONE) {
+    if (!vi_contact_law_has_stop(contact->law.law)) {
         return;
     }
     if (!is_law(contact->law.law)) {
         vi_complain(message,
                     "contact[%d].law: expected 0 (none), 1 (restitution), 2 (kelvin_voigt), 3 (hertz),"
-                    " 4 (hunt_crossley), 5 (external) or 6 (external_force), got %lld",
+                    " 4 (hunt_crossley), 5 (external), 6 (external_force) or 7 (pair), got %lld",
                     n, (long long)contact->law.law);
     }
     if (contact->side != VI_SIDE_UPPER && contact->side != VI_SIDE_LOWER) {
@@ -98,7 +98,7 @@ static void check_contact(char *message, const oscillator *o, int k)
 static void check_gap(char *message, const oscillator *o)
 {
     const vi_contact *a = &o->body.contacts[0], *b = &o->body.contacts[1];
-    if (a->law.law == VI_LAW_NONE || b->law.law == VI_LAW_NONE || a->side == b->side) {
+    if (!vi_contact_law_has_stop(a->law.law) || !vi_contact_law_has_stop(b->law.law) || a->side == b->side) {
         return;
     }
     const double sign = vi_contact_direction(a->side);
@@ -122,6 +122,8 @@ static void check_inputs(char *message, const oscillator *o)
                         contact->applied_stiffness);
         vi_check_finite(message, k == 0 ? "contact[1].applied_damping" : "contact[2].applied_damping",
                         contact->applied_damping);
+        vi_check_finite(message, k == 0 ? "contact[1].applied_impulse" : "contact[2].applied_impulse",
+                        contact->applied_impulse);
     }
 }
 
@@ -179,6 +181,7 @@ static void update_outputs(void *self)
     double relative;
     o->time = vi_clock_time(&o->body.clock, oscillator_now(o));
     if (o->inputs_changed) {
+        oscillator_take_impulses(o);
         oscillator_hold(o);
     }
     oscillator_outputs(o, &o->displacement, &o->velocity, &relative);
@@ -276,6 +279,7 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
         return VI_STEP_ERROR;
     }
     if (!oscillator_continues(o)) {
+        oscillator_take_impulses(o);
         oscillator_follow_amplitude(o);
         oscillator_hold(o);
     }

@@ -16,6 +16,7 @@ typedef struct {
     /* the importer's answers for the external laws */
     double applied_restitution;
     double applied_force, applied_stiffness, applied_damping;
+    double applied_impulse; /* along +displacement, N s; given once, then 0 again */
     int32_t answered; /* applied_restitution was set since the pending contact was reported */
     /* outputs */
     int32_t stuck;
@@ -23,6 +24,15 @@ typedef struct {
     int64_t count, graze_count;
     double last_time, last_phase, last_velocity, stick_start, stick_end, event_time;
 } vi_contact;
+
+/* Another body has hit this point with an impulse. */
+static inline void vi_contact_struck(vi_contact *contact, double time)
+{
+    contact->count += 1;
+    contact->last_time = time;
+    contact->impulse = fabs(contact->applied_impulse);
+    contact->applied_impulse = 0.0;
+}
 
 /* Nothing has happened at this contact yet. */
 static inline void vi_contact_clear(vi_contact *contact)

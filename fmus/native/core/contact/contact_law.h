@@ -14,7 +14,8 @@ enum {
     VI_LAW_HERTZ = 3,
     VI_LAW_HUNT_CROSSLEY = 4,
     VI_LAW_EXTERNAL = 5,      /* another FMU answers with a coefficient of restitution */
-    VI_LAW_EXTERNAL_FORCE = 6 /* another FMU answers with a force and its slopes */
+    VI_LAW_EXTERNAL_FORCE = 6, /* another FMU answers with a force and its slopes */
+    VI_LAW_PAIR = 7            /* no stop: the importer says what another body gives this point */
 };
 enum { VI_SIDE_UPPER = 1, VI_SIDE_LOWER = 2 };
 
@@ -43,6 +44,9 @@ vi_contact_force vi_contact_law_force(const vi_contact_law *law, double penetrat
 
 /* Is this a law that a stop can evaluate by itself? */
 bool vi_contact_law_known(int64_t law);
+
+/* Is there a stop that the body looks for by itself? */
+bool vi_contact_law_has_stop(int64_t law);
 
 /* Does the stop yield (a force law), instead of answering with an impulse? */
 bool vi_contact_law_is_compliant(int64_t law);

@@ -37,7 +37,8 @@ static double landing_room(const vi_structure *s)
 {
     bool external = false;
     for (int k = 0; k < s->model->contacts; ++k) {
-        external = external || s->contacts[k].law.law >= VI_LAW_EXTERNAL;
+        const int64_t law = s->contacts[k].law.law;
+        external = external || law == VI_LAW_EXTERNAL || law == VI_LAW_EXTERNAL_FORCE;
     }
     return external ? vi_landing_room(vi_clock_time(&s->model->clock, s->state->now)) : 0.0;
 }
@@ -348,7 +349,7 @@ static void place(const vi_structure *s, int k)
 {
     vi_structure_state *state = s->state;
     const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k), clearance = vi_structure_clearance(s, k);
-    if (s->contacts[k].law.law == VI_LAW_NONE || clearance > noise) {
+    if (!vi_contact_law_has_stop(s->contacts[k].law.law) || clearance > noise) {
         return;
     }
     state->status[k] = VI_CONTACT_TOUCHING;

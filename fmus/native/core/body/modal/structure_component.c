@@ -4,6 +4,8 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "body/modal/structure_impact.h"
+
 /* An importer's communication point may differ from the body's own time by this times (1 + |time|), s. */
 static const double TIME_MISMATCH = 1e-9;
 static const double DEFAULT_TOLERANCE = 1e-10;
@@ -53,14 +55,15 @@ static void check_yielding(char *message, int k, const vi_contact *contact)
 
 static bool law_exists(int64_t law)
 {
-    return vi_contact_law_known(law) || law == VI_LAW_EXTERNAL || law == VI_LAW_EXTERNAL_FORCE;
+    return vi_contact_law_known(law) || law == VI_LAW_EXTERNAL || law == VI_LAW_EXTERNAL_FORCE
+           || law == VI_LAW_PAIR;
 }
 
 static void check_contact(char *message, int k, const vi_contact *contact)
 {
     const vi_contact_law *law = &contact->law;
     if (!law_exists(law->law)) {
-        vi_complain(message, "contact[%d].law: expected 0 (none) to 6 (external_force), got %lld", k + 1,
+        vi_complain(message, "contact[%d].law: expected 0 (none) to 7 (pair), got %lld", k + 1,
                     (long long)law->law);
     }
     if (contact->side != VI_SIDE_UPPER && contact->side != VI_SIDE_LOWER) {
@@ -86,6 +89,7 @@ static void check_inputs(const vi_structure_component *c, char *message)
         vi_check_finite(message, name_of(k, "applied_force").text, c->contacts[k].applied_force);
         vi_check_finite(message, name_of(k, "applied_stiffness").text, c->contacts[k].applied_stiffness);
         vi_check_finite(message, name_of(k, "applied_damping").text, c->contacts[k].applied_damping);
+        vi_check_finite(message, name_of(k, "applied_impulse").text, c->contacts[k].applied_impulse);
     }
 }
 
@@ -151,7 +155,8 @@ static void check_points(const vi_structure_component *c, char message[VI_MESSAG
 {
     for (int j = 1; j < c->model.contacts; ++j) {
         for (int i = 0; i < j; ++i) {
-            const bool both = c->contacts[i].law.law != VI_LAW_NONE && c->contacts[j].law.law != VI_LAW_NONE;
+            const bool both = vi_contact_law_has_stop(c->contacts[i].law.law)
+                              && vi_contact_law_has_stop(c->contacts[j].law.law);
             if (both && at_one_point(&c->model, i, j)) {
                 check_pair(c->contacts, i, j, message);
             }
@@ -214,6 +219,12 @@ bool vi_structure_component_start(vi_structure_component *c, double start_time, 
     const vi_structure parts = parts_of(c);
     vi_structure_start(&parts, now);
     return true;
+}
+
+void vi_structure_component_take_impulses(vi_structure_component *c)
+{
+    const vi_structure parts = parts_of(c);
+    vi_structure_take_impulses(&parts);
 }
 
 void vi_structure_component_hold(vi_structure_component *c, const double held[VI_MODES],

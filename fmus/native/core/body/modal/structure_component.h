@@ -46,6 +46,9 @@ int vi_structure_component_ports(const vi_structure_component *c);
 bool vi_structure_component_start(vi_structure_component *c, double start_time, const char *start_name,
                                   char message[VI_MESSAGE_LENGTH]);
 
+/* Give the body the impulses of its contacts, once; before new forces. */
+void vi_structure_component_take_impulses(vi_structure_component *c);
+
 /* Give the engine new modal input forces (from now on, with slopes). */
 void vi_structure_component_hold(vi_structure_component *c, const double held[VI_MODES],
                                  const double held_rate[VI_MODES]);

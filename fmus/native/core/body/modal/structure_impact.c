@@ -237,6 +237,41 @@ static void wedge(const vi_structure *s)
     s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
 }
 
+void vi_structure_take_impulses(const vi_structure *s)
+{
+    vi_structure_state *state = s->state;
+    double impulse[VI_PORTS], low[VI_PORTS] = {0.0};
+    bool any = false;
+    if (state->pending) {
+        return; /* an impact comes first */
+    }
+    for (int k = 0; k < s->model->contacts; ++k) {
+        vi_contact *contact = &s->contacts[k];
+        impulse[k] = -vi_structure_direction(s, k) * contact->applied_impulse;
+        if (contact->applied_impulse != 0.0) {
+            any = true;
+            vi_contact_struck(contact, vi_clock_time(&s->model->clock, state->now));
+        }
+    }
+    if (!any) {
+        return;
+    }
+    give_impulses(s, impulse, low);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (state->status[k] == VI_CONTACT_HELD) {
+            vi_structure_release(s, k, 0);
+        }
+    }
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (state->status[k] == VI_CONTACT_TOUCHING) {
+            state->leaving[k] = 0;
+        }
+    }
+    for (int j = 0; j < s->model->modes; ++j) {
+        state->origin[j].known = 0;
+    }
+}
+
 void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS])
 {
     int now[VI_PORTS];

@@ -7,4 +7,8 @@
 /* Joint impulses of all contacts that touch with an approach; answers of external laws are used where `answered`. */
 void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS]);
 
+/* Give the body the impulses that its contacts have been given, once. What rests on a stop leaves it, or hits it as the
+ * next step begins. */
+void vi_structure_take_impulses(const vi_structure *s);
+
 #endif

@@ -138,7 +138,7 @@ double vi_structure_kinetic(const vi_structure *s)
 
 bool vi_structure_watched(const vi_structure *s, int k)
 {
-    return s->contacts[k].law.law != VI_LAW_NONE && !s->state->passed;
+    return vi_contact_law_has_stop(s->contacts[k].law.law) && !s->state->passed;
 }
 
 int vi_structure_beyond(const vi_structure *s)
@@ -147,7 +147,7 @@ int vi_structure_beyond(const vi_structure *s)
         const int64_t law = s->contacts[k].law.law;
         const bool rigid = !vi_contact_law_is_compliant(law) && law != VI_LAW_EXTERNAL_FORCE;
         const double noise = VI_ROUNDING * vi_structure_displacement_size(s, k);
-        if (law != VI_LAW_NONE && rigid && vi_structure_clearance(s, k) < -noise) {
+        if (vi_contact_law_has_stop(law) && rigid && vi_structure_clearance(s, k) < -noise) {
             return k + 1;
         }
     }

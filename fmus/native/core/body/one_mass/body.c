@@ -403,6 +403,23 @@ void vi_body_resolve(vi_body *body)
     vi_body_impact(body, k, fabs(body->velocity), body->contacts[k].applied_restitution);
 }
 
+void vi_body_take_impulses(vi_body *body)
+{
+    for (int k = 0; k < VI_BODY_CONTACTS && !body->pending; ++k) {
+        vi_contact *contact = &body->contacts[k];
+        if (contact->applied_impulse == 0.0) {
+            continue;
+        }
+        if (body->stuck) {
+            release(body);
+        }
+        body->velocity += contact->applied_impulse / body->mass;
+        body->leaving = 0;
+        body->origin.known = 0;
+        vi_contact_struck(contact, vi_clock_time(&body->clock, body->now));
+    }
+}
+
 double vi_body_outputs(vi_body *body)
 {
     const vi_mode *mode = &body->mode;

@@ -21,6 +21,10 @@ void vi_body_complain(const vi_body *body, char message[VI_MESSAGE_LENGTH]);
 /* Resolve the pending contact with its answer. */
 void vi_body_resolve(vi_body *body);
 
+/* Give the body the impulses that its contacts have been given, once. One that rests on a stop leaves it, or hits it as
+ * the next step begins. */
+void vi_body_take_impulses(vi_body *body);
+
 /* Relative acceleration, and the contacts' outputs, at the present instant. */
 double vi_body_outputs(vi_body *body);
 

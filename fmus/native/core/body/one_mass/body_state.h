@@ -48,7 +48,7 @@ static inline double vi_body_direction(const vi_body *body, int k)
 /* Is this contact looked for? */
 static inline bool vi_body_watched(const vi_body *body, int k)
 {
-    return body->contacts[k].law.law != VI_LAW_NONE && !body->passed;
+    return vi_contact_law_has_stop(body->contacts[k].law.law) && !body->passed;
 }
 
 /* Held input per unit mass at the present instant, m/s^2. */
