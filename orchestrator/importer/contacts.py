@@ -68,8 +68,10 @@ class ContactBonds:
         """Is there any contact?"""
         return bool(self.ports or self.held or self.pairs.pairs)
 
-    def take_masses(self, contacts: Sequence[StopContactSpec]) -> None:
-        """Take the masses of `contacts`, which are the same ones otherwise, for the next run."""
+    def take_numbers(self, contacts: Sequence[StopContactSpec], pairs: Sequence[PairSpec]) -> None:
+        """Take the masses of `contacts` and the numbers of `pairs`, which are the same otherwise, for the next run."""
+        for pair, spec in zip(self.pairs.pairs, pairs, strict=True):
+            pair.take(spec)
         for bond, contact in zip(self.held, contacts, strict=True):
             bond.given_mass = contact.mass
 

@@ -118,7 +118,9 @@ class Importer:
         order = order_of(connections, self.components)
         self.transfers = transfers_of(order, self.components)
         self.loops = LoopSolver(order.loops, self.components)
-        self.contacts = ContactBonds(self.components, self.transfers, connections, contacts, pairs, contact_steps)
+        self.contacts = ContactBonds(
+            self.components, self.transfers, connections, contacts, pairs, contact_steps
+        )
         fed = [*(c.target for c in connections), *((c.body, c.force) for c in contacts)]
         for name, component in self.components.items():
             component.watch_inputs(variable for owner, variable in fed if owner == name)

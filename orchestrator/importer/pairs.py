@@ -1,12 +1,12 @@
-"""Bodies that hit each other: where two contact points meet is found by step revision, what they do to each other here.
+"""Bodies that hit each other: where two contact points meet, and what they do to each other.
 
-The gap of a pair is `clearance + displacement of the upper body - displacement of the lower one`. No body knows of it, so
-their step is looked at from outside: a cubic through gap and closing speed at both ends is compared with the gap in
-the middle, and the step is halved until both agree and the cubic keeps clear of 0; the first crossing is refined on the
-bodies' own motion, and all components are stepped to it.
+The gap of a pair is `clearance + displacement of the upper body - displacement of the lower one`. No body knows of it,
+so their step is looked at from outside: a cubic through gap and closing speed at both ends is compared with the gap
+in the middle, and the step is halved until both agree and the cubic keeps clear of 0; the first crossing is refined on
+the bodies' own motion, and all components are stepped to it.
 
 At that instant the pairs that touch and close give each other impulses, one pair after the other, the fastest first,
-until none closes: docs/equations.md 3.4.
+until none closes: docs/equations.md 3.5.
 """
 
 from __future__ import annotations
@@ -231,7 +231,7 @@ class Pair:
         return self.look(seconds)
 
     def _level(self, start: Motion) -> float:
-        """The gap at which bodies meet: 0, or a little less where they touch already and are moved apart or not at all."""
+        """The gap at which bodies meet: 0, or a little less where they touch already and do not close."""
         return 0.0 if start.gap > self._room else min(start.gap, 0.0) - self._room
 
     def _keeps_clear(self, first: Motion, last: Motion) -> bool:
@@ -240,7 +240,9 @@ class Pair:
         moved = size * max(abs(first.closing), abs(last.closing)) + abs(last.gap - first.gap)
         return min(first.gap, last.gap) > FAR * moved + self._room
 
-    def _search(self, time: float, first: Motion, last: Motion, halvings: int) -> tuple[Motion, Motion] | None:
+    def _search(
+        self, time: float, first: Motion, last: Motion, halvings: int
+    ) -> tuple[Motion, Motion] | None:
         """Return the ends of a part of the step in which the bodies meet for the first time; None where they do not."""
         if self._keeps_clear(first, last):
             return None
@@ -366,7 +368,9 @@ class _Rate:
         known = body.variables
         self._natural = group([n for n in known if n.startswith("natural_angular_frequency[")])
         self._forcing = group([n for n in ("forcing.angular_frequency",) if n in known])
-        self._spring = group(["mass", "stiffness", "damping"] if {"mass", "stiffness", "damping"} <= set(known) else [])
+        self._spring = group(
+            ["mass", "stiffness", "damping"] if {"mass", "stiffness", "damping"} <= set(known) else []
+        )
 
     def fastest(self) -> float:
         """Return it; the parameters are set."""

@@ -12,6 +12,14 @@ from vibroimpact.fmus.shipped import package_folder
 Crossing = Literal["falling", "rising", "either"]
 Exchange = Literal["jacobi", "gauss_seidel", "iterated"]
 Side = Literal["upper", "lower"]
+PairLaw = Literal["restitution", "kelvin_voigt", "hertz", "hunt_crossley"]
+#: What each law of a pair takes, beside the clearance.
+PAIR_NUMBERS: Mapping[PairLaw, tuple[str, ...]] = {
+    "restitution": ("restitution",),
+    "kelvin_voigt": ("stiffness", "damping"),
+    "hertz": ("stiffness",),
+    "hunt_crossley": ("stiffness", "damping", "exponent"),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +115,11 @@ class StopContactSpec:
     side: Side | None = None
 
     @property
+    def numbers(self) -> dict[str, float]:
+        """The numbers that it is given, by name."""
+        return {} if self.mass is None else {"mass": self.mass}
+
+    @property
     def name(self) -> str:
         """The name of its force, `stop.output -> body.input`."""
         return f"{self.stop}.{self.stop_force} -> {self.body}.{self.force}"
@@ -129,13 +142,31 @@ class PairSpec:
     lower, upper : tuple of str
         Component and contact port (`contact[k]`, of the law `pair`) of each: their gap is
         `clearance + displacement of upper - displacement of lower`.
-    restitution : float
-        Coefficient of restitution, 0 to 1.
     clearance : float
         Gap where both displacements are 0, m.
+    law : str
+        `restitution`, or one that yields: `kelvin_voigt`, `hertz`, `hunt_crossley`.
+    restitution : float
+        Coefficient of restitution, 0 to 1.
+    stiffness, damping, exponent : float
+        Of a law that yields, as of a contact port.
     """
 
     lower: tuple[str, str]
     upper: tuple[str, str]
-    restitution: float = 1.0
     clearance: float = 0.0
+    law: PairLaw = "restitution"
+    restitution: float = 1.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    exponent: float = 1.5
+
+    @property
+    def name(self) -> str:
+        """Both points, the lower one first."""
+        return f"{'.'.join(self.lower)} - {'.'.join(self.upper)}"
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The numbers that its law has, by name."""
+        return {name: getattr(self, name) for name in (*PAIR_NUMBERS[self.law], "clearance")}

@@ -160,4 +160,4 @@ def _energy_connections(scene: Scene) -> tuple[str, ...]:
     # only general scenes need FMPy, which takes long to import
     from vibroimpact.orchestrator.importer.energy import force_connections
 
-    return force_connections(scene.general.components, scene.general.connections, scene.general.contacts)
+    return force_connections(scene.general.components, scene.general.connections, scene.general.stop_contacts)

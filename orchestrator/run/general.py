@@ -76,7 +76,8 @@ class GeneralRunner:
             general.components,
             general.connections,
             general.events,
-            general.contacts,
+            general.stop_contacts,
+            general.pairs,
             exchange=general.exchange,
             macro_step=general.macro_step,
             log=self._log,
@@ -136,7 +137,7 @@ class GeneralRunner:
         for component in self._importer.components.values():
             component.instance.log.take()  # what it said in the point before is no reason for this one's end
         self._set_gains(general)
-        self._importer.contacts.take_masses(general.contacts)
+        self._importer.contacts.take_numbers(general.stop_contacts, general.pairs)
         end = record.transient_time + record.recorded_time
         try:
             with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused at the end

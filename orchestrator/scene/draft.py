@@ -66,6 +66,24 @@ class DraftTables:
             return []
         return [(table, (name, place)) for place, table in enumerate(raw)]
 
+    def variant(
+        self, models: Mapping[str, type[Table]], tag: str, default: str, raw: object, path: KeyPath
+    ) -> Table | None:
+        """Read a table whose kind decides its keys; of an unknown kind nothing else is judged."""
+        kind = raw.get(tag, default) if isinstance(raw, dict) else default
+        if isinstance(kind, str) and kind in models:
+            there = len(self.problems)
+            table = self.read(models[kind], raw, path)
+            belongs = _keys_of_other_kinds(raw, models, tag, kind, path)
+            self.problems[there:] = [
+                replace(problem, hint=belongs.get(problem.key, problem.hint))
+                for problem in self.problems[there:]
+            ]
+            return table
+        model = models[default]
+        self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, models))
+        return None
+
 
 class Draft(DraftTables):
     """A scene of the short form on its way.
@@ -84,7 +102,7 @@ class Draft(DraftTables):
         self.body: Body | None = self._body()
         self.forcing = self.table(Forcing, "forcing")
         self.stops: tuple[Stop | None, ...] = tuple(
-            self._variant(STOP_MODELS, "law", "restitution", *entry) for entry in self.entries("stop")
+            self.variant(STOP_MODELS, "law", "restitution", *entry) for entry in self.entries("stop")
         )
         self.record = self.table(Record, "record", {})
         self.execution = self.table(Execution, "execution", {})
@@ -96,25 +114,7 @@ class Draft(DraftTables):
             hint = "Add [body] with mass, stiffness and damping."
             self.problems.append(Problem("body", "one [body] table", "nothing", hint))
             return None
-        return self._variant(BODY_MODELS, "kind", "oscillator", self.document["body"], ("body",))
-
-    def _variant(
-        self, models: Mapping[str, type[Table]], tag: str, default: str, raw: object, path: KeyPath
-    ) -> Table | None:
-        """Read a table whose kind decides its keys; of an unknown kind nothing else is judged."""
-        kind = raw.get(tag, default) if isinstance(raw, dict) else default
-        if isinstance(kind, str) and kind in models:
-            there = len(self.problems)
-            table = self.read(models[kind], raw, path)
-            belongs = _keys_of_other_kinds(raw, models, tag, kind, path)
-            self.problems[there:] = [
-                replace(problem, hint=belongs.get(problem.key, problem.hint))
-                for problem in self.problems[there:]
-            ]
-            return table
-        model = models[default]
-        self.problems.append(choice_problem((*path, tag), model.model_fields[tag], kind, models))
-        return None
+        return self.variant(BODY_MODELS, "kind", "oscillator", self.document["body"], ("body",))
 
     def worst(self, *tables: str) -> str:
         """Return a note for a number that may be the worst of a sweep over keys of these tables."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION, RestitutionStop
@@ -50,7 +51,9 @@ def contacts(scene: Scene) -> dict[str, str]:
     """Return what meets what in each contact of a general scene, by the key of the contact."""
     found = () if scene.general is None else scene.general.contacts
     return {
-        f"contact[{number}]": f"{contact.body}.{contact.displacement} on {contact.stop}, force held over a step"
+        f"contact[{number}]": f"{contact.name}, {contact.law}"
+        if isinstance(contact, PairSpec)
+        else f"{contact.body}.{contact.displacement} on {contact.stop}, force held over a step"
         for number, contact in enumerate(found, start=1)
     }
 

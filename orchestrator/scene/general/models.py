@@ -9,7 +9,14 @@ from pydantic import Field
 
 from vibroimpact.orchestrator.importer.specification import Crossing, Side
 from vibroimpact.orchestrator.scene.fields import Rule
-from vibroimpact.orchestrator.scene.models import Finite, NotNegative, Positive, SceneTable
+from vibroimpact.orchestrator.scene.models import (
+    FEEDS_ENERGY,
+    Finite,
+    Fraction,
+    NotNegative,
+    Positive,
+    SceneTable,
+)
 
 _Text = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]*$")]
 _VARIABLE_RULE = Rule(
@@ -138,6 +145,70 @@ class StopContactTable(SceneTable):
             doc="the name of the stop's force, >= 0, which presses the body away",
         ),
     ] = "applied_force"
+
+
+_PAIR_LAWS = Rule(
+    "the name of a contact law",
+    doc='`"restitution"`, `"kelvin_voigt"`, `"hertz"`, `"hunt_crossley"`; decides which other keys there are',
+)
+
+
+class PairTable(SceneTable):
+    """`[[contact]]` with `between`: two bodies that hit each other."""
+
+    between: Annotated[
+        tuple[Reference, Reference],
+        Field(strict=False),
+        Rule(
+            'two points of bodies such as ["a.mass[2]", "b.tip"]',
+            item='a point of a body such as "a.mass[2]"',
+            doc='two points: `"a"` (of an Oscillator), `"a.mass[2]"` (of a Chain), `"a.tip"` (of a Beam), or any '
+            '`"a.contact[1]"` with its place among the parameters; the gap is clearance + displacement of the second '
+            "- that of the first",
+        ),
+    ]
+    clearance: Annotated[Finite, Rule(unit="m", doc="gap where both displacements are 0")] = 0.0
+
+
+class RestitutionPair(PairTable):
+    """`[[contact]]` with `between`: an impact multiplies the closing velocity by -restitution."""
+
+    law: Annotated[Literal["restitution"], _PAIR_LAWS] = "restitution"
+    restitution: Annotated[Fraction, Rule("0 <= r <= 1", hint="Use 1 for elastic bodies, 0 for dead ones.")]
+
+
+class KelvinVoigtPair(PairTable):
+    """`[[contact]]` with `between`: a spring beside a dashpot; it never pulls."""
+
+    law: Annotated[Literal["kelvin_voigt"], _PAIR_LAWS]
+    stiffness: Annotated[Positive, Rule(unit="N/m")]
+    damping: Annotated[NotNegative, Rule(unit="N s/m", hint=FEEDS_ENERGY)] = 0.0
+
+
+class HertzPair(PairTable):
+    """`[[contact]]` with `between`: elastic spheres, force = stiffness penetration^1.5."""
+
+    law: Annotated[Literal["hertz"], _PAIR_LAWS]
+    stiffness: Annotated[Positive, Rule(unit="N/m^1.5")]
+
+
+class HuntCrossleyPair(PairTable):
+    """`[[contact]]` with `between`: force = stiffness penetration^exponent (1 + damping rate); it never pulls."""
+
+    law: Annotated[Literal["hunt_crossley"], _PAIR_LAWS]
+    stiffness: Annotated[Positive, Rule(unit="N/m^exponent")]
+    damping: Annotated[NotNegative, Rule(unit="s/m", hint=FEEDS_ENERGY)] = 0.0
+    exponent: Annotated[Finite, Field(ge=1, le=10), Rule()] = 1.5
+
+
+BodyPair = RestitutionPair | KelvinVoigtPair | HertzPair | HuntCrossleyPair
+
+PAIR_MODELS: dict[str, type[BodyPair]] = {
+    "restitution": RestitutionPair,
+    "kelvin_voigt": KelvinVoigtPair,
+    "hertz": HertzPair,
+    "hunt_crossley": HuntCrossleyPair,
+}
 
 
 class GeneralRecord(SceneTable):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import (
@@ -12,11 +13,12 @@ from vibroimpact.orchestrator.importer.specification import (
     ConnectionSpec,
     EventSpec,
     Exchange,
+    PairSpec,
     StopContactSpec,
 )
 
 _GAIN_KEY = re.compile(r"connection\[([1-9][0-9]{0,8})\]\.gain")
-_MASS_KEY = re.compile(r"contact\[([1-9][0-9]{0,8})\]\.mass")
+_CONTACT_KEY = re.compile(r"contact\[([1-9][0-9]{0,8})\]\.([a-z_]+)")
 
 
 def component_variable(reference: str) -> tuple[str, str]:
@@ -51,8 +53,20 @@ def mass_place(key: str) -> int | None:
     >>> mass_place("contact[2].mass"), mass_place("ball.mass")
     (1, None)
     """
-    match = _MASS_KEY.fullmatch(key)
-    return int(match[1]) - 1 if match else None
+    found = contact_key(key)
+    return found[0] if found is not None and found[1] == "mass" else None
+
+
+def contact_key(key: str) -> tuple[int, str] | None:
+    """Return the 0-based place of the contact of which a key names a number, and that name; None when it names none.
+
+    Examples
+    --------
+    >>> contact_key("contact[2].restitution"), contact_key("ball.mass")
+    ((1, 'restitution'), None)
+    """
+    match = _CONTACT_KEY.fullmatch(key)
+    return (int(match[1]) - 1, match[2]) if match else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +95,8 @@ class GeneralScene:
     units : mapping of str to str
         Unit of each recorded variable and swept key as the description writes it; `1` where it has none.
     start_units : mapping of str to str
-        The same of each start value, gain and contact mass that the scene gives.
-    contacts : tuple of StopContactSpec
+        The same of each start value, gain and number of a contact that the scene gives.
+    contacts : tuple of StopContactSpec and PairSpec
         In the order of the file.
     """
 
@@ -96,10 +110,20 @@ class GeneralScene:
     guard: bool
     units: Mapping[str, str]
     start_units: Mapping[str, str] = field(default_factory=dict)
-    contacts: tuple[StopContactSpec, ...] = ()
+    contacts: tuple[StopContactSpec | PairSpec, ...] = ()
+
+    @property
+    def stop_contacts(self) -> tuple[StopContactSpec, ...]:
+        """Bodies of any tool that meet stops."""
+        return tuple(contact for contact in self.contacts if isinstance(contact, StopContactSpec))
+
+    @property
+    def pairs(self) -> tuple[PairSpec, ...]:
+        """Bodies that hit each other."""
+        return tuple(contact for contact in self.contacts if isinstance(contact, PairSpec))
 
     def value(self, key: str) -> float:
-        """Return the number that `COMPONENT.VARIABLE`, `connection[N].gain` or `contact[N].mass` has.
+        """Return the number that `COMPONENT.VARIABLE`, `connection[N].gain` or `contact[N].NAME` has.
 
         Raises
         ------
@@ -109,14 +133,14 @@ class GeneralScene:
         place = gain_place(key)
         if place is not None:
             return self._connection(place, key).gain
-        place = mass_place(key)
-        if place is not None:
-            return self._mass(place, key)
+        named = contact_key(key)
+        if named is not None:
+            return self._contact_number(*named, key)
         component, variable = self._start_value(key)
         return float(self.components[component].parameters[variable])
 
     def numbers(self) -> Iterator[tuple[str, float]]:
-        """Yield each start value that is a number, each gain and each contact mass, with its key."""
+        """Yield each start value that is a number, each gain and each number of a contact, with its key."""
         for component in self.components:
             for variable, start in component.parameters.items():
                 if isinstance(start, int | float) and not isinstance(start, bool):
@@ -124,11 +148,11 @@ class GeneralScene:
         for number, connection in enumerate(self.connections, start=1):
             yield f"connection[{number}].gain", connection.gain
         for number, contact in enumerate(self.contacts, start=1):
-            if contact.mass is not None:
-                yield f"contact[{number}].mass", contact.mass
+            for name, value in contact.numbers.items():
+                yield f"contact[{number}].{name}", value
 
     def at(self, values: Mapping[str, float]) -> GeneralScene:
-        """Return this scene with other start values, gains and masses, without validating it again.
+        """Return this scene with other start values, gains and numbers of contacts, without validating it again.
 
         Raises
         ------
@@ -143,10 +167,11 @@ class GeneralScene:
                 self._connection(place, key)
                 connections[place] = replace(connections[place], gain=float(value))
                 continue
-            place = mass_place(key)
-            if place is not None:
-                self._mass(place, key)
-                contacts[place] = replace(contacts[place], mass=float(value))
+            named = contact_key(key)
+            if named is not None:
+                self._contact_number(*named, key)
+                number: dict[str, Any] = {named[1]: float(value)}
+                contacts[named[0]] = replace(contacts[named[0]], **number)
                 continue
             index, variable = self._start_value(key)
             before = components[index].parameters
@@ -161,11 +186,11 @@ class GeneralScene:
             return self.connections[place]
         raise UsageError(f"{key}: expected one of {len(self.connections)} connections, got an absent one.")
 
-    def _mass(self, place: int, key: str) -> float:
-        mass = self.contacts[place].mass if place < len(self.contacts) else None
-        if mass is not None:
-            return mass
-        raise UsageError(f"{key}: expected a contact mass that this scene gives or sweeps, got none.")
+    def _contact_number(self, place: int, name: str, key: str) -> float:
+        numbers = self.contacts[place].numbers if place < len(self.contacts) else {}
+        if name in numbers:
+            return numbers[name]
+        raise UsageError(f"{key}: expected a number of a contact that this scene gives or sweeps, got none.")
 
     def _start_value(self, key: str) -> tuple[int, str]:
         """Return the place of the component and the variable that a key names."""

@@ -1,4 +1,4 @@
-"""The sweep of a general scene: over start values of any component, gains of connections, masses of contacts."""
+"""The sweep of a general scene: over start values of any component, gains of connections, numbers of contacts."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
+from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, numeric_keys, rule_of
 from vibroimpact.orchestrator.scene.general.component_facts import Misfit, swept_value
 from vibroimpact.orchestrator.scene.general.components import settable_names, start_problems
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, reference_problem
-from vibroimpact.orchestrator.scene.general.scene import component_variable, gain_place, mass_place
+from vibroimpact.orchestrator.scene.general.scene import component_variable, contact_key, gain_place
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
@@ -43,7 +44,7 @@ def _key_problems(key: str, entry: object, draft: GeneralDraft) -> Iterator[Prob
     elif _names_an_entry(key, "connection", draft):
         yield from _gain_problems(key, where, draft)
     elif _names_an_entry(key, "contact", draft):
-        yield from _mass_problems(key, where, draft)
+        yield from _contact_problems(key, where, draft)
     else:
         yield from _start_value_problems(key, where, draft)
 
@@ -78,11 +79,17 @@ def _gain_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Proble
         yield Problem(where, "the gain of a connection of real numbers", got)
 
 
-def _mass_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Problem]:
-    place, count = mass_place(key), len(draft.contacts)
-    if place is None or place >= count:
+def _contact_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Problem]:
+    named, count = contact_key(key), len(draft.contacts)
+    if named is None or named[0] >= count:
         hint = f"Indices start at 1 and this scene has {count} [[contact]]."
-        yield Problem(where, "the mass of a contact", quoted(key), hint)
+        yield Problem(where, "a number of a contact", quoted(key), hint)
+        return
+    place, name = named
+    table = draft.contact(place)
+    if table is not None and name not in (known := list(numeric_keys(type(table)))):
+        near = partial(nearest, name, known, f"contact[{place + 1}].")
+        yield Problem(where, "a number of this contact", quoted(key), near)
 
 
 def _start_value_problems(key: str, where: str, draft: GeneralDraft) -> Iterator[Problem]:
@@ -109,13 +116,25 @@ def _axis_problems(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:
         return
     variable = draft.variable(axis.key)
     if variable is None:
-        if mass_place(axis.key) is not None and not all(value > 0.0 for value in axis.values):
-            yield Problem(key_path(("sweep", axis.key)), "numbers > 0", quoted(min(axis.values)))
+        yield from _contact_values(axis, draft)
         return
     for value in axis.values:
         fitted = swept_value(variable, value)
         if isinstance(fitted, Misfit):
             yield Problem(key_path(("sweep", axis.key)), fitted.expected, quoted(value), fitted.hint)
+            return
+
+
+def _contact_values(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:
+    named = contact_key(axis.key)
+    table = None if named is None else draft.contact(named[0])
+    if named is None or table is None or named[1] not in type(table).model_fields:
+        return
+    field = field_of(type(table), named[1])
+    rule, (low, high, is_open) = rule_of(field), bounds_of(field)
+    for value in axis.values:
+        if not low <= value <= high or (is_open and value == low):
+            yield Problem(key_path(("sweep", axis.key)), rule.expected, quoted(value), rule.hint)
             return
 
 

@@ -11,6 +11,7 @@ from vibroimpact.orchestrator.importer.specification import (
     ComponentSpec,
     ConnectionSpec,
     EventSpec,
+    PairSpec,
     StopContactSpec,
 )
 from vibroimpact.orchestrator.scene.general.component_facts import Misfit, StartValue, swept_value
@@ -20,7 +21,9 @@ from vibroimpact.orchestrator.scene.general.models import (
     ConnectionTable,
     EventTable,
     GeneralRecord,
+    StopContactTable,
 )
+from vibroimpact.orchestrator.scene.general.pair_rules import PortPlan, plan_ports
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, general_problems
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable, mass_place
 from vibroimpact.orchestrator.scene.general.sweep import read_general_sweep
@@ -33,7 +36,14 @@ def read_general(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, A
     """Validate a document that has components; as `read_tables`."""
     draft = GeneralDraft(document, folder)
     axes, sweep_problems = read_general_sweep(draft)
-    problems = draft.problems + general_problems(draft) + contact_problems(draft) + sweep_problems
+    plan = plan_ports(draft)
+    problems = [
+        *draft.problems,
+        *general_problems(draft),
+        *contact_problems(draft),
+        *plan.problems,
+        *sweep_problems,
+    ]
     if problems:
         return {}, problems
     assert draft.header is not None
@@ -45,7 +55,7 @@ def read_general(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, A
         "record": _record(draft.record),
         "sweep": axes,
         "execution": execution,
-        "general": _general(draft, draft.record, execution, axes),
+        "general": _general(draft, plan, execution, axes),
     }, []
 
 
@@ -69,10 +79,12 @@ def _execution(draft: GeneralDraft, execution: Execution) -> Execution:
 
 
 def _general(
-    draft: GeneralDraft, record: GeneralRecord, execution: Execution, axes: tuple[SweepAxis, ...]
+    draft: GeneralDraft, plan: PortPlan, execution: Execution, axes: tuple[SweepAxis, ...]
 ) -> GeneralScene:
+    record = draft.record
+    assert record is not None
     general = GeneralScene(
-        components=tuple(_component(component, axes) for component in draft.components.values()),
+        components=tuple(_component(component, plan, axes) for component in draft.components.values()),
         connections=tuple(_connection(table) for table in draft.connections if table),
         events=tuple(_event(table) for table in draft.events if table),
         variables=record.variables,
@@ -81,14 +93,15 @@ def _general(
         exchange=execution.exchange,
         guard=execution.guard,
         units={key: draft.unit(key) for key in (*record.variables, *(axis.key for axis in axes))},
-        contacts=tuple(_contact(draft, place, axes) for place in range(len(draft.contacts))),
+        contacts=tuple(_contact(draft, plan, place, axes) for place in range(len(draft.contacts))),
     )
     return replace(general, start_units={key: draft.unit(key) for key, _ in general.numbers()})
 
 
-def _component(component: DraftComponent, axes: tuple[SweepAxis, ...]) -> ComponentSpec:
+def _component(component: DraftComponent, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> ComponentSpec:
     assert component.fmu is not None
-    parameters = {**_first_swept(component, axes), **(component.parameters or {})}
+    ports = plan.parameters.get(component.name, {})
+    parameters = {**_first_swept(component, axes), **(component.parameters or {}), **ports}
     return ComponentSpec(component.name, component.fmu, parameters)
 
 
@@ -115,9 +128,13 @@ def _event(table: EventTable) -> EventSpec:
     return EventSpec(*component_variable(table.watch), table.direction, table.level)
 
 
-def _contact(draft: GeneralDraft, place: int, axes: tuple[SweepAxis, ...]) -> StopContactSpec:
-    table = draft.contacts[place]
+def _contact(
+    draft: GeneralDraft, plan: PortPlan, place: int, axes: tuple[SweepAxis, ...]
+) -> StopContactSpec | PairSpec:
+    table = draft.contact(place)
     assert table is not None
+    if not isinstance(table, StopContactTable):
+        return plan.pair(place, table)
     swept = next((axis.values[0] for axis in axes if mass_place(axis.key) == place), None)
     return StopContactSpec(
         body=table.body,

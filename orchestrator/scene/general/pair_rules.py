@@ -1,0 +1,193 @@
+"""Rules of pairs of bodies that hit each other (`[[contact]]` with `between`), and the contact port of each body."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+from vibroimpact.orchestrator.importer.specification import PairSpec
+from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
+from vibroimpact.orchestrator.scene.general.components import DraftComponent
+from vibroimpact.orchestrator.scene.general.models import BodyPair
+from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
+from vibroimpact.orchestrator.scene.general.scene import component_variable
+from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
+
+#: The law of a port that watches no stop of its own.
+PAIR_LAW = "pair"
+_PORT = re.compile(r"contact\[([1-9][0-9]?)\]")
+_MASS = re.compile(r"mass\[([1-9][0-9]?)\]")
+#: Variables that say where a port is: of a chain, of a beam. A beam's tip.
+_MASS_NUMBER, _LOCATION, _TIP = "mass_number", "location", 1.0
+
+
+@dataclass
+class PortPlan:
+    """Which contact port each end of each pair takes, and what its component must be given for that.
+
+    Attributes
+    ----------
+    ends : mapping of (place, end) to (component, port)
+        By the 0-based place of the `[[contact]]` and of the point in its `between`.
+    parameters : mapping of str to mapping
+        Start values by component.
+    problems : list of Problem
+        Everything that is wrong.
+    """
+
+    ends: dict[tuple[int, int], tuple[str, str]] = field(default_factory=dict)
+    parameters: dict[str, dict[str, StartValue]] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+
+    def pair(self, place: int, table: BodyPair) -> PairSpec:
+        """Return the pair of a `[[contact]]` without problems."""
+        numbers = table.model_dump(exclude={"between"})
+        return PairSpec(self.ends[place, 0], self.ends[place, 1], **numbers)
+
+
+def plan_ports(draft: GeneralDraft) -> PortPlan:
+    """Find a contact port for each point that another body may hit."""
+    plan = PortPlan()
+    taken: dict[tuple[str, str], str] = {}
+    for place, table in enumerate(draft.pairs):
+        if table is None:
+            continue
+        names = [component_variable(point)[0] for point in table.between]
+        where = key_path(("contact", place, "between"))
+        if names[0] == names[1]:
+            hint = "The points of one body are held together by its own springs: give it stops instead."
+            plan.problems.append(Problem(where, "points of two bodies", f"{quoted(names[0])} twice", hint))
+            continue
+        for end, point in enumerate(table.between):
+            found = _port_of(draft, point, key_path(("contact", place, "between", end)), taken, plan)
+            if found is not None:
+                plan.ends[place, end] = found
+    return plan
+
+
+def _port_of(
+    draft: GeneralDraft, point: str, where: str, taken: dict[tuple[str, str], str], plan: PortPlan
+) -> tuple[str, str] | None:
+    """Return component and port of a point; None where there is none, which is a problem then."""
+    name, rest = component_variable(point)
+    component = draft.components.get(name)
+    if component is None:
+        if draft.components:
+            near = partial(nearest, name, draft.components)
+            plan.problems.append(Problem(where, "a point of a component of this scene", quoted(point), near))
+        return None
+    if component.facts is None:
+        return None
+    problem = _body_problem(component.facts, name, where) or _point_problem(component, rest, where, point)
+    if problem is not None:
+        plan.problems.append(problem)
+        return None
+    if (name, rest) not in taken:
+        port = rest if _PORT.fullmatch(rest) else _free_port(draft, component, plan)
+        if port is None:
+            plan.problems.append(_no_port(component.facts, name, where))
+            return None
+        taken[name, rest] = port
+        given = plan.parameters.setdefault(name, {})
+        given.update(_start_values(component.facts, port, rest))
+    return name, taken[name, rest]
+
+
+def _body_problem(facts: ComponentFacts, name: str, where: str) -> Problem | None:
+    if "contact[1].applied_impulse" in facts.variables and facts.restorable:
+        return None
+    lean = "contact[1].law" in facts.variables
+    hint = (
+        "Export it with --ports external."
+        if lean
+        else "A body of another tool takes no impulse: let it meet a stop that yields ([[contact]] with body and stop)."
+    )
+    got = f"{name}, whose {facts.file} has no contact[1].applied_impulse"
+    return Problem(where, "a body of this package: Oscillator, Chain or Beam", got, hint)
+
+
+def _kind(facts: ComponentFacts) -> str:
+    if f"contact[1].{_MASS_NUMBER}" in facts.variables:
+        return "Chain"
+    return "Beam" if f"contact[1].{_LOCATION}" in facts.variables else "Oscillator"
+
+
+def _point_problem(component: DraftComponent, rest: str, where: str, point: str) -> Problem | None:
+    facts, name = component.facts, component.name
+    assert facts is not None
+    if _PORT.fullmatch(rest):
+        return _given_port_problem(component, rest, where, point)
+    kind = _kind(facts)
+    words = {
+        "Oscillator": f'"{name}", "{name}.mass"',
+        "Chain": f'"{name}.mass[1]", "{name}.mass[2]", ..., or "{name}" for the last mass',
+        "Beam": f'"{name}.tip"',
+    }[kind]
+    expected = f'one of {words}, or "{name}.contact[1]"'
+    mass = _MASS.fullmatch(rest)
+    if kind == "Chain" and mass:
+        count = _masses(component)
+        return None if int(mass[1]) <= count else Problem(where, f"a mass from 1 to {count}", quoted(point))
+    known = {"Oscillator": ("", "mass"), "Chain": ("",), "Beam": ("tip",)}[kind]
+    return None if rest in known else Problem(where, expected, quoted(point))
+
+
+def _masses(component: DraftComponent) -> int:
+    assert component.facts is not None
+    given = (component.parameters or {}).get("masses")
+    if isinstance(given, int):
+        return given
+    return sum(name.startswith("mass[") for name in component.facts.variables)
+
+
+def _given_port_problem(component: DraftComponent, port: str, where: str, point: str) -> Problem | None:
+    assert component.facts is not None
+    law = component.facts.variables.get(f"{port}.law")
+    if law is None:
+        return Problem(where, f"a contact port of {component.facts.file}", quoted(point))
+    given = (component.parameters or {}).get(f"{port}.law", 0)
+    if given in (0, law.items[PAIR_LAW]):
+        return None
+    names = {number: name for name, number in law.items.items()}
+    hint = f'Remove {port}.law from its parameters: a pair sets it to "{PAIR_LAW}".'
+    return Problem(where, "a port without a stop", f"{quoted(point)} with the law {names[int(given)]}", hint)
+
+
+def _free_port(draft: GeneralDraft, component: DraftComponent, plan: PortPlan) -> str | None:
+    """Return the first port that neither the scene nor another pair uses."""
+    assert component.facts is not None
+    swept = draft.document.get("sweep")
+    named = [point for table in draft.pairs if table for point in table.between]
+    used = {
+        *(component.parameters or {}),
+        *plan.parameters.get(component.name, {}),
+        *(component_variable(key)[1] for key in swept or () if component_variable(key)[0] == component.name),
+        *(f"{component_variable(p)[1]}.law" for p in named if component_variable(p)[0] == component.name),
+        *(
+            component_variable(c.target)[1]
+            for c in draft.connections
+            if c and component_variable(c.target)[0] == component.name
+        ),
+    }
+    ports = (name.removesuffix(".law") for name in component.facts.variables if name.endswith("].law"))
+    return next((port for port in ports if not any(key.startswith(f"{port}.") for key in used)), None)
+
+
+def _no_port(facts: ComponentFacts, name: str, where: str) -> Problem:
+    count = sum(name.endswith("].law") for name in facts.variables)
+    hint = "Every stop and every point that is hit takes one: remove a stop, or export a body with more contacts."
+    return Problem(where, "a body with a free contact port", f"{quoted(name)}, whose {count} are taken", hint)
+
+
+def _start_values(facts: ComponentFacts, port: str, rest: str) -> Mapping[str, StartValue]:
+    """What a component must be given so that a port is at this point."""
+    law: StartValue = facts.variables[f"{port}.law"].items[PAIR_LAW]
+    values: dict[str, StartValue] = {f"{port}.law": law}
+    mass = _MASS.fullmatch(rest)
+    if mass:
+        values[f"{port}.{_MASS_NUMBER}"] = int(mass[1])
+    elif rest == "tip":
+        values[f"{port}.{_LOCATION}"] = _TIP
+    return values
