@@ -97,8 +97,14 @@ class ContactBonds:
 
     def revised_end(self, time: float, end: float) -> float | None:
         """Return where a step just made must be repeated to, s; None when it may stay as it is."""
-        found = [bond.revised_end(time, end) for bond in self._following]
-        return min((e for e in found if e is not None), default=None)
+        open_pairs = [pair for pair in self.pairs.pairs if not pair.closed]
+        pressed = [bond for bond in self._following if bond not in open_pairs]
+        # bodies that fly are looked at once all forces agree
+        for bonds in (pressed, open_pairs):
+            found = [e for e in (bond.revised_end(time, end) for bond in bonds) if e is not None]
+            if found:
+                return min(found)
+        return None
 
     def agree(self, time: float, end: float) -> None:
         """Before the bodies without states make their step: it ends at `end`, s."""
@@ -109,7 +115,8 @@ class ContactBonds:
         """The step, of `size` s, counts; returns the bodies that have come to a stop at its end, without event mode."""
         for bond in self._following:
             bond.end_step(size)
-        return [bond.body for bond in self.held if bond.arrived]
+        met = [pair.lower.body for pair in self.pairs.pairs if pair.arrived]
+        return [*(bond.body for bond in self.held if bond.arrived), *met]
 
     def remarks(self) -> list[str]:
         """What a reader of the results must know of held forces."""

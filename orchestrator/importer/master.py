@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from numpy.typing import NDArray
@@ -202,7 +202,7 @@ class Importer:
             watch.begin()
         self.wants_to_end = self._event_mode.begin_run(start_time)
         self.contacts.begin(start_time)
-        self._hit()
+        self._note(self.contacts.pairs.resolve(start_time))
 
     # ---- advancing ----
 
@@ -289,14 +289,13 @@ class Importer:
         if self._at_event:
             for watch in self.watches:
                 watch.confirm()
-            if self.on_event is not None:
-                self._note_events(self.on_event)
+            self._note(component.name for component in self._at_event)
             if self._event_mode.resolve(end):
                 self.wants_to_end = True
         elif end < target and self.on_pause is not None:
             self.on_pause()
         if contacts.pairs:
-            self._hit()
+            self._note(contacts.pairs.resolve(end))
 
     def _prepare(self, time: float) -> None:
         """What the rarer kinds of step need: loops solved, inputs noted, states saved."""
@@ -450,20 +449,12 @@ class Importer:
 
     # ---- events ----
 
-    def _note_events(self, note: Callable[[Event], None]) -> None:
-        for component in self._at_event:
-            note(self._event_of(component.name))
-
-    def _event_of(self, component: str) -> Event:
-        self._event_index = self._event_index + 1 if self.time == self._event_time else 0
-        self._event_time = self.time
-        return Event(self.time, self._event_index, component)
-
-    def _hit(self) -> None:
-        """Resolve the impacts between bodies at this instant."""
-        for name in self.contacts.pairs.resolve(self.time):
+    def _note(self, components: Iterable[str]) -> None:
+        for name in components:
+            self._event_index = self._event_index + 1 if self.time == self._event_time else 0
+            self._event_time = self.time
             if self.on_event is not None:
-                self.on_event(self._event_of(name))
+                self.on_event(Event(self.time, self._event_index, name))
 
     # ---- repeated steps ----
 

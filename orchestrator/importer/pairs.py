@@ -12,99 +12,41 @@ until none closes: docs/equations.md 3.5.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import NamedTuple
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.revision import PRECISION, Bracket, refine
+from vibroimpact.orchestrator.importer.held_force import ForceInput
+from vibroimpact.orchestrator.importer.pair_ends import BodyRate, Motion, PairEnd, Scale, precision_at
+from vibroimpact.orchestrator.importer.pair_force import PairForce
+from vibroimpact.orchestrator.importer.revision import Bracket, refine
 from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.importer.step_path import StepPath
 
-#: Touching pairs are nearer than what the fastest body moves in this many times the precision of an impact ...
-TOUCHING_TIMES = 64.0
-#: ... and this times the largest displacement.
-TOUCHING_SIZE = 1e-12
-#: Closing speeds below this times the largest speed of a body are no impacts, unless the bodies sink into each other.
-SLOW = 1e-9
+#: Likewise of bodies that rest on each other, whose force makes up for less.
+HIT_AT_REST = 1e-4
 #: Bodies sunk into each other by this many times the distance at which they touch are pressed together.
 SUNK = 100.0
 #: Impulses at one instant.
 MOST_IMPULSES = 10_000
 #: A step is at most this part of the shortest period of a body that says its own.
 PART_OF_PERIOD = 0.125
+#: A step of two bodies that rest on each other is this much shorter again.
+RESTING_STEPS = 16.0
+#: Bounces still to come that take less than this part of the longest one are summed to their end.
+ACCUMULATED = 1e-3
+#: A bounce whose closing speed times its duration is below this times the distance of touching is none.
+LOW = 64.0
+#: A step longer than its limit by more than this factor, as its end shows, is made shorter.
+SLACK = 1.5
 #: Halvings of a step in search of a contact.
 MOST_HALVINGS = 40
 #: A gap this many times larger than what the bodies close at their speeds over a step is not looked into.
 FAR = 4.0
 #: Allowance for the error of a cubic over the defect that it has in its middle.
 MARGIN = 2.0
-
-
-class Motion(NamedTuple):
-    """A pair at one instant of a step: seconds from its start, gap (m) and closing speed (m/s)."""
-
-    seconds: float
-    gap: float
-    closing: float
-
-
-class PairEnd:
-    """The contact point of one body of a pair.
-
-    Attributes
-    ----------
-    body : Component
-        Its body.
-    name : str
-        `body.contact[k]`.
-    mass : float
-        Impulse over the change of its velocity, kg; known once a run has begun.
-    """
-
-    def __init__(self, components: Mapping[str, Component], end: tuple[str, str]) -> None:
-        component, port = end
-        self.name = f"{component}.{port}"
-        self.body = components[component]
-        self._motion = self.body.group("Float64", [f"{port}.displacement", f"{port}.velocity"])
-        self._mass = self.body.group("Float64", [f"{port}.mass"])
-        self._impulse = self.body.group("Float64", [f"{port}.applied_impulse"])
-
-    def begin(self) -> None:
-        """Start a run."""
-        self.mass = float(self._mass.get()[0])
-
-    def look(self) -> tuple[float, float]:
-        """Return displacement (m) and velocity (m/s)."""
-        displacement, velocity = self._motion.get()
-        return float(displacement), float(velocity)
-
-    def strike(self, impulse: float) -> None:
-        """Give the point an impulse along its displacement, N s; a body with event mode is in it."""
-        self._impulse.values[0] = impulse
-        self._impulse.set()
-        instance = self.body.instance
-        if self.body.event_mode and isinstance(instance, Instance3):
-            instance.check(instance.update_call(), "UpdateDiscreteStates")
-
-
-class Scale:
-    """The largest displacement (m) and speed (m/s) that any body of a pair has had, by which others are small."""
-
-    def __init__(self) -> None:
-        self.displacement = self.speed = 0.0
-
-    def room(self, time: float) -> float:
-        """Return the gap below which bodies touch, m."""
-        moved = TOUCHING_TIMES * _precision(time) * self.speed
-        return moved + TOUCHING_SIZE * self.displacement
-
-    @property
-    def slow(self) -> float:
-        """Closing speed that is none, m/s."""
-        return SLOW * self.speed
 
 
 class Pair:
@@ -124,7 +66,13 @@ class Pair:
 
     active = True
 
-    def __init__(self, components: Mapping[str, Component], spec: PairSpec, scale: Scale) -> None:
+    def __init__(
+        self,
+        components: Mapping[str, Component],
+        spec: PairSpec,
+        scale: Scale,
+        inputs: dict[tuple[str, str], ForceInput],
+    ) -> None:
         for name in {spec.lower[0], spec.upper[0]}:
             if not components[name].has_states:
                 raise ComponentError(
@@ -132,16 +80,20 @@ class Pair:
                     "The instant at which two bodies meet is found by going back.",
                     instance=name,
                 )
-        self.lower, self.upper = PairEnd(components, spec.lower), PairEnd(components, spec.upper)
-        self.name = f"{self.lower.name} - {self.upper.name}"
+        self.lower = PairEnd(components, spec.lower, inputs)
+        self.upper = PairEnd(components, spec.upper, inputs)
+        self.name = spec.name
         self.bodies = tuple({end.body.name: end.body for end in (self.lower, self.upper)}.values())
         self._scale = scale
-        self._rates = [_Rate(body) for body in self.bodies]
+        self._rates = [BodyRate(body) for body in self.bodies]
         self.take(spec)
 
     def take(self, spec: PairSpec) -> None:
         """Take the numbers of a specification, for the next run."""
         self.clearance, self.restitution = spec.clearance, spec.restitution
+        self._surface = 0.0  # where bodies that have rested on each other part: not quite at a gap of 0
+        self._force = PairForce(spec)
+        self.yields = self._force.law is not None
 
     def begin(self, time: float) -> None:
         """Start a run.
@@ -155,9 +107,13 @@ class Pair:
         self.upper.begin()
         rate = max(rate.fastest() for rate in self._rates)
         self._longest = PART_OF_PERIOD * 2.0 * math.pi / rate if rate > 0.0 else math.inf
-        self._agreed = -math.inf
+        self._reduced = 1.0 / (1.0 / self.lower.mass + 1.0 / self.upper.mass)
+        self._force.begin(self._reduced)
+        self._agreed = self._last_impact = -math.inf
+        self._last_flight, self._longest_flight = math.inf, 0.0
+        self.arrived = self.closed = self._pressed = False
         gap = self.look().gap
-        if not gap >= -self._scale.room(time):
+        if not gap >= -self._scale.room(time) and not self.yields:
             raise ComponentError(
                 f"{self.name}: expected bodies that do not overlap at the start, got a gap of {gap:.6g} m. "
                 "The gap is clearance + displacement of the second - displacement of the first.",
@@ -172,29 +128,81 @@ class Pair:
         scale = self._scale
         scale.displacement = max(scale.displacement, abs(low), abs(high), abs(self.clearance))
         scale.speed = max(scale.speed, abs(low_speed), abs(high_speed))
-        return Motion(seconds, self.clearance + high - low, low_speed - high_speed)
+        return Motion(seconds, self.clearance + high - low - self._surface, low_speed - high_speed)
 
     def is_due(self, now: Motion, time: float) -> bool:
-        """Do the bodies touch and close?"""
+        """Do the bodies touch and close, and hit each other?"""
+        if self.yields:
+            return False
         room = self._scale.room(time)
+        if self._force.resting:
+            return now.closing > HIT_AT_REST * self._scale.speed
         return now.gap <= room and (now.closing > self._scale.slow or (now.gap < -room and now.closing > 0.0))
 
     # ---- a step ----
 
-    def begin_step(self, time: float, target: float, _steps: float) -> float:
+    def begin_step(self, time: float, target: float, steps: float) -> float:
         """Look at the pair before a step; returns where it should end, s."""
-        self._start = self.look()
-        return min(target, time + self._longest)
+        start, self._time = self.look(), time
+        self._room = self._scale.room(time)
+        if self._surface and start.gap + self._surface > self._room:
+            start, self._surface = start._replace(gap=start.gap + self._surface), 0.0
+        self._start = start
+        was_closed, self.arrived = self.closed, False
+        self.closed = self._force.resting
+        if self.yields:
+            self.closed = start.gap < -self._room or (start.gap <= self._room and start.closing > 0.0)
+        self._steps = steps
+        target = min(target, time + self._longest)
+        if not self.closed:
+            self._force.let_go()
+            return target
+        if self.yields and not was_closed:
+            self._force.arrive(start.closing)
+        if self.yields:
+            target = min(target, time + self._force.time_scale(start.gap) / steps)
+        else:
+            target = min(target, time + self._longest / RESTING_STEPS)
+        self._force.start(start.gap, start.closing, target - time)
+        return target
 
     def apply(self) -> None:
-        """Nothing is held over a step."""
+        """Give both bodies the force of the contact."""
+        if self.closed or self._pressed:
+            self.lower.press(self.name, -self._force.value)
+            self.upper.press(self.name, self._force.value)
+            self._pressed = self._force.value != 0.0
 
     def revised_end(self, time: float, end: float) -> float | None:
+        """Return where a step just made must be repeated to, s; None when it may stay as it is."""
+        if not self.closed:
+            return self._meeting(time, end)
+        now, size = self.look(end - time), end - time
+        if self.yields:
+            scale = self._force.time_scale(now.gap) / self._steps
+            if size > SLACK * scale:
+                self._force.start(self._start.gap, self._start.closing, scale)
+                return time + scale
+        if self._force.corrects(now.gap, now.closing, size):
+            return end
+        if self._force.resting and self._force.value < 0.0:
+            self._force.let_go()
+            self._surface += min(self._start.gap, 0.0)
+            self._start = self._start._replace(gap=max(self._start.gap, 0.0))
+            self.closed = False
+            return end
+        return None
+
+    def end_step(self, size: float) -> None:
+        """The step of `size` s counts."""
+        end = self._time + size
+        self.arrived = self.yields and not self.closed and abs(end - self._agreed) <= precision_at(end)
+
+    def _meeting(self, time: float, end: float) -> float | None:
         """Return the instant in the step just made at which the bodies meet first, s; None without one before `end`."""
-        precision = _precision(time)
+        precision = precision_at(time)
         if abs(end - self._agreed) <= precision:
             return None
-        self._room = self._scale.room(time)
         size = end - time
         last = self.look(size)
         if self._keeps_clear(self._start, last):
@@ -211,12 +219,10 @@ class Pair:
                 precision,
             )
         if located >= size:
+            self._agreed = end
             return None
         self._agreed = time + located
         return self._agreed
-
-    def end_step(self, size: float) -> None:
-        """Nothing is kept of a step."""
 
     @contextmanager
     def _taken_back(self) -> Iterator[None]:
@@ -235,7 +241,10 @@ class Pair:
         return 0.0 if start.gap > self._room else min(start.gap, 0.0) - self._room
 
     def _keeps_clear(self, first: Motion, last: Motion) -> bool:
-        """Is the gap too large to be closed at such speeds?"""
+        """Is the gap too large to be closed at such speeds, or do both lie idle beside each other?"""
+        is_idle = max(abs(first.closing), abs(last.closing)) <= self._scale.slow
+        if is_idle and max(abs(first.gap), abs(last.gap)) <= self._room:
+            return True
         size = last.seconds - first.seconds
         moved = size * max(abs(first.closing), abs(last.closing)) + abs(last.gap - first.gap)
         return min(first.gap, last.gap) > FAR * moved + self._room
@@ -263,12 +272,40 @@ class Pair:
     def _rounding(self) -> float:
         return 0.01 * self._room
 
-    def strike(self, now: Motion) -> None:
-        """Give both bodies the impulse of their impact."""
-        below, above = self.lower.mass, self.upper.mass
-        impulse = (1.0 + self.restitution) * now.closing / (1.0 / below + 1.0 / above)
+    def strike(self, now: Motion, time: float, *, is_first: bool) -> None:
+        """Give both bodies the impulse of their impact; bounces that accumulate end in rest.
+
+        Parameters
+        ----------
+        now : Motion
+            The pair before it.
+        time : float
+            s.
+        is_first : bool
+            The bodies met by themselves: no other impact of this instant has thrown them at each other.
+        """
+        restitution = 0.0 if is_first and self._accumulates(now, time) else self.restitution
+        impulse = (1.0 + restitution) * now.closing * self._reduced
         self.lower.strike(-impulse)
         self.upper.strike(impulse)
+        if restitution == 0.0:
+            self._force.rest(now.gap)
+        else:
+            self._force.let_go()
+
+    def _accumulates(self, now: Motion, time: float) -> bool:
+        """Would the bounces still to come end in next to no time, or be no higher than bodies that touch are apart?"""
+        flight, before = time - self._last_impact, self._last_flight
+        self._last_impact, self._last_flight = time, flight
+        if math.isfinite(flight):
+            self._longest_flight = max(self._longest_flight, flight)
+        if self.restitution in (0.0, 1.0):
+            return self.restitution == 0.0
+        shrinks = flight < 0.5 * (1.0 + self.restitution) * before
+        longest = min(self._longest, self._longest_flight)
+        left = flight * self.restitution / (1.0 - self.restitution)
+        low = now.closing * flight < LOW * self._scale.room(time)
+        return low or (shrinks and left < ACCUMULATED * longest)
 
 
 class Pairs:
@@ -282,7 +319,8 @@ class Pairs:
 
     def __init__(self, components: Mapping[str, Component], specs: Sequence[PairSpec]) -> None:
         self._scale = Scale()
-        self.pairs = [Pair(components, spec, self._scale) for spec in specs]
+        inputs: dict[tuple[str, str], ForceInput] = {}
+        self.pairs = [Pair(components, spec, self._scale, inputs) for spec in specs]
         bodies = {body.name: body for pair in self.pairs for body in pair.bodies}
         self._instances = [
             body.instance
@@ -320,13 +358,15 @@ class Pairs:
             return hit
         for instance in self._instances:
             instance.check(instance.enter_event_call(), "EnterEventMode")
+        met = {pair for pair in self.pairs if pair.is_due(pair.look(), time)}
         for _ in range(MOST_IMPULSES):
             due = [(now.closing, pair, now) for pair in self.pairs if pair.is_due(now := pair.look(), time)]
             if not due:
                 break
             closing, pair, now = max(due, key=lambda found: found[0])
             self._refuse_pressed(pair, now, time)
-            pair.strike(now)
+            pair.strike(now, time, is_first=pair in met)
+            met.discard(pair)
             if closing > self._scale.slow:
                 hit.append(pair.lower.body.name)
         else:
@@ -353,38 +393,6 @@ class Pairs:
             instance=self.pairs[0].lower.body.name,
             time=time,
         )
-
-
-class _Rate:
-    """The fastest rate that a body says of itself, rad/s; 0 where it says none."""
-
-    def __init__(self, body: Component) -> None:
-        def group(names: Sequence[str]) -> Callable[[], list[float]]:
-            if not names:
-                return list
-            found = body.group("Float64", names)
-            return lambda: [float(value) for value in found.get()]
-
-        known = body.variables
-        self._natural = group([n for n in known if n.startswith("natural_angular_frequency[")])
-        self._forcing = group([n for n in ("forcing.angular_frequency",) if n in known])
-        self._spring = group(
-            ["mass", "stiffness", "damping"] if {"mass", "stiffness", "damping"} <= set(known) else []
-        )
-
-    def fastest(self) -> float:
-        """Return it; the parameters are set."""
-        rates = [0.0, *self._natural(), *self._forcing()]
-        spring = self._spring()
-        if spring:
-            mass, stiffness, damping = spring
-            rates += [math.sqrt(stiffness / mass), damping / mass]
-        return max(rates)
-
-
-def _precision(time: float) -> float:
-    """Seconds to which an impact is located."""
-    return PRECISION + 2.0 * math.ulp(time)
 
 
 def _lowest(path: StepPath) -> float:

@@ -1,0 +1,130 @@
+"""The ends of a pair of bodies: their contact points, how they move, and what is small beside that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+from vibroimpact.orchestrator.fmi.instance3 import Instance3
+from vibroimpact.orchestrator.importer.asked_stop import LOWER_SIDE
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.held_force import ForceInput
+from vibroimpact.orchestrator.importer.revision import PRECISION
+
+#: Touching pairs are nearer than what the fastest body moves in this many times the precision of an impact ...
+TOUCHING_TIMES = 64.0
+#: ... and this times the largest displacement.
+TOUCHING_SIZE = 1e-12
+#: Closing speeds below this times the largest speed of a body are no impacts, unless the bodies sink into each other.
+SLOW = 1e-9
+
+
+class Motion(NamedTuple):
+    """A pair at one instant of a step: seconds from its start, gap (m) and closing speed (m/s)."""
+
+    seconds: float
+    gap: float
+    closing: float
+
+
+class PairEnd:
+    """The contact point of one body of a pair.
+
+    Attributes
+    ----------
+    body : Component
+        Its body.
+    name : str
+        `body.contact[k]`.
+    mass : float
+        Impulse over the change of its velocity, kg; known once a run has begun.
+    """
+
+    def __init__(
+        self,
+        components: Mapping[str, Component],
+        end: tuple[str, str],
+        inputs: dict[tuple[str, str], ForceInput],
+    ) -> None:
+        component, port = end
+        self.name = f"{component}.{port}"
+        self.body = components[component]
+        self._motion = self.body.group("Float64", [f"{port}.displacement", f"{port}.velocity"])
+        self._mass = self.body.group("Float64", [f"{port}.mass"])
+        self._impulse = self.body.group("Float64", [f"{port}.applied_impulse"])
+        self._side = self.body.group("Int64", [f"{port}.side"])
+        self._input = inputs.setdefault(end, ForceInput(self.body, f"{port}.applied_force"))
+
+    def begin(self) -> None:
+        """Start a run."""
+        self.mass = float(self._mass.get()[0])
+        self._direction = -1.0 if int(self._side.get()[0]) == LOWER_SIDE else 1.0
+        self._input.parts.clear()
+
+    def press(self, pair: str, force: float) -> None:
+        """Hold a force of a pair along the displacement over the next step, N."""
+        self._input.parts[pair] = -self._direction * force
+        self._input.write()
+
+    def look(self) -> tuple[float, float]:
+        """Return displacement (m) and velocity (m/s)."""
+        displacement, velocity = self._motion.get()
+        return float(displacement), float(velocity)
+
+    def strike(self, impulse: float) -> None:
+        """Give the point an impulse along its displacement, N s; a body with event mode is in it."""
+        self._impulse.values[0] = impulse
+        self._impulse.set()
+        instance = self.body.instance
+        if self.body.event_mode and isinstance(instance, Instance3):
+            instance.check(instance.update_call(), "UpdateDiscreteStates")
+
+
+class Scale:
+    """The largest displacement (m) and speed (m/s) that any body of a pair has had, by which others are small."""
+
+    def __init__(self) -> None:
+        self.displacement = self.speed = 0.0
+
+    def room(self, time: float) -> float:
+        """Return the gap below which bodies touch, m."""
+        moved = TOUCHING_TIMES * precision_at(time) * self.speed
+        return moved + TOUCHING_SIZE * self.displacement
+
+    @property
+    def slow(self) -> float:
+        """Closing speed that is none, m/s."""
+        return SLOW * self.speed
+
+
+class BodyRate:
+    """The fastest rate that a body says of itself, rad/s; 0 where it says none."""
+
+    def __init__(self, body: Component) -> None:
+        def group(names: Sequence[str]) -> Callable[[], list[float]]:
+            if not names:
+                return list
+            found = body.group("Float64", names)
+            return lambda: [float(value) for value in found.get()]
+
+        known = body.variables
+        self._natural = group([n for n in known if n.startswith("natural_angular_frequency[")])
+        self._forcing = group([n for n in ("forcing.angular_frequency",) if n in known])
+        self._spring = group(
+            ["mass", "stiffness", "damping"] if {"mass", "stiffness", "damping"} <= set(known) else []
+        )
+
+    def fastest(self) -> float:
+        """Return it; the parameters are set."""
+        rates = [0.0, *self._natural(), *self._forcing()]
+        spring = self._spring()
+        if spring:
+            mass, stiffness, damping = spring
+            rates += [math.sqrt(stiffness / mass), damping / mass]
+        return max(rates)
+
+
+def precision_at(time: float) -> float:
+    """Seconds to which an impact is located."""
+    return PRECISION + 2.0 * math.ulp(time)

@@ -1,0 +1,150 @@
+"""The force that two bodies in contact hold on each other over a step: equal and opposite, so that momentum is exact.
+
+- Of a law that yields it is the force that does over the step the work of the law: the mean of its elastic part over
+  the way (a discrete gradient, so that energy is closed), and of the rest over time.
+- Of two bodies that rest on each other after their impacts (law restitution) it is the force that leaves them without
+  relative velocity at the end of the step.
+
+Either depends on where the step ends, which is repeated until both agree.
+"""
+
+from __future__ import annotations
+
+import math
+
+from vibroimpact.orchestrator.importer.specification import PairSpec
+from vibroimpact.orchestrator.importer.step_path import NODES, StepPath
+
+#: A force this close to the one that the step asks for, relative to the largest of the contact, is the one.
+FORCE_TOLERANCE = 1e-12
+#: A way shorter than this part of the penetration has one force.
+SHORT_WAY = 1e-7
+#: Part of the gap that has opened between two resting bodies which a step closes again.
+CLOSING = 0.2
+
+
+class PairLaw:
+    """A law that yields: force and potential of a penetration (m) and its rate (m/s)."""
+
+    def __init__(self, spec: PairSpec) -> None:
+        self._stiffness = spec.stiffness
+        self._damping = 0.0 if spec.law == "hertz" else spec.damping
+        self._exponent = {"kelvin_voigt": 1.0, "hertz": 1.5}.get(spec.law, spec.exponent)
+        self._is_linear = spec.law == "kelvin_voigt"
+
+    def elastic(self, penetration: float) -> float:
+        """Return the force at rest, N."""
+        return self._stiffness * penetration**self._exponent if penetration > 0.0 else 0.0
+
+    def force(self, penetration: float, rate: float) -> float:
+        """Return the force, N; it never pulls."""
+        if not penetration > 0.0:
+            return 0.0
+        spring = self.elastic(penetration)
+        drag = self._damping * rate * (1.0 if self._is_linear else spring)
+        return max(0.0, spring + drag)
+
+    def potential(self, penetration: float) -> float:
+        """Return the elastic energy, J."""
+        return penetration * self.elastic(penetration) / (self._exponent + 1.0) if penetration > 0.0 else 0.0
+
+    def slope(self, penetration: float) -> float:
+        """Return the stiffness, N/m."""
+        return self._exponent * self.elastic(penetration) / penetration if penetration > 0.0 else 0.0
+
+    def depth(self, energy: float) -> float:
+        """Return the penetration that takes this energy (J), m."""
+        power = self._exponent + 1.0
+        return float((power * energy / self._stiffness) ** (1.0 / power))
+
+    def mean(self, path: StepPath) -> float:
+        """Return the force that does over a step the work of the law, N; `path` is that of the penetration."""
+        first, last = path.start, path.end
+        way = last - first
+        if abs(way) > SHORT_WAY * max(abs(first), abs(last)):
+            elastic = (self.potential(last) - self.potential(first)) / way
+        else:
+            elastic = self.elastic(0.5 * (first + last))
+        if self._damping == 0.0:
+            return elastic
+        rest = 0.0
+        for u, weight in NODES:
+            penetration, rate = path.at(u)
+            rest += weight * (self.force(penetration, rate) - self.elastic(penetration))
+        return max(0.0, elastic + rest)
+
+
+class PairForce:
+    """The force of one contact between two bodies over the step under way.
+
+    Attributes
+    ----------
+    value : float
+        The force that presses both apart, N.
+    resting : bool
+        The law is restitution, and the bodies stay together.
+    """
+
+    def __init__(self, spec: PairSpec) -> None:
+        self.law = None if spec.law == "restitution" else PairLaw(spec)
+        self.begin(0.0)
+
+    def begin(self, mass: float) -> None:
+        """Start a run; `mass` is the reduced mass of both points, kg."""
+        self._mass = mass
+        self.value = self._largest = self._pace = self._rest_gap = 0.0
+        self.resting = False
+        self._arrival_limit = math.inf
+        self._before: tuple[float, float] | None = None
+
+    def start(self, gap: float, closing: float, size: float) -> None:
+        """Guess the force of a step of `size` s that begins at this gap (m) and closing speed (m/s)."""
+        self._gap, self._closing, self._before = gap, closing, None
+        if self.law is not None:
+            self.value = self.law.force(-gap + 0.5 * closing * size, closing)
+
+    def arrive(self, closing: float) -> None:
+        """A contact begins with this closing speed, m/s: how long it takes says how long its steps may be."""
+        assert self.law is not None
+        depth = self.law.depth(0.5 * self._mass * closing * closing) if closing > 0.0 else 0.0
+        self._arrival_limit = math.pi * depth / closing if depth > 0.0 else math.inf
+
+    def time_scale(self, gap: float) -> float:
+        """Return the duration of a contact this deep, s."""
+        assert self.law is not None
+        slope = self.law.slope(-gap)
+        own = math.pi * math.sqrt(self._mass / slope) if slope > 0.0 else math.inf
+        return min(own, self._arrival_limit)
+
+    def corrects(self, gap: float, closing: float, size: float) -> bool:
+        """Take the force that the end of a step asks for; returns whether it is another one."""
+        if self.law is None:
+            self._pace = max(self._pace, size)
+            target = CLOSING * (gap - self._rest_gap) / self._pace
+            answer = self.value + (closing - target) * self._mass / size
+        else:
+            answer = self.law.mean(StepPath(-self._gap, self._closing, -gap, closing, size))
+        self._largest = max(self._largest, abs(answer))
+        force = self.value
+        if abs(answer - force) <= FORCE_TOLERANCE * self._largest:
+            return False
+        self.value = _secant(force, answer, self._before)
+        self._before = force, answer
+        return self.value != force
+
+    def rest(self, gap: float) -> None:
+        """The bodies stay together from now on, at this gap, m."""
+        self.resting, self.value, self._rest_gap = True, 0.0, gap
+        self._largest = self._pace = 0.0
+
+    def let_go(self) -> None:
+        """They do not press each other any more."""
+        self.resting, self.value = False, 0.0
+
+
+def _secant(force: float, answer: float, before: tuple[float, float] | None) -> float:
+    """Where a straight line through two answers equals its argument; without a second one the answer itself."""
+    if before is None or force == before[0]:
+        return answer
+    slope = (answer - before[1]) / (force - before[0])
+    return force + (answer - force) / (1.0 - slope) if abs(slope) < 0.9 else answer
