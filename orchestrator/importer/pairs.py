@@ -39,6 +39,10 @@ RESTING_STEPS = 16.0
 ACCUMULATED = 1e-3
 #: A bounce whose closing speed times its duration is below this times the distance of touching is none.
 LOW = 64.0
+#: A bounce is small below this times the longest step and the largest speed; after so many in a row elastic bodies are
+#: pressed together.
+SMALL = 1e-3
+MOST_SMALL_BOUNCES = 1000
 #: A step longer than its limit by more than this factor, as its end shows, is made shorter.
 SLACK = 1.5
 #: Halvings of a step in search of a contact.
@@ -111,6 +115,7 @@ class Pair:
         self._force.begin(self._reduced)
         self._agreed = self._last_impact = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
+        self._longest_step, self._small_bounces = 0.0, 0
         self.arrived = self.closed = self._pressed = False
         gap = self.look().gap
         if not gap >= -self._scale.room(time) and not self.yields:
@@ -144,6 +149,7 @@ class Pair:
     def begin_step(self, time: float, target: float, steps: float) -> float:
         """Look at the pair before a step; returns where it should end, s."""
         start, self._time = self.look(), time
+        self._longest_step = max(self._longest_step, target - time)
         self._room = self._scale.room(time)
         if self._surface and start.gap + self._surface > self._room:
             start, self._surface = start._replace(gap=start.gap + self._surface), 0.0
@@ -293,12 +299,19 @@ class Pair:
         else:
             self._force.let_go()
 
+    @property
+    def never_parts(self) -> bool:
+        """Has it made so many small bounces in a row?"""
+        return self._small_bounces > MOST_SMALL_BOUNCES
+
     def _accumulates(self, now: Motion, time: float) -> bool:
         """Would the bounces still to come end in next to no time, or be no higher than bodies that touch are apart?"""
         flight, before = time - self._last_impact, self._last_flight
         self._last_impact, self._last_flight = time, flight
         if math.isfinite(flight):
             self._longest_flight = max(self._longest_flight, flight)
+        is_small = flight < SMALL * self._longest_step and now.closing < SMALL * self._scale.speed
+        self._small_bounces = self._small_bounces + 1 if is_small else 0
         if self.restitution in (0.0, 1.0):
             return self.restitution == 0.0
         shrinks = flight < 0.5 * (1.0 + self.restitution) * before
@@ -376,7 +389,7 @@ class Pairs:
         return hit
 
     def _refuse_pressed(self, pair: Pair, now: Motion, time: float) -> None:
-        if now.gap < -SUNK * self._scale.room(time):
+        if pair.never_parts or now.gap < -SUNK * self._scale.room(time):
             raise ComponentError(
                 f"{pair.name}: expected bodies that part after their impacts, got two that stay in contact at time "
                 f"{time:.12g}. The law restitution has no force to hold them: use kelvin_voigt, hertz or "
