@@ -234,7 +234,7 @@ def _is_an_echo(entry: Any, entries: Sequence[Any], model: type[BaseModel]) -> b
     """Whether an error only follows from another one of the same table."""
     location = entry["loc"]
     if entry["type"] == "too_short":  # bad items do not count as items
-        return bool(entry["input"])
+        return any(other["loc"][:-1] == location for other in entries)
     if entry["type"] != "missing":
         return False
     misspelt = (

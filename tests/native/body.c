@@ -85,6 +85,22 @@ static void step(vi_body *body, double size, bool early)
 
 static vi_body body, image, copy, saved;
 
+/* Another body hits this one: its momentum changes by the impulse, which is taken once. */
+static void strike(uint64_t *seed, int run)
+{
+    const int k = (int)choice(seed, VI_BODY_CONTACTS);
+    const double impulse = uniform(seed, -1.0, 1.0), before = body.velocity;
+    const int64_t count = body.contacts[k].count;
+    body.contacts[k].applied_impulse = impulse;
+    image.contacts[k].applied_impulse = -impulse;
+    for (int twice = 0; twice < 2; ++twice) {
+        vi_body_take_impulses(&body);
+        vi_body_take_impulses(&image);
+    }
+    CHECK(body.velocity == before + impulse / body.mass, "run %d: %.17g after %.17g", run, body.velocity, before);
+    CHECK(body.contacts[k].applied_impulse == 0.0 && body.contacts[k].count == count + 1 && !body.stuck, "run %d", run);
+}
+
 static void run_one(uint64_t *seed, int run)
 {
     make(&body, seed);
@@ -94,6 +110,9 @@ static void run_one(uint64_t *seed, int run)
             const double held = uniform(seed, -1.0, 1.0), rate = choice(seed, 2) == 0 ? 0.0 : uniform(seed, -1.0, 1.0);
             vi_body_hold(&body, held, rate);
             vi_body_hold(&image, -held, -rate);
+        }
+        if (choice(seed, 4) == 0) {
+            strike(seed, run);
         }
         const double size = pow(10.0, uniform(seed, -9.0, 1.0));
         const bool early = choice(seed, 2) == 0;

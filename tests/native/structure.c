@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "body/modal/structure_impact.h"
 #include "check.h"
 
 enum { RUNS = 10000 };
@@ -15,7 +16,7 @@ static const double STIFFNESSES[] = {1.0, 1e2, 1e4, 1e6, 1e10, 1e15};
 static const double RESTITUTIONS[] = {0.0, 1e-12, 0.5, 0.7, 0.9, 0.999, 1.0};
 static const double GAPS[] = {0.0, 1e-9, 1e-3, 0.1, 1.0};
 static const int64_t LAWS[] = {VI_LAW_NONE, VI_LAW_RESTITUTION, VI_LAW_RESTITUTION, VI_LAW_KELVIN_VOIGT, VI_LAW_HERTZ,
-                               VI_LAW_HUNT_CROSSLEY};
+                               VI_LAW_HUNT_CROSSLEY, VI_LAW_PAIR};
 
 #define ANY(table) table[choice(seed, (unsigned)(sizeof table / sizeof table[0]))]
 
@@ -153,6 +154,25 @@ static void one_event_too_many_is_said(void)
     CHECK(strstr(message, "1000 events at ") != NULL, "%s", message);
 }
 
+/* Another body hits a point: it gets the impulse over its contact mass, once. */
+static void strike(uint64_t *seed, int run)
+{
+    const int k = (int)choice(seed, (unsigned)model.contacts);
+    const double wanted = uniform(seed, -1.0, 1.0), sign = vi_contact_direction(contacts[k].side);
+    const double before = sign * vi_structure_approach(&body, k), size = vi_structure_velocity_size(&body, k);
+    contacts[k].applied_impulse = model.mobility[k][k] > 0.0 ? wanted / model.mobility[k][k] : 0.0;
+    for (int twice = 0; twice < 2; ++twice) {
+        vi_structure_take_impulses(&body);
+    }
+    const double after = sign * vi_structure_approach(&body, k);
+    CHECK(contacts[k].applied_impulse == 0.0, "run %d: an impulse is left", run);
+    CHECK(model.mobility[k][k] == 0.0 || state.pending || fabs(after - before - wanted) <= 1e-12 * (size + 1.0),
+          "run %d: %.17g after %.17g, expected %.17g more", run, after, before, wanted);
+    for (int l = 0; l < model.contacts; ++l) {
+        CHECK(state.pending || state.status[l] != VI_CONTACT_HELD, "run %d: still held", run);
+    }
+}
+
 int main(int count, char **names)
 {
     one_event_too_many_is_said();
@@ -169,6 +189,9 @@ int main(int count, char **names)
             continue; /* two stops from either side of a point, started between them by rounding only */
         }
         for (int n = 0; n < 6; ++n) {
+            if (model.contacts > 0 && n % 3 == 1) {
+                strike(&own, run);
+            }
             const double size = pow(10.0, uniform(&own, -3.0, 2.0)) / fastest_rate(), before = vi_clock_time(&model.clock, state.now);
             const vi_step_request request = {before, size, false, false};
             const vi_step_result result = vi_structure_advance(&body, vi_clock_after(&model.clock, state.now, size), &request);

@@ -69,7 +69,7 @@ BAD_CONTACT = [
 ]
 BAD_STRUCTURE = [
     *BAD_CONTACT,
-    ("contact[1].law", 7, "6 (external_force)"),
+    ("contact[1].law", 8, "7 (pair)"),
     ("contact[1].yield_velocity", -1.0, ">= 0"),
     ("contact[1].relaxation_time", math.nan, ">= 0"),
     ("contact[1].applied_force", math.nan, "finite"),

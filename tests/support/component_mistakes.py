@@ -101,6 +101,7 @@ OF_COMPONENTS = [
         '"externl"',
         'component.a.parameters."contact[1].law": expected one of "none" (0), "restitution" (1), '
         '"kelvin_voigt" (2), "hertz" (3), "hunt_crossley" (4), "external" (5), "external_force" (6), '
+        '"pair" (7), '
         'got "externl". Did you mean external?',
     ),
     (

@@ -157,8 +157,8 @@ class PairTable(SceneTable):
     """`[[contact]]` with `between`: two bodies that hit each other."""
 
     between: Annotated[
-        tuple[Reference, Reference],
-        Field(strict=False),
+        tuple[Reference, ...],
+        Field(strict=False, min_length=2, max_length=2),
         Rule(
             'two points of bodies such as ["a.mass[2]", "b.tip"]',
             item='a point of a body such as "a.mass[2]"',

@@ -475,3 +475,25 @@ def test_a_foreign_or_damaged_state_is_refused_and_changes_nothing(body: BodySce
             assert b.serialized() == good
         b.restore(good)
         b.step(1.0)
+
+
+@each_body
+@each_version
+def test_an_impulse_on_a_pair_port_is_given_once_and_a_saved_state_holds_it(
+    body: BodyScene, version: str
+) -> None:
+    scene = {**body.scene, "contact[1].law": 7}
+    with body.fmu(scene, version=version) as b:
+        b.step(0.1)
+        mass, before = b.get("contact[1].mass"), b.get("contact[1].velocity")
+        b.set("contact[1].applied_impulse", 2.0 * mass)
+        data, time = b.serialized(), b.time
+        for _ in range(2):
+            assert b.get("contact[1].velocity") == pytest.approx(before + 2.0, rel=1e-12)
+            assert b.get("contact[1].applied_impulse") == 0.0
+        b.step(0.3)
+        after = b.get("contact[1].velocity")
+        b.restore(data)
+        b.time = time
+        b.step(0.3)
+        assert b.get("contact[1].velocity") == after
