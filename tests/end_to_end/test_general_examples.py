@@ -53,6 +53,27 @@ def test_two_oscillators_follow_the_exact_two_mass_solution(tmp_path: Path) -> N
     comes_back(tmp_path, "two_oscillators", "--gains", "component", "--ssp", "2.0")
 
 
+def test_in_the_cradle_one_ball_goes_in_and_one_comes_out(tmp_path: Path) -> None:
+    dataset = read_flat(ran(tmp_path, "newtons_cradle"))
+    out = math.sin(math.sqrt(9.81) * 0.4985 - 0.5 * math.pi) * 0.1  # the swing of the first before it hits
+    assert dataset.ball1_displacement.values[50] == pytest.approx(-0.1 * math.cos(math.sqrt(9.81) * 0.5), abs=1e-12)
+    assert out < 0.0
+    late = dataset.time.values > 7.6
+    assert np.abs(dataset.ball3_displacement.values).max() < 1e-11
+    assert np.abs(dataset.ball5_displacement.values).max() == pytest.approx(0.1, rel=1e-3)
+    assert np.abs(dataset.ball5_displacement.values[late]).max() < 1e-11
+    times = dataset.event_time.values
+    assert len(times) == 32
+    assert np.allclose(np.diff(times[::4]), math.pi / math.sqrt(9.81), atol=1e-11)
+
+
+def test_the_buildings_pound_and_never_pass_each_other(tmp_path: Path) -> None:
+    dataset = read_flat(ran(tmp_path, "pounding"))
+    gap = 0.02 + dataset.soft_displacement_2.values - dataset.stiff_displacement_2.values
+    assert gap.min() > -1e-6
+    assert dataset.event_time.sizes["event"] > 50
+
+
 def test_a_body_and_a_stop_of_two_fmi_versions_keep_the_period_one_orbit(tmp_path: Path) -> None:
     dataset = read_flat(ran(tmp_path, "mixed_versions"))
     assert np.allclose(np.diff(dataset.event_time.values), 2.0 * math.pi, atol=1e-11)

@@ -92,7 +92,7 @@ OSCILLATOR = BodyScene(
     laws=[{}, {**stop(0.0), "forcing.angular_frequency": 0.2}],
     bad=[
         *BAD_CONTACT,
-        ("contact[1].law", 7, "1 (restitution)"),
+        ("contact[1].law", 8, "1 (restitution)"),
         ("mass", 0.0, "> 0"),
         ("mass", -1.0, "> 0"),
         ("mass", math.nan, "> 0"),
