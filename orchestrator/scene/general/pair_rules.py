@@ -15,12 +15,13 @@ from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
 from vibroimpact.orchestrator.scene.general.scene import component_variable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 
-#: The law of a port that watches no stop of its own.
-PAIR_LAW = "pair"
+#: The law of a port that watches no stop of its own, and its number: lean descriptions have numbers alone.
+PAIR_LAW, PAIR_NUMBER = "pair", 7
 _PORT = re.compile(r"contact\[([1-9][0-9]?)\]")
 _MASS = re.compile(r"mass\[([1-9][0-9]?)\]")
-#: Variables that say where a port is: of a chain, of a beam. A beam's tip.
-_MASS_NUMBER, _LOCATION, _TIP = "mass_number", "location", 1.0
+#: Variables that say where a port is: of a chain, of a beam. The last mass, the tip.
+_MASS_NUMBER, _LOCATION = "mass_number", "location"
+_LAST, _TIP = 0, 1.0
 
 
 @dataclass
@@ -85,7 +86,7 @@ def _port_of(
         plan.problems.append(problem)
         return None
     if (name, rest) not in taken:
-        port = rest if _PORT.fullmatch(rest) else _free_port(draft, component, plan)
+        port = rest if _PORT.fullmatch(rest) else _free_port(draft, component, rest, plan)
         if port is None:
             plan.problems.append(_no_port(component.facts, name, where))
             return None
@@ -148,20 +149,28 @@ def _given_port_problem(component: DraftComponent, port: str, where: str, point:
     if law is None:
         return Problem(where, f"a contact port of {component.facts.file}", quoted(point))
     given = (component.parameters or {}).get(f"{port}.law", 0)
-    if given in (0, law.items[PAIR_LAW]):
+    if given in (0, PAIR_NUMBER):
         return None
     names = {number: name for name, number in law.items.items()}
     hint = f'Remove {port}.law from its parameters: a pair sets it to "{PAIR_LAW}".'
-    return Problem(where, "a port without a stop", f"{quoted(point)} with the law {names[int(given)]}", hint)
+    return Problem(
+        where, "a port without a stop", f"{quoted(point)} with the law {names.get(int(given), given)}", hint
+    )
 
 
-def _free_port(draft: GeneralDraft, component: DraftComponent, plan: PortPlan) -> str | None:
-    """Return the first port that neither the scene nor another pair uses."""
+def _free_port(draft: GeneralDraft, component: DraftComponent, rest: str, plan: PortPlan) -> str | None:
+    """Return the first port that is given this place already, or that neither the scene nor another pair uses."""
     assert component.facts is not None
+    parameters = component.parameters or {}
+    ports = [name.removesuffix(".law") for name in component.facts.variables if name.endswith("].law")]
+    for port in ports:
+        wanted = _start_values(component.facts, port, rest)
+        if all(parameters.get(name) == value for name, value in wanted.items()):
+            return port
     swept = draft.document.get("sweep")
     named = [point for table in draft.pairs if table for point in table.between]
     used = {
-        *(component.parameters or {}),
+        *parameters,
         *plan.parameters.get(component.name, {}),
         *(component_variable(key)[1] for key in swept or () if component_variable(key)[0] == component.name),
         *(f"{component_variable(p)[1]}.law" for p in named if component_variable(p)[0] == component.name),
@@ -171,7 +180,6 @@ def _free_port(draft: GeneralDraft, component: DraftComponent, plan: PortPlan) -
             if c and component_variable(c.target)[0] == component.name
         ),
     }
-    ports = (name.removesuffix(".law") for name in component.facts.variables if name.endswith("].law"))
     return next((port for port in ports if not any(key.startswith(f"{port}.") for key in used)), None)
 
 
@@ -183,11 +191,12 @@ def _no_port(facts: ComponentFacts, name: str, where: str) -> Problem:
 
 def _start_values(facts: ComponentFacts, port: str, rest: str) -> Mapping[str, StartValue]:
     """What a component must be given so that a port is at this point."""
-    law: StartValue = facts.variables[f"{port}.law"].items[PAIR_LAW]
-    values: dict[str, StartValue] = {f"{port}.law": law}
+    values: dict[str, StartValue] = {f"{port}.law": PAIR_NUMBER}
+    if _PORT.fullmatch(rest):
+        return values
     mass = _MASS.fullmatch(rest)
-    if mass:
-        values[f"{port}.{_MASS_NUMBER}"] = int(mass[1])
+    if _kind(facts) == "Chain":
+        values[f"{port}.{_MASS_NUMBER}"] = int(mass[1]) if mass else _LAST
     elif rest == "tip":
         values[f"{port}.{_LOCATION}"] = _TIP
     return values

@@ -1,0 +1,72 @@
+"""What an impact between two bodies costs, and what 10^4 of them keep.
+
+Newton's cradle of five balls with restitution 1 swings until it has made the impulses asked for, in FMI 3.0 and 2.0;
+two chains pound, and two masses on springs hit each other with a law that yields. Processor time for each impulse (or
+contact), and the relative change of the energy.
+Run with `python tests/benchmarks/bench_bodies_in_contact.py [--impacts 10000]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from support.pair_parts import PairRun, cradle, hit, pair, run_of
+
+#: Largest relative change of the energy.
+MOST_CHANGE = 1e-12
+
+
+def pounding_chains() -> PairRun:
+    """Return two chains of three masses, which hit each other at their second."""
+    chain = {"masses": 3, "contact[1].mass_number": 2}
+    lower = hit("lower", "Chain", **chain, **{"velocity_start[3]": 1.0})
+    upper = hit("upper", "Chain", **chain, **{"mass[2]": 3.0, "displacement_start[2]": -0.5})
+    return run_of([lower, upper], [pair("lower", "upper", clearance=0.51)])
+
+
+def yielding_masses() -> PairRun:
+    """Return two masses on springs with Hertz's law between them."""
+    bodies = [hit("a", displacement_start=-1.0), hit("b", stiffness=3.0)]
+    return run_of(bodies, [pair("a", "b", clearance=0.1, law="hertz", stiffness=1e5)])
+
+
+def measure(name: str, make: Callable[[], PairRun], impacts: int) -> bool:
+    """Run a system until it has made its impacts; say what each has cost, and whether the energy is kept."""
+    run = make()
+    energy = run.energy()
+    began = time.process_time()
+    while len(run.events) < impacts:
+        run.at(run.importer.time + 10.0)
+    seconds = time.process_time() - began
+    change = run.energy() / energy - 1.0
+    count = len(run.events)
+    run.importer.free()
+    print(
+        f"{name:22} {count:6d} impacts {1e6 * seconds / count:8.0f} us each, energy changed by {change:9.1e}"
+    )
+    return abs(change) <= MOST_CHANGE
+
+
+def main() -> None:
+    """Measure all systems."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--impacts", type=int, default=10_000)
+    impacts = parser.parse_args().impacts
+    kept = [
+        measure("cradle, FMI 3.0", lambda: cradle({0: -0.1}), impacts),
+        measure("cradle, FMI 2.0", lambda: cradle({0: -0.1}, version="2.0"), impacts),
+        measure("chains that pound", pounding_chains, impacts // 10),
+    ]
+    measure("hertz, 30 steps", yielding_masses, impacts // 100)
+    if not all(kept):
+        raise SystemExit(f"energy: expected a relative change of at most {MOST_CHANGE:g}, got a larger one.")
+    print(f"Impacts with restitution 1 keep the energy to {MOST_CHANGE:g}.")
+
+
+if __name__ == "__main__":
+    main()
