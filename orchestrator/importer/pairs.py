@@ -113,7 +113,7 @@ class Pair:
         self._longest = PART_OF_PERIOD * 2.0 * math.pi / rate if rate > 0.0 else math.inf
         self._reduced = 1.0 / (1.0 / self.lower.mass + 1.0 / self.upper.mass)
         self._force.begin(self._reduced)
-        self._agreed = self._last_impact = -math.inf
+        self._agreed = self._last_impact = self._deepest = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
         self.arrived = self.closed = self._pressed = False
@@ -207,10 +207,11 @@ class Pair:
     def _meeting(self, time: float, end: float) -> float | None:
         """Return the instant in the step just made at which the bodies meet first, s; None without one before `end`."""
         precision = precision_at(time)
-        if abs(end - self._agreed) <= precision:
-            return None
         size = end - time
         last = self.look(size)
+        # a step that ends elsewhere may give the bodies other inputs: they are looked at again where they overlap
+        if abs(end - self._agreed) <= precision and last.gap >= self._deepest:
+            return None
         if self._keeps_clear(self._start, last):
             return None
         with self._taken_back():
@@ -224,6 +225,7 @@ class Pair:
                 lambda u: self._motion_at(time, u).gap - level,
                 precision,
             )
+        self._deepest = level - self._room
         if located >= size:
             self._agreed = end
             return None
