@@ -26,6 +26,31 @@ typedef struct {
     uint32_t offset; /* in the component's struct, bytes */
 } vi_variable;
 
+/* What a component gives to an importer that integrates it (model exchange). Between events its derivatives and its
+ * indicators are smooth; all that jumps does so in `handle_event`. */
+typedef struct {
+    /* Numbers of states and of event indicators of the model description. */
+    size_t (*states)(const void *self);
+    size_t (*indicators)(const void *self);
+    /* From its next initialization on it is integrated by the importer; called after `defaults`. */
+    void (*enable)(void *self);
+    /* Initialization has ended. False, with all reasons in `message`, when this set-up cannot be integrated. `tolerance`:
+     * relative, of the importer's integrator; 0: unknown. */
+    bool (*begin)(void *self, double tolerance, char message[VI_MESSAGE_LENGTH]);
+    /* False when the time cannot be counted. */
+    bool (*set_time)(void *self, double time);
+    void (*get_states)(void *self, double states[]);
+    void (*set_states)(void *self, const double states[]);
+    void (*get_nominals)(void *self, double nominals[]);
+    void (*get_derivatives)(void *self, double derivatives[]);
+    void (*get_indicators)(void *self, double indicators[]);
+    /* Resolve what happens at this instant; *changed: the states have jumped, *limit: impact_limit is reached. False, with
+     * the reason in `message`, when there is no end to it. */
+    bool (*handle_event)(void *self, bool *changed, bool *limit, char message[VI_MESSAGE_LENGTH]);
+    /* Time goes on: events are over. */
+    void (*go_on)(void *self);
+} vi_model_exchange;
+
 /* A component. Each of its functions works on the flat struct `self` and never allocates. */
 typedef struct {
     const char *name;
@@ -66,6 +91,9 @@ typedef struct {
     void *(*open)(const char *folder, char message[VI_MESSAGE_LENGTH]);
     void (*attach)(void *self, const void *resources);
     void (*close)(void *resources);
+
+    /* NULL for a component of co-simulation alone. */
+    const vi_model_exchange *exchange;
 } vi_component;
 
 /* The one component that this shared library holds. */

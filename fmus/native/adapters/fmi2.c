@@ -1,4 +1,4 @@
-/* FMI 2.0 co-simulation over vi_this_component. FMI 2.0 has no event mode: see event_time in the model description.
+/* FMI 2.0 over vi_this_component. Co-simulation of FMI 2.0 has no event mode: see event_time in the model description.
  *
  * A step that ends early (a full record, impact_limit) cannot be said without fmi2Discard, after which no stock
  * importer continues; so steps never end early here, rows beyond the record are counted as dropped, and reaching
@@ -76,7 +76,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     if (instanceName == NULL || instanceName[0] == '\0') {
         return refuse(functions, instanceName, "fmi2Instantiate: expected an instance name, got none");
     }
-    if (fmuType != fmi2CoSimulation) {
+    if (fmuType != fmi2CoSimulation && vi_this_component.exchange == NULL) {
         return refuse(functions, instanceName, "fmi2Instantiate: only co-simulation is available");
     }
     if (!vi_token_fits(fmuGUID)) {
@@ -95,6 +95,9 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
             vi_instance_free(instance);
             return NULL;
         }
+        if (fmuType == fmi2ModelExchange) {
+            vi_instance_exchange(instance);
+        }
     }
     return instance;
 }
@@ -107,14 +110,13 @@ void fmi2FreeInstance(fmi2Component c)
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
-    UNUSED(toleranceDefined);
-    UNUSED(tolerance);
     vi_instance *it = c;
     if (it == NULL || !vi_instance_expect(it, "fmi2SetupExperiment", VI_MODE_INSTANTIATED)) {
         return fmi2Error;
     }
     it->start_time = startTime;
     it->stop_time = stopTimeDefined ? stopTime : HUGE_VAL;
+    it->tolerance = toleranceDefined ? tolerance : 0.0;
     return fmi2OK;
 }
 
@@ -137,7 +139,7 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c)
         || !vi_instance_initialize(it, function)) {
         return fmi2Error;
     }
-    it->mode = VI_MODE_STEP;
+    it->mode = it->exchange ? VI_MODE_EVENT : VI_MODE_STEP;
     return fmi2OK;
 }
 
@@ -168,7 +170,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     static const char function[] = "fmi2DoStep";
     UNUSED(noSetFMUStatePriorToCurrentPoint);
     vi_instance *it = c;
-    if (it == NULL || !vi_instance_expect(it, function, VI_MODE_STEP)
+    if (it == NULL || !vi_instance_expect_steps(it, function) || !vi_instance_expect(it, function, VI_MODE_STEP)
         || !vi_instance_expect_end(it, function, currentCommunicationPoint, communicationStepSize)) {
         return fmi2Error;
     }
@@ -402,72 +404,4 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
     }
     *FMUstate = saved;
     return fmi2OK;
-}
-
-/* ---- model exchange: importers look these up; each says that it is not available ---- */
-
-fmi2Status fmi2EnterEventMode(fmi2Component c)
-{
-    return unavailable(c, "fmi2EnterEventMode");
-}
-
-fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
-{
-    UNUSED(eventInfo);
-    return unavailable(c, "fmi2NewDiscreteStates");
-}
-
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c)
-{
-    return unavailable(c, "fmi2EnterContinuousTimeMode");
-}
-
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi2Boolean *enterEventMode, fmi2Boolean *terminateSimulation)
-{
-    UNUSED(noSetFMUStatePriorToCurrentPoint);
-    UNUSED(enterEventMode);
-    UNUSED(terminateSimulation);
-    return unavailable(c, "fmi2CompletedIntegratorStep");
-}
-
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time)
-{
-    UNUSED(time);
-    return unavailable(c, "fmi2SetTime");
-}
-
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx)
-{
-    UNUSED(x);
-    UNUSED(nx);
-    return unavailable(c, "fmi2SetContinuousStates");
-}
-
-fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx)
-{
-    UNUSED(derivatives);
-    UNUSED(nx);
-    return unavailable(c, "fmi2GetDerivatives");
-}
-
-fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni)
-{
-    UNUSED(eventIndicators);
-    UNUSED(ni);
-    return unavailable(c, "fmi2GetEventIndicators");
-}
-
-fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx)
-{
-    UNUSED(x);
-    UNUSED(nx);
-    return unavailable(c, "fmi2GetContinuousStates");
-}
-
-fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx)
-{
-    UNUSED(x_nominal);
-    UNUSED(nx);
-    return unavailable(c, "fmi2GetNominalsOfContinuousStates");
 }

@@ -1,8 +1,8 @@
-/* FMI 3.0 co-simulation over vi_this_component: event mode with early return, get/set/serialize state. */
+/* FMI 3.0 over vi_this_component; co-simulation: event mode with early return, get/set/serialize state. */
 #include "fmi3Functions.h"
 
 #include <math.h>
-#include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "instance.h"
@@ -41,11 +41,43 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, siz
     return fmi3OK;
 }
 
-static void refuse(fmi3LogMessageCallback log, fmi3InstanceEnvironment environment, const char *text)
+static void refuse(fmi3LogMessageCallback log, fmi3InstanceEnvironment environment, const char *function,
+                   const char *reason)
 {
+    char text[256];
     if (log != NULL) {
+        (void)snprintf(text, sizeof text, "%s: %s", function, reason);
         log(environment, fmi3Error, "logStatusError", text);
     }
+}
+
+/* An instance with the sizes and start values of its description; NULL after logging. */
+static vi_instance *instantiate(const char *function, fmi3String name, fmi3String token, fmi3String folder,
+                                fmi3Boolean logging, fmi3InstanceEnvironment environment, fmi3LogMessageCallback log)
+{
+    if (name == NULL || name[0] == '\0') {
+        refuse(log, environment, function, "expected an instance name, got none");
+        return NULL;
+    }
+    if (!vi_token_fits(token)) {
+        refuse(log, environment, function,
+               "the instantiation token is not this component's: the binary and the model description are of different "
+               "versions");
+        return NULL;
+    }
+    vi_instance *instance = vi_instance_new(name);
+    if (instance == NULL) {
+        return NULL;
+    }
+    instance->log = log_message;
+    instance->callback = (void (*)(void))log;
+    instance->environment = environment;
+    instance->logging = logging;
+    if (!vi_instance_describe(instance, function, folder, vi_token_is_of_export(token))) {
+        vi_instance_free(instance);
+        return NULL;
+    }
+    return instance;
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
@@ -57,38 +89,21 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
+    static const char function[] = "fmi3InstantiateCoSimulation";
     UNUSED(visible);
-    /* FMI lets an importer require only variables that are described as intermediate, which none of ours is; fmusim
-     * requires all it records. The callback is never called, and all values are there at the end of a step. */
+    /* FMI lets an importer require only variables that are described as intermediate, which none of ours is; some
+     * require all they record. The callback is never called, and all values are there at the end of a step. */
     UNUSED(requiredIntermediateVariables);
     UNUSED(intermediateUpdate);
-    if (instanceName == NULL || instanceName[0] == '\0') {
-        refuse(logMessage, instanceEnvironment, "fmi3InstantiateCoSimulation: expected an instance name, got none");
-        return NULL;
-    }
-    if (!vi_token_fits(instantiationToken)) {
-        refuse(logMessage, instanceEnvironment,
-               "fmi3InstantiateCoSimulation: the instantiation token is not this component's: the binary and the "
-               "model description are of different versions");
-        return NULL;
-    }
-    vi_instance *instance = vi_instance_new(instanceName);
+    vi_instance *instance = instantiate(function, instanceName, instantiationToken, resourcePath, loggingOn,
+                                        instanceEnvironment, logMessage);
     if (instance != NULL) {
-        instance->log = log_message;
-        instance->callback = (void (*)(void))logMessage;
-        instance->environment = instanceEnvironment;
-        instance->logging = loggingOn;
         instance->event_mode_used = eventModeUsed;
         instance->early_return_allowed = earlyReturnAllowed;
-        if (nRequiredIntermediateVariables > 0 && loggingOn) {
-            log_message(instance, fmi3Warning, "logStatusWarning",
-                        "fmi3InstantiateCoSimulation: intermediate variables are not available in this component");
-        }
-        if (!vi_instance_describe(instance, "fmi3InstantiateCoSimulation", resourcePath,
-                                  vi_token_is_of_export(instantiationToken))) {
-            vi_instance_free(instance);
-            return NULL;
-        }
+    }
+    if (instance != NULL && nRequiredIntermediateVariables > 0 && loggingOn) {
+        log_message(instance, fmi3Warning, "logStatusWarning",
+                    "fmi3InstantiateCoSimulation: intermediate variables are not available in this component");
     }
     return instance;
 }
@@ -98,13 +113,18 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3InstanceEnvironment instanceEnvironment,
                                           fmi3LogMessageCallback logMessage)
 {
-    UNUSED(instanceName);
-    UNUSED(instantiationToken);
-    UNUSED(resourcePath);
+    static const char function[] = "fmi3InstantiateModelExchange";
     UNUSED(visible);
-    UNUSED(loggingOn);
-    refuse(logMessage, instanceEnvironment, "fmi3InstantiateModelExchange: only co-simulation is available");
-    return NULL;
+    if (vi_this_component.exchange == NULL) {
+        refuse(logMessage, instanceEnvironment, function, "only co-simulation is available");
+        return NULL;
+    }
+    vi_instance *instance = instantiate(function, instanceName, instantiationToken, resourcePath, loggingOn,
+                                        instanceEnvironment, logMessage);
+    if (instance != NULL) {
+        vi_instance_exchange(instance);
+    }
+    return instance;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -123,7 +143,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     UNUSED(clockUpdate);
     UNUSED(lockPreemption);
     UNUSED(unlockPreemption);
-    refuse(logMessage, instanceEnvironment, "fmi3InstantiateScheduledExecution: only co-simulation is available");
+    refuse(logMessage, instanceEnvironment, "fmi3InstantiateScheduledExecution", "not available in this component");
     return NULL;
 }
 
@@ -135,8 +155,6 @@ void fmi3FreeInstance(fmi3Instance instance)
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
-    UNUSED(toleranceDefined);
-    UNUSED(tolerance);
     vi_instance *it = instance;
     if (it == NULL || !vi_instance_expect(it, "fmi3EnterInitializationMode", VI_MODE_INSTANTIATED)) {
         return fmi3Error;
@@ -144,6 +162,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     it->mode = VI_MODE_INITIALIZATION;
     it->start_time = startTime;
     it->stop_time = stopTimeDefined ? stopTime : HUGE_VAL;
+    it->tolerance = toleranceDefined ? tolerance : 0.0;
     it->outputs_stale = true;
     return fmi3OK;
 }
@@ -151,7 +170,7 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
 /* A law that another FMU answers needs an importer that stops at events. */
 static bool events_are_handled(vi_instance *it, const char *function)
 {
-    if (!vi_this_component.needs_events(it->self) || (it->event_mode_used && it->early_return_allowed)) {
+    if (it->exchange || !vi_this_component.needs_events(it->self) || (it->event_mode_used && it->early_return_allowed)) {
         return true;
     }
     return vi_instance_fail(it, function,
@@ -169,17 +188,17 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
         || !vi_instance_initialize(it, function)) {
         return fmi3Error;
     }
-    it->mode = it->event_mode_used ? VI_MODE_EVENT : VI_MODE_STEP;
+    it->mode = it->event_mode_used || it->exchange ? VI_MODE_EVENT : VI_MODE_STEP;
     return fmi3OK;
 }
 
 fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 {
     vi_instance *it = instance;
-    if (it == NULL || !vi_instance_expect(it, "fmi3EnterEventMode", VI_MODE_STEP)) {
+    if (it == NULL || !vi_instance_expect(it, "fmi3EnterEventMode", VI_MODE_STEP | VI_MODE_CONTINUOUS)) {
         return fmi3Error;
     }
-    if (!it->event_mode_used) {
+    if (!it->event_mode_used && !it->exchange) {
         return status(vi_instance_fail(it, "fmi3EnterEventMode", "the instance was made with eventModeUsed = false"));
     }
     it->mode = VI_MODE_EVENT;
@@ -189,7 +208,8 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 fmi3Status fmi3EnterStepMode(fmi3Instance instance)
 {
     vi_instance *it = instance;
-    if (it == NULL || !vi_instance_expect(it, "fmi3EnterStepMode", VI_MODE_EVENT)) {
+    if (it == NULL || !vi_instance_expect_steps(it, "fmi3EnterStepMode")
+        || !vi_instance_expect(it, "fmi3EnterStepMode", VI_MODE_EVENT)) {
         return fmi3Error;
     }
     it->mode = VI_MODE_STEP;
@@ -225,7 +245,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     UNUSED(noSetFMUStatePriorToCurrentPoint);
     vi_instance *it = instance;
     if (it == NULL || eventHandlingNeeded == NULL || terminateSimulation == NULL || earlyReturn == NULL
-        || lastSuccessfulTime == NULL || !vi_instance_expect(it, "fmi3DoStep", VI_MODE_STEP)
+        || lastSuccessfulTime == NULL || !vi_instance_expect_steps(it, "fmi3DoStep") || !vi_instance_expect(it, "fmi3DoStep", VI_MODE_STEP)
         || !vi_instance_expect_end(it, "fmi3DoStep", currentCommunicationPoint, communicationStepSize)) {
         return fmi3Error;
     }
@@ -269,9 +289,12 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
         return fmi3Error;
     }
     *discreteStatesNeedUpdate = *terminateSimulation = *nominalsOfContinuousStatesChanged = false;
-    *valuesOfContinuousStatesChanged = vi_this_component.event_pending(it->self);
     *nextEventTimeDefined = false;
     *nextEventTime = 0.0;
+    if (it->exchange) {
+        return status(vi_instance_handle_event(it, function, valuesOfContinuousStatesChanged, terminateSimulation));
+    }
+    *valuesOfContinuousStatesChanged = vi_this_component.event_pending(it->self);
     if (!vi_this_component.resolve(it->self, it->message)) {
         return status(vi_instance_fail(it, function, "%s", it->message));
     }

@@ -79,7 +79,7 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     return nValueReferences == 0 ? fmi3OK : unavailable(instance, "fmi3SetClock");
 }
 
-/* ---- model exchange, scheduled execution, clocks, derivatives ---- */
+/* ---- scheduled execution, clocks, directional derivatives ---- */
 
 #define UNAVAILABLE(NAME, ...)               \
     fmi3Status NAME(__VA_ARGS__)             \
@@ -122,21 +122,6 @@ UNAVAILABLE(fmi3SetShiftDecimal, fmi3Instance instance, const fmi3ValueReference
             size_t nValueReferences, const fmi3Float64 shifts[])
 UNAVAILABLE(fmi3SetShiftFraction, fmi3Instance instance, const fmi3ValueReference valueReferences[],
             size_t nValueReferences, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-UNAVAILABLE(fmi3EnterContinuousTimeMode, fmi3Instance instance)
-UNAVAILABLE(fmi3CompletedIntegratorStep, fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-            fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
-UNAVAILABLE(fmi3SetTime, fmi3Instance instance, fmi3Float64 time)
-UNAVAILABLE(fmi3SetContinuousStates, fmi3Instance instance, const fmi3Float64 continuousStates[],
-            size_t nContinuousStates)
-UNAVAILABLE(fmi3GetContinuousStateDerivatives, fmi3Instance instance, fmi3Float64 derivatives[],
-            size_t nContinuousStates)
-UNAVAILABLE(fmi3GetEventIndicators, fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
-UNAVAILABLE(fmi3GetContinuousStates, fmi3Instance instance, fmi3Float64 continuousStates[],
-            size_t nContinuousStates)
-UNAVAILABLE(fmi3GetNominalsOfContinuousStates, fmi3Instance instance, fmi3Float64 nominals[],
-            size_t nContinuousStates)
-UNAVAILABLE(fmi3GetNumberOfEventIndicators, fmi3Instance instance, size_t *nEventIndicators)
-UNAVAILABLE(fmi3GetNumberOfContinuousStates, fmi3Instance instance, size_t *nContinuousStates)
 UNAVAILABLE(fmi3GetOutputDerivatives, fmi3Instance instance, const fmi3ValueReference valueReferences[],
             size_t nValueReferences, const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
 UNAVAILABLE(fmi3ActivateModelPartition, fmi3Instance instance, fmi3ValueReference clockReference,

@@ -87,12 +87,15 @@ void vi_instance_reset(vi_instance *instance)
     for (int i = 0; component->sized != NULL && i < instance->sizes.count; ++i) {
         component->sized(instance->self, instance->sizes.of[i].block, instance->sizes.of[i].size);
     }
+    if (instance->exchange) {
+        component->exchange->enable(instance->self);
+    }
     for (size_t i = 0; i < instance->start_count; ++i) {
         put_start(instance, &instance->starts[i]);
     }
     instance->mode = VI_MODE_INSTANTIATED;
     instance->outputs_stale = false;
-    instance->start_time = 0.0;
+    instance->start_time = instance->tolerance = 0.0;
     instance->stop_time = HUGE_VAL;
 }
 
@@ -170,6 +173,7 @@ static const char *mode_name(vi_mode_of_use mode)
     case VI_MODE_EVENT: return "event mode";
     case VI_MODE_TERMINATED: return "terminated";
     case VI_MODE_FAILED: return "failed";
+    case VI_MODE_CONTINUOUS: return "continuous-time mode";
     }
     return "unknown";
 }
@@ -180,6 +184,28 @@ bool vi_instance_expect(vi_instance *instance, const char *function, int modes)
         return true;
     }
     return vi_instance_fail(instance, function, "not allowed now: the instance is %s", mode_name(instance->mode));
+}
+
+void vi_instance_exchange(vi_instance *instance)
+{
+    instance->exchange = true;
+    component->exchange->enable(instance->self);
+}
+
+bool vi_instance_expect_exchange(vi_instance *instance, const char *function, int modes)
+{
+    if (!instance->exchange) {
+        return vi_instance_fail(instance, function, "not allowed: the instance was made for co-simulation. Advance it by"
+                                " doStep, or make one for model exchange");
+    }
+    return vi_instance_expect(instance, function, modes);
+}
+
+bool vi_instance_expect_steps(vi_instance *instance, const char *function)
+{
+    return !instance->exchange
+           || vi_instance_fail(instance, function, "not allowed: the instance was made for model exchange. Integrate its"
+                               " states, or make one for co-simulation");
 }
 
 bool vi_instance_expect_end(vi_instance *instance, const char *function, double time, double size)
@@ -198,11 +224,25 @@ bool vi_instance_initialize(vi_instance *instance, const char *function)
     if (!component->initialize(instance->self, instance->start_time, instance->message)) {
         return vi_instance_fail(instance, function, "%s", instance->message);
     }
+    if (instance->exchange) {
+        char reason[VI_MESSAGE_LENGTH] = "";
+        if (!component->exchange->begin(instance->self, instance->tolerance, reason)) {
+            return vi_instance_fail(instance, function, "%s", reason);
+        }
+    }
     if (instance->message[0] != '\0') {
         warn(instance, function, "%s", instance->message);
     }
     instance->outputs_stale = false;
     return true;
+}
+
+bool vi_instance_handle_event(vi_instance *instance, const char *function, bool *states_changed, bool *terminate)
+{
+    instance->message[0] = '\0';
+    instance->outputs_stale = true;
+    return component->exchange->handle_event(instance->self, states_changed, terminate, instance->message)
+           || vi_instance_fail(instance, function, "%s", instance->message);
 }
 
 /* ---- variables ---- */
@@ -222,8 +262,11 @@ static const vi_variable *find(vi_instance *instance, const char *function, int 
     return &component->variables[own];
 }
 
-static void refresh_outputs(vi_instance *instance)
+void vi_instance_refresh(vi_instance *instance)
 {
+    if (!instance->outputs_stale) {
+        return;
+    }
     if (instance->mode == VI_MODE_INITIALIZATION) {
         /* outputs follow the start values; a bad parameter is reported when initialization ends */
         (void)component->initialize(instance->self, instance->start_time, instance->message);
@@ -242,9 +285,7 @@ static bool all_values_used(vi_instance *instance, const char *function, size_t 
 bool vi_instance_get(vi_instance *instance, const char *function, int type, const uint32_t references[], size_t n,
                      void *values, size_t value_count, vi_convert convert)
 {
-    if (instance->outputs_stale) {
-        refresh_outputs(instance);
-    }
+    vi_instance_refresh(instance);
     size_t first = 0;
     for (size_t i = 0; i < n; ++i) {
         const vi_variable *variable = find(instance, function, type, references[i]);
@@ -300,7 +341,7 @@ struct vi_saved {
     char magic[8];
     uint64_t token_hash, state_hash;
     uint64_t size, capacity; /* of the data, bytes */
-    int64_t mode;
+    int64_t mode, exchange;
     double start_time;
     int64_t outputs_stale;
     unsigned char data[];
@@ -348,6 +389,7 @@ bool vi_instance_save(vi_instance *instance, const char *function, vi_saved **sa
     memcpy(state->magic, MAGIC, sizeof MAGIC);
     state->size = size;
     state->mode = (int64_t)instance->mode;
+    state->exchange = instance->exchange;
     state->start_time = instance->start_time;
     state->outputs_stale = instance->outputs_stale;
     memcpy(state->data, instance->self, size);
@@ -362,6 +404,11 @@ bool vi_instance_restore(vi_instance *instance, const char *function, const vi_s
     }
     if (component->attach != NULL && saved->size != component->used_size(instance->self)) {
         return vi_instance_fail(instance, function, "expected a state that fits the FMU's resources, got one of others");
+    }
+    if ((saved->exchange != 0) != instance->exchange) {
+        return vi_instance_fail(instance, function, "expected a state of an instance of %s, got one of %s",
+                                instance->exchange ? "model exchange" : "co-simulation",
+                                instance->exchange ? "co-simulation" : "model exchange");
     }
     memcpy(instance->self, saved->data, saved->size);
     instance->mode = (vi_mode_of_use)saved->mode;

@@ -15,13 +15,14 @@ typedef enum {
     VI_MODE_STEP = 4,
     VI_MODE_EVENT = 8,
     VI_MODE_TERMINATED = 16,
-    VI_MODE_FAILED = 32
+    VI_MODE_FAILED = 32,
+    VI_MODE_CONTINUOUS = 64
 } vi_mode_of_use;
 
 enum {
-    VI_ANY_MODE = 63,
+    VI_ANY_MODE = 127,
     VI_BEFORE_START = VI_MODE_INSTANTIATED | VI_MODE_INITIALIZATION,
-    VI_RUNNING = VI_MODE_STEP | VI_MODE_EVENT
+    VI_RUNNING = VI_MODE_STEP | VI_MODE_EVENT | VI_MODE_CONTINUOUS
 };
 
 typedef struct vi_instance vi_instance;
@@ -31,6 +32,8 @@ struct vi_instance {
     vi_mode_of_use mode;
     bool outputs_stale;    /* an input was set since the outputs were computed */
     bool event_mode_used, early_return_allowed, logging;
+    bool exchange;         /* made for model exchange: the importer integrates it */
+    double tolerance;      /* relative, of its integrator; 0: unknown */
     double start_time, stop_time; /* stop_time: infinite where the importer defines none */
     char *name;
     char message[VI_MESSAGE_LENGTH];
@@ -73,6 +76,21 @@ bool vi_instance_expect(vi_instance *instance, const char *function, int modes);
 
 /* Initialization's end: false (with the component's message logged) when a parameter is bad. Logs its warning. */
 bool vi_instance_initialize(vi_instance *instance, const char *function);
+
+/* Make it one of model exchange, before anything else is done with it. */
+void vi_instance_exchange(vi_instance *instance);
+
+/* Is the instance one of model exchange, and in one of these modes? If not, log it. */
+bool vi_instance_expect_exchange(vi_instance *instance, const char *function, int modes);
+
+/* Is it one of co-simulation? If not, log it. */
+bool vi_instance_expect_steps(vi_instance *instance, const char *function);
+
+/* Model exchange: resolve what happens at this instant. */
+bool vi_instance_handle_event(vi_instance *instance, const char *function, bool *states_changed, bool *terminate);
+
+/* Recompute the outputs if something was set since: in initialization mode, where the motion starts anew. */
+void vi_instance_refresh(vi_instance *instance);
 
 /* Get and set `n` variables of one type. `convert` moves one variable's `count` elements between the struct and the
  * importer's array, which is advanced by the caller's type. Return false after logging. */

@@ -49,6 +49,7 @@ static void sized(void *self, const char *block, int count)
     if (strcmp(block, "modes") == 0 && count >= 1 && count <= VI_MODES) {
         b->modes = b->modes_described = count;
     }
+    vi_structure_component_sized(&b->body, block, count);
 }
 
 /* ---- validation ---- */
@@ -343,26 +344,46 @@ static double base_acceleration(const beam *b)
     return forced ? input + b->forcing_amplitude * vi_structure_component_forcing(&b->body) : input;
 }
 
-static void update_outputs(void *self)
+static void refresh_inputs(beam *b)
 {
-    beam *b = self;
-    b->time = vi_structure_component_time(&b->body);
     if (b->body.inputs_changed) {
         vi_structure_component_take_impulses(&b->body);
         hold_inputs(b);
     }
+}
+
+/* As an importer integrates it: its states are those of the modes. */
+static vi_exchange_body exchange_body(beam *b)
+{
+    vi_exchange_body body = vi_structure_component_exchange(&b->body);
+    body.modes = (int)b->modes_described;
+    body.scale = b->root_mass;
+    body.refused = b->depends_on_amplitude ? "amplitude" : body.refused;
+    return body;
+}
+
+static void update_outputs(void *self)
+{
+    beam *b = self;
+    b->time = vi_structure_component_time(&b->body);
+    refresh_inputs(b);
     const vi_structure_component *body = &b->body;
     const double base = base_acceleration(b);
     vi_structure_component_outputs(&b->body, base);
     for (int j = 0; j < b->modes; ++j) {
         b->modal_displacement[j] = body->state.q[j] / b->root_mass;
         b->modal_velocity[j] = body->state.p[j] / b->root_mass;
+        b->modal_acceleration[j] = body->modal_acceleration[j] / b->root_mass;
     }
     for (int k = 0; k < BEAM_SENSORS; ++k) {
         beam_sensor *sensor = &b->sensor[k];
         sensor->displacement = vi_structure_at(&body->model, sensor->shape, body->state.q);
         sensor->velocity = vi_structure_at(&body->model, sensor->shape, body->state.p);
         sensor->acceleration = vi_structure_at(&body->model, sensor->shape, body->modal_acceleration) + base;
+    }
+    if (body->state.exchange.on) {
+        const vi_exchange_body integrated = exchange_body(b);
+        vi_exchange_show_indicators(&integrated);
     }
 }
 
@@ -439,6 +460,8 @@ static size_t used_size(const void *self)
     return sizeof(beam) - vi_structure_component_unused(&((const beam *)self)->body);
 }
 
+VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);
+
 const vi_component vi_this_component = {
     .name = BEAM_NAME,
     .token = BEAM_TOKEN,
@@ -456,4 +479,5 @@ const vi_component vi_this_component = {
     .time = present_time,
     .used_size = used_size,
     .sized = sized,
+    .exchange = &exchange,
 };

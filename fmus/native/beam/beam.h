@@ -42,7 +42,7 @@ typedef struct {
     double participation[VI_MODES];      /* modal force of a unit acceleration of the base, kg^(1/2) */
     int32_t depends_on_amplitude;        /* some mode does */
     /* outputs */
-    double modal_displacement[VI_MODES], modal_velocity[VI_MODES];
+    double modal_displacement[VI_MODES], modal_velocity[VI_MODES], modal_acceleration[VI_MODES];
     beam_sensor sensor[BEAM_SENSORS];
     vi_structure_component body; /* last: its record is saved only as far as it is used */
 } beam;

@@ -27,6 +27,7 @@ static void sized(void *self, const char *block, int count)
     if (strcmp(block, "masses") == 0 && count >= 1 && count <= VI_MODES) {
         c->masses = c->masses_described = count;
     }
+    vi_structure_component_sized(&c->body, block, count);
 }
 
 /* ---- validation ---- */
@@ -149,6 +150,16 @@ static void start_modes(chain *c)
     project(c, velocity, c->body.state.p);
 }
 
+/* As an importer integrates it: its states are those of the masses. */
+static vi_exchange_body exchange_body(chain *c)
+{
+    vi_exchange_body body = vi_structure_component_exchange(&c->body);
+    body.modes = (int)c->masses_described;
+    body.shape = (const double(*)[VI_MODES])c->shape;
+    body.mass = c->parameter.mass;
+    return body;
+}
+
 /* ---- life ---- */
 
 static void hold_inputs(chain *c)
@@ -163,20 +174,30 @@ static void hold_inputs(chain *c)
     vi_structure_component_hold(&c->body, held, held_rate);
 }
 
-static void update_outputs(void *self)
+static void refresh_inputs(chain *c)
 {
-    chain *c = self;
-    c->time = vi_structure_component_time(&c->body);
     if (c->body.inputs_changed) {
         vi_structure_component_take_impulses(&c->body);
         hold_inputs(c);
     }
+}
+
+static void update_outputs(void *self)
+{
+    chain *c = self;
+    c->time = vi_structure_component_time(&c->body);
+    refresh_inputs(c);
     const double base = vi_structure_component_base_acceleration(&c->body);
     vi_structure_component_outputs(&c->body, base);
     for (int i = 0; i < c->masses; ++i) {
         c->displacement[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.q);
         c->velocity[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.state.p);
-        c->acceleration[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.modal_acceleration) + base;
+        c->relative_acceleration[i] = vi_structure_at(&c->body.model, c->shape[i], c->body.modal_acceleration);
+        c->acceleration[i] = c->relative_acceleration[i] + base;
+    }
+    if (c->body.state.exchange.on) {
+        const vi_exchange_body body = exchange_body(c);
+        vi_exchange_show_indicators(&body);
     }
 }
 
@@ -254,6 +275,8 @@ static size_t used_size(const void *self)
     return sizeof(chain) - vi_structure_component_unused(&((const chain *)self)->body);
 }
 
+VI_EXCHANGE_TABLE(exchange, exchange_body, refresh_inputs);
+
 const vi_component vi_this_component = {
     .name = CHAIN_NAME,
     .token = CHAIN_TOKEN,
@@ -271,4 +294,5 @@ const vi_component vi_this_component = {
     .time = present_time,
     .used_size = used_size,
     .sized = sized,
+    .exchange = &exchange,
 };

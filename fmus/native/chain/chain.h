@@ -21,7 +21,7 @@ typedef struct {
     /* inputs */
     double force[VI_MODES], force_rate[VI_MODES];
     /* outputs */
-    double displacement[VI_MODES], velocity[VI_MODES], acceleration[VI_MODES];
+    double displacement[VI_MODES], velocity[VI_MODES], acceleration[VI_MODES], relative_acceleration[VI_MODES];
     double shape[VI_MODES][VI_MODES]; /* shape[i][j]: displacement of mass i for q_j = 1, kg^(-1/2) */
     vi_structure_component body; /* last: its record is saved only as far as it is used */
 } chain;

@@ -132,6 +132,68 @@ static size_t used_size(const void *self)
     return sizeof(impact_stop);
 }
 
+/* ---- model exchange: no states, no events; outputs follow inputs ---- */
+
+static size_t none(const void *self)
+{
+    (void)self;
+    return 0;
+}
+
+static void nothing(void *self)
+{
+    (void)self;
+}
+
+static bool begin(void *self, double tolerance, char message[VI_MESSAGE_LENGTH])
+{
+    (void)self;
+    (void)tolerance;
+    message[0] = '\0';
+    return true;
+}
+
+static bool set_time(void *self, double time)
+{
+    ((impact_stop *)self)->time = time;
+    return isfinite(time);
+}
+
+static void no_values(void *self, double values[])
+{
+    (void)self;
+    (void)values;
+}
+
+static void no_states(void *self, const double states[])
+{
+    (void)self;
+    (void)states;
+}
+
+static bool no_event(void *self, bool *changed, bool *limit, char message[VI_MESSAGE_LENGTH])
+{
+    (void)self;
+    *changed = *limit = false;
+    message[0] = '\0';
+    return true;
+}
+
+static const vi_model_exchange exchange = {
+    .states = none,
+    .indicators = none,
+    .enable = nothing,
+    .begin = begin,
+    .set_time = set_time,
+    .get_states = no_values,
+    .set_states = no_states,
+    .get_nominals = no_values,
+    .get_derivatives = no_values,
+    .get_indicators = no_values,
+    .handle_event = no_event,
+    .go_on = nothing,
+};
+
 const vi_component vi_this_component = {
     .name = IMPACT_STOP_NAME,
     .token = IMPACT_STOP_TOKEN,
@@ -148,4 +210,5 @@ const vi_component vi_this_component = {
     .needs_events = never,
     .time = present_time,
     .used_size = used_size,
+    .exchange = &exchange,
 };

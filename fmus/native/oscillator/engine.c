@@ -12,13 +12,22 @@ bool oscillator_yields(const oscillator *o)
             return true;
         }
     }
-    return false;
+    return o->state.exchange.on != 0;
 }
 
 /* The parts of the one-mode body. */
 static vi_structure parts(oscillator *o)
 {
     return (vi_structure){&o->model, &o->state, o->body.contacts, &o->body.record};
+}
+
+vi_exchange_body oscillator_exchange(oscillator *o)
+{
+    return (vi_exchange_body){.parts = parts(o),
+                              .modes = 1,
+                              .contacts = o->contacts_described,
+                              .scale = sqrt(o->mass),
+                              .refused = vi_amplitude_acts(&o->amplitude) ? "amplitude" : NULL};
 }
 
 /* A force of frequency 0 is constant. */

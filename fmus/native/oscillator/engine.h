@@ -4,10 +4,14 @@
 
 #include <stdbool.h>
 
+#include "body/modal/structure_exchange.h"
 #include "oscillator.h"
 
-/* Has a contact a law of force, its own or another FMU's? */
+/* Does it run on the engine of structure.h: has a contact a law of force, or does the importer integrate the motion? */
 bool oscillator_yields(const oscillator *o);
+
+/* As an importer integrates it. */
+vi_exchange_body oscillator_exchange(oscillator *o);
 
 /* Start the forcing's clock; false when the start time cannot be counted in its periods. */
 bool oscillator_start_clock(oscillator *o, double start_time, vi_instant *now);

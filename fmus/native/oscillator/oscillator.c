@@ -1,6 +1,7 @@
 #include "oscillator.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "component.h"
 #include "engine.h"
@@ -15,6 +16,7 @@ static void defaults(void *self)
 {
     oscillator *o = self;
     o->mass = o->stiffness = 1.0;
+    o->contacts_described = VI_BODY_CONTACTS;
     o->contact_tolerance = CONTACT_TOLERANCE;
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {
         vi_contact *contact = &o->body.contacts[k];
@@ -23,6 +25,13 @@ static void defaults(void *self)
         contact->law.exponent = 1.5;
         contact->last_time = contact->last_phase = contact->stick_start = contact->stick_end = NAN;
         contact->event_time = NAN;
+    }
+}
+
+static void sized(void *self, const char *block, int count)
+{
+    if (strcmp(block, "contacts") == 0 && count >= 0 && count <= VI_BODY_CONTACTS) {
+        ((oscillator *)self)->contacts_described = count;
     }
 }
 
@@ -175,17 +184,25 @@ static void was_set(void *self, uint32_t value_reference)
     }
 }
 
-static void update_outputs(void *self)
+static void refresh_inputs(oscillator *o)
 {
-    oscillator *o = self;
-    double relative;
-    o->time = vi_clock_time(&o->body.clock, oscillator_now(o));
     if (o->inputs_changed) {
         oscillator_take_impulses(o);
         oscillator_hold(o);
     }
-    oscillator_outputs(o, &o->displacement, &o->velocity, &relative);
-    o->acceleration = relative + o->base_acceleration;
+}
+
+static void update_outputs(void *self)
+{
+    oscillator *o = self;
+    o->time = vi_clock_time(&o->body.clock, oscillator_now(o));
+    refresh_inputs(o);
+    oscillator_outputs(o, &o->displacement, &o->velocity, &o->relative_acceleration);
+    o->acceleration = o->relative_acceleration + o->base_acceleration;
+    if (o->state.exchange.on) {
+        const vi_exchange_body body = oscillator_exchange(o);
+        vi_exchange_show_indicators(&body);
+    }
     o->energy_kinetic = 0.5 * o->mass * o->velocity * o->velocity;
     o->energy_potential = 0.5 * o->stiffness * o->displacement * o->displacement;
 }
@@ -316,6 +333,8 @@ static size_t used_size(const void *self)
     return sizeof(oscillator) - vi_record_unused(&((const oscillator *)self)->body.record);
 }
 
+VI_EXCHANGE_TABLE(exchange, oscillator_exchange, refresh_inputs);
+
 const vi_component vi_this_component = {
     .name = OSCILLATOR_NAME,
     .token = OSCILLATOR_TOKEN,
@@ -332,4 +351,6 @@ const vi_component vi_this_component = {
     .needs_events = needs_events,
     .time = present_time,
     .used_size = used_size,
+    .sized = sized,
+    .exchange = &exchange,
 };

@@ -21,10 +21,11 @@ typedef struct {
     double force, force_rate, base_acceleration, base_acceleration_rate;
     int32_t inputs_changed; /* since they were last given to the body */
     /* outputs */
-    double displacement, velocity, acceleration, energy_kinetic, energy_potential;
+    double displacement, velocity, relative_acceleration, acceleration, energy_kinetic, energy_potential;
     /* A stop that yields (a law of force) is met on the engine of structure.h, with one mode; the impulsive laws alone
-     * on the faster one of body.h. Contacts and record are those of `body` either way. */
+     * on the faster one of body.h, unless the importer integrates the motion. Contacts and record are those of `body` either way. */
     int32_t yields;
+    int32_t contacts_described; /* ports of the model description */
     vi_structure_model model;
     vi_structure_state state;
     vi_body body; /* last: its record is saved only as far as it is used */

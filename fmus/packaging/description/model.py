@@ -90,6 +90,10 @@ class Variable:
         empty: everybody.
     counts : str
         Name of the block of which it says how many are in use (`mode`); an export gives it that start value.
+    derivative : str
+        Name of the continuous state whose derivative it is, in model exchange.
+    event_indicator : bool
+        Whether its sign tells of events, in model exchange.
     shown_name, shown_description : str
         For a reader: with the letter k in place of the index.
     """
@@ -115,6 +119,8 @@ class Variable:
     repeat_index: int = 0
     counts: str = ""
     ports: str = ""
+    derivative: str = ""
+    event_indicator: bool = False
     shown_name: str = ""
     shown_description: str = ""
 
@@ -127,7 +133,7 @@ class Variable:
     def is_initial_unknown(self) -> bool:
         """Whether ModelStructure lists it among the unknowns of initialization."""
         calculated_output = self.causality == "output" and self.initial in {"approx", "calculated"}
-        return calculated_output or self.causality == "calculatedParameter"
+        return calculated_output or bool(self.derivative) or self.causality == "calculatedParameter"
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +158,7 @@ class ComponentDescription:
     header: str
     description: str
     event_mode: bool
+    model_exchange: bool
     token: str
     source: Path
     repeats: Mapping[str, int]
@@ -168,6 +175,30 @@ class ComponentDescription:
     def variables_of(self, version: int) -> tuple[Variable, ...]:
         """Return the variables that FMI 2.0 (`version=2`) or 3.0 (`version=3`) can express, in order."""
         return tuple(v for v in self.variables if version in v.versions)
+
+    def derivatives(self) -> tuple[Variable, ...]:
+        """Return the derivatives of the continuous states: those of displacements, then those of velocities."""
+        names = {v.name for v in self.variables}
+        found = [v for v in self.variables if v.derivative in names]
+        second = {v.derivative for v in found} & {v.name for v in found}
+        return tuple(sorted(found, key=lambda v: v.derivative in second))
+
+    def states(self) -> tuple[str, ...]:
+        """Return the names of the continuous states, in the order of `derivatives`."""
+        return tuple(v.derivative for v in self.derivatives())
+
+    def event_indicators(self) -> tuple[Variable, ...]:
+        """Return the event indicators, in order."""
+        return tuple(v for v in self.variables if v.event_indicator)
+
+    def direct_knowns(self, variable: Variable, version: int) -> tuple[str, ...]:
+        """Return the names of the inputs and states that an output depends on directly."""
+        if variable.variability != "continuous":
+            return self.direct_inputs(variable, version)
+        states = self.states()
+        return (
+            (variable.name,) if variable.name in states else (*self.direct_inputs(variable, version), *states)
+        )
 
     def direct_inputs(self, variable: Variable, version: int) -> tuple[str, ...]:
         """Return the names of the inputs of that FMI version that an output depends on directly."""

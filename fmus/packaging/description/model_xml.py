@@ -59,11 +59,14 @@ def model_description(
         told = {"copyright": "vibroimpact developers", "generationDateAndTime": edition.date_and_time}
         head |= {"version": edition.version, **_present(told)}
     root = Element("fmiModelDescription", identity | head)
-    interface = SubElement(root, "CoSimulation", _capabilities(component, version))
-    if version == 2 and source_files:
-        files = SubElement(interface, "SourceFiles")
-        for name in source_files:
-            SubElement(files, "File", name=name)
+    if version == 2 and component.model_exchange:
+        root.set("numberOfEventIndicators", str(len(component.event_indicators())))
+    for kind in ("ModelExchange", "CoSimulation") if component.model_exchange else ("CoSimulation",):
+        interface = SubElement(root, kind, _capabilities(component, version, kind))
+        if version == 2 and source_files:
+            files = SubElement(interface, "SourceFiles")
+            for name in source_files:
+                SubElement(files, "File", name=name)
     if component.units:
         root.append(unit_definitions(component.units))
     _add_types(root, component.enumerations, version)
@@ -72,8 +75,9 @@ def model_description(
         SubElement(categories, "Category", name=name, description=description)
     SubElement(root, "DefaultExperiment", _experiment(edition.experiment if edition else Experiment()))
     variables = SubElement(root, "ModelVariables")
+    references = _references(component, version)
     for variable in component.variables_of(version):
-        _add_variable(variables, variable, version)
+        _add_variable(variables, variable, version, references)
     _add_structure(root, component, version, initial_dependencies=edition is not None)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
@@ -99,21 +103,30 @@ def _experiment(experiment: Experiment) -> dict[str, str]:
     }
 
 
-def _capabilities(component: ComponentDescription, version: int) -> dict[str, str]:
+def _references(component: ComponentDescription, version: int) -> dict[str, str]:
+    """Return how other elements name each variable."""
+    variables = component.variables_of(version)
     if version == 2:
-        return {
-            "modelIdentifier": component.name,
-            "canHandleVariableCommunicationStepSize": "true",
-            "canBeInstantiatedOnlyOncePerProcess": "false",
-            "canGetAndSetFMUstate": "true",
-            "canSerializeFMUstate": "true",
-        }
-    events = literal(component.event_mode)
-    return {
+        return {v.name: str(place) for place, v in enumerate(variables, 1)}
+    return {v.name: str(v.value_reference) for v in variables}
+
+
+def _capabilities(component: ComponentDescription, version: int, kind: str) -> dict[str, str]:
+    state = "state" if version == 2 else "State"
+    common = {
         "modelIdentifier": component.name,
         "canBeInstantiatedOnlyOncePerProcess": "false",
-        "canGetAndSetFMUState": "true",
-        "canSerializeFMUState": "true",
+        f"canGetAndSetFMU{state}": "true",
+        f"canSerializeFMU{state}": "true",
+    }
+    if kind == "ModelExchange":
+        without = "completedIntegratorStepNotNeeded" if version == 2 else "needsCompletedIntegratorStep"
+        return {**common, without: literal(version == 2)}
+    if version == 2:
+        return {**common, "canHandleVariableCommunicationStepSize": "true"}
+    events = literal(component.event_mode)
+    return {
+        **common,
         "canHandleVariableCommunicationStepSize": "true",
         "mightReturnEarlyFromDoStep": events,
         "canReturnEarlyAfterIntermediateUpdate": "false",
@@ -149,7 +162,9 @@ def _add_types(root: Element, enumerations: tuple[Enumeration, ...], version: in
             SubElement(element, "Item", _present(values))
 
 
-def _add_variable(parent: Element, variable: Variable, version: int) -> None:
+def _add_variable(
+    parent: Element, variable: Variable, version: int, references: Mapping[str, str]
+) -> None:
     attributes = {
         "name": variable.name,
         "valueReference": str(variable.value_reference),
@@ -160,19 +175,21 @@ def _add_variable(parent: Element, variable: Variable, version: int) -> None:
     }
     if version == 2:
         scalar = SubElement(parent, "ScalarVariable", _present(attributes))
-        SubElement(scalar, FMI2_TYPES[variable.type], _value_attributes(variable))
+        SubElement(scalar, FMI2_TYPES[variable.type], _value_attributes(variable, references))
         return
-    element = SubElement(parent, variable.type, _present(attributes) | _value_attributes(variable))
+    values = _value_attributes(variable, references)
+    element = SubElement(parent, variable.type, _present(attributes) | values)
     for size in variable.dimensions:
         SubElement(element, "Dimension", start=str(size))
 
 
-def _value_attributes(variable: Variable) -> dict[str, str]:
-    """Return the attributes of a variable's value: declared type, unit, bounds, start."""
+def _value_attributes(variable: Variable, references: Mapping[str, str]) -> dict[str, str]:
+    """Return the attributes of a variable's value: declared type, unit, bounds, start, derivative."""
     attributes = {"declaredType": variable.enumeration, "unit": variable.unit}
     for key, value in (("min", variable.minimum), ("max", variable.maximum), ("start", variable.start)):
         if value is not None:  # TOML's `1` is `1.0` for a Float64
             attributes[key] = literal(float(value) if variable.type == "Float64" else value)
+    attributes["derivative"] = references.get(variable.derivative, "")
     return _present(attributes)
 
 
@@ -185,14 +202,15 @@ def _add_structure(
     root: Element, component: ComponentDescription, version: int, *, initial_dependencies: bool
 ) -> None:
     variables = component.variables_of(version)
-    if version == 2:
-        key, references = "index", {v.name: str(place) for place, v in enumerate(variables, 1)}
-    else:
-        key, references = "valueReference", {v.name: str(v.value_reference) for v in variables}
+    key = "index" if version == 2 else "valueReference"
+    references = _references(component, version)
+    states = "Derivative" if version == 2 else "ContinuousStateDerivative"
     structure = SubElement(root, "ModelStructure")
     for kind, unknowns in (
         ("Output", [v for v in variables if v.causality == "output"]),
+        (states, list(component.derivatives())),
         ("InitialUnknown", [v for v in variables if v.is_initial_unknown]),
+        ("EventIndicator", list(component.event_indicators()) if version == 3 else []),
     ):
         # FMI 2.0 has a list of each kind, and none that is empty
         parent = SubElement(structure, f"{kind}s") if version == 2 and unknowns else structure
@@ -200,10 +218,10 @@ def _add_structure(
             unknown = SubElement(
                 parent, "Unknown" if version == 2 else kind, {key: references[variable.name]}
             )
-            if variable.dependencies is None:
+            if variable.dependencies is None or kind in {states, "EventIndicator"}:
                 continue
             if kind == "Output":
-                knowns = component.direct_inputs(variable, version)
+                knowns = component.direct_knowns(variable, version)
             elif initial_dependencies:
                 knowns = component.knowns_at_start(variable, version)
             else:

@@ -32,7 +32,7 @@ TYPES = ("Float64", "Int64", "Boolean", "Enumeration")
 REQUIRED_KEYS = {"name", "description", "causality", "variability", "type", "field", "code"}
 OPTIONAL_KEYS = {
     *("unit", "enumeration", "start", "min", "max", "initial"),
-    *("repeat", "dimensions", "fmi", "dependencies", "counts", "ports"),
+    *("repeat", "dimensions", "fmi", "dependencies", "counts", "ports", "derivative", "event_indicator"),
 }
 PORTS = ("importer", "external")
 #: Stands in a dependency for every index of a repeated block, as `{k}` stands for the variable's own.
@@ -108,6 +108,7 @@ def _component(table: Mapping[str, Any], path: Path, token: str) -> ComponentDes
         header=head["header"],
         description=head["description"],
         event_mode=head.get("event_mode", False),
+        model_exchange=head.get("model_exchange", False),
         token=f"{{{token}}}",
         source=path,
         repeats=repeats,
@@ -188,6 +189,8 @@ def _variable(
         repeat_index=index,
         counts=entry.get("counts", ""),
         ports=entry.get("ports", ""),
+        derivative=_indexed(entry.get("derivative", ""), index),
+        event_indicator=entry.get("event_indicator", False),
         shown_name=entry["name"].replace("{k}", "k"),
         shown_description=entry["description"].replace("{k}", "k"),
     )
@@ -281,6 +284,11 @@ def _rules(table: Mapping[str, Any]) -> tuple[Rule, ...]:
             "counts",
             "a repeated block of the file",
             lambda e: "counts" not in e or e["counts"] in _repeat_names(table),
+        ),
+        (
+            "derivative",
+            "the name of a variable of the file",
+            lambda e: e.get("derivative", e["name"]) in names,
         ),
         ("ports", f"one of {', '.join(PORTS)}, or none", lambda e: e.get("ports", PORTS[0]) in PORTS),
         ("repeat", "a count in [component]", lambda e: _repeat_is_counted(table["component"], e)),

@@ -21,6 +21,7 @@ typedef struct {
     /* outputs */
     int32_t stuck;
     double displacement, velocity, mass, force, impulse;
+    double indicator; /* of model exchange; 0 in co-simulation */
     int64_t count, graze_count;
     double last_time, last_phase, last_velocity, stick_start, stick_end, event_time;
 } vi_contact;

@@ -368,6 +368,7 @@ void vi_structure_start(const vi_structure *s, vi_instant now)
     memcpy(fresh.held, state->held, sizeof fresh.held);
     memcpy(fresh.held_rate, state->held_rate, sizeof fresh.held_rate);
     fresh.follow_energies = state->follow_energies;
+    fresh.exchange = state->exchange;
     fresh.now = fresh.held_since = now;
     vi_budget_start(&fresh.budget, now);
     *state = fresh;

@@ -14,6 +14,7 @@ static const double LOOSEST_TOLERANCE = 1e-2;
 void vi_structure_component_defaults(vi_structure_component *c)
 {
     c->contact_tolerance = DEFAULT_TOLERANCE;
+    c->contacts_described = VI_PORTS;
     for (int k = 0; k < VI_PORTS; ++k) {
         c->contacts[k].side = VI_SIDE_UPPER;
         c->contacts[k].law.restitution = 1.0;
@@ -26,6 +27,21 @@ void vi_structure_component_defaults(vi_structure_component *c)
 static vi_structure parts_of(vi_structure_component *c)
 {
     return (vi_structure){&c->model, &c->state, c->contacts, &c->record};
+}
+
+void vi_structure_component_sized(vi_structure_component *c, const char *block, int count)
+{
+    if (strcmp(block, "contacts") == 0 && count >= 0 && count <= VI_PORTS) {
+        c->contacts_described = count;
+    }
+}
+
+vi_exchange_body vi_structure_component_exchange(vi_structure_component *c)
+{
+    return (vi_exchange_body){.parts = parts_of(c),
+                              .contacts = c->contacts_described,
+                              .scale = 1.0,
+                              .refused = c->record_energies ? "record.energies" : NULL};
 }
 
 /* ---- validation ---- */
@@ -264,7 +280,7 @@ double vi_structure_component_time(const vi_structure_component *c)
 double vi_structure_component_base_acceleration(const vi_structure_component *c)
 {
     const double since = vi_clock_elapsed(&c->model.clock, c->state.held_since, c->state.now);
-    return c->base_acceleration + c->base_acceleration_rate * since;
+    return c->base_acceleration + (c->state.exchange.on ? 0.0 : c->base_acceleration_rate * since);
 }
 
 double vi_structure_component_forcing(const vi_structure_component *c)

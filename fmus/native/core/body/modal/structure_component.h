@@ -13,6 +13,7 @@
 
 #include "body/complaint.h"
 #include "body/modal/structure.h"
+#include "body/modal/structure_exchange.h"
 
 typedef struct {
     /* parameters; impact_limit and the contacts' are in `model` and `contacts` */
@@ -27,6 +28,7 @@ typedef struct {
     double energy_kinetic, energy_potential;
     double natural[VI_MODES], modal_energy[VI_MODES];
     double modal_acceleration[VI_MODES]; /* kg^(1/2) m/s^2 */
+    int32_t contacts_described; /* ports of the model description */
     vi_structure_model model;
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
@@ -37,6 +39,9 @@ void vi_structure_component_defaults(vi_structure_component *c);
 
 /* Parameters that all have: forcing's frequency and phase, the contacts' laws, tolerance, limit, shared inputs. */
 void vi_structure_component_check(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH]);
+
+/* The model description has so many ports. */
+void vi_structure_component_sized(vi_structure_component *c, const char *block, int count);
 
 /* Number of ports that have to be followed: up to the last one with a law. */
 int vi_structure_component_ports(const vi_structure_component *c);
@@ -81,6 +86,9 @@ bool vi_structure_component_continues(const vi_structure_component *c);
  * of the next contact, `taken` the reference of record.taken. */
 void vi_structure_component_was_set(vi_structure_component *c, uint32_t reference, uint32_t restitution,
                                     uint32_t stride, uint32_t taken);
+
+/* The body as an importer integrates it, but for the form of its states. */
+vi_exchange_body vi_structure_component_exchange(vi_structure_component *c);
 
 bool vi_structure_component_needs_events(const vi_structure_component *c);
 double vi_structure_component_time(const vi_structure_component *c);

@@ -32,7 +32,9 @@ vi_contact_force vi_structure_yield(const vi_structure *s, int k)
     const double d = -vi_structure_clearance(s, k), rate = vi_structure_approach(s, k);
     if (press.kind == VI_PRESS_LINEAR) {
         const double force = press.constant + press.stiffness * d + press.damping * rate;
-        return (vi_contact_force){vi_max(0.0, force), press.stiffness, press.damping};
+        /* an integrator looks beyond the end of a contact before it finds it: there the force goes on smoothly */
+        const double least = s->state->exchange.on ? force : 0.0;
+        return (vi_contact_force){vi_max(least, force), press.stiffness, press.damping};
     }
     return vi_contact_law_force(&s->contacts[k].law, d, rate);
 }

@@ -43,6 +43,15 @@ static double resolution(const vi_structure *s, int k, double pressure, double a
     return DBL_EPSILON * (low ? fabs(s->contacts[k].position) : vi_structure_displacement_size(s, k));
 }
 
+/* Height of a bounce that can be told from none: by rounding, or by the integrator of model exchange. */
+static double bounce_resolution(const vi_structure *s, int k, double pressure, double rebound)
+{
+    const vi_exchange *exchange = &s->state->exchange;
+    const double integrated =
+        exchange->on ? exchange->tolerance * exchange->displacement * sqrt(s->model->compliance[k][k]) : 0.0;
+    return vi_max(integrated, resolution(s, k, pressure, rebound));
+}
+
 /* The plastic impact that stands for the rest of a chatter sequence, or for a stop without rebound. */
 static void come_to_rest(const vi_structure *s, int k, const vi_held_view *view, double delay, double tail_impulse)
 {
@@ -72,7 +81,7 @@ static void rest_if_summable(const vi_structure *s, int k, double rebound, doubl
                           .drag = drag_at(s, k),
                           .fastest = s->model->fastest,
                           .moving = s->model->fastest,
-                          .resolution = resolution(s, k, view.pressure, rebound),
+                          .resolution = bounce_resolution(s, k, view.pressure, rebound),
                           .tiny = tiny};
     const vi_chatter chatter = vi_chatter_look(&b, s->state->low_impacts[k]);
     if (chatter.rests) {
@@ -109,7 +118,9 @@ static void after_impact(const vi_structure *s, int k, double approach, double i
                                   || 2.0 * rebound * s->model->fastest <= VI_SHORT_FLIGHT * a);
     state->status[k] = VI_CONTACT_TOUCHING;
     state->leaving[k] = rebound == 0.0 ? 1 : 0;
-    if (vi_chatter_count(&state->fastest_impact[k], &state->low_impacts[k], approach, rebound, graze, tiny)) {
+    const bool counted =
+        vi_chatter_count(&state->fastest_impact[k], &state->low_impacts[k], approach, rebound, graze, tiny);
+    if (counted || state->exchange.on) { /* an integrator cannot follow bounces below its tolerance, however few */
         rest_if_summable(s, k, rebound, restitution, tiny);
     }
 }

@@ -170,6 +170,9 @@ void vi_structure_hold(const vi_structure *s, const double held[], const double 
     vi_structure_state *state = s->state;
     memcpy(state->held, held, (size_t)s->model->modes * sizeof held[0]);
     memcpy(state->held_rate, held_rate, (size_t)s->model->modes * sizeof held_rate[0]);
+    if (state->exchange.on) { /* the importer gives the inputs at each instant: there is no step that slopes are for */
+        memset(state->held_rate, 0, sizeof state->held_rate);
+    }
     state->held_since = state->now;
     state->budget.unfinished = 0;
     for (int k = 0; k < s->model->contacts; ++k) {

@@ -64,6 +64,13 @@ typedef struct {
     double impulse;               /* so far, N s */
 } vi_touch_down;
 
+/* Model exchange: the importer integrates the modes, and time does not run in here. */
+typedef struct {
+    int32_t on;
+    double displacement, velocity; /* nominal, of a mode: what the importer's tolerance is relative to */
+    double tolerance;              /* of the importer's integrator, relative */
+} vi_exchange;
+
 typedef struct {
     vi_instant now;
     vi_standstill standstill;
@@ -77,6 +84,7 @@ typedef struct {
     int32_t passed;             /* 0, or the external contact that the last step passed through (FMI 2.0) */
     int32_t follow_energies;    /* input: integrate `energies` */
     vi_energies energies;
+    vi_exchange exchange;
     double fastest_impact[VI_PORTS]; /* largest approach since the last stick, m/s */
     int64_t low_impacts[VI_PORTS];   /* impacts in a row that are far below it */
     double tail_impulse[VI_PORTS];   /* of the chatter summed at the last stick, N s */
