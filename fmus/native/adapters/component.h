@@ -34,9 +34,8 @@ typedef struct {
     size_t (*indicators)(const void *self);
     /* From its next initialization on it is integrated by the importer; called after `defaults`. */
     void (*enable)(void *self);
-    /* Initialization has ended. False, with all reasons in `message`, when this set-up cannot be integrated. `tolerance`:
-     * relative, of the importer's integrator; 0: unknown. */
-    bool (*begin)(void *self, double tolerance, char message[VI_MESSAGE_LENGTH]);
+    /* Initialization has ended. False, with all reasons in `message`, when this set-up cannot be integrated. */
+    bool (*begin)(void *self, char message[VI_MESSAGE_LENGTH]);
     /* False when the time cannot be counted. */
     bool (*set_time)(void *self, double time);
     void (*get_states)(void *self, double states[]);

@@ -110,13 +110,14 @@ void fmi2FreeInstance(fmi2Component c)
 fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance, fmi2Real startTime,
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime)
 {
+    UNUSED(toleranceDefined);
+    UNUSED(tolerance);
     vi_instance *it = c;
     if (it == NULL || !vi_instance_expect(it, "fmi2SetupExperiment", VI_MODE_INSTANTIATED)) {
         return fmi2Error;
     }
     it->start_time = startTime;
     it->stop_time = stopTimeDefined ? stopTime : HUGE_VAL;
-    it->tolerance = toleranceDefined ? tolerance : 0.0;
     return fmi2OK;
 }
 

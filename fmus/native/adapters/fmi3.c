@@ -155,6 +155,8 @@ void fmi3FreeInstance(fmi3Instance instance)
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
+    UNUSED(toleranceDefined);
+    UNUSED(tolerance);
     vi_instance *it = instance;
     if (it == NULL || !vi_instance_expect(it, "fmi3EnterInitializationMode", VI_MODE_INSTANTIATED)) {
         return fmi3Error;
@@ -162,7 +164,6 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     it->mode = VI_MODE_INITIALIZATION;
     it->start_time = startTime;
     it->stop_time = stopTimeDefined ? stopTime : HUGE_VAL;
-    it->tolerance = toleranceDefined ? tolerance : 0.0;
     it->outputs_stale = true;
     return fmi3OK;
 }

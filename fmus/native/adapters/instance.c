@@ -95,7 +95,7 @@ void vi_instance_reset(vi_instance *instance)
     }
     instance->mode = VI_MODE_INSTANTIATED;
     instance->outputs_stale = false;
-    instance->start_time = instance->tolerance = 0.0;
+    instance->start_time = 0.0;
     instance->stop_time = HUGE_VAL;
 }
 
@@ -226,7 +226,7 @@ bool vi_instance_initialize(vi_instance *instance, const char *function)
     }
     if (instance->exchange) {
         char reason[VI_MESSAGE_LENGTH] = "";
-        if (!component->exchange->begin(instance->self, instance->tolerance, reason)) {
+        if (!component->exchange->begin(instance->self, reason)) {
             return vi_instance_fail(instance, function, "%s", reason);
         }
     }

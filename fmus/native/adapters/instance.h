@@ -33,7 +33,6 @@ struct vi_instance {
     bool outputs_stale;    /* an input was set since the outputs were computed */
     bool event_mode_used, early_return_allowed, logging;
     bool exchange;         /* made for model exchange: the importer integrates it */
-    double tolerance;      /* relative, of its integrator; 0: unknown */
     double start_time, stop_time; /* stop_time: infinite where the importer defines none */
     char *name;
     char message[VI_MESSAGE_LENGTH];

@@ -145,10 +145,9 @@ static void nothing(void *self)
     (void)self;
 }
 
-static bool begin(void *self, double tolerance, char message[VI_MESSAGE_LENGTH])
+static bool begin(void *self, char message[VI_MESSAGE_LENGTH])
 {
     (void)self;
-    (void)tolerance;
     message[0] = '\0';
     return true;
 }

@@ -9,14 +9,13 @@
 #include "body/modal/structure_contact.h"
 #include "body/modal/structure_forces.h"
 #include "body/modal/structure_held.h"
+#include "body/modal/structure_impact.h"
 #include "body/modal/structure_settle.h"
 #include "body/step.h"
 
 /* Distance from zero, in roundings, at which an indicator changes its sign: a contact that has just left its stop, or has
  * just met it, is not told to do so again. */
 static const double INDICATED = 16.0;
-/* Relative tolerance of an integrator that does not say its own. */
-static const double USUAL_TOLERANCE = 1e-7;
 /* Times that the contacts are looked at again at one instant: each look may set off others, in a corner. */
 enum { MOST_LOOKS = 2 * VI_PORTS };
 
@@ -29,7 +28,7 @@ void vi_exchange_enable(const vi_exchange_body *body)
 
 static void check_contact(const vi_contact *contact, int k, char *message)
 {
-    if (contact->law.law == VI_LAW_EXTERNAL || contact->law.law == VI_LAW_EXTERNAL_FORCE) {
+    if (contact->law.law >= VI_LAW_EXTERNAL) {
         vi_complain(message, "contact[%d].law: expected a law that the body evaluates itself, 0 (none) to 4"
                              " (hunt_crossley), in model exchange, got %lld", k + 1, (long long)contact->law.law);
     } else if (vi_contact_law_is_compliant(contact->law.law) && contact->relaxation_time > 0.0) {
@@ -83,13 +82,13 @@ static void find_nominals(const vi_structure *s)
     s->state->exchange.velocity = vi_max(velocity, slowest * s->state->exchange.displacement);
 }
 
-bool vi_exchange_begin(const vi_exchange_body *body, double tolerance, char message[VI_MESSAGE_LENGTH])
+bool vi_exchange_begin(const vi_exchange_body *body, char message[VI_MESSAGE_LENGTH])
 {
     if (!is_supported(body, message)) {
         return false;
     }
     find_nominals(&body->parts);
-    body->parts.state->exchange.tolerance = tolerance > 0.0 && tolerance < 1.0 ? tolerance : USUAL_TOLERANCE;
+    body->parts.state->exchange.unresolved = 0.0;
     return true;
 }
 
@@ -226,14 +225,17 @@ void vi_exchange_show_indicators(const vi_exchange_body *body)
 /* A free contact has reached its stop: is it hit? Not where it is on its way off, but for the integrator's error. */
 static int arrive(const vi_structure *s, int k)
 {
+    const double approach = vi_structure_approach(s, k), noise = VI_ROUNDING * vi_structure_velocity_size(s, k);
     const bool rigid = s->contacts[k].law.law == VI_LAW_RESTITUTION;
-    if (rigid || fabs(vi_structure_clearance(s, k)) <= s->state->exchange.tolerance * s->state->exchange.displacement
-                                                            * sqrt(s->model->compliance[k][k])) {
+    if (rigid) {
         vi_structure_put_on_stop(s, k);
     }
     s->state->status[k] = VI_CONTACT_TOUCHING;
     s->state->leaving[k] = 0;
-    return vi_structure_approach(s, k) > VI_ROUNDING * vi_structure_velocity_size(s, k);
+    if (rigid && approach < -noise) {
+        vi_structure_end_bounce(s, k);
+    }
+    return approach > noise;
 }
 
 /* What the sign of its indicator says of contact k; true when it is hit. */

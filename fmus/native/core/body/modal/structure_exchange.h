@@ -27,8 +27,8 @@ typedef struct {
 void vi_exchange_enable(const vi_exchange_body *body);
 
 /* After the start: nominal values; false with the reasons when contacts, or the record, ask for what an integrator cannot
- * give. tolerance: of the integrator, 0 where it is unknown. */
-bool vi_exchange_begin(const vi_exchange_body *body, double tolerance, char message[VI_MESSAGE_LENGTH]);
+ * give. */
+bool vi_exchange_begin(const vi_exchange_body *body, char message[VI_MESSAGE_LENGTH]);
 
 bool vi_exchange_set_time(const vi_exchange_body *body, double time);
 void vi_exchange_get_states(const vi_exchange_body *body, double states[]);
@@ -63,10 +63,10 @@ void vi_exchange_go_on(const vi_exchange_body *body);
         const vi_exchange_body body = BIND(self);                                                                    \
         vi_exchange_enable(&body);                                                                                   \
     }                                                                                                                \
-    static bool NAME##_begin(void *self, double tolerance, char message[VI_MESSAGE_LENGTH])                          \
+    static bool NAME##_begin(void *self, char message[VI_MESSAGE_LENGTH])                                            \
     {                                                                                                                \
         const vi_exchange_body body = BIND(self);                                                                    \
-        return vi_exchange_begin(&body, tolerance, message);                                                         \
+        return vi_exchange_begin(&body, message);                                                                    \
     }                                                                                                                \
     static bool NAME##_set_time(void *self, double time)                                                             \
     {                                                                                                                \

@@ -17,6 +17,9 @@
  * no room it would go on for ever. */
 static const int MOST_ROUNDS = 64;
 
+/* Height of a bounce, relative to the motion, that any integrator can follow. */
+static const double HIGHEST_UNRESOLVED = 1e-4;
+
 static double restitution_of(const vi_structure *s, int k, double approach)
 {
     const vi_contact *contact = &s->contacts[k];
@@ -46,9 +49,7 @@ static double resolution(const vi_structure *s, int k, double pressure, double a
 /* Height of a bounce that can be told from none: by rounding, or by the integrator of model exchange. */
 static double bounce_resolution(const vi_structure *s, int k, double pressure, double rebound)
 {
-    const vi_exchange *exchange = &s->state->exchange;
-    const double integrated =
-        exchange->on ? exchange->tolerance * exchange->displacement * sqrt(s->model->compliance[k][k]) : 0.0;
+    const double integrated = s->state->exchange.unresolved * sqrt(s->model->compliance[k][k]);
     return vi_max(integrated, resolution(s, k, pressure, rebound));
 }
 
@@ -96,6 +97,20 @@ static double rebound_of(const vi_structure *s, int k, double approach, double i
     const double own = restitution * approach, speed = -vi_structure_approach(s, k);
     const bool thrown = !(impulse > 0.0) && speed > own + VI_ROUNDING * vi_structure_velocity_size(s, k);
     return thrown ? speed : own;
+}
+
+void vi_structure_end_bounce(const vi_structure *s, int k)
+{
+    vi_exchange *exchange = &s->state->exchange;
+    const double rebound = -vi_structure_approach(s, k);
+    vi_held_view view;
+    vi_structure_look_at_held(s, k, &view);
+    if (!(rebound > 0.0 && view.pressure > 0.0)) {
+        return;
+    }
+    const double height = 0.5 * rebound * rebound / (view.pressure * sqrt(s->model->compliance[k][k]));
+    exchange->unresolved = vi_min(vi_max(exchange->unresolved, height), HIGHEST_UNRESOLVED * exchange->displacement);
+    rest_if_summable(s, k, rebound, restitution_of(s, k, rebound), false);
 }
 
 /* One contact after the impulses: count it, and let it rest where its chatter can be summed. */

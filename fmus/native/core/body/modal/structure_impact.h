@@ -11,4 +11,8 @@ void vi_structure_collide(const vi_structure *s, const int hit[VI_PORTS]);
  * next step begins. */
 void vi_structure_take_impulses(const vi_structure *s);
 
+/* Model exchange: the integrator brings contact k back to its stop while it still leaves it, so low is its bounce. The
+ * bounces still to come are summed, and from now on all that are as low. */
+void vi_structure_end_bounce(const vi_structure *s, int k);
+
 #endif

@@ -67,8 +67,8 @@ typedef struct {
 /* Model exchange: the importer integrates the modes, and time does not run in here. */
 typedef struct {
     int32_t on;
-    double displacement, velocity; /* nominal, of a mode: what the importer's tolerance is relative to */
-    double tolerance;              /* of the importer's integrator, relative */
+    double displacement, velocity; /* nominal, of a mode: what an integrator's tolerance is relative to */
+    double unresolved;             /* highest bounce that the integrator has failed to follow, as a modal displacement */
 } vi_exchange;
 
 typedef struct {
