@@ -9,7 +9,7 @@ from typing import Any
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.archive import platforms, unpack
 from vibroimpact.fmus.packaging.build import BUILT, build, read_components, update_readmes
-from vibroimpact.fmus.packaging.check import check_fmu
+from vibroimpact.fmus.packaging.check import check_fmu, kinds_of
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.python_fmus import build_user_contact_law
 from vibroimpact.fmus.printing import table
@@ -55,6 +55,8 @@ def check_all(files: Sequence[Path]) -> None:
     problems = [f"{path}: {problem}" for path in paths for problem in check_fmu(path)]
     if problems:
         raise ComponentFileError("\n".join(problems))
+    for path in files:
+        say(f"{path}: {kinds_of(path)}")
     say(f"{len(paths)} FMU{'s' if len(paths) != 1 else ''} checked: no problems.")
 
 

@@ -23,6 +23,12 @@ from vibroimpact.fmus.safe_xml import root_of
 
 #: Longest time that loading and instantiating an FMU may take, s.
 LOADING_LIMIT = 60.0
+#: What the interfaces are called.
+KINDS = {
+    "CoSimulation": "co-simulation",
+    "ModelExchange": "model exchange",
+    "ScheduledExecution": "scheduled execution",
+}
 DECLARATION = "{http://www.w3.org/2001/XMLSchema}attribute"
 SYSTEM_OF_PREFIX = {prefix: system for system, prefix in FMI2_SYSTEMS.items()}
 
@@ -42,6 +48,14 @@ def check_fmu(path: Path) -> tuple[str, ...]:
         *_missing_binaries(fmu),
         *_loading_problems(fmu),
     )
+
+
+def kinds_of(path: Path) -> str:
+    """Return in words what an FMU is for: `FMI 3.0: co-simulation, model exchange`."""
+    fmu = unpack(path)
+    root = _description(fmu)
+    found = [KINDS[tag] for tag in INTERFACES if root.find(tag) is not None]
+    return f"FMI {fmu.fmi_version}: {', '.join(found)}"
 
 
 def _spelling_problems(fmu: UnpackedFmu) -> Iterator[str]:
@@ -87,7 +101,7 @@ def _loading_problems(fmu: UnpackedFmu) -> tuple[str, ...]:
         "binary": str(binary),
         "fmi_version": fmu.fmi_version,
         "token": fmu.token,
-        "interface": next(tag for tag in INTERFACES if root.find(tag) is not None),
+        "interfaces": [tag for tag in INTERFACES if root.find(tag) is not None],
         "resources": str(fmu.resources),
         # PythonFMU's binary is the same for all its FMUs, and looks at no token
         "any_token": root.get("generationTool", "").startswith("PythonFMU"),

@@ -49,7 +49,7 @@ def problems_of(facts: dict[str, Any]) -> Iterator[str]:
     Parameters
     ----------
     facts : dict
-        `binary`, `fmi_version`, `token`, `interface` (CoSimulation, ...), `resources` (a folder), and `any_token`:
+        `binary`, `fmi_version`, `token`, `interfaces` (CoSimulation, ...), `resources` (a folder), and `any_token`:
         the binary is known to take every token.
     """
     name = Path(facts["binary"]).name
@@ -58,6 +58,12 @@ def problems_of(facts: dict[str, Any]) -> Iterator[str]:
     except OSError as error:
         yield f"{name}: expected a library that loads, got: {error}."
         return
+    for interface in facts["interfaces"]:
+        yield from _problems_of_interface(library, {**facts, "interface": interface})
+
+
+def _problems_of_interface(library: CDLL, facts: dict[str, Any]) -> Iterator[str]:
+    name = Path(facts["binary"]).name
     required = required_functions(facts["fmi_version"], facts["interface"])
     missing = [function for function in required if not hasattr(library, function)]
     if missing:

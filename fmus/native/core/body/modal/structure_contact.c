@@ -102,12 +102,13 @@ static bool only_touched(const vi_structure *s, int k)
     return true;
 }
 
-/* Is what ends now a touch of rounding size, with neither speed nor impulse? It is no impact. */
+/* Is what ends now a touch of rounding size, with neither speed nor impulse? It is no impact. An impulse is known only where
+ * the force is integrated in here. */
 static bool is_rounding(const vi_structure *s, int k)
 {
     const vi_touch_down *touch = &s->state->touch_down[k];
     const double noise = VI_ROUNDING * vi_structure_velocity_size(s, k);
-    return touch->velocity == 0.0 && touch->impulse * s->model->mobility[k][k] <= noise;
+    return !s->state->exchange.on && touch->velocity == 0.0 && touch->impulse * s->model->mobility[k][k] <= noise;
 }
 
 void vi_structure_separate(const vi_structure *s, int k, bool receding)
