@@ -162,9 +162,7 @@ def _add_types(root: Element, enumerations: tuple[Enumeration, ...], version: in
             SubElement(element, "Item", _present(values))
 
 
-def _add_variable(
-    parent: Element, variable: Variable, version: int, references: Mapping[str, str]
-) -> None:
+def _add_variable(parent: Element, variable: Variable, version: int, references: Mapping[str, str]) -> None:
     attributes = {
         "name": variable.name,
         "valueReference": str(variable.value_reference),

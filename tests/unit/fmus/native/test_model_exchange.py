@@ -120,7 +120,12 @@ def test_the_orbit_of_one_impact_a_period_stays_what_it_is() -> None:
 
 # ---- against co-simulation ----
 
-DRIVEN = {"displacement_start": -0.01, "damping": 0.05, "forcing.amplitude": 0.02, "forcing.angular_frequency": 0.7}
+DRIVEN = {
+    "displacement_start": -0.01,
+    "damping": 0.05,
+    "forcing.amplitude": 0.02,
+    "forcing.angular_frequency": 0.7,
+}
 YIELDING = {
     "kelvin_voigt": stop(law=KELVIN_VOIGT, stiffness=100.0, damping=3.0, position=0.002),
     "hertz": stop(law=HERTZ, stiffness=5000.0, position=0.002),
@@ -242,7 +247,9 @@ class Integrated:
 
     def _logger(self) -> dict[str, Any]:
         if self.new:
-            return {"logMessage": fmi3LogMessageCallback(lambda *texts: self.messages.append(texts[-1].decode()))}
+            return {
+                "logMessage": fmi3LogMessageCallback(lambda *texts: self.messages.append(texts[-1].decode()))
+            }
         self.callbacks = fmi2CallbackFunctions()
         self.callbacks.componentEnvironment = id(self)
         self.callbacks.logger = LOGGER2
