@@ -102,6 +102,8 @@ class ContactBonds:
         # bodies that fly are looked at once all forces agree
         for bonds in (pressed, open_pairs):
             found = [e for e in (bond.revised_end(time, end) for bond in bonds) if e is not None]
+            if bonds is pressed and not found and (again := self.pairs.rest_end(time, end)) is not None:
+                return again
             if found:
                 return min(found)
         return None

@@ -118,12 +118,8 @@ class PairForce:
 
     def corrects(self, gap: float, closing: float, size: float) -> bool:
         """Take the force that the end of a step asks for; returns whether it is another one."""
-        if self.law is None:
-            self._pace = max(self._pace, size)
-            target = CLOSING * (gap - self._rest_gap) / self._pace
-            answer = self.value + (closing - target) * self._mass / size
-        else:
-            answer = self.law.mean(StepPath(-self._gap, self._closing, -gap, closing, size))
+        assert self.law is not None
+        answer = self.law.mean(StepPath(-self._gap, self._closing, -gap, closing, size))
         self._largest = max(self._largest, abs(answer))
         force = self.value
         if abs(answer - force) <= FORCE_TOLERANCE * self._largest:
@@ -131,6 +127,11 @@ class PairForce:
         self.value = _secant(force, answer, self._before)
         self._before = force, answer
         return self.value != force
+
+    def excess(self, gap: float, closing: float, size: float) -> float:
+        """Return the closing speed that a force at rest has left at the end of a step, m/s."""
+        self._pace = max(self._pace, size)
+        return closing - CLOSING * (gap - self._rest_gap) / self._pace
 
     def rest(self, gap: float) -> None:
         """The bodies stay together from now on, at this gap, m."""

@@ -15,6 +15,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 
+import numpy as np
+
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
@@ -35,6 +37,8 @@ MOST_IMPULSES = 10_000
 PART_OF_PERIOD = 0.125
 #: A step of two bodies that rest on each other is this much shorter again.
 RESTING_STEPS = 16.0
+#: Forces of bodies at rest agree to this, relative to the largest.
+REST_TOLERANCE = 1e-10
 #: Bounces still to come that take less than this part of the longest one are summed to their end.
 ACCUMULATED = 1e-3
 #: A bounce whose closing speed times its duration is below this times the distance of touching is none.
@@ -183,21 +187,45 @@ class Pair:
         """Return where a step just made must be repeated to, s; None when it may stay as it is."""
         if not self.closed:
             return self._meeting(time, end)
+        if not self.yields:
+            return None  # all that rest are looked at together
         now, size = self.look(end - time), end - time
-        if self.yields:
-            scale = self._force.time_scale(now.gap) / self._steps
-            if size > SLACK * scale:
-                self._force.start(self._start.gap, self._start.closing, scale)
-                return time + scale
-        if self._force.corrects(now.gap, now.closing, size):
-            return end
-        if self._force.resting and self._force.value < 0.0:
-            self._force.let_go()
-            self._surface += min(self._start.gap, 0.0)
-            self._start = self._start._replace(gap=max(self._start.gap, 0.0))
-            self.closed = False
-            return end
-        return None
+        scale = self._force.time_scale(now.gap) / self._steps
+        if size > SLACK * scale:
+            self._force.start(self._start.gap, self._start.closing, scale)
+            return time + scale
+        return end if self._force.corrects(now.gap, now.closing, size) else None
+
+    @property
+    def rests(self) -> bool:
+        """Do the bodies rest on each other in the step under way?"""
+        return self.closed and self._force.resting
+
+    @property
+    def force(self) -> float:
+        """The force that the bodies press each other with in the step under way, N."""
+        return self._force.value
+
+    @force.setter
+    def force(self, value: float) -> None:
+        self._force.value = value
+
+    def excess(self, size: float) -> float:
+        """Return the closing speed that is left at the end of a step of bodies that rest, m/s."""
+        now = self.look(size)
+        return self._force.excess(now.gap, now.closing, size)
+
+    def mobility(self, other: Pair) -> float:
+        """Return the closing speed that a unit of impulse between another pair takes from this one, 1/kg."""
+        ends = ((self.lower, 1.0), (self.upper, -1.0))
+        others = ((other.lower, 1.0), (other.upper, -1.0))
+        return sum(s * t / a.mass for a, s in ends for b, t in others if a.name == b.name)
+
+    def stop_resting(self) -> None:
+        """In the step under way the bodies do not press each other."""
+        self._part(self._start.gap)
+        self._start = self._start._replace(gap=max(self._start.gap, 0.0))
+        self.closed = False
 
     def end_step(self, size: float) -> None:
         """The step of `size` s counts."""
@@ -296,15 +324,21 @@ class Pair:
         impulse = (1.0 + restitution) * now.closing * self._reduced
         self.lower.strike(-impulse)
         self.upper.strike(impulse)
+        if self._force.resting:
+            self._part(now.gap)
+            now = now._replace(gap=max(now.gap, 0.0))
         if restitution == 0.0:
             self._force.rest(now.gap)
-        else:
-            self._force.let_go()
 
-    @property
-    def never_parts(self) -> bool:
-        """Has it made so many small bounces in a row?"""
-        return self._small_bounces > MOST_SMALL_BOUNCES
+    def _part(self, gap: float) -> None:
+        """Bodies that have rested on each other part where they are."""
+        self._force.let_go()
+        self._surface += min(gap, 0.0)
+
+    def is_pressed(self, now: Motion, time: float) -> bool:
+        """Have the bodies sunk into each other, or made many small bounces in a row?"""
+        is_sunk = now.gap < -SUNK * self._scale.room(time) and not self._force.resting
+        return is_sunk or self._small_bounces > MOST_SMALL_BOUNCES
 
     def _accumulates(self, now: Motion, time: float) -> bool:
         """Would the bounces still to come end in next to no time, or be no higher than bodies that touch are apart?"""
@@ -390,8 +424,27 @@ class Pairs:
             instance.check(instance.enter_step_call(), "EnterStepMode")
         return hit
 
+    def rest_end(self, time: float, end: float) -> float | None:
+        """Make the forces of all bodies at rest agree; returns where to repeat the step to, s, or None."""
+        resting = [pair for pair in self.pairs if pair.rests]
+        if not resting or not end > time:
+            return None
+        size = end - time
+        mobility = np.array([[a.mobility(b) for b in resting] for a in resting])
+        change = np.linalg.lstsq(mobility, [pair.excess(size) for pair in resting], rcond=None)[0] / size
+        largest = max(abs(pair.force) for pair in resting)
+        if np.abs(change).max() > REST_TOLERANCE * largest:
+            for pair, more in zip(resting, change, strict=True):
+                pair.force += float(more)
+            return end
+        weakest = min(resting, key=lambda pair: pair.force)
+        if weakest.force < 0.0:
+            weakest.stop_resting()
+            return end
+        return None
+
     def _refuse_pressed(self, pair: Pair, now: Motion, time: float) -> None:
-        if pair.never_parts or now.gap < -SUNK * self._scale.room(time):
+        if pair.is_pressed(now, time):
             raise ComponentError(
                 f"{pair.name}: expected bodies that part after their impacts, got two that stay in contact at time "
                 f"{time:.12g}. The law restitution has no force to hold them: use kelvin_voigt, hertz or "
