@@ -117,7 +117,7 @@ class Pair:
         self._longest = PART_OF_PERIOD * 2.0 * math.pi / rate if rate > 0.0 else math.inf
         self._reduced = 1.0 / (1.0 / self.lower.mass + 1.0 / self.upper.mass)
         self._force.begin(self._reduced)
-        self._agreed = self._last_impact = self._deepest = -math.inf
+        self._agreed = self._last_impact = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
         self.arrived = self.closed = self._pressed = False
@@ -237,8 +237,8 @@ class Pair:
         precision = precision_at(time)
         size = end - time
         last = self.look(size)
-        # a step that ends elsewhere may give the bodies other inputs: they are looked at again where they overlap
-        if abs(end - self._agreed) <= precision and last.gap >= self._deepest:
+        # other inputs of a step that ends elsewhere, and forces that hold others, may have moved them since
+        if abs(end - self._agreed) <= precision and last.gap >= self._level(self._start) - self._room:
             return None
         if self._keeps_clear(self._start, last):
             return None
@@ -253,7 +253,6 @@ class Pair:
                 lambda u: self._motion_at(time, u).gap - level,
                 precision,
             )
-        self._deepest = level - self._room
         if located >= size:
             self._agreed = end
             return None
