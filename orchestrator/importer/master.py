@@ -44,6 +44,8 @@ STANDSTILLS = 100
 #: Repetitions of a step with exchange "iterated", and the relative change at which they end.
 STEP_ITERATIONS = 50
 STEP_TOLERANCE = 1e-13
+#: Repetitions of a step until bodies that rest on each other and those that meet meanwhile agree.
+PAIR_REPETITIONS = 100
 
 
 class Importer:
@@ -336,7 +338,7 @@ class Importer:
 
     def _settle_contacts(self, time: float) -> None:
         """Repeat a step until the stops that yield agree with what their bodies made of their forces."""
-        for _ in range(MOST_REPETITIONS):
+        for _ in range(PAIR_REPETITIONS if self.contacts.pairs else MOST_REPETITIONS):
             end = self.contacts.revised_end(time, self._reached)
             if end is None or self._reached <= time:
                 return

@@ -31,6 +31,8 @@ from vibroimpact.orchestrator.importer.step_path import StepPath
 HIT_AT_REST = 1e-4
 #: Bodies sunk into each other by this many times the distance at which they touch are pressed together.
 SUNK = 100.0
+#: Likewise, at any time, by this part of the largest displacement.
+DEEP = 1e-3
 #: Impulses at one instant.
 MOST_IMPULSES = 10_000
 #: A step is at most this part of the shortest period of a body that says its own.
@@ -228,8 +230,16 @@ class Pair:
         self.closed = False
 
     def end_step(self, size: float) -> None:
-        """The step of `size` s counts."""
+        """The step of `size` s counts.
+
+        Raises
+        ------
+        ComponentError
+            The bodies have come deep into each other: the forces of several at rest did not agree.
+        """
         end = self._time + size
+        if not self.yields and self.look().gap < -DEEP * self._scale.displacement:
+            raise self.pressed_error(end)
         self.arrived = self.yields and not self.closed and abs(end - self._agreed) <= precision_at(end)
 
     def _meeting(self, time: float, end: float) -> float | None:
@@ -334,6 +344,15 @@ class Pair:
         self._force.let_go()
         self._surface += min(gap, 0.0)
 
+    def pressed_error(self, time: float) -> ComponentError:
+        """Return the error of bodies that do not part."""
+        return ComponentError(
+            f"{self.name}: expected bodies that part after their impacts, got two that stay in contact at time "
+            f"{time:.12g}. The law restitution cannot hold them: use kelvin_voigt, hertz or hunt_crossley.",
+            instance=self.lower.body.name,
+            time=time,
+        )
+
     def is_pressed(self, now: Motion, time: float) -> bool:
         """Have the bodies sunk into each other, or made many small bounces in a row?"""
         is_sunk = now.gap < -SUNK * self._scale.room(time) and not self._force.resting
@@ -412,7 +431,8 @@ class Pairs:
             if not due:
                 break
             closing, pair, now = max(due, key=lambda found: found[0])
-            self._refuse_pressed(pair, now, time)
+            if pair.is_pressed(now, time):
+                raise pair.pressed_error(time)
             pair.strike(now, time, is_first=pair in met)
             met.discard(pair)
             if closing > self._scale.slow:
@@ -441,16 +461,6 @@ class Pairs:
             weakest.stop_resting()
             return end
         return None
-
-    def _refuse_pressed(self, pair: Pair, now: Motion, time: float) -> None:
-        if pair.is_pressed(now, time):
-            raise ComponentError(
-                f"{pair.name}: expected bodies that part after their impacts, got two that stay in contact at time "
-                f"{time:.12g}. The law restitution has no force to hold them: use kelvin_voigt, hertz or "
-                "hunt_crossley.",
-                instance=pair.lower.body.name,
-                time=time,
-            )
 
     def _endless(self, time: float) -> ComponentError:
         names = ", ".join(pair.name for pair in self.pairs if pair.is_due(pair.look(), time))
