@@ -102,7 +102,7 @@ def test_the_mass_of_a_contact_is_swept(folder: Path) -> None:
         steps.append(runner._importer.contacts.held[0].mass)
     runner.close()
     assert steps == [0.5, 1.0]
-    with pytest.raises(UsageError, match=r"contact\[2\]\.mass: expected a contact mass"):
+    with pytest.raises(UsageError, match=r"contact\[2\]\.mass: expected a number of a contact"):
         scene.general.value("contact[2].mass")
 
 
@@ -154,13 +154,13 @@ MISTAKES = [
     (
         "[record]",
         '[sweep]\n"contact[2].mass" = { values = [1.0, 2.0] }\n[record]',
-        'sweep."contact[2].mass": expected the mass of a contact, got "contact[2].mass". '
+        'sweep."contact[2].mass": expected a number of a contact, got "contact[2].mass". '
         "Indices start at 1 and this scene has 1 [[contact]].",
     ),
     (
         "[record]",
         '[sweep]\n"contact[1].mass" = { values = [1.0, -2.0] }\n[record]',
-        'sweep."contact[1].mass": expected numbers > 0, got -2.0.',
+        'sweep."contact[1].mass": expected a number > 0, got -2.0.',
     ),
 ]
 
