@@ -207,7 +207,7 @@ def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
         ({"mass": 10**400}, "mass: expected a number >= 0"),
         ({"displacement": 1.0}, "displacement: expected a parameter or an input, got none of this name."),
         ({"contact[1].law": "sticky"}, "expected one of none, restitution, kelvin_voigt, hertz"),
-        ({"contact[1].law": 7}, "contact[1].law: expected one of none"),
+        ({"contact[1].law": 8}, "contact[1].law: expected one of none"),
         ({"contact[3].law": 1}, "contact[3].law: expected contact 1 to 2, got 3."),
         ({"contact[1].restitution": 1.5}, "contact[1].restitution: expected a number from 0 to 1, got 1.5."),
         ({"impact_limit": 2.5}, "impact_limit: expected a whole number >= 0, got 2.5."),
