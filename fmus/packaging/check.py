@@ -42,11 +42,16 @@ def check_fmu(path: Path) -> tuple[str, ...]:
         fmu = unpack(path)
     except ComponentFileError as error:
         return (str(error).removeprefix(f"{path}: "),)
-    return (
-        *validate(path),
-        *_spelling_problems(fmu),
-        *_missing_binaries(fmu),
-        *_loading_problems(fmu),
+    # what two interfaces have in common is wrong with each of them
+    return tuple(
+        dict.fromkeys(
+            (
+                *validate(path),
+                *_spelling_problems(fmu),
+                *_missing_binaries(fmu),
+                *_loading_problems(fmu),
+            )
+        )
     )
 
 

@@ -43,7 +43,7 @@ typedef struct {
     void (*get_nominals)(void *self, double nominals[]);
     void (*get_derivatives)(void *self, double derivatives[]);
     void (*get_indicators)(void *self, double indicators[]);
-    /* Resolve what happens at this instant; *changed: the states have jumped, *limit: impact_limit is reached. False, with
+    /* Resolve what happens at this instant; *changed: states, or their derivatives, have jumped, *limit: impact_limit is reached. False, with
      * the reason in `message`, when there is no end to it. */
     bool (*handle_event)(void *self, bool *changed, bool *limit, char message[VI_MESSAGE_LENGTH]);
     /* Time goes on: events are over. */

@@ -216,9 +216,9 @@ def _add_structure(
             unknown = SubElement(
                 parent, "Unknown" if version == 2 else kind, {key: references[variable.name]}
             )
-            if variable.dependencies is None or kind in {states, "EventIndicator"}:
+            if variable.dependencies is None:
                 continue
-            if kind == "Output":
+            if kind != "InitialUnknown":
                 knowns = component.direct_knowns(variable, version)
             elif initial_dependencies:
                 knowns = component.knowns_at_start(variable, version)

@@ -19,8 +19,8 @@ from fmpy.fmi2 import (
     fmi2CallbackFunctions,
     free,
 )
-from fmpy.logging import addLoggerProxy
 from fmpy.fmi3 import FMU3Model, FMU3Slave, fmi3LogMessageCallback
+from fmpy.logging import addLoggerProxy
 from support.component_fmu import LOGGER2, MESSAGES2
 
 from vibroimpact.fmus.packaging.archive import unpack
@@ -193,7 +193,8 @@ def test_chatter_ends_at_rest_until_the_force_lets_go() -> None:
     assert found["contact[1].stick_start"][-1] == pytest.approx(exact["contact[1].stick_start"][-1], abs=5e-3)
     assert found["displacement"][-1] == pytest.approx(exact["displacement"][-1], abs=1e-7)
     held = found["contact[1].stuck"] > 0
-    assert held.any() and not held.all()
+    assert held.any()
+    assert not held.all()
     assert np.ptp(found["displacement"][held]) < 1e-12
     assert (found["contact[1].force"][held][1:-1] > 0.0).all()
 
@@ -219,7 +220,8 @@ def test_a_plastic_stop_holds_at_once() -> None:
 
 def test_impact_limit_ends_the_simulation() -> None:
     found = simulate("Oscillator", {**FREE, "impact_limit": 1}, 10.0)
-    assert found["time"][-1] < 3.0 and found["contact[1].count"][-1] <= 1
+    assert found["time"][-1] < 3.0
+    assert found["contact[1].count"][-1] <= 1
 
 
 # ---- the interface ----
@@ -413,4 +415,5 @@ def test_what_an_integrator_cannot_follow_is_refused_with_the_way_out(name: str)
     it = Integrated(component, "3.0")
     it.set(values)
     message = it.message(it.fmu.exitInitializationMode)
-    assert name in message and "use this component by co-simulation" in message
+    assert name in message
+    assert "use this component by co-simulation" in message

@@ -43,11 +43,14 @@ def test_every_unknown_names_what_it_depends_on_and_only_what_is_there(lean: Pat
     description = read_description(lean)
     outputs = {v.name for v in description.modelVariables if v.causality == "output"}
     assert {unknown.variable.name for unknown in description.outputs} == outputs
-    assert {unknown.variable.name for unknown in description.initialUnknowns} == outputs
-    for unknown in (*description.outputs, *description.initialUnknowns):
+    derivatives = {unknown.variable.name for unknown in description.derivatives}
+    states = {unknown.variable.derivative.name for unknown in description.derivatives}
+    assert {unknown.variable.name for unknown in description.initialUnknowns} == outputs | derivatives
+    for unknown in (*description.outputs, *description.derivatives, *description.initialUnknowns):
         assert unknown.dependencies is not None, unknown.variable.name
         for known in unknown.dependencies:
-            assert known.causality in {"input", "parameter"}, unknown.variable.name
+            of_input = known.causality in {"input", "parameter"}
+            assert of_input or known.name in states, unknown.variable.name
 
 
 def test_a_default_run_gives_numbers_and_no_warning(lean: Path) -> None:

@@ -302,12 +302,16 @@ bool vi_exchange_event(const vi_exchange_body *body, bool *changed, bool *limit,
     const vi_structure *s = &body->parts;
     double q[VI_MODES], p[VI_MODES];
     const size_t size = (size_t)s->model->modes * sizeof q[0];
+    int32_t status[VI_PORTS];
     memcpy(q, s->state->q, size);
     memcpy(p, s->state->p, size);
+    memcpy(status, s->state->status, sizeof status);
     look_at_all(s);
     settle(s);
     vi_structure_project(s);
-    *changed = memcmp(q, s->state->q, size) != 0 || memcmp(p, s->state->p, size) != 0;
+    /* there are integrators that go on with the steps they have made unless a state has jumped: forces count too */
+    *changed = memcmp(q, s->state->q, size) != 0 || memcmp(p, s->state->p, size) != 0
+               || memcmp(status, s->state->status, sizeof status) != 0;
     *limit = s->model->impact_limit > 0 && s->state->budget.events >= s->model->impact_limit;
     if (vi_clock_stands(&s->state->standstill, s->state->now)) {
         vi_structure_complain(s, message);

@@ -40,7 +40,7 @@ void vi_exchange_get_indicators(const vi_exchange_body *body, double indicators[
 /* The same as outputs of the contacts. */
 void vi_exchange_show_indicators(const vi_exchange_body *body);
 
-/* All that happens at this instant: impacts, touch-downs, separations, rests, releases. *changed: states have jumped;
+/* All that happens at this instant: impacts, touch-downs, separations, rests, releases. *changed: states or forces have jumped;
  * *limit: impact_limit is reached. False, with the reason, when time stands still. */
 bool vi_exchange_event(const vi_exchange_body *body, bool *changed, bool *limit, char message[VI_MESSAGE_LENGTH]);
 

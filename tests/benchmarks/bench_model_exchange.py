@@ -1,0 +1,145 @@
+"""What model exchange costs beside co-simulation: seconds per impact and error, one driven mass with a rigid stop.
+
+The same FMU in FMPy: stepped by its own exact motion (co-simulation), and integrated by CVode (model exchange) at a
+ladder of tolerances; and by this package's own run. The error is that of the last impact's time, against the exact one.
+
+Run with `python tests/benchmarks/bench_model_exchange.py [FOLDER]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import xarray as xr
+
+import vibroimpact as vi
+from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.shipped import fmu_path
+from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+
+TOLERANCES = np.array([1e-4, 1e-6, 1e-8, 1e-10])
+PERIODS = 100
+OWN_PERIODS = 100 * PERIODS
+"""Of our own run, which begins and ends in tenths of a second."""
+REPETITIONS = 3
+FREQUENCY = 0.9
+VALUES = {
+    "damping": 0.1,
+    "forcing.amplitude": 0.5,
+    "forcing.angular_frequency": FREQUENCY,
+    "contact[1].law": 1,
+    "contact[1].position": 0.1,
+    "contact[1].restitution": 0.7,
+}
+SCENE = {
+    "body": {"kind": "oscillator", "mass": 1.0, "stiffness": 1.0, "damping": 0.1},
+    "forcing": {"amplitude": 0.5, "angular_frequency": FREQUENCY},
+    "stop": [{"position": 0.1, "restitution": 0.7}],
+    "record": {"transient_periods": 0, "recorded_periods": OWN_PERIODS},
+}
+
+
+def quickest(run: Callable[[], Any]) -> tuple[Any, float]:
+    """Return a result and the seconds of the quickest of some repetitions."""
+    seconds, result = math.inf, None
+    for _ in range(REPETITIONS):
+        began = time.perf_counter()
+        result = run()
+        seconds = min(seconds, time.perf_counter() - began)
+    return result, seconds
+
+
+def simulated(kind: str, tolerance: float = 1e-6) -> tuple[float, float, float]:
+    """Return the number of impacts, the time of the last one, s, and the seconds of a run by FMPy."""
+    folder = str(unpack(fmu_path("Oscillator")).folder)
+    period = 2.0 * math.pi / FREQUENCY
+
+    def run() -> Any:
+        return fmpy.simulate_fmu(
+            folder,
+            fmi_type=kind,
+            solver="CVode",
+            relative_tolerance=tolerance,
+            start_values=VALUES,
+            stop_time=PERIODS * period,
+            output_interval=period,
+            output=["contact[1].count", "contact[1].last_time"],
+            record_events=False,
+        )
+
+    result, seconds = quickest(run)
+    return float(result["contact[1].count"][-1]), float(result["contact[1].last_time"][-1]), seconds
+
+
+def measured() -> xr.Dataset:
+    """Measure model exchange at all tolerances, co-simulation and our own run once."""
+    _, own = quickest(lambda: vi.run(SCENE))
+    count, exact, stepped = simulated("CoSimulation")
+    ladder = np.array([simulated("ModelExchange", float(t)) for t in TOLERANCES])
+    return xr.Dataset(
+        {
+            "impacts": ("tolerance", ladder[:, 0], {"units": "1", "long_name": "impacts"}),
+            "error": (
+                "tolerance",
+                np.abs(ladder[:, 1] - exact),
+                {"units": "s", "long_name": "error of the last impact's time"},
+            ),
+            "wall_time": ("tolerance", ladder[:, 2], {"units": "s", "long_name": "wall time"}),
+            "co_simulation_wall_time": ((), stepped, {"units": "s", "long_name": "wall time, co-simulation"}),
+            "own_wall_time": (
+                (),
+                own * PERIODS / OWN_PERIODS,
+                {"units": "s", "long_name": "wall time of as many periods, this package's run"},
+            ),
+            "co_simulation_impacts": ((), count, {"units": "1", "long_name": "impacts, co-simulation"}),
+        },
+        coords={"tolerance": ("tolerance", TOLERANCES, {"units": "1", "long_name": "relative tolerance"})},
+        attrs={
+            "title": "Model exchange beside co-simulation",
+            "Conventions": "CF-1.11",
+            "source": f"vibroimpact {versions()['vibroimpact']}, tests/benchmarks/bench_model_exchange.py",
+            "versions": json.dumps(versions()),
+            "git_commit": git_commit(),
+        },
+    )
+
+
+def table(dataset: xr.Dataset) -> None:
+    """Print the ladder."""
+    count, stepped = float(dataset.co_simulation_impacts), float(dataset.co_simulation_wall_time)
+    print(
+        f"{PERIODS} periods, {count:.0f} impacts; co-simulation in FMPy: {stepped / count * 1e6:.0f} us an impact"
+    )
+    print(f"this package's run: {float(dataset.own_wall_time) / stepped:.2f} of that")
+    print("  tolerance   impacts   error of the last impact, s   cost / co-simulation")
+    for row in range(dataset.sizes["tolerance"]):
+        at = dataset.isel(tolerance=row)
+        ratio = float(at.wall_time) / stepped
+        print(f"  {float(at.tolerance):9.0e} {float(at.impacts):9.0f} {float(at.error):29.1e} {ratio:22.1f}")
+
+
+def main() -> None:
+    """Measure, print, leave a dataset."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("results"), help="where results go")
+    folder = parser.parse_args().folder
+    folder.mkdir(parents=True, exist_ok=True)
+    dataset = measured()
+    table(dataset)
+    path = folder / "model_exchange.nc"
+    dataset.to_netcdf(path)
+    print(f"  dataset: {path}")
+
+
+if __name__ == "__main__":
+    main()
