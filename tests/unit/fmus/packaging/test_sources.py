@@ -41,7 +41,9 @@ def test_every_file_that_is_named_is_there_and_nothing_is_included_that_is_not(
             named = [e.get("name") for e in root.iter("SourceFile")]
         else:
             root = ElementTree.fromstring(archive.read("modelDescription.xml"))
-            named = [e.get("name") for e in root.iter("File")]
+            lists = [[e.get("name") for e in files] for files in root.iter("SourceFiles")]
+            named = lists[0]
+            assert all(names == named for names in lists)
     assert sorted(named) == sorted(n for n in texts if n.endswith(".c"))  # type: ignore[type-var]
     assert f"fmi{fmi[0]}.c" in named
     assert not [n for n in texts if "door" in n or n.startswith(f"fmi{5 - int(fmi[0])}")]
