@@ -1,4 +1,5 @@
 /* A body that its importer integrates: impacts, chatter to rest and release, stops that yield, by plain steps of Euler. */
+#include "body/modal/structure.h"
 #include "body/modal/structure_exchange.h"
 
 #include <math.h>
