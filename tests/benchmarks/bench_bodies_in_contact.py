@@ -25,8 +25,8 @@ MOST_CHANGE = 1e-12
 def pounding_chains() -> PairRun:
     """Return two chains of three masses, which hit each other at their second."""
     chain: dict[str, Any] = {"masses": 3, "contact[1].mass_number": 2}
-    lower = hit("lower", "Chain", **chain, **{"velocity_start[3]": 1.0})
-    upper = hit("upper", "Chain", **chain, **{"mass[2]": 3.0, "displacement_start[2]": -0.5})
+    lower = hit("lower", "Chain", **chain | {"velocity_start[3]": 1.0})
+    upper = hit("upper", "Chain", **chain | {"mass[2]": 3.0, "displacement_start[2]": -0.5})
     return run_of([lower, upper], [pair("lower", "upper", clearance=0.51)])
 
 
