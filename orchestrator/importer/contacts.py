@@ -57,7 +57,7 @@ class ContactBonds:
         ]
         inputs: dict[tuple[str, str], ForceInput] = {}
         self.held = [HeldForceBond(components, contact, inputs) for contact in contacts]
-        self.pairs = Pairs(components, pairs)
+        self.pairs = Pairs(components, pairs, inputs)
         self._following: list[ContactBond | HeldForceBond | Pair] = []
         self.active = False
 

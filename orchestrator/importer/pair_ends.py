@@ -6,11 +6,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.asked_stop import LOWER_SIDE
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.held_force import ForceInput
 from vibroimpact.orchestrator.importer.revision import PRECISION
+from vibroimpact.orchestrator.importer.specification import BodyPoint
 
 #: Touching pairs are nearer than what the fastest body moves in this many times the precision of an impact ...
 TOUCHING_TIMES = 64.0
@@ -28,8 +30,8 @@ class Motion(NamedTuple):
     closing: float
 
 
-class PairEnd:
-    """The contact point of one body of a pair.
+class PortEnd:
+    """The contact port of a body of this package, as one end of a pair.
 
     Attributes
     ----------
@@ -79,6 +81,69 @@ class PairEnd:
         instance = self.body.instance
         if self.body.event_mode and isinstance(instance, Instance3):
             instance.check(instance.update_call(), "UpdateDiscreteStates")
+
+
+class PointEnd:
+    """The point of a body of any tool, as one end of a pair whose law yields: it takes a force, and no impulse.
+
+    Attributes
+    ----------
+    body, name, mass
+        As those of `PortEnd`; the mass is given.
+    """
+
+    def __init__(
+        self,
+        components: Mapping[str, Component],
+        point: BodyPoint,
+        inputs: dict[tuple[str, str], ForceInput],
+    ) -> None:
+        self.name, self.mass = point.name, point.mass
+        self.body = components[point.component]
+        self._motion = self.body.group("Float64", [point.displacement, point.velocity])
+        self._input = inputs.setdefault((point.component, point.force), ForceInput(self.body, point.force))
+
+    def begin(self) -> None:
+        """Start a run."""
+        self._input.parts.clear()
+
+    def press(self, pair: str, force: float) -> None:
+        """Hold a force of a pair along the displacement over the next step, N."""
+        self._input.parts[pair] = force
+        self._input.write()
+
+    def look(self) -> tuple[float, float]:
+        """Return displacement (m) and velocity (m/s)."""
+        displacement, velocity = self._motion.get()
+        return float(displacement), float(velocity)
+
+    def strike(self, impulse: float) -> None:
+        """Refuse an impulse, N s.
+
+        Raises
+        ------
+        ComponentError
+            Always: only forces can be given to it.
+        """
+        raise ComponentError(
+            f"{self.name}: expected a law that yields, got an impulse of {impulse:.6g} N s. A body of another tool "
+            "takes forces only: use kelvin_voigt, hertz or hunt_crossley.",
+            instance=self.body.name,
+        )
+
+
+PairEnd = PortEnd | PointEnd
+
+
+def end_of(
+    components: Mapping[str, Component],
+    end: tuple[str, str] | BodyPoint,
+    inputs: dict[tuple[str, str], ForceInput],
+) -> PairEnd:
+    """Return one end of a pair."""
+    if isinstance(end, BodyPoint):
+        return PointEnd(components, end, inputs)
+    return PortEnd(components, end, inputs)
 
 
 class Scale:

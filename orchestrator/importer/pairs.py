@@ -21,7 +21,7 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.held_force import ForceInput
-from vibroimpact.orchestrator.importer.pair_ends import BodyRate, Motion, PairEnd, Scale, precision_at
+from vibroimpact.orchestrator.importer.pair_ends import BodyRate, Motion, PortEnd, Scale, end_of, precision_at
 from vibroimpact.orchestrator.importer.pair_force import PairForce
 from vibroimpact.orchestrator.importer.revision import Bracket, refine
 from vibroimpact.orchestrator.importer.specification import PairSpec
@@ -66,7 +66,7 @@ class Pair:
     ----------
     name : str
         `lower.contact[k] - upper.contact[k]`.
-    lower, upper : PairEnd
+    lower, upper : PortEnd or PointEnd
         The gap between them closes as the displacement of the lower one grows.
     active : bool
         Steps may have to be repeated: always.
@@ -83,19 +83,20 @@ class Pair:
         scale: Scale,
         inputs: dict[tuple[str, str], ForceInput],
     ) -> None:
-        for name in {spec.lower[0], spec.upper[0]}:
-            if not components[name].has_states:
-                raise ComponentError(
-                    f"{name}: expected a body that can save its state, got one that cannot. "
-                    "The instant at which two bodies meet is found by going back.",
-                    instance=name,
-                )
-        self.lower = PairEnd(components, spec.lower, inputs)
-        self.upper = PairEnd(components, spec.upper, inputs)
         self.name = spec.name
+        self.lower = end_of(components, spec.lower, inputs)
+        self.upper = end_of(components, spec.upper, inputs)
+        for end in (self.lower, self.upper):
+            if not end.body.has_states:
+                raise ComponentError(
+                    f"{end.body.name}: expected a body that can save its state, got one that cannot. "
+                    "The instant at which two bodies meet is found by going back.",
+                    instance=end.body.name,
+                )
         self.bodies = tuple({end.body.name: end.body for end in (self.lower, self.upper)}.values())
         self._scale = scale
-        self._rates = [BodyRate(body) for body in self.bodies]
+        # what variables of other tools' bodies mean is not known
+        self._rates = [BodyRate(end.body) for end in (self.lower, self.upper) if isinstance(end, PortEnd)]
         self.take(spec)
 
     def take(self, spec: PairSpec) -> None:
@@ -115,7 +116,7 @@ class Pair:
         """
         self.lower.begin()
         self.upper.begin()
-        rate = max(rate.fastest() for rate in self._rates)
+        rate = max((rate.fastest() for rate in self._rates), default=0.0)
         self._longest = PART_OF_PERIOD * 2.0 * math.pi / rate if rate > 0.0 else math.inf
         self._reduced = 1.0 / (1.0 / self.lower.mass + 1.0 / self.upper.mass)
         self._force.begin(self._reduced)
@@ -163,7 +164,7 @@ class Pair:
         was_closed, self.arrived = self.closed, False
         self.closed = self._force.resting
         if self.yields:
-            self.closed = start.gap < -self._room or (start.gap <= self._room and start.closing > 0.0)
+            self.closed = self._touches(start)
         self._steps = steps
         target = min(target, time + self._longest)
         if not self.closed:
@@ -240,7 +241,11 @@ class Pair:
         end = self._time + size
         if not self.yields and self.look().gap < -DEEP * self._scale.displacement:
             raise self.pressed_error(end)
-        self.arrived = self.yields and not self.closed and abs(end - self._agreed) <= precision_at(end)
+        met = abs(end - self._agreed) <= precision_at(end) or self._touches(self.look())
+        self.arrived = self.yields and not self.closed and met
+
+    def _touches(self, now: Motion) -> bool:
+        return now.gap < -self._room or (now.gap <= self._room and now.closing > 0.0)
 
     def _meeting(self, time: float, end: float) -> float | None:
         """Return the instant in the step just made at which the bodies meet first, s; None without one before `end`."""
@@ -384,9 +389,13 @@ class Pairs:
         In the order of their specifications.
     """
 
-    def __init__(self, components: Mapping[str, Component], specs: Sequence[PairSpec]) -> None:
+    def __init__(
+        self,
+        components: Mapping[str, Component],
+        specs: Sequence[PairSpec],
+        inputs: dict[tuple[str, str], ForceInput],
+    ) -> None:
         self._scale = Scale()
-        inputs: dict[tuple[str, str], ForceInput] = {}
         self.pairs = [Pair(components, spec, self._scale, inputs) for spec in specs]
         bodies = {body.name: body for pair in self.pairs for body in pair.bodies}
         self._instances = [

@@ -134,14 +134,40 @@ class StopContactSpec:
 
 
 @dataclass(frozen=True, slots=True)
-class PairSpec:
-    """Two of our bodies that hit each other.
+class BodyPoint:
+    """A point of a body of any tool that another body may hit.
 
     Attributes
     ----------
-    lower, upper : tuple of str
-        Component and contact port (`contact[k]`, of the law `pair`) of each: their gap is
-        `clearance + displacement of upper - displacement of lower`.
+    component : str
+        The body.
+    displacement, velocity, force : str
+        Its variables: the motion of the point, and the input of the force on it.
+    mass : float
+        Effective mass of the point, kg: the change of its momentum over that of its velocity.
+    """
+
+    component: str
+    displacement: str
+    velocity: str
+    force: str
+    mass: float
+
+    @property
+    def name(self) -> str:
+        """The variable of its displacement, `body.x`."""
+        return f"{self.component}.{self.displacement}"
+
+
+@dataclass(frozen=True, slots=True)
+class PairSpec:
+    """Two bodies that hit each other.
+
+    Attributes
+    ----------
+    lower, upper : tuple of str, or BodyPoint
+        Component and contact port (`contact[k]`, of the law `pair`) of each of our bodies, or a point of one of any
+        tool where the law yields: their gap is `clearance + displacement of upper - displacement of lower`.
     clearance : float
         Gap where both displacements are 0, m.
     law : str
@@ -152,8 +178,8 @@ class PairSpec:
         Of a law that yields, as of a contact port.
     """
 
-    lower: tuple[str, str]
-    upper: tuple[str, str]
+    lower: tuple[str, str] | BodyPoint
+    upper: tuple[str, str] | BodyPoint
     clearance: float = 0.0
     law: PairLaw = "restitution"
     restitution: float = 1.0
@@ -164,7 +190,8 @@ class PairSpec:
     @property
     def name(self) -> str:
         """Both points, the lower one first."""
-        return f"{'.'.join(self.lower)} - {'.'.join(self.upper)}"
+        lower, upper = (p.name if isinstance(p, BodyPoint) else ".".join(p) for p in (self.lower, self.upper))
+        return f"{lower} - {upper}"
 
     @property
     def numbers(self) -> dict[str, float]:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -263,8 +263,10 @@ def _owner(model: type[BaseModel], location: Sequence[str | int]) -> tuple[type[
     name = str(location[0])
     if len(location) == 1 or isinstance(location[1], int):
         return model, name
-    inner = forms_of(field_of(model, name).annotation)[0]
-    return _owner(inner, location[1:])
+    annotation = field_of(model, name).annotation
+    if get_origin(annotation) is dict:  # of tables by name
+        return _owner(get_args(annotation)[1], location[2:]) if len(location) > 2 else (model, name)
+    return _owner(forms_of(annotation)[0], location[1:])
 
 
 def value_problem(path: Sequence[str | int], field: FieldInfo, value: object) -> Problem:

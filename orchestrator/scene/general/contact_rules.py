@@ -65,7 +65,7 @@ def _variables_are_there(draft: GeneralDraft, place: int, table: StopContactTabl
         facts = _facts(draft, component)
         if facts is not None and name is not None:
             where = key_path(("contact", place, key))
-            yield from _variable_problems(where, component, facts, name, causality, unit)
+            yield from variable_problems(where, component, facts, name, causality, unit)
 
 
 def _component_problems(draft: GeneralDraft, place: int, key: str, name: str) -> Iterator[Problem]:
@@ -75,9 +75,10 @@ def _component_problems(draft: GeneralDraft, place: int, key: str, name: str) ->
         yield Problem(where, "a component of this scene", quoted(name), near)
 
 
-def _variable_problems(
+def variable_problems(
     where: str, component: str, facts: ComponentFacts, name: str, causality: str, unit: Unit | None
 ) -> Iterator[Problem]:
+    """Yield why a variable of a component is no such input or output, or has another unit."""
     variable = facts.variables.get(name)
     article = f"{'an' if causality[0] in 'io' else 'a'} {causality}"
     if variable is None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from vibroimpact.orchestrator.importer.specification import PairSpec
+from vibroimpact.fmus.units import parse_unit
+from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
 from vibroimpact.orchestrator.scene.general.components import DraftComponent
-from vibroimpact.orchestrator.scene.general.models import BodyPair
+from vibroimpact.orchestrator.scene.general.contact_rules import variable_problems
+from vibroimpact.orchestrator.scene.general.models import BodyPair, BodyPointTable, YieldingPair
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
 from vibroimpact.orchestrator.scene.general.scene import component_variable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
@@ -26,11 +28,11 @@ _LAST, _TIP = 0, 1.0
 
 @dataclass
 class PortPlan:
-    """Which contact port each end of each pair takes, and what its component must be given for that.
+    """Which contact port, or point, each end of each pair takes, and what its component must be given for that.
 
     Attributes
     ----------
-    ends : mapping of (place, end) to (component, port)
+    ends : mapping of (place, end) to (component, port) or BodyPoint
         By the 0-based place of the `[[contact]]` and of the point in its `between`.
     parameters : mapping of str to mapping
         Start values by component.
@@ -38,13 +40,13 @@ class PortPlan:
         Everything that is wrong.
     """
 
-    ends: dict[tuple[int, int], tuple[str, str]] = field(default_factory=dict)
+    ends: dict[tuple[int, int], tuple[str, str] | BodyPoint] = field(default_factory=dict)
     parameters: dict[str, dict[str, StartValue]] = field(default_factory=dict)
     problems: list[Problem] = field(default_factory=list)
 
     def pair(self, place: int, table: BodyPair) -> PairSpec:
         """Return the pair of a `[[contact]]` without problems."""
-        numbers = table.model_dump(exclude={"between"})
+        numbers = table.model_dump(exclude={"between", "bodies"})
         return PairSpec(self.ends[place, 0], self.ends[place, 1], **numbers)
 
 
@@ -61,11 +63,64 @@ def plan_ports(draft: GeneralDraft) -> PortPlan:
             hint = "The points of one body are held together by its own springs: give it stops instead."
             plan.problems.append(Problem(where, "points of two bodies", f"{quoted(names[0])} twice", hint))
             continue
+        points = table.bodies if isinstance(table, YieldingPair) else {}
+        plan.problems += _unused_points(points, table.between, place)
         for end, point in enumerate(table.between):
+            if point in points:
+                plan.problems += _foreign_point_problems(draft, place, point, points[point])
+                plan.ends[place, end] = BodyPoint(component=point, **points[point].model_dump())
+                continue
             found = _port_of(draft, point, key_path(("contact", place, "between", end)), taken, plan)
             if found is not None:
                 plan.ends[place, end] = found
     return plan
+
+
+def _unused_points(
+    points: Mapping[str, BodyPointTable], between: Sequence[str], place: int
+) -> Iterator[Problem]:
+    for name in points:
+        if name not in between:
+            where = key_path(("contact", place, "bodies", name))
+            yield Problem(where, f"one of {' and '.join(map(quoted, between))}", "another name")
+
+
+def _foreign_point_problems(
+    draft: GeneralDraft, place: int, name: str, point: BodyPointTable
+) -> Iterator[Problem]:
+    """Yield what is wrong with the point of a body of another tool."""
+    component = draft.components.get(name)
+    if component is None:
+        if draft.components:
+            near = partial(nearest, name, draft.components)
+            where = key_path(("contact", place, "bodies", name))
+            yield Problem(where, "a component of this scene", quoted(name), near)
+        return
+    facts = component.facts
+    if facts is None:
+        return
+    metre, speed, newton = map(parse_unit, ("m", "m/s", "N"))
+    for key, causality, unit in (
+        ("displacement", "output", metre),
+        ("velocity", "output", speed),
+        ("force", "input", newton),
+    ):
+        where = key_path(("contact", place, "bodies", name, key))
+        yield from variable_problems(where, name, facts, getattr(point, key), causality, unit)
+    if not facts.restorable:
+        got = f"{facts.file}, which does not have canGetAndSetFMUState"
+        hint = "The instant at which two bodies meet is found by going back."
+        yield Problem(
+            key_path(("contact", place, "bodies", name)),
+            "an FMU whose state can be kept and restored",
+            got,
+            hint,
+        )
+    for number, connection in enumerate(draft.connections, start=1):
+        if connection is not None and component_variable(connection.target) == (name, point.force):
+            where = key_path(("contact", place, "bodies", name, "force"))
+            got = f"{quoted(connection.target)}, which connection[{number}] feeds already"
+            yield Problem(where, "an input that contacts alone feed", got, "Remove the connection.")
 
 
 def _port_of(
@@ -103,7 +158,7 @@ def _body_problem(facts: ComponentFacts, name: str, where: str) -> Problem | Non
     hint = (
         "Export it with --ports external."
         if lean
-        else "A body of another tool takes no impulse: let it meet a stop that yields ([[contact]] with body and stop)."
+        else "A body of another tool takes forces only: give a law that yields, and its variables in bodies."
     )
     got = f"{name}, whose {facts.file} has no contact[1].applied_impulse"
     return Problem(where, "a body of this package: Oscillator, Chain or Beam", got, hint)

@@ -6,10 +6,12 @@ import re
 from pathlib import Path
 
 import pytest
+import xarray as xr
 from support.fmu_factory import mass
 
 from vibroimpact.fmus.errors import SceneError, UsageError
-from vibroimpact.orchestrator.importer.specification import PairSpec
+from vibroimpact.orchestrator.campaign.single_run import run_scene
+from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 
@@ -164,6 +166,79 @@ def test_a_body_of_another_tool_is_refused_with_the_way_out(tmp_path: Path) -> N
     with pytest.raises(
         SceneError, match=re.escape("expected a body of this package: Oscillator, Chain or Beam")
     ):
+        load_scene(tmp_path / "s.toml")
+
+
+FOREIGN = """
+[component.tip]
+fmu = "Oscillator"
+[component.ball]
+fmu = "{fmu}"
+parameters = {{ x = 1.0, v = -1.0 }}
+[[contact]]
+between = ["tip", "ball"]
+law = "hertz"
+stiffness = 1e6
+bodies = {{ ball = {{ displacement = "x", velocity = "v", force = "f", mass = 1.0 }} }}
+[record]
+recorded_time = 1.5
+variables = ["ball.v"]
+rate = 10
+[execution]
+macro_step = 0.1
+"""
+
+
+def test_a_body_of_another_tool_is_hit_where_the_law_yields(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(FOREIGN.format(fmu=mass(tmp_path, "3.0").name))
+    scene = load_scene(tmp_path / "s.toml")
+    assert scene.general is not None
+    (pair,) = scene.general.pairs
+    assert pair.lower == ("tip", "contact[1]")
+    assert pair.upper == BodyPoint("ball", "x", "v", "f", 1.0)
+    assert pair.name == "tip.contact[1] - ball.x"
+    run_scene(scene, tmp_path / "r.nc")
+    with xr.open_dataset(tmp_path / "r.nc") as found:
+        assert len(found["event_time"]) == 1
+        assert found["ball_v"].values[-1] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"x", vel', '"y", vel', "contact[1].bodies.ball.displacement: expected an output of Mass.fmi3.fmu"),
+        (
+            'force = "f"',
+            'force = "v"',
+            "contact[1].bodies.ball.force: expected an input that is one real number",
+        ),
+        ('velocity = "v"', 'velocity = "x"', "contact[1].bodies.ball.velocity: expected a variable in m/s"),
+        ("mass = 1.0 }", "mass = -1.0 }", "contact[1].bodies.ball.mass: expected a number > 0, got -1.0"),
+        (", mass = 1.0 }", " }", "contact[1].bodies.ball.mass: expected a number > 0, got nothing"),
+        ("{ ball =", "{ bal =", 'contact[1].bodies.bal: expected one of "tip" and "ball"'),
+        ('law = "hertz"\nstiffness = 1e6', "restitution = 1.0", "contact[1].bodies: expected a known key"),
+        ("bodies = { ball", "bodies = 3 # { ball", "contact[1].bodies: expected a table of bodies"),
+        (
+            "[record]",
+            '[[connection]]\nfrom = "tip.velocity"\nto = "ball.f"\ngain_unit = "N.s/m"\n[record]',
+            "contact[1].bodies.ball.force: expected an input that contacts alone feed",
+        ),
+    ],
+)
+def test_a_mistake_in_a_body_of_another_tool_is_told_with_its_place(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    text = FOREIGN.format(fmu=mass(tmp_path, "3.0").name)
+    assert old in text
+    (tmp_path / "s.toml").write_text(text.replace(old, new))
+    with pytest.raises(SceneError) as caught:
+        load_scene(tmp_path / "s.toml")
+    assert any(said in str(problem) for problem in caught.value.problems), caught.value.problems
+
+
+def test_a_body_that_cannot_restore_its_state_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(FOREIGN.format(fmu=mass(tmp_path, "3.0", states=False).name))
+    with pytest.raises(SceneError, match="expected an FMU whose state can be kept and restored"):
         load_scene(tmp_path / "s.toml")
 
 
