@@ -310,9 +310,9 @@ class Pair:
         middle = self._motion_at(time, first.seconds + 0.5 * path.size)
         error = MARGIN * abs(middle.gap - path.at(0.5)[0]) + self._rounding()
         if last.gap > level:
-            if _lowest(path) - error > level or halvings == 0:
+            if path.lowest - error > level or halvings == 0:
                 return None
-        elif halvings == 0 or (middle.closing > 0.0 and first.closing >= 0.0 and _falls(path)):
+        elif halvings == 0 or (middle.closing > 0.0 and first.closing >= 0.0 and not path.turns):
             return first, last
         if middle.gap <= level:
             return self._search(time, first, middle, halvings - 1)
@@ -479,25 +479,3 @@ class Pairs:
             instance=self.pairs[0].lower.body.name,
             time=time,
         )
-
-
-def _lowest(path: StepPath) -> float:
-    """Lowest displacement of a cubic path."""
-    return min(path.start, path.end, *(path.at(u)[0] for u in _turns(path)))
-
-
-def _falls(path: StepPath) -> bool:
-    """Does a cubic path never turn?"""
-    return not _turns(path)
-
-
-def _turns(path: StepPath) -> list[float]:
-    """Fractions of a step at which the velocity of a cubic path is 0."""
-    v, w, mean = path.start_velocity, path.end_velocity, (path.end - path.start) / path.size
-    a, b, c = 3.0 * (v + w - 2.0 * mean), 2.0 * (3.0 * mean - 2.0 * v - w), v
-    square = b * b - 4.0 * a * c
-    if square < 0.0:
-        return []
-    q = -0.5 * (b + math.copysign(math.sqrt(square), b))
-    roots = [q / a if a != 0.0 else math.nan, c / q if q != 0.0 else math.nan]
-    return [u for u in roots if 0.0 < u < 1.0]

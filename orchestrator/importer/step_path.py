@@ -52,6 +52,23 @@ class StepPath:
             return None
         return last_true(lambda u: self.at(u)[1] > 0.0)
 
+    @property
+    def turns(self) -> list[float]:
+        """Fractions of the step, between its ends, at which the velocity is 0."""
+        v, w, mean = self.start_velocity, self.end_velocity, (self.end - self.start) / self.size
+        a, b, c = 3.0 * (v + w - 2.0 * mean), 2.0 * (3.0 * mean - 2.0 * v - w), v
+        square = b * b - 4.0 * a * c
+        if square < 0.0:
+            return []
+        q = -0.5 * (b + math.copysign(math.sqrt(square), b))
+        roots = [q / a if a != 0.0 else math.nan, c / q if q != 0.0 else math.nan]
+        return [u for u in roots if 0.0 < u < 1.0]
+
+    @property
+    def lowest(self) -> float:
+        """Lowest displacement on the way, m."""
+        return min(self.start, self.end, *(self.at(u)[0] for u in self.turns))
+
 
 def last_true(holds: Callable[[float], bool], begin: float = 0.0, finish: float = 1.0) -> float:
     """Return the last fraction at which something holds that does at `begin` and not at `finish`.
