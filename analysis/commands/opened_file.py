@@ -9,9 +9,8 @@ from pathlib import Path
 import xarray as xr
 
 from vibroimpact.analysis.dataset import open_dataset, open_measured
-from vibroimpact.analysis.dataset.results import file_attributes
 from vibroimpact.analysis.files.fingerprints import matches_recorded_hash
-from vibroimpact.analysis.files.opening import DAMAGE, unreadable
+from vibroimpact.analysis.files.opening import DAMAGE, file_attributes, unreadable
 from vibroimpact.analysis.recording import Recording, open_recording
 
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.analysis.dataset.results import file_attributes
+from vibroimpact.analysis.files.opening import file_attributes
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.file_names import refuse_no_text
 from vibroimpact.fmus.wording import typed_or_called

@@ -12,7 +12,6 @@ import xarray as xr
 from vibroimpact.analysis.dataset.schema import CONVENTIONS
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
-from vibroimpact.analysis.files.opening import opened_netcdf
 from vibroimpact.fmus.errors import DatasetError
 
 RESULTS_SCHEMA = "1"
@@ -32,15 +31,6 @@ def described(rows: Rows) -> dict[str, Any]:
         name: (dims, values, {"units": unit, "long_name": words})
         for name, (dims, values, unit, words) in rows.items()
     }
-
-
-def file_attributes(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the global attributes of a NetCDF file; none of a file that cannot be read."""
-    try:
-        with opened_netcdf(path) as file:
-            return {name: file.getncattr(name) for name in file.ncattrs()}
-    except DatasetError:
-        return {}
 
 
 def write_results(dataset: xr.Dataset, path: str | os.PathLike[str], *, kind: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import netCDF4
 
@@ -64,3 +65,12 @@ def unreadable(path: str | os.PathLike[str], problem: Exception) -> DatasetError
         f"{os.fspath(path)}: expected a readable NetCDF dataset, got {said}. "
         "The file is damaged or of another kind; write it again."
     )
+
+
+def file_attributes(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the global attributes of a NetCDF file; none of a file that cannot be read."""
+    try:
+        with opened_netcdf(path) as file:
+            return {name: file.getncattr(name) for name in file.ncattrs()}
+    except DatasetError:
+        return {}

@@ -9,7 +9,6 @@ from typing import Any
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.archive import platforms, unpack
 from vibroimpact.fmus.packaging.build import BUILT, build, read_components, update_readmes
-from vibroimpact.fmus.packaging.check import check_fmu, kinds_of
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.python_fmus import build_user_contact_law
 from vibroimpact.fmus.printing import table
@@ -51,6 +50,8 @@ def build_into(output: Path | None) -> None:
 
 def check_all(files: Sequence[Path]) -> None:
     """Check FMUs, all of the package if none is named."""
+    from vibroimpact.fmus.packaging.check import check_fmu, kinds_of  # loads fmpy, which an export needs not
+
     paths = files or [fmu_path(name, version) for name in components() for version in FOLDERS]
     problems = [f"{path}: {problem}" for path in paths for problem in check_fmu(path)]
     if problems:

@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from vibroimpact.analysis.dataset.outputs import refuse_outputs
 from vibroimpact.fmus.commands.fmu import export_component, export_user_law, note
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import say
-from vibroimpact.orchestrator.run.export import export_scene
-from vibroimpact.orchestrator.scene import load_scene
 
 USER_CONTACT_LAW = "user-contact-law"
 
@@ -42,7 +39,22 @@ def export_to_file(
     for name, count in counts.items():
         if count is not None:
             raise UsageError(f"--{name}: a scene says how many there are; leave the option out.")
-    scene_file = Path(component)
+    _export_scene_file(Path(component), output, changes, fmi, platform, kinds)
+
+
+def _export_scene_file(
+    scene_file: Path,
+    output: Path | None,
+    changes: Sequence[str] | None,
+    fmi: str,
+    platform: str | None,
+    kinds: Mapping[str, bool],
+) -> None:
+    # half a second of libraries that a component needs none of
+    from vibroimpact.analysis.dataset.outputs import refuse_outputs
+    from vibroimpact.orchestrator.run.export import export_scene
+    from vibroimpact.orchestrator.scene import load_scene
+
     scene, target = load_scene(scene_file, changes or ()), output or Path(f"{scene_file.stem}.fmu")
     refuse_outputs([scene_file], target, ending=".fmu")
     say(str(export_scene(scene, target, fmi=fmi, platform=platform, note=note, **kinds)))

@@ -61,6 +61,21 @@ def assert_misuse(done: subprocess.CompletedProcess[str], *told: str) -> None:
         assert words in done.stderr
 
 
+def test_an_export_loads_nothing_of_datasets(tmp_path: Path) -> None:
+    scene, output = str(EXAMPLES / "single_run.toml"), str(tmp_path / "body.fmu")
+    program = f"""
+import sys
+from vibroimpact.orchestrator.commands.cli import main
+try:
+    main(["fmu", "export", sys.argv[1], "-o", {output!r}])
+finally:
+    print([name for name in ("xarray", "pandas", "scipy", "dask", "matplotlib") if name in sys.modules])
+"""
+    for what in ("beam", scene):
+        done = subprocess.run([sys.executable, "-c", program, what], capture_output=True, text=True)
+        assert done.stdout.splitlines() == [output, "[]"], done.stderr
+
+
 def test_every_command_has_help_with_an_example() -> None:
     load_commands()
     group = typer.main.get_command(app)

@@ -18,9 +18,9 @@ from support.dataset_examples import everything, up_down
 
 from vibroimpact.analysis import open_dataset, write_dataset
 from vibroimpact.analysis.dataset import open_measured, read_flat, read_part
-from vibroimpact.analysis.dataset.results import file_attributes
 from vibroimpact.analysis.dataset.schema import RULES
 from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
+from vibroimpact.analysis.files.opening import file_attributes
 from vibroimpact.analysis.recording import (
     Channel,
     EventTrain,

@@ -13,7 +13,8 @@ import xarray as xr
 from support.dataset_examples import dataset_of, record
 
 from vibroimpact.analysis.dataset import write_dataset
-from vibroimpact.analysis.dataset.results import file_attributes, write_results
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.files.opening import file_attributes
 from vibroimpact.analysis.recording import (
     Channel,
     EventTrain,
