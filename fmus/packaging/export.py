@@ -12,7 +12,8 @@ import math
 import os
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -38,8 +39,8 @@ STARTS_MEMBER = "resources/starts.txt"
 #: How many of a repeated block a lean description has where nobody says it.
 LEAN_COUNTS = {"contact": 2, "sensor": 0}
 
-#: What start values begin with that set a body in motion, or may be in the way of a displacement.
-SET_IN_MOTION = ("forcing.", "contact[")
+#: What start values begin with that set a body in motion.
+SET_IN_MOTION = "forcing."
 
 #: The component that only a recording makes an FMU of.
 REPLAY = "Replay"
@@ -81,8 +82,8 @@ def export_fmu(
         `3.0` or `2.0`.
     starts : mapping of str to number or str, optional
         Start values by variable name, SI: a number, a truth value, or the name of an enumeration's value; the others
-        are the component's own. Where none is of forcing, contacts or the state at the start, the body is displaced, so
-        that a run shows motion.
+        are the component's own. Where none is of forcing or the state at the start, the body is displaced, to a side
+        where contacts leave room, so that a run shows motion.
     full : bool
         Describe all variables, as this package's own importer needs them.
     external : bool
@@ -122,32 +123,55 @@ def export_fmu(
             "`vibroimpact fmu replay recording.nc -o replay.fmu`."
         )
     original = component_of(full_name)
-    given = dict(starts or {})
-    if not full and not any(name.startswith(SET_IN_MOTION) or "_start" in name for name in given):
-        given |= original.start_of_export
-    own_starts = _checked_starts(original, given)
     asked = {"contact": contacts, "mode": modes, "mass": masses, "sensor": sensors}
     counts = {block: count for block, count in asked.items() if count is not None}
     _check_counts(original, counts)
-    if not full:
-        counts = _lean_counts(original, own_starts) | counts
-    component = original.with_repeats(counts)
-    component = with_starts(component, own_starts)
-    experiment = default_experiment(full_name, _numbers(component), stop_time)
-    suitable = default_experiment(full_name, _numbers(component))
-    edition = None
-    if not full:
-        edition = edition_of(experiment)
-        component = lean(component, external=external, enumerations=enumerations)
-    component = with_units(component, units or {})
-    _refuse_starts_beyond(component, own_starts)
-    resources = {}
-    if own_starts:
-        resources[STARTS_MEMBER] = "".join(_start_lines(original, own_starts)).encode("ascii")
-    tried = replace(experiment, stop_time=min(experiment.stop_time, suitable.stop_time))
-    contents = Contents(original, component, fmi, edition, tried, counts, resources, platform, note)
-    write_fmu(target, members_of(contents))
+
+    def members_with(given: Mapping[str, Start]) -> dict[str, bytes]:
+        own_starts = _checked_starts(original, given)
+        component, shown, edition = original, counts, None
+        if not full:
+            shown = _lean_counts(original, own_starts) | counts
+        component = with_starts(original.with_repeats(shown), own_starts)
+        experiment = default_experiment(full_name, _numbers(component), stop_time)
+        suitable = default_experiment(full_name, _numbers(component))
+        if not full:
+            edition = edition_of(experiment)
+            component = lean(component, external=external, enumerations=enumerations)
+        component = with_units(component, units or {})
+        _refuse_starts_beyond(component, own_starts)
+        resources = {}
+        if own_starts:
+            resources[STARTS_MEMBER] = "".join(_start_lines(original, own_starts)).encode("ascii")
+        tried = replace(experiment, stop_time=min(experiment.stop_time, suitable.stop_time))
+        contents = Contents(original, component, fmi, edition, tried, shown, resources, platform, note)
+        return members_of(contents)
+
+    given = dict(starts or {})
+    displaced = [] if full else _displacements(original, given)
+    write_fmu(target, _first_taken([*(given | one for one in displaced), given], members_with))
     return target
+
+
+def _first_taken(
+    choices: Sequence[Mapping[str, Start]], members_with: Callable[[Mapping[str, Start]], dict[str, bytes]]
+) -> dict[str, bytes]:
+    """Return the members with the first start values that the library takes, or the error of the last ones."""
+    *first, last = choices
+    for choice in first:
+        with suppress(UsageError):
+            return members_with(choice)
+    return members_with(last)
+
+
+def _displacements(component: ComponentDescription, starts: Mapping[str, Start]) -> list[dict[str, Start]]:
+    """Return start values that displace a body to either side; none where something else moves it."""
+    if any(name.startswith(SET_IN_MOTION) or "_start" in name for name in starts):
+        return []
+    displaced: dict[str, Start] = dict(component.start_of_export)
+    return (
+        [displaced, {name: -value for name, value in component.start_of_export.items()}] if displaced else []
+    )
 
 
 def _numbers(component: ComponentDescription) -> dict[str, Number]:

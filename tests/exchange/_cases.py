@@ -192,8 +192,9 @@ def made_pair(name: str, fmi: str, folder: Path) -> tuple[dict[str, Path], Rows]
     rows = np.column_stack([samples[output.replace(".", "_")].values for output in PAIR_OUTPUTS])[
         1 : COUNT + 1
     ]
+    still = {"displacement_start": 0.0}  # else an export that nothing moves starts displaced
     fmus = {
-        one: export_fmu("oscillator", folder / f"{one}.fmu", fmi=fmi, starts=parameters)
+        one: export_fmu("oscillator", folder / f"{one}.fmu", fmi=fmi, starts=still | parameters)
         for one, parameters in pair.parameters.items()
     }
     return fmus, rows

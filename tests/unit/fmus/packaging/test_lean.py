@@ -115,6 +115,34 @@ def test_a_run_that_nobody_set_anything_for_shows_motion(tmp_path: Path, name: s
     assert 100 <= len(values["time"]) <= 20_000
 
 
+@pytest.mark.parametrize(
+    "stops",
+    [
+        {"contact[1].law": "restitution"},
+        {"contact[1].law": "restitution", "contact[1].side": "lower"},
+        {"contact[1].law": "restitution", "contact[1].position": -0.005, "contact[2].law": "none"},
+    ],
+    ids=str,
+)
+def test_a_body_of_which_only_stops_are_set_is_displaced_to_where_they_leave_room(
+    tmp_path: Path, stops: dict[str, str | float]
+) -> None:
+    path = export_fmu("oscillator", tmp_path / "rig.fmu", fmi="2.0", starts=stops)
+    assert simulated(path, output=["contact[1].count"])["contact[1].count"][-1] > 20
+
+
+def test_a_body_that_its_stops_hold_starts_where_it_is(tmp_path: Path) -> None:
+    stops = {f"contact[{k}].law": "restitution" for k in (1, 2)} | {"contact[2].side": "lower"}
+    stops |= {"contact[1].position": 1e-3, "contact[2].position": -1e-3}
+    path = export_fmu("oscillator", tmp_path / "held.fmu", fmi="2.0", starts=stops)
+    with ComponentFmu(path, version="2.0") as fmu:
+        assert fmu.get("displacement") == 0.0
+    stops["contact[1].position"] = -1e-3
+    with pytest.raises(UsageError, match=r"contact\[2\]\.position: expected room between the stops"):
+        export_fmu("oscillator", tmp_path / "none.fmu", starts=stops)
+    assert not (tmp_path / "none.fmu").exists()
+
+
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_start_values_of_an_export_are_those_of_the_description_and_of_the_binary(
     tmp_path: Path, fmi: str
