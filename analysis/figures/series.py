@@ -210,9 +210,18 @@ def _name_lines(axis: Axes, variables: list[xr.DataArray], lines: list[Artist], 
 
 def _common(variables: list[xr.DataArray]) -> str:
     """Return the quantity that all variables of a panel are: their common words, or the last part of their names."""
-    quantities = {_quantity(variable) or title(variable).rpartition(".")[2] for variable in variables}
+    quantities = {_quantity(variable) or _last_name(title(variable)) for variable in variables}
     words = min(quantities).replace("_", " ") if len(quantities) == 1 else ""
     return words if len(words) <= _LONGEST_QUANTITY else ""
+
+
+def _last_name(name: str) -> str:
+    """Return what a variable of a component is, whichever of them it is.
+
+    >>> _last_name("soft.displacement[3]"), _last_name("load")
+    ('displacement', 'load')
+    """
+    return name.rpartition(".")[2].partition("[")[0]
 
 
 def _columns(variables: list[xr.DataArray]) -> int:

@@ -20,6 +20,17 @@ from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted, s
 
 LARGEST_FILE = 2**20  # bytes; a scene is some hundred lines, and more is most likely another kind of file
 
+OTHER_KINDS = (
+    (
+        b"PK\x03\x04",
+        "an archive",
+        "An FMU runs as a component of a scene ([component.NAME]); a system's name ends in .ssp.",
+    ),
+    (b"\x89HDF", "a NetCDF or HDF5 file", "`vibroimpact describe` says what it holds."),
+    (b"CDF", "a NetCDF file", "`vibroimpact describe` says what it holds."),
+)
+"""What files that are no text begin with, what they are, and where such a file is taken."""
+
 _VALUE = "a value that TOML has: a number, True, False, text, a sequence or a mapping"
 
 
@@ -139,6 +150,11 @@ def _read_bytes(path: Path, source: str) -> bytes:
         raise _file_error(
             source, "a readable scene file", f"an error: {reason}", "Check the path and its rights."
         ) from None
+    for first, kind, hint in OTHER_KINDS:
+        if content.startswith(first):
+            raise _file_error(source, "a scene file (TOML)", kind, hint)
+    if b"\0" in content[:LARGEST_FILE]:
+        raise _file_error(source, "a scene file (TOML)", "a file that is no text", "Name a .toml file.")
     if len(content) > LARGEST_FILE:
         hint = "Write a long list of values as a range, and check that this is a scene."
         raise _file_error(source, "a scene file of at most 1 MiB", "a larger one", hint)

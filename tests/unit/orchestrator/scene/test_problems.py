@@ -238,9 +238,25 @@ def test_a_file_that_is_not_utf_8_is_told_with_the_line(tmp_path: Path) -> None:
     assert load_problem(path) == "line 2: expected UTF-8 text, got the byte 0xe4. Save the file as UTF-8."
 
 
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (b"PK\x03\x04" + bytes(2**21), "an archive. An FMU runs as a component of a scene"),
+        (b"\x89HDF\r\n\x1a\n", "a NetCDF or HDF5 file. `vibroimpact describe` says what it holds."),
+        (b"\x7fELF\x02\0", "a file that is no text. Name a .toml file."),
+    ],
+    ids=["FMU", "dataset", "program"],
+)
+def test_a_file_of_another_kind_is_told_by_what_it_is(tmp_path: Path, content: bytes, kind: str) -> None:
+    path = tmp_path / "wrong.toml"
+    path.write_bytes(content)
+    assert load_problem(path).startswith(f"expected a scene file (TOML), got {kind}")
+
+
 def test_a_huge_file_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "huge.toml"
     with path.open("wb") as file:
+        file.write(b" " * 2**20)
         file.truncate(2**34)
     assert "expected a scene file of at most 1 MiB" in load_problem(path)
 
