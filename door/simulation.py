@@ -260,7 +260,7 @@ def export_ssp(
     *,
     ssp: str = "1.0",
     fmi: str | None = None,
-    gains: str = "transformation",
+    gains: str = "component",
     platform: str | None = None,
 ) -> Path:
     """Write a scene of components as a system (SSP) that other tools run; `import_ssp` gives it back.
@@ -276,7 +276,7 @@ def export_ssp(
     fmi : str, optional
         Version of FMI of this package's components in the archive; by default 2.0, in SSP 2.0 that of the scene.
     gains : str
-        How a connection has its gain: as a `transformation`, or as a `component` with units of its own.
+        How a connection has its gain: as a `component` with units of its own, or as a `transformation`.
     platform : str, optional
         As `vibroimpact.fmus.export` has it.
 

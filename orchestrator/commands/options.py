@@ -215,10 +215,10 @@ def export_ssp(
     gains: Annotated[
         str,
         typer.Option(
-            help="A gain is a transformation of its connection, or a component with units of its own, which is all "
-            "that OMSimulator takes."
+            help="A gain is a component with units of its own, or a transformation of its connection: without delay "
+            "where values are exchanged once a step, but OMSimulator leaves it out."
         ),
-    ] = "transformation",
+    ] = "component",
     platform: Annotated[
         str | None, typer.Option(help="Machines it is for, as `vibroimpact fmu export` has them.")
     ] = None,

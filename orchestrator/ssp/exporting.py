@@ -16,11 +16,11 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp.members import Travel, component_members
 from vibroimpact.orchestrator.ssp.names import SSD_FILE, VERSIONS
 from vibroimpact.orchestrator.ssp.scene_tables import OWN_TABLES
-from vibroimpact.orchestrator.ssp.writing import description, parameter_set
+from vibroimpact.orchestrator.ssp.writing import description, parameter_set, swept_members
 
 ABOUT_A_RUN = ("scene", "record", "sweep", "execution")
 """Tables of a scene that say how it is run, not what it is."""
-GAINS = ("transformation", "component")
+GAINS = ("component", "transformation")
 
 
 def export_system(
@@ -29,7 +29,7 @@ def export_system(
     *,
     ssp: str = "1.0",
     fmi: str | None = None,
-    gains: str = "transformation",
+    gains: str = "component",
     platform: str | None = None,
     note: Note = lambda _: None,
 ) -> Path:
@@ -47,8 +47,8 @@ def export_system(
         Version of the FMUs of this package's components in the archive, `2.0` or `3.0`. By default 2.0, the version
         that SSP 1.0 knows, and in SSP 2.0 that of the scene.
     gains : str
-        How a connection has its gain: as a `transformation` of its value, or as a `component` with units of its own,
-        for tools that take no other.
+        How a connection has its gain: as a `component` with units of its own (a spring between bodies is one in N/m),
+        or as a `transformation` of its value, which OMSimulator leaves out and Ecos and libcosim take without a delay.
     platform
         As `vibroimpact.fmus.export` has it.
     note : callable
@@ -93,8 +93,15 @@ def export_system(
         members[SSD_FILE] = description(scene, general, parts, ssp, duration)
     except SceneError as error:
         raise UsageError(str(error)) from None
+    members |= swept_members(scene, parts, ssp)
     target = Path(output)
     write_fmu(target, members)
+    springs = [part.name for part in parts.values() if part.gain_of is not None]
+    if springs:
+        note(
+            f"{', '.join(springs)}: each gain is a component; a tool that exchanges values once a step answers one "
+            f"step later through it than with {option('gains')} transformation"
+        )
     for name in parse_toml(scene.text).keys() - {*OWN_TABLES, *ABOUT_A_RUN}:
         note(f"[[{name}]] travels in an annotation: other tools run the system without it")
     return target

@@ -16,7 +16,7 @@ from vibroimpact.fmus.units import BASE_UNITS, Unit, agree
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.general.component_facts import NUMERIC_KINDS, StartValue, VariableFacts
-from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene, component_variable, gain_place
 from vibroimpact.orchestrator.ssp.members import Part
 from vibroimpact.orchestrator.ssp.names import (
     ANNOTATION,
@@ -29,6 +29,8 @@ from vibroimpact.orchestrator.ssp.scene_tables import OWN_TABLES
 
 START_VALUES = "start"
 """Name of the parameter set of each component."""
+SWEPT_VALUES, SWEPT_MAPPING = "resources/system.sweep.ssv", "resources/system.sweep.ssm"
+"""Members with what the scene sweeps; no component has a dot in its name."""
 KINDS = {
     "1.0": frozenset({"input", "output", "parameter", "calculatedParameter"}),
     "2.0": frozenset({"input", "output", "parameter", "calculatedParameter", "local"}),
@@ -60,6 +62,10 @@ def description(
     root.set("name", _NO_IDENTIFIER.sub("_", scene.title) or "model")
     root.set("description", scene.title)
     system = SubElement(root, "ssd:System", name="system")
+    if swept_values(scene, parts):
+        bindings = SubElement(system, "ssd:ParameterBindings")
+        binding = SubElement(bindings, "ssd:ParameterBinding", source=SWEPT_VALUES)
+        SubElement(binding, "ssd:ParameterMapping", source=SWEPT_MAPPING)
     elements = SubElement(system, "ssd:Elements")
     shown = {part.name: _shown(part, general, scene, ssp) for part in parts.values()}
     for part in parts.values():
@@ -91,13 +97,55 @@ def description(
 
 def parameter_set(part: Part, ssp: str) -> bytes:
     """Return the SSV of a component's start values."""
+    values = {name: (part.facts.variables[name], value) for name, value in part.values.items()}
+    return _parameter_set(START_VALUES, values, ssp)
+
+
+def _parameter_set(name: str, values: Mapping[str, tuple[VariableFacts, StartValue]], ssp: str) -> bytes:
     root = _root("ssv:ParameterSet", ssp, ("ssc",))
-    root.set("name", START_VALUES)
+    root.set("name", name)
     parameters = SubElement(root, "ssv:Parameters")
-    for name, value in part.values.items():
-        kind, text = _value(part.facts.variables[name], value)
-        SubElement(SubElement(parameters, "ssv:Parameter", name=name), f"ssv:{kind}", value=text)
+    for parameter, (variable, value) in values.items():
+        kind, text = _value(variable, value)
+        SubElement(SubElement(parameters, "ssv:Parameter", name=parameter), f"ssv:{kind}", value=text)
     return _written(root)
+
+
+def swept_values(scene: Scene, parts: Mapping[str, Part]) -> dict[str, tuple[str, str]]:
+    """Return what the scene sweeps that is a start value of a component: its element and variable, by its coordinate.
+
+    A coordinate is what a dataset calls a swept key: `mass` of `b.mass`. A gain is one where it is a component.
+    """
+    assert scene.general is not None
+    gains = {part.gain_of: part.name for part in parts.values() if part.gain_of is not None}
+    found = {}
+    for axis in scene.sweep:
+        place = gain_place(axis.key)
+        if place is not None:
+            end = gains.get(scene.general.connections[place], ""), "gain"
+        else:
+            end = component_variable(axis.key)
+        if end[0] in parts and end[1] in parts[end[0]].values:
+            found[scene.sweep_coordinate_name(axis.key)] = end
+    return found
+
+
+def swept_members(scene: Scene, parts: Mapping[str, Part], ssp: str) -> dict[str, bytes]:
+    """Return the SSV of what the scene sweeps, and the SSM that maps its names to the components'; nothing without.
+
+    Another tool varies in this one set what the scene sweeps; the values are those that the components have.
+    """
+    swept = swept_values(scene, parts)
+    if not swept:
+        return {}
+    values = {
+        name: (parts[component].facts.variables[variable], parts[component].values[variable])
+        for name, (component, variable) in swept.items()
+    }
+    mapping = _root("ssm:ParameterMapping", ssp, ("ssc",))
+    for name, end in swept.items():
+        SubElement(mapping, "ssm:MappingEntry", source=name, target=".".join(end))
+    return {SWEPT_VALUES: _parameter_set("sweep", values, ssp), SWEPT_MAPPING: _written(mapping)}
 
 
 def _notes(general: GeneralScene, parts: Mapping[str, Part]) -> Iterator[tuple[str, dict[str, str]]]:

@@ -1,4 +1,8 @@
-"""A scene of components as an SSP archive in other tools: its own run to 1e-9, with nothing set and nothing edited."""
+"""A scene of components as an SSP archive in other tools: its own run to 1e-9, with nothing set and nothing edited.
+
+Where a gain is a component and a tool exchanges values once a step, it is the motion whose springs answer one step
+late.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +20,12 @@ HERE = [pair for pair in PAIRS if pair[0].package or not pair[0].missing()]
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("tool", "fmi", "gains"), HERE, ids=[f"{tool.name}, FMI {fmi}" for tool, fmi, _ in HERE]
+    ("tool", "fmi", "gains"), HERE, ids=[f"{tool.name}, FMI {fmi}, {gains}" for tool, fmi, gains in HERE]
 )
 def test_a_system_in_another_tool_is_our_own_run(tmp_path: Path, tool: Tool, fmi: str, gains: str) -> None:
     if reason := tool.missing():
         pytest.skip(reason)
-    system, expected = made(tmp_path, fmi, gains)
+    system, expected = made(tmp_path, tool, fmi, gains)
     rows = np.array(run_system(tool, system, NAMES, STEP, COUNT, tmp_path).rows)
     assert rows.shape == expected.shape == (COUNT, 2)
     assert np.ptp(expected[:, 1]) > 0.9

@@ -69,6 +69,26 @@ def test_an_archive_is_valid_and_fmpy_reads_what_the_scene_says(system: Path) ->
     assert all(name == "SystemStructure.ssd" or name.startswith("resources/") for name in names)
 
 
+def test_what_is_swept_is_one_parameter_set_of_the_system_mapped_to_its_components(
+    system: Path, tmp_path: Path
+) -> None:
+    (binding,) = read_ssd(str(system)).system.parameterBindings
+    given = {p.name: float(p.value) for p in read_ssv(str(system), binding.source).parameters}
+    springs = {"gain": 0.25} if "resources/gain_1.fmu" in zipfile.ZipFile(system).namelist() else {}
+    assert given == {"mass": 2.0, **springs}
+    changed = tmp_path / "changed.ssp"
+    with zipfile.ZipFile(system) as old, zipfile.ZipFile(changed, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            if name == "resources/system.sweep.ssv":
+                content = content.replace(b'"2.0"', b'"7.0"').replace(b'"0.25"', b'"0.75"')
+            new.writestr(name, content)
+    general = load_system(changed).scene.general
+    assert general is not None
+    assert {c.name: c for c in general.components}["b"].parameters["mass"] == 7.0
+    assert general.connections[0].gain == (0.75 if springs else 0.25)
+
+
 @pytest.mark.slow
 def test_the_scene_comes_back_with_its_sweep_and_gives_the_same_dataset(system: Path) -> None:
     ours, theirs = vi.Scene.from_dict(TWO), load_system(system).scene
@@ -136,7 +156,7 @@ def test_one_file_travels_once_and_names_stay_apart_where_case_does_not_count(tm
     [
         ({"ssp": "1.1"}, "expected 1.0 or 2.0, got '1.1'"),
         ({"fmi": "1.0"}, "expected 3.0 or 2.0, got '1.0'"),
-        ({"gains": "none"}, "expected transformation or component"),
+        ({"gains": "none"}, "expected component or transformation"),
     ],
 )
 def test_other_versions_are_refused(tmp_path: Path, options: dict[str, str], expected: str) -> None:
