@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from vibroimpact.fmus import fmu_path
+from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import Value, description_of
 from vibroimpact.orchestrator.importer.events import Event
@@ -55,6 +56,24 @@ def body_integers(integers: Mapping[str, int]) -> dict[str, int]:
     return {name: law_of(v) if name.endswith("].law") else v for name, v in integers.items()}
 
 
+def stop_of(k: int, integers: Mapping[str, int], version: str = "3.0") -> ComponentSpec:
+    """Return the component of stop `k` (1-based) with its law and side."""
+    law, side = integers.get(f"contact[{k}].law", RESTITUTION), integers.get(f"contact[{k}].side", 1)
+    known = law if law in (RESTITUTION, *COMPLIANT) else RESTITUTION
+    return ComponentSpec(stop_name(k), fmu_path("ImpactStop", version), {"law": known, "side": side})
+
+
+def stop_parameters(stops: int, floats: Mapping[str, float]) -> dict[tuple[str, str], str]:
+    """Return the parameters of the stops, with the names of the body's parameters that they come from."""
+    known = {v.name for v in description_of(fmu_path("ImpactStop")).modelVariables}
+    return {
+        (stop_name(k), name): f"contact[{k}].{name}"
+        for k in range(1, stops + 1)
+        for name in LAW_PARAMETERS
+        if f"contact[{k}].{name}" in floats and name in known
+    }
+
+
 class CoupledDriver(RecordedBody):
     """Drives a body and its stops through whole runs.
 
@@ -73,6 +92,8 @@ class CoupledDriver(RecordedBody):
         Name of the body's FMU: `Oscillator`, `Chain` or `Beam`.
     others, connections : sequences
         Further components, such as a Replay, and how they are connected to the body.
+    wrap : callable or None
+        Given a component's name: what wraps the functions of its FMU.
     """
 
     def __init__(
@@ -86,37 +107,20 @@ class CoupledDriver(RecordedBody):
         body: str = "Oscillator",
         others: Sequence[ComponentSpec] = (),
         connections: Sequence[ConnectionSpec] = (),
+        wrap: WrapOf | None = None,
     ) -> None:
         self._limit = integers["impact_limit"]
         own = {name: value for name, value in integers.items() if name != "impact_limit"}
-        self._stops = [self._stop(k, own) for k in range(1, stops + 1)]
+        self._stops = [stop_of(k, own) for k in range(1, stops + 1)]
         specs = [ComponentSpec(BODY, fmu_path(body), body_integers(own)), *self._stops, *others]
         joined = [*connections_of(stops), *connections]
-        self.importer = Importer(specs, joined, macro_step=macro_step, exchange=exchange)
+        self.importer = Importer(specs, joined, macro_step=macro_step, exchange=exchange, wrap=wrap)
         self.importer.on_event = self._count_event
         self.importer.on_pause = self._make_room
-        self._stop_floats = self._stop_parameters(floats)
+        self._stop_floats = stop_parameters(stops, floats)
         super().__init__(self._group)
         self.importer.watchers.append(self._deadline.watcher)
         self._events = 0
-
-    @staticmethod
-    def _stop(k: int, integers: Mapping[str, int]) -> ComponentSpec:
-        """A stop with its law and side."""
-        law, side = integers.get(f"contact[{k}].law", RESTITUTION), integers.get(f"contact[{k}].side", 1)
-        known = law if law in (RESTITUTION, *COMPLIANT) else RESTITUTION
-        return ComponentSpec(stop_name(k), fmu_path("ImpactStop"), {"law": known, "side": side})
-
-    def _stop_parameters(self, floats: Mapping[str, float]) -> dict[tuple[str, str], str]:
-        """Parameters of the stops, with the names of the body's parameters that they come from."""
-        known = {v.name for v in description_of(fmu_path("ImpactStop")).modelVariables}
-        ports = [(stop.name, f"contact[{k}]") for k, stop in enumerate(self._stops, 1)]
-        return {
-            (stop, name): f"{port}.{name}"
-            for stop, port in ports
-            for name in LAW_PARAMETERS
-            if f"{port}.{name}" in floats and name in known
-        }
 
     def _group(self, kind: str, names: Sequence[str], size: int | None = None) -> VariableGroup:
         body = self.importer.components[BODY]

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.packaging.archive import unpack
-from vibroimpact.orchestrator.fmi.instance import DISCARD
+from vibroimpact.orchestrator.fmi.instance import DISCARD, WrapOf
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import description_of
@@ -24,15 +24,22 @@ class BodyDriver(RecordedBody):
         Integer and enumeration parameters, the same for all runs.
     body : str
         Name of the FMU: `Oscillator`, `Chain` or `Beam`.
+    wrap : callable or None
+        Given a component's name: what wraps the functions of its FMU.
     """
 
     def __init__(
-        self, floats: Mapping[str, float], integers: Mapping[str, int], body: str = "Oscillator"
+        self,
+        floats: Mapping[str, float],
+        integers: Mapping[str, int],
+        body: str = "Oscillator",
+        *,
+        wrap: WrapOf | None = None,
     ) -> None:
         path = fmu_path(body, "3.0")
         self.fmu = unpack(path)
         self._references = {v.name: v.valueReference for v in description_of(path).modelVariables}
-        self.instance = Instance3(self.fmu, "body", early_return=True)
+        self.instance = Instance3(self.fmu, "body", early_return=True, wrap=wrap and wrap("body"))
         super().__init__(self._group)
         self._floats = self._group("Float64", tuple(floats))
         self._float_names = tuple(floats)

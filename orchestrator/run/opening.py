@@ -67,7 +67,7 @@ def open_runner(
         return GeneralRunner(scene, execution=execution, log=log, wrap=wrap)
     if scene.replay is not None:
         return named_runner(scene, REPLAY_RUNNER, execution)
-    return PointRunner(scene, execution=execution)
+    return PointRunner(scene, execution=execution, wrap=wrap)
 
 
 def named_runner(scene: Scene, dotted: str, execution: str | None = None) -> Runner:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError, SceneError
+from vibroimpact.orchestrator.fmi.instance import WrapOf
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.run.coupled import CoupledDriver
 from vibroimpact.orchestrator.run.fused import BodyDriver
@@ -48,6 +49,8 @@ class PointRunner:
         The scene; swept keys take their values from each point.
     execution : str
         `fused`, `coupled`, or `auto`, which takes `fused`.
+    wrap : callable or None
+        Given a component's name: what wraps the functions of its FMU.
 
     Attributes
     ----------
@@ -59,12 +62,12 @@ class PointRunner:
         SHA-256 of each component's FMU, by instance.
     """
 
-    def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
+    def __init__(self, scene: Scene, *, execution: str = "auto", wrap: WrapOf | None = None) -> None:
         self.execution = "fused" if execution == "auto" else execution
         self.instruction_set = platform.machine()
         self._scene = scene
         self._plan = TimeSeriesPlan(scene)
-        self._driver = driver_of(scene, self.execution)
+        self._driver = driver_of(scene, self.execution, wrap=wrap)
         self._driver.watch(
             contacts=len(scene.stops),
             sampled=self._plan.variables,
@@ -107,12 +110,14 @@ def driver_of(
     execution: str,
     others: Sequence[ComponentSpec] = (),
     connections: Sequence[ConnectionSpec] = (),
+    *,
+    wrap: WrapOf | None = None,
 ) -> RecordedBody:
     """Return what drives a scene's body: fused, or coupled to its stops and to other components."""
     floats, integers = float_parameters(scene, None), integer_parameters(scene)
     fmu = FMU_NAMES[scene.body.kind]
     if execution == "fused":
-        return BodyDriver(floats, integers, fmu)
+        return BodyDriver(floats, integers, fmu, wrap=wrap)
     if execution == "coupled":
         step = scene.execution.macro_step
         return CoupledDriver(
@@ -124,8 +129,28 @@ def driver_of(
             body=fmu,
             others=others,
             connections=connections,
+            wrap=wrap,
         )
     raise SceneError([f'{scene.source}: execution.how: expected "fused" or "coupled", got "{execution}".'])
+
+
+def recorded_window(scene: Scene, parameters: Mapping[str, float]) -> tuple[float, float]:
+    """Return start and end of the recording, s; those of a forced scene are at forcing phase 0.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of the short form.
+    parameters : mapping of str to float
+        Of its body, as `float_parameters` gives them.
+    """
+    record, period = scene.record, scene.period
+    if period is None:
+        return record.transient_time, record.transient_time + record.recorded_time
+    phase = parameters["forcing.phase"] % TWO_PI
+    lag = phase / parameters["forcing.angular_frequency"]
+    first = record.transient_periods + (1 if phase > 0.0 else 0)
+    return first * period - lag, (first + record.recorded_periods) * period - lag
 
 
 class _Run:
@@ -139,17 +164,7 @@ class _Run:
         self.plan = plan
         self.parameters = float_parameters(scene, start)
         self.samples = array("d")
-        self.begin_time, self.end_time = self._window()
-
-    def _window(self) -> tuple[float, float]:
-        """Start and end of the recording, s; those of a forced scene are at forcing phase 0."""
-        record, period = self.scene.record, self.scene.period
-        if period is None:
-            return record.transient_time, record.transient_time + record.recorded_time
-        phase = self.parameters["forcing.phase"] % TWO_PI
-        lag = phase / self.parameters["forcing.angular_frequency"]
-        first = record.transient_periods + (1 if phase > 0.0 else 0)
-        return first * period - lag, (first + record.recorded_periods) * period - lag
+        self.begin_time, self.end_time = recorded_window(scene, self.parameters)
 
     def run(self) -> tuple[Outcome, str]:
         """Run to the end; returns how that went."""
