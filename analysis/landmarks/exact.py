@@ -65,6 +65,40 @@ class ImpactOscillator:
         """Static deflection under the force amplitude, m."""
         return self.amplitude / self.stiffness
 
+    def single_impact_motions(self, angular_frequency: float) -> tuple[tuple[float, float], ...]:
+        """Return the motions of one impact in each forcing period, P(1,1): thesis eqs. 2.48-2.66, equations.md 4.3.
+
+        Parameters
+        ----------
+        angular_frequency : float
+            Of the force, rad/s.
+
+        Returns
+        -------
+        tuple of (float, float)
+            Impact velocity (m/s) and forcing phase at impact (rad, from 0 to 2 pi) of each that passes no stop
+            between two impacts; stable or not.
+
+        Examples
+        --------
+        >>> (motion,) = ImpactOscillator(1.0, 0.08, 1.0, 0.45, 0.8, 0.75).single_impact_motions(1.1)
+        >>> print("%.14f %.14f" % motion)
+        0.95248614777472 0.21056066189221
+        """
+        w, a, zeta = angular_frequency / self.natural_frequency, self.stop_position, self.damping_ratio
+        alpha, after = (float(value) for value in _homogeneous(self, w))
+        slope = -(after + self.restitution) / w
+        steady = self.force / complex(1.0 - w**2, 2.0 * zeta * w)
+        c, s = steady.real, -steady.imag
+        roots = np.roots([alpha**2 + slope**2, -2.0 * a * alpha, a**2 - abs(steady) ** 2])
+        found = []
+        for velocity in sorted(float(root.real) for root in roots if root.imag == 0.0 and root.real > 0.0):
+            y, v = a - alpha * velocity, slope * velocity
+            theta = math.atan2(s * y - c * v, c * y + s * v)
+            if _clears_the_stop(self, w, velocity, theta):
+                found.append((velocity * self.natural_frequency, theta % (2.0 * math.pi)))
+        return tuple(found)
+
     @classmethod
     def from_scene(cls, text: str) -> ImpactOscillator:
         """Read the parameters from the text of a scene.
@@ -83,6 +117,10 @@ class ImpactOscillator:
                 "Exact landmarks are known for that one only."
             )
         body, stop = scene["body"], stops[0]
+        if stop.get("law", "restitution") != "restitution":
+            raise DatasetError(
+                f"scene: expected an impulsive stop at a positive distance, got law {stop['law']!r}."
+            )
         sign = -1.0 if stop.get("side", "upper") == "lower" else 1.0
         oscillator = cls(
             mass=float(body["mass"]),
@@ -94,10 +132,10 @@ class ImpactOscillator:
         )
         if oscillator.damping_ratio >= 1:
             raise DatasetError(f"scene: expected damping_ratio < 1, got {oscillator.damping_ratio}.")
-        if stop.get("law", "restitution") != "restitution" or oscillator.stop_position <= 0:
+        if oscillator.stop_position <= 0:
             raise DatasetError(
                 "scene: expected an impulsive stop at a positive distance, "
-                f"got law {stop.get('law')!r} at distance {oscillator.stop_position}."
+                f"got distance {oscillator.stop_position}."
             )
         return oscillator
 
