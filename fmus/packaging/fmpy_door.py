@@ -1,20 +1,25 @@
 """The one door to FMPy: descriptions read and validated by the reference implementation of FMI in Python.
 
-No other module imports fmpy; the drivers of FMUs call their functions directly.
+No other module imports fmpy; the drivers of FMUs call their functions directly. What integrates an FMU for model
+exchange, which this package does not, is FMPy's too.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import fmpy
+import numpy as np
+from fmpy import simulate_fmu
 from fmpy.model_description import ModelDescription, ModelVariable, ValidationError, read_model_description
 from fmpy.validation import validate_fmu
 
-from vibroimpact.fmus.errors import ComponentFileError
+from vibroimpact.fmus.errors import ComponentError, ComponentFileError
 from vibroimpact.fmus.packaging.archive import unpack
 
-__all__ = ["ModelDescription", "ModelVariable", "read_description", "schema_folder", "validate"]
+__all__ = ["ModelDescription", "ModelVariable", "integrated", "read_description", "schema_folder", "validate"]
 
 
 def read_description(path: Path) -> ModelDescription:
@@ -39,6 +44,64 @@ def validate(path: Path) -> tuple[str, ...]:
     """Return what `fmpy validate` finds wrong with an FMU; the file is checked for safety first."""
     unpack(path)
     return tuple(validate_fmu(str(path)))
+
+
+def integrated(
+    path: Path,
+    stop_time: float,
+    output: Sequence[str],
+    *,
+    tolerance: float,
+    start_values: Mapping[str, float],
+    interval: float,
+    step_finished: Callable[[float], bool] = lambda time: True,
+) -> np.ndarray[Any, Any]:
+    """Return what an FMU for model exchange gives when FMPy's CVode integrates it.
+
+    Parameters
+    ----------
+    path : Path
+        The FMU.
+    stop_time : float
+        The end, s, from time 0.
+    output : sequence of str
+        Variables, numbers.
+    tolerance : float
+        Relative tolerance of the integrator.
+    start_values : mapping of str to float
+        Enumerations as integers.
+    interval : float
+        Time between two rows, s; events have rows too.
+    step_finished : callable
+        Given the time after each step; what it answers says whether to go on.
+
+    Returns
+    -------
+    ndarray
+        A structured array: `time`, then the variables.
+
+    Raises
+    ------
+    ComponentError
+        The integrator or the FMU failed, with what FMPy says.
+    """
+    folder = str(unpack(path).folder)
+    try:
+        found: np.ndarray[Any, Any] = simulate_fmu(
+            folder,
+            fmi_type="ModelExchange",
+            solver="CVode",
+            stop_time=stop_time,
+            output=list(output),
+            relative_tolerance=tolerance,
+            start_values=dict(start_values),
+            output_interval=interval,
+            step_finished=lambda time, recorder: step_finished(time),
+        )
+    except Exception as error:
+        # FMPy raises plain Exception where a solver gives up
+        raise ComponentError(f"{path.stem}: model exchange: {error}") from error
+    return found
 
 
 def schema_folder() -> Path:
