@@ -53,6 +53,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.hardware.recordings import ImportSettings as ImportSettings
     from vibroimpact.hardware.recordings import import_recording as import_recording
     from vibroimpact.orchestrator.scene import Scene as Scene
+    from vibroimpact.simulation import accuracy as accuracy
     from vibroimpact.simulation import campaign as campaign
     from vibroimpact.simulation import cost_of as cost_of
     from vibroimpact.simulation import export_fmu as export_fmu
@@ -83,7 +84,16 @@ _NAMES = {
     "fmus.errors": ("VibroimpactError",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
     "orchestrator.scene": ("Scene",),
-    "simulation": ("campaign", "cost_of", "export_fmu", "export_ssp", "import_ssp", "replay", "run"),
+    "simulation": (
+        "accuracy",
+        "campaign",
+        "cost_of",
+        "export_fmu",
+        "export_ssp",
+        "import_ssp",
+        "replay",
+        "run",
+    ),
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}
 _ROOMS = {"figures": "analysis.figures", "fmus": "fmus"}

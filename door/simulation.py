@@ -29,6 +29,8 @@ from vibroimpact.orchestrator.ssp import (
     opened_scene,
     refuse_system_elsewhere,
 )
+from vibroimpact.orchestrator.study import BUDGET, refuse_unreached, study_accuracy
+from vibroimpact.orchestrator.study import dataset_of as accuracy_dataset
 
 SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
 PathLike = str | os.PathLike[str]
@@ -182,6 +184,54 @@ def replay(
     if path is not None:
         write_results(whole.dataset, _path(path), kind="replay")
     return whole.dataset
+
+
+def accuracy(
+    scene: SceneLike,
+    path: PathLike | None = None,
+    *,
+    tolerance: float | None = None,
+    of: str = "all",
+    budget: float = BUDGET,
+) -> xr.Dataset:
+    """Simulate a scene in all ways that it can be, and measure what the accuracy of each costs in time.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        Its sweep is left out.
+    path : path, optional
+        The dataset to write as well (.nc).
+    tolerance : float, optional
+        Relative error for which the cheapest way is looked for.
+    of : str
+        What errors are of: `impact_time`, `impact_velocity`, `displacement_range`, `final_state`, `samples`, or `all`.
+    budget : float
+        Wall time to spend, about, s.
+
+    Returns
+    -------
+    xarray.Dataset
+        `error` and `cost` (s) of each `way`, what is wrong with it (`failure`); `attrs["verdict"]` says what to choose.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+    UsageError
+        There is nothing to vary, no such quantity, or no way reaches the tolerance.
+
+    Examples
+    --------
+    >>> accuracy("examples/single_run.toml", tolerance=1e-6).attrs["chosen"]    # doctest: +SKIP
+    'fused'
+    """
+    study = study_accuracy(_scene(scene), tolerance=tolerance, quantity=of, budget=budget)
+    dataset = accuracy_dataset(study)
+    if path is not None:
+        write_results(dataset, _path(path), kind="accuracy")
+    refuse_unreached(study)
+    return dataset.assign_attrs(results_kind="accuracy")
 
 
 def cost_of(scene: SceneLike) -> SceneCost:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.accuracy import draw_accuracy
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
@@ -39,13 +40,14 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.wording import option
 
 Data = xr.Dataset | Recording
-Family = Literal["runs", "recording", "replay", "estimates", "spikes", "ladder"]
+Family = Literal["runs", "recording", "replay", "estimates", "spikes", "accuracy", "ladder"]
 _WORDS: dict[Family, str] = {
     "runs": "a dataset of runs",
     "recording": "a recording",
     "replay": "a replay",
     "estimates": "estimates",
     "spikes": "spikes",
+    "accuracy": "a study of accuracy",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -141,6 +143,7 @@ KINDS: dict[str, FigureKind] = {
     ),
     "estimates": FigureKind({"estimates": lambda data, view: draw_estimates(data)}),
     "intervals": FigureKind({"spikes": lambda data, view: draw_intervals(data)}),
+    "accuracy": FigureKind({"accuracy": lambda data, view: draw_accuracy(data)}),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
@@ -195,7 +198,12 @@ def _family(data: Data) -> Family:
             f"figure: expected a dataset or a recording, got {type(data).__name__}. "
             "open_dataset, open_measured and open_recording open files."
         )
-    results: dict[str, Family] = {"replay": "replay", "estimates": "estimates", "spikes": "spikes"}
+    results: dict[str, Family] = {
+        "replay": "replay",
+        "estimates": "estimates",
+        "spikes": "spikes",
+        "accuracy": "accuracy",
+    }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:
         return results[written]

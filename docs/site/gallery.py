@@ -91,6 +91,9 @@ def kinds() -> dict[str, Picture]:
         "scores": _of("scores", "grid", "vibroimpact replay grid.toml hit.nc -o grid --workers 2"),
         "estimates": _of("estimates", "found", "vibroimpact estimate impacts single_run.nc -o found.nc"),
         "intervals": _of("intervals", "trains", "vibroimpact spikes figure_2_11.nc -o trains.nc"),
+        "accuracy": _of(
+            "accuracy", "study", "vibroimpact accuracy examples/single_run.toml -o study.nc --tolerance 1e-6"
+        ),
         "convergence": _of("convergence", "ladder"),
         "work-precision": _of("work-precision", "ladder"),
     }

@@ -28,7 +28,7 @@ ssp_commands = typer.Typer(no_args_is_help=True, help="Exchange systems of FMUs 
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this package to the command line."""
-    for command in (check, run, campaign, demo, replay):
+    for command in (check, run, campaign, demo, accuracy, replay):
         app.command()(command)
     fmu_commands.command()(export)
     ssp_commands.command("export")(export_ssp)
@@ -84,6 +84,39 @@ def campaign(
     from vibroimpact.orchestrator.commands.campaign import run_to_folder
 
     run_to_folder(scene, output, changes or (), workers, scheduler)
+
+
+def accuracy(
+    scene: SceneFile,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
+    figure: FigureFile = None,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Relative error for which the cheapest way is looked for.")
+    ] = None,
+    of: Annotated[
+        str,
+        typer.Option(
+            help="What errors are of: impact_time, impact_velocity, displacement_range, final_state, samples; or all."
+        ),
+    ] = "all",
+    write: Annotated[
+        Path | None, typer.Option(help="Scene file (TOML) to write, with the way that reaches the tolerance.")
+    ] = None,
+    budget: Annotated[float, typer.Option(help="Wall time to spend, about, s.", min=1.0)] = 40.0,
+    changes: Changes = None,
+    force: Force = False,
+) -> None:
+    """Show what accuracy costs in time: simulate a scene in all ways that it can be, against the best reference.
+
+    Ways: stops inside the body's FMU or as FMUs of their own (FMI 3.0, 2.0), plain steps of equal size, model
+    exchange; each at its settings. Times are medians of runs in turn. A sweep is left out. Exit code 2: no way
+    reaches the tolerance.
+
+    Example: vibroimpact accuracy examples/single_run.toml -o accuracy.nc --figure accuracy.png --tolerance 1e-6
+    """
+    from vibroimpact.orchestrator.commands.accuracy import study_scene
+
+    study_scene(scene, changes or (), output, figure, tolerance, of, write, budget, force)
 
 
 def demo(

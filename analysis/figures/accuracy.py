@@ -1,0 +1,126 @@
+"""What accuracy costs in time: errors of all ways of simulating a scene over the seconds that they take."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vibroimpact.analysis.figures.page import COLOURS, MARK, canvas, page_style
+from vibroimpact.fmus.errors import DatasetError
+
+_MARKERS = "osD^vP"
+_NEEDED = ("cost", "error", "name", "failure", "on_front", "is_model")
+_ROUNDING = 1e-16
+"""Error below which nothing is told apart; an error of 0 is drawn there."""
+_ROWS = 12
+"""mm: a row of names below the panel."""
+
+
+def draw_accuracy(dataset: xr.Dataset) -> Figure:
+    """Draw the error of each way over its cost, a line for each way and a mark for each setting.
+
+    The line of those that no other way beats is drawn behind them; what failed is a cross at the top, where its time
+    went; another model of the same thing is hollow.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Of kind `accuracy`, as `vibroimpact accuracy` writes it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One column (85 mm) wide.
+
+    Raises
+    ------
+    DatasetError
+        If a variable is missing.
+    """
+    missing = [name for name in _NEEDED if name not in dataset]
+    if missing:
+        raise DatasetError(
+            f"figure: expected what `vibroimpact accuracy` writes, got none of {', '.join(missing)}."
+        )
+    names = list(dict.fromkeys(str(name) for name in dataset["name"].values))
+    with page_style():
+        figure = canvas(80 + _ROWS * len(names) / 2)
+        axis = figure.subplots()
+        errors = np.maximum(dataset["error"].values, _ROUNDING)
+        good = np.isfinite(errors) & (dataset["failure"].values == "")
+        top = 10.0 * max(float(errors[good].max(initial=_ROUNDING)), 1.0)
+        _draw_front(axis, dataset, errors)
+        for place, name in enumerate(names):
+            _draw_way(axis, dataset, errors, good, name, place, top)
+        if dataset.attrs.get("reference_error", 0.0) > 0.0:
+            axis.axhspan(0.1 * _ROUNDING, float(dataset.attrs["reference_error"]), color="0.9", zorder=-2)
+        tolerance = float(dataset.attrs.get("tolerance", np.nan))
+        if tolerance > 0.0:
+            axis.axhline(tolerance, color=MARK, linewidth=0.6, linestyle=":")
+        axis.set(xscale="log", yscale="log", xlabel="wall time of a run (s)", ylabel=_label(dataset))
+        axis.set_ylim(0.3 * _ROUNDING, 10.0 * top)
+        figure.legend(
+            *axis.get_legend_handles_labels(), loc="outside lower center", ncols=1, frameon=False, fontsize=6
+        )
+        figure.suptitle(str(dataset.attrs.get("title", "")), fontsize=8, wrap=True)
+    return figure
+
+
+def _label(dataset: xr.Dataset) -> str:
+    quantity = str(dataset.attrs.get("quantity", "all"))
+    return (
+        "largest relative error (-)"
+        if quantity == "all"
+        else f"relative error of {quantity.replace('_', ' ')} (-)"
+    )
+
+
+def _draw_front(axis: Axes, dataset: xr.Dataset, errors: np.ndarray) -> None:
+    on = dataset["on_front"].values.astype(bool)
+    order = np.argsort(dataset["cost"].values[on])
+    axis.plot(
+        dataset["cost"].values[on][order],
+        errors[on][order],
+        color="0.75",
+        linewidth=4.0,
+        solid_capstyle="round",
+        marker="o",
+        markersize=8.0,
+        zorder=-1,
+        label="not beaten by another way",
+    )
+
+
+def _draw_way(
+    axis: Axes,
+    dataset: xr.Dataset,
+    errors: np.ndarray,
+    good: np.ndarray,
+    name: str,
+    place: int,
+    top: float,
+) -> None:
+    its = dataset["name"].values == name
+    cost, colour = dataset["cost"].values, COLOURS[place % len(COLOURS)]
+    hollow = bool(dataset["is_model"].values[its].any())
+    style: dict[str, Any] = {
+        "color": colour,
+        "marker": _MARKERS[place % len(_MARKERS)],
+        "markersize": 3.5,
+        "linewidth": 0.8,
+    }
+    shown = its & good
+    axis.plot(
+        cost[shown],
+        errors[shown],
+        linestyle="--" if hollow else "-",
+        markerfacecolor="white" if hollow else colour,
+        label=f"{name} (another model)" if hollow else name,
+        **style,
+    )
+    failed = its & ~good & np.isfinite(cost)
+    axis.plot(cost[failed], np.full(failed.sum(), top), "x", color=colour, markersize=5.0)

@@ -1,0 +1,109 @@
+"""What `vibroimpact accuracy` does: it shows what accuracy costs in time, for a person's own scene."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.fmus.wording import option
+from vibroimpact.orchestrator.commands.check import duration
+from vibroimpact.orchestrator.ssp import opened_scene
+from vibroimpact.orchestrator.study import Measured, Study, dataset_of, study_accuracy
+from vibroimpact.orchestrator.study.choice import advice, error_of_reference, refuse_unreached
+from vibroimpact.orchestrator.study.tuned import tuned_text
+
+
+def study_scene(
+    path: Path,
+    changes: Sequence[str],
+    output: Path | None,
+    figure: Path | None,
+    tolerance: float | None,
+    quantity: str,
+    write: Path | None,
+    budget: float,
+    force: bool,
+) -> None:
+    """Study a scene, print a table and what to choose, and write what was asked for."""
+    if write is not None and tolerance is None:
+        raise UsageError(
+            f"{option('write')}: expected a tolerance to tune for, got none. Add {option('tolerance')} 1e-6."
+        )
+    refuse_outputs([path], output, figure)
+    if write is not None:
+        refuse_outputs([path], write, ending=".toml")
+    scene = opened_scene(path, changes)
+    refuse_overwriting(
+        output,
+        force,
+        lambda there: (there.get("results_kind"), there.get("scene_file")) == ("accuracy", str(path)),
+    )
+    study = study_accuracy(scene, tolerance=tolerance, quantity=quantity, budget=budget, told=_say_tried)
+    _print(study)
+    dataset = dataset_of(study).assign_attrs(scene_file=str(path))
+    if output is not None:
+        write_results(dataset, output, kind="accuracy")
+        say(f"Dataset written to {output}.")
+    if figure is not None:
+        from vibroimpact.analysis import figures  # half a second, which a table needs not
+
+        figures.save(figures.draw(dataset.assign_attrs(results_kind="accuracy")), figure)
+        say(f"Figure written to {figure}.")
+    refuse_unreached(study)
+    if write is not None:
+        _write_tuned(scene.text, study, write)
+
+
+def _say_tried(one: Measured) -> None:
+    said = one.errors.failure or f"error {one.error('all'):.1e}"
+    say(f"  {one.way.label}: {said}")
+
+
+def _print(study: Study) -> None:
+    rows = table(
+        f"What accuracy costs: {study.scene.title or study.scene.source}",
+        *("<way", "<set", ">value", ">error", ">a run", ">spread", ">calls", "<what is wrong"),
+    )
+    known = error_of_reference(study.reference, study.quantity)
+    for one in study.measured:
+        spread = (max(one.seconds) - min(one.seconds)) / one.cost if len(one.seconds) > 1 else math.nan
+        rows.add_row(
+            f"{one.way.name}{' (another model)' if one.way.model else ''}",
+            one.way.knob or "-",
+            f"{one.way.setting:.3g}" if one.way.knob else "-",
+            one.told(study.quantity, known),
+            duration(one.cost) if one.seconds else "-",
+            "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
+            str(one.calls) if one.calls >= 0 else "-",
+            one.errors.failure,
+        )
+    wide_terminal().print(rows)
+    say(f"Reference: {study.reference.name}, known to {known:.0e}.")
+    for remark in study.remarks:
+        say(f"Left out: {remark}.")
+    say(advice(study))
+
+
+def _write_tuned(text: str, study: Study, target: Path) -> None:
+    chosen = study.chosen
+    assert chosen is not None  # else refused
+    known = error_of_reference(study.reference, study.quantity)
+    settings = {key.partition(".")[2]: value for key, value in chosen.way.changes.items()}
+    if not settings:
+        raise UsageError(
+            f"{option('write')}: expected a way that a scene can ask for, got {chosen.way.label}. "
+            "It is the cheapest all the same."
+        )
+    reason = (
+        f"{chosen.way.label}: {study.quantity.replace('_', ' ')} to {chosen.told(study.quantity, known)} "
+        f"(asked: {study.tolerance:g}), {duration(chosen.cost)} a run; vibroimpact accuracy"
+    )
+    write_atomically(target, tuned_text(text, settings, reason).encode("utf-8"))
+    say(f"Scene written to {target}.")

@@ -1,0 +1,346 @@
+"""What accuracy costs in time: a scene, simulated in all ways that it can be, each against the best reference."""
+
+from __future__ import annotations
+
+import gc
+import json
+import math
+import time
+import tracemalloc
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset.results import Rows, described
+from vibroimpact.fmus.errors import ComponentError, SceneError, UsageError
+from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.fmus.wording import option
+from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.choice import advice, cheapest, pareto_front
+from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, errors_of, no_errors
+from vibroimpact.orchestrator.study.measured import Measured, Study
+from vibroimpact.orchestrator.study.references import Reference, disturbed_scenes, observed, reference_of
+from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
+from vibroimpact.orchestrator.study.trials import far_off
+from vibroimpact.orchestrator.study.ways import CallCounter, Trial, Way, remarks_on, ways_of
+
+BUDGET = 40.0
+"""Wall time of a study, s, where nobody says another."""
+LEAST_ROUNDS, MOST_ROUNDS = 3, 15
+"""How often each way is timed, in turn with the others."""
+EACH_SHARE = 0.1
+"""Of the time that is left, what one way may have taken and still be timed again."""
+LATE_SHARE, LEAST_LATE = 0.04, 0.5
+"""Of the budget, after which one run is given up; and no earlier than that, s."""
+COUNTED = 0.25
+"""Wall time of a run, s, above which its calls are not counted: that takes several times as long."""
+REPLICATES = 6
+"""Runs of chaotic motion, each from a slightly different number, that tell the sampling error of its statistics."""
+MOST_FIRST_PERIODS = 4096
+"""Periods within which the first impacts are looked for."""
+
+
+def study_accuracy(
+    scene: Scene,
+    *,
+    tolerance: float | None = None,
+    quantity: str = "all",
+    budget: float = BUDGET,
+    told: Callable[[Measured], None] = lambda measured: None,
+) -> Study:
+    """Simulate a scene in all ways that it can be, and measure the error and the cost of each.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its sweep is left out: each swept number has the value of its own table.
+    tolerance : float, optional
+        Relative error that is asked for.
+    quantity : str
+        `impact_time`, `impact_velocity`, `displacement_range`, `final_state`, `samples`, or `all`, the worst of those.
+    budget : float
+        Wall time that the study takes, about, s.
+    told : callable
+        Given each way as soon as it has run once.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    UsageError
+        There is no such quantity, nothing to vary, or no tolerance > 0.
+    """
+    _refuse_misuse(tolerance, quantity)
+    began = time.perf_counter()
+    whole, late = studied_scene(scene), max(LEAST_LATE, LATE_SHARE * budget)
+    reference = reference_of(whole)
+    studied = first_impacts(whole, reference) if reference.chaotic else whole
+    if reference.chaotic:
+        reference = replace(reference_of(studied), chaotic=True, sensitivity=reference.sensitivity)
+    found: list[Measured] = []
+    with ExitStack() as stack:
+        measured: list[tuple[Measured, Trial]] = []
+        for way in _refuse_none(ways_of(given_up_after(studied, late)), scene):
+            one, trial = _tried(way, reference)
+            if trial is not None:
+                stack.callback(trial.close)
+                measured.append((one, trial))
+            told(one)
+            found.append(one)
+        _time_in_turn(measured, began + budget)
+    if reference.chaotic:
+        _add_statistics(whole, given_up_after(whole, late), found)
+    wanted = math.nan if tolerance is None else tolerance
+    chosen = cheapest(found, tolerance, quantity, reference)
+    return Study(studied, reference, found, quantity, wanted, chosen, tuple(remarks_on(scene)))
+
+
+def studied_scene(scene: Scene) -> Scene:
+    """Return a scene as it is studied: one point, impacts and extremes recorded.
+
+    A time series is left out where impacts tell more, since it costs more than the motion; a general scene and a free
+    motion have nothing else to be compared by.
+    """
+    alone = scene.with_sweep({}) if scene.sweep else scene
+    if scene.general is not None:
+        return alone
+    if scene.record.time_series is not None:
+        document = parse_toml(alone.text)
+        del document["record"]["time_series"]
+        alone = Scene.from_dict(document, scene.source)
+    return alone.with_values({"record.impacts": True, "record.extrema": True})
+
+
+def given_up_after(scene: Scene, seconds: float) -> Scene:
+    """Return a scene whose runs are given up after some wall time, or earlier where it says so."""
+    own = scene.execution.deadline
+    return scene.with_values({"execution.deadline": seconds if own is None else min(own, seconds)})
+
+
+def first_impacts(scene: Scene, reference: Reference) -> Scene:
+    """Return a scene that ends after its first impacts, from its start: all that chaos leaves comparable."""
+    if scene.period is None:
+        return scene
+    periods = 1
+    while periods < MOST_FIRST_PERIODS:
+        periods *= 2
+        short = scene.with_values({"record.transient_periods": 0, "record.recorded_periods": periods})
+        if len(observed(short).impacts) >= FIRST_IMPACTS:
+            break
+    return short
+
+
+def _refuse_misuse(tolerance: float | None, quantity: str) -> None:
+    if quantity not in ("all", *QUANTITIES):
+        raise UsageError(f"{option('of')}: expected all, {', '.join(QUANTITIES)}, got {quantity!r}.")
+    if tolerance is not None and not 0.0 < tolerance < math.inf:
+        raise UsageError(f"{option('tolerance')}: expected a relative error > 0, got {tolerance!r}.")
+
+
+def _refuse_none(ways: list[Way], scene: Scene) -> list[Way]:
+    if len([way for way in ways if not way.model]) < 2:
+        raise UsageError(
+            f"{scene.source}: expected a scene with something to vary (stops, or components that exchange values), "
+            "got one that is simulated in one way. It is exact."
+        )
+    return ways
+
+
+def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
+    """Run a way once, counting calls and memory, and compare what it shows; no trial where it failed."""
+    try:
+        trial = way.open(None)
+    except (ComponentError, SceneError) as error:
+        return Measured(way, no_errors(_first_line(error))), None
+    try:
+        found = trial.run()
+    except ComponentError as error:
+        trial.close()
+        return Measured(way, no_errors(_first_line(error))), None
+    errors = errors_of(found, reference.observation, reference.scales)
+    if not found.failure and far_off(found, reference.observation):
+        errors = no_errors("fell through")
+    one = Measured(way, errors, impacts=len(found.impacts), energy_residual=found.energy_residual)
+    if found.failure:
+        trial.close()
+        one.seconds.append(found.seconds)
+        return one, None
+    if found.seconds < COUNTED:
+        one.calls, one.memory = _counted(way)
+    return one, trial
+
+
+def _counted(way: Way) -> tuple[int, int]:
+    """Return the calls of functions of FMUs in a run, and the largest memory that Python took for it, bytes."""
+    counter = CallCounter()
+    trial = way.open(counter.wrap)
+    tracemalloc.start()
+    try:
+        trial.run()
+        return sum(counter.calls.values()), tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+        trial.close()
+
+
+def _time_in_turn(measured: Sequence[tuple[Measured, Trial]], end: float) -> None:
+    """Run all ways in turn, again and again, until the time is over; a way that failed is timed as well."""
+    gc.collect()
+    for round_number in range(MOST_ROUNDS):
+        if round_number >= LEAST_ROUNDS and time.perf_counter() > end:
+            break
+        for one, trial in measured:
+            if round_number >= LEAST_ROUNDS and sum(one.seconds) > EACH_SHARE * (end - time.perf_counter()):
+                continue
+            one.seconds.append(trial.run().seconds)
+
+
+def _add_statistics(scene: Scene, limited: Scene, found: Sequence[Measured]) -> None:
+    """Compare the statistics of whole runs where nothing else can be compared."""
+    replicates = [observed(one) for one in disturbed_scenes(scene, REPLICATES)]
+    reference = observed(scene)
+    by_label = {one.way.label: one for one in found}
+    for way in ways_of(limited):
+        one = by_label.get(way.label)
+        if one is None or one.errors.failure:
+            continue
+        with suppress(ComponentError):
+            trial = way.open(None)
+            try:
+                one.statistics = statistics_of(trial.run(), reference, replicates)
+            finally:
+                trial.close()
+
+
+def _first_line(error: Exception) -> str:
+    said = str(error).splitlines()[0]
+    return "grew without bound" if "expected finite numbers" in said else said
+
+
+def dataset_of(study: Study) -> xr.Dataset:
+    """Return a study as a dataset, for `write_results` of kind `accuracy` and for figures."""
+    found = study.measured
+    front = pareto_front(found, study.quantity)
+    rows: Rows = {
+        "cost": ("way", [one.cost for one in found], "s", "median wall time of a run"),
+        "cost_low": (
+            "way",
+            [min(one.seconds, default=math.nan) for one in found],
+            "s",
+            "shortest wall time of a run",
+        ),
+        "cost_high": (
+            "way",
+            [max(one.seconds, default=math.nan) for one in found],
+            "s",
+            "longest wall time of a run",
+        ),
+        "cost_per_impact": (
+            "way",
+            [one.cost / one.impacts if one.impacts else math.nan for one in found],
+            "s",
+            "median wall time of a run over the impacts recorded",
+        ),
+        "rounds": ("way", [len(one.seconds) for one in found], "1", "runs that were timed"),
+        "calls": ("way", [one.calls for one in found], "1", "calls of functions of FMUs in a run"),
+        "memory": ("way", [one.memory for one in found], "byte", "largest memory that Python took for a run"),
+        "impacts": ("way", [one.impacts for one in found], "1", "impacts recorded"),
+        "energy_residual": (
+            "way",
+            [one.energy_residual for one in found],
+            "J",
+            "energy that the exchange of forces added",
+        ),
+        "error": (
+            "way",
+            [one.error(study.quantity) for one in found],
+            "1",
+            f"error of {study.quantity}, relative",
+        ),
+        "on_front": (
+            "way",
+            [one in front for one in found],
+            "1",
+            "no other way is both cheaper and more exact",
+        ),
+        "is_model": (
+            "way",
+            [one.way.model for one in found],
+            "1",
+            "another model, not another way of solving it",
+        ),
+    }
+    for quantity in QUANTITIES:
+        values = [one.error(quantity) for one in found]
+        if not all(map(math.isnan, values)):
+            name = quantity.replace("_", " ")
+            rows = {**rows, f"error_{quantity}": ("way", values, "1", f"error of the {name}, relative")}
+    if study.reference.chaotic:
+        rows = {**rows, **_rows_of_chaos(found)}
+    dataset = xr.Dataset(described(rows))
+    names = {
+        "name": [one.way.name for one in found],
+        "knob": [one.way.knob for one in found],
+        "failure": [one.errors.failure for one in found],
+    }
+    words = {"name": "way of simulating", "knob": "what is set", "failure": "what is wrong with it"}
+    for key, texts in names.items():
+        dataset[key] = ("way", np.array(texts, dtype=object), {"units": "1", "long_name": words[key]})
+    setting = [one.way.setting for one in found]
+    dataset["setting"] = ("way", setting, {"units": "1", "long_name": "its value, in the unit of the key"})
+    reference = study.reference
+    return dataset.assign_attrs(
+        title=f"What accuracy costs: {study.scene.title or study.scene.source}",
+        reference=reference.name,
+        reference_error=reference.error.get(study.quantity, max(reference.error.values())),
+        sensitivity=reference.sensitivity,
+        motion="chaotic" if reference.chaotic else "not chaotic",
+        quantity=study.quantity,
+        tolerance=study.tolerance,
+        chosen=study.chosen.way.label if study.chosen else "",
+        verdict=advice(study),
+        remarks="; ".join(study.remarks),
+        scene=study.scene.text,
+        versions=json.dumps(versions()),
+        git_commit=git_commit(),
+    )
+
+
+def _rows_of_chaos(found: Sequence[Measured]) -> Rows:
+    growth = np.full((len(found), FIRST_IMPACTS), np.nan)
+    for place, one in enumerate(found):
+        part = one.errors.growth[:FIRST_IMPACTS]
+        growth[place, : len(part)] = part
+    missing = Statistics(math.nan, math.nan, math.nan, math.nan)
+    of = [one.statistics or missing for one in found]
+    rows: Rows = {
+        "mean_interval_error": (
+            "way",
+            [one.mean_interval_error for one in of],
+            "1",
+            "error of the mean interval between impacts, relative",
+        ),
+        "mean_interval_sampling": (
+            "way",
+            [one.mean_interval_sampling for one in of],
+            "1",
+            "sampling error of the mean interval, relative",
+        ),
+        "velocity_distance": (
+            "way",
+            [one.velocity_distance for one in of],
+            "1",
+            "largest distance between the distributions of impact velocity",
+        ),
+        "velocity_sampling": ("way", [one.velocity_sampling for one in of], "1", "its sampling error"),
+    }
+    return {
+        **rows,
+        "error_growth": (("way", "impact"), growth, "1", "error of the velocity of each impact, relative"),
+    }

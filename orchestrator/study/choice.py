@@ -1,0 +1,103 @@
+"""What to choose: the ways that no other one beats, and the cheapest that reaches a tolerance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.wording import option
+from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
+from vibroimpact.orchestrator.study.measured import Measured, Study
+from vibroimpact.orchestrator.study.references import Reference
+
+DEFAULT_TOLERANCE = 1e-6
+"""Relative error of what is recommended where nobody asks for one."""
+
+
+def pareto_front(measured: Sequence[Measured], quantity: str) -> list[Measured]:
+    """Return the ways of which no other is both cheaper and at least as exact; other models are no ways."""
+    able = [one for one in measured if not one.way.model and one.error(quantity) == one.error(quantity)]
+    front: list[Measured] = []
+    for one in sorted(able, key=lambda one: (one.cost, one.error(quantity))):
+        if not front or one.error(quantity) < front[-1].error(quantity):
+            front.append(one)
+    return front
+
+
+def cheapest(
+    measured: Sequence[Measured], tolerance: float | None, quantity: str, reference: Reference
+) -> Measured | None:
+    """Return the cheapest way whose error, with that of the reference added, is within a tolerance; or None.
+
+    Without a tolerance it is `DEFAULT_TOLERANCE`, or the least error that there is.
+    """
+    own = error_of_reference(reference, quantity)
+    able = [one for one in measured if not one.way.model and one.error(quantity) == one.error(quantity)]
+    if tolerance is None:
+        least = min((one.error(quantity) for one in able), default=math.nan)
+        tolerance = max(DEFAULT_TOLERANCE, least + own)
+    able = [one for one in able if one.error(quantity) + own <= tolerance]
+    return min(able, key=lambda one: one.cost, default=None)
+
+
+def error_of_reference(reference: Reference, quantity: str) -> float:
+    """Return how far the reference may be off itself, of a quantity or at most."""
+    known = [error for error in reference.error.values() if error == error]
+    return reference.error[quantity] if quantity != "all" else max(known, default=math.nan)
+
+
+def refuse_unreached(study: Study) -> None:
+    """Refuse a tolerance that no way has reached, with what was.
+
+    Raises
+    ------
+    UsageError
+    """
+    if study.chosen is not None or math.isnan(study.tolerance):
+        return
+    able = [one for one in study.measured if not one.way.model and one.error(study.quantity) >= 0.0]
+    own = error_of_reference(study.reference, study.quantity)
+    best = min(able, key=lambda one: one.error(study.quantity), default=None)
+    reached = "nothing"
+    if best is not None:
+        reached = (
+            f"{best.error(study.quantity) + own:.1e} by {best.way.label}, the reference known to {own:.0e}"
+        )
+    raise UsageError(
+        f"{option('tolerance')}: expected one that a way reaches, got {study.tolerance:g}; reached was {reached}."
+    )
+
+
+def advice(study: Study) -> str:
+    """Return what to choose, in a sentence."""
+    chosen, quantity = study.chosen, study.quantity
+    if chosen is None:
+        return "No way reached the tolerance."
+    known = error_of_reference(study.reference, quantity)
+    what = "" if quantity == "all" else f" of {quantity.replace('_', ' ')}"
+    told, cost = chosen.told(quantity, known), _seconds(chosen.cost)
+    words = f"Take {chosen.way.label}: a relative error{what} of {told} in {cost} a run"
+    others = [
+        one
+        for one in study.measured
+        if one.way.name != chosen.way.name
+        and not one.way.model
+        and one.error(quantity) == one.error(quantity)
+    ]
+    if others:
+        other = min(others, key=lambda one: one.cost)
+        ratio = other.cost / chosen.cost
+        words += f"; {other.way.label} takes {ratio:.2g} times that and errs by {other.told(quantity, known)}"
+    if study.reference.chaotic:
+        words += (
+            f". The motion is chaotic: after its first {FIRST_IMPACTS} impacts or so only statistics compare"
+        )
+    return f"{words}."
+
+
+def _seconds(seconds: float) -> str:
+    for factor, unit in ((1e6, "us"), (1e3, "ms")):
+        if seconds * factor < 1000.0:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds:.3g} s"

@@ -1,0 +1,172 @@
+"""How far what one way showed is from the reference: by quantity, relative, and what is missing altogether."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibroimpact.orchestrator.study.observation import Floats, Observation
+
+QUANTITIES = ("impact_time", "impact_velocity", "displacement_range", "final_state", "samples")
+"""What errors are given of."""
+FIRST_IMPACTS = 10
+"""Impacts over which the growth of errors is shown where motion is chaotic."""
+COMPARED = 1e-3
+"""Speed of an impact, over that of the fastest, below which it is not compared: ways end a chatter differently."""
+
+
+@dataclass(frozen=True, slots=True)
+class Scales:
+    """What errors are relative to.
+
+    Attributes
+    ----------
+    time : float
+        The forcing period, or the time recorded where there is none, s.
+    window : tuple of float
+        Start and end of the recording, s: an impact at its edge may be in one way and not in another.
+    """
+
+    time: float
+    window: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """The errors of a way.
+
+    Attributes
+    ----------
+    of : mapping of str to float
+        By quantity, relative; NaN where the way does not tell it, or the reference does not.
+    failure : str
+        What is wrong altogether; empty where nothing is.
+    growth : ndarray, shape (impact,)
+        Relative error of the velocity of each compared impact, in their order.
+    """
+
+    of: Mapping[str, float]
+    failure: str
+    growth: Floats
+
+    def worst(self, quantity: str = "all") -> float:
+        """Return the error of a quantity, or the largest of all that are known; NaN where none is."""
+        if quantity != "all":
+            return self.of[quantity]
+        known = [error for error in self.of.values() if not math.isnan(error)]
+        return max(known, default=math.nan)
+
+
+def no_errors(failure: str) -> Errors:
+    """Return the errors of a way that showed nothing."""
+    return Errors(dict.fromkeys(QUANTITIES, math.nan), failure, np.empty(0))
+
+
+def errors_of(
+    found: Observation, reference: Observation, scales: Scales, *, impacts: int | None = None
+) -> Errors:
+    """Compare what a way showed with the reference.
+
+    Parameters
+    ----------
+    found, reference : Observation
+    scales : Scales
+    impacts : int, optional
+        Compare no more than so many impacts, and nothing else: what chaos leaves comparable.
+    """
+    if found.failure:
+        return no_errors(found.failure)
+    pairs, failure = matched(found.impacts, reference.impacts, scales, impacts)
+    own, other = found.impacts[pairs[:, 0]], reference.impacts[pairs[:, 1]]
+    errors = dict.fromkeys(QUANTITIES, math.nan)
+    growth = np.empty(0)
+    if len(pairs):
+        speed = float(np.abs(reference.impacts[:, 1]).max())
+        errors["impact_time"] = float(np.abs(own[:, 0] - other[:, 0]).max()) / scales.time
+        growth = np.abs(own[:, 1] - other[:, 1]) / speed if speed > 0.0 else growth
+        errors["impact_velocity"] = float(growth.max()) if growth.size else math.nan
+    if impacts is None:
+        errors |= _errors_of_motion(found, reference, scales)
+    return Errors(errors, failure, growth)
+
+
+def _errors_of_motion(found: Observation, reference: Observation, scales: Scales) -> dict[str, float]:
+    size, errors = reference.displacement_range, {}
+    rate = 2.0 * math.pi / scales.time
+    if size > 0.0:
+        errors["displacement_range"] = abs(found.displacement_range - size) / size
+    else:  # an unforced scene has no extremes; the state at its end tells how large the motion is
+        size = math.hypot(reference.final[0], reference.final[1] / rate)
+    if 0.0 < size < math.inf:
+        off = np.abs(np.subtract(found.final, reference.final)) / (size, size * rate)
+        errors["final_state"] = float(off.max())
+    samples, expected = found.samples, reference.samples
+    if samples is not None and expected is not None and expected.size and samples.shape == expected.shape:
+        spread = np.ptp(expected, axis=0)
+        off = np.abs(samples - expected).max(axis=0)
+        moving = spread > 0.0
+        errors["samples"] = float((off[moving] / spread[moving]).max()) if moving.any() else math.nan
+    return errors
+
+
+def matched(
+    found: Floats, reference: Floats, scales: Scales, most: int | None = None
+) -> tuple[np.ndarray, str]:
+    """Return which impacts are the same ones (places in both), and what is missing or too much, in words.
+
+    Parameters
+    ----------
+    found, reference : ndarray, shape (impact, 3)
+        Time, velocity, contact; in the order of time.
+    scales : Scales
+    most : int, optional
+        Take no more than the first so many of the reference.
+    """
+    own, other = _compared(found), _compared(reference)
+    if most is not None:
+        other = other[:most]
+        own = own[:most]
+    pairs: list[tuple[int, int]] = []
+    if len(other):
+        gap = _reach(reference[other], scales)
+        taken = 0
+        for j in other:
+            same = [i for i in own[taken:] if found[i, 2] == reference[j, 2]]
+            near = [i for i in same if abs(found[i, 0] - reference[j, 0]) <= gap]
+            if near:
+                best = min(near, key=lambda i: abs(found[i, 0] - reference[j, 0]))
+                pairs.append((int(best), int(j)))
+                taken = int(np.searchsorted(own, best)) + 1
+    margin = max((abs(found[i, 0] - reference[j, 0]) for i, j in pairs), default=0.0) * 2.0 + 1e-9
+    missed = _inside(reference, other, {j for _, j in pairs}, scales, margin)
+    extra = 0 if most is not None else _inside(found, own, {i for i, _ in pairs}, scales, margin)
+    words = []
+    if missed:
+        words.append(f"missed {missed} of {len(other)} impacts")
+    if extra:
+        words.append(f"{extra} impact{'s' if extra > 1 else ''} that {'are' if extra > 1 else 'is'} none")
+    return np.array(pairs, dtype=int).reshape(-1, 2), ", ".join(words)
+
+
+def _compared(impacts: Floats) -> np.ndarray:
+    if not len(impacts):
+        return np.empty(0, dtype=int)
+    speeds = np.abs(impacts[:, 1])
+    if np.isnan(speeds).all():
+        return np.arange(len(impacts))
+    return np.flatnonzero(speeds >= COMPARED * np.nanmax(speeds))
+
+
+def _reach(impacts: Floats, scales: Scales) -> float:
+    """Return how far apart in time two impacts may be that are the same: half of the shortest interval, s."""
+    intervals = np.diff(impacts[:, 0])
+    intervals = intervals[intervals > 1e-9 * scales.time]
+    return 0.5 * min(float(intervals.min()) if intervals.size else math.inf, scales.time)
+
+
+def _inside(impacts: Floats, places: np.ndarray, known: set[int], scales: Scales, margin: float) -> int:
+    begin, end = scales.window
+    return sum(1 for i in places if int(i) not in known and begin + margin < impacts[i, 0] < end - margin)

@@ -1,0 +1,83 @@
+"""What one run of a scene showed, whichever way it was simulated, and what it cost."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+
+Floats = NDArray[np.float64]
+
+IMPACT_TIME, IMPACT_VELOCITY, IMPACT_CONTACT = 0, 2, 4
+"""Columns of the impacts of a `RunRecord`."""
+
+
+def _no_impacts() -> Floats:
+    return np.empty((0, 3))
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """What one run showed while it was recorded.
+
+    Attributes
+    ----------
+    impacts : ndarray, shape (impact, 3)
+        Time (s), velocity (m/s), contact (1-based) of each impact.
+    lowest, highest : float
+        Smallest and largest displacement, m; NaN where this way does not tell.
+    final : tuple of float
+        Displacement (m) and velocity (m/s) at the end.
+    energy_residual : float
+        Energy that the exchange of a contact's force added, J; NaN where nothing is exchanged.
+    samples : ndarray, shape (sample, variable), or None
+        What a general scene samples, without the time.
+    seconds : float
+        Wall time, s.
+    failure : str
+        Why there is no result, or what is wrong with it; empty where it is one.
+    """
+
+    impacts: Floats = field(default_factory=_no_impacts)
+    lowest: float = math.nan
+    highest: float = math.nan
+    final: tuple[float, float] = (math.nan, math.nan)
+    energy_residual: float = math.nan
+    samples: Floats | None = None
+    seconds: float = math.nan
+    failure: str = ""
+
+    @property
+    def displacement_range(self) -> float:
+        """Largest minus smallest displacement, m."""
+        return self.highest - self.lowest
+
+
+def observation_of(record: RunRecord) -> Observation:
+    """Return what the record of a run shows.
+
+    Parameters
+    ----------
+    record : RunRecord
+        Of a scene of either form.
+    """
+    failure = ""
+    if record.outcome == Outcome.timeout:
+        failure = "did not finish"
+    elif record.outcome not in (Outcome.ok, Outcome.stuck):
+        failure = f"{record.outcome.name}: {record.message}"
+    impacts, periods = _no_impacts(), record.periods
+    if record.impacts is not None:
+        impacts = record.impacts[:, [IMPACT_TIME, IMPACT_VELOCITY, IMPACT_CONTACT]]
+    lowest = highest = residual = math.nan
+    if periods is not None and len(periods):
+        highest, lowest = float(periods[:, 0].max()), float(periods[:, 1].min())
+    if record.energy_residual is not None and len(record.energy_residual):
+        residual = float(np.abs(record.energy_residual).sum())
+    samples = None if record.samples is None else record.samples[:, 1:]
+    final = (record.final_displacement, record.final_velocity)
+    return Observation(impacts, lowest, highest, final, residual, samples, record.seconds, failure)

@@ -1,0 +1,192 @@
+"""What errors are measured against: the best that is known of a scene, and how far it may be off itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vibroimpact.analysis.landmarks import ImpactOscillator
+from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.orchestrator.run.parameters import float_parameters
+from vibroimpact.orchestrator.run.point import recorded_window
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.models import HertzStop, HuntCrossleyStop, RestitutionStop
+from vibroimpact.orchestrator.study.errors import QUANTITIES, Scales, errors_of
+from vibroimpact.orchestrator.study.observation import Floats, Observation
+from vibroimpact.orchestrator.study.ways import SceneTrial
+
+DISTURBANCE = 1e-9
+"""Relative change of a number of the scene by which the sensitivity of its motion is measured."""
+DISTURBED = (
+    *("body.mass", "body.masses[1]", "body.mass_per_length", "body.stiffness", "body.frequency"),
+    *("forcing.amplitude", "stop[1].position", "body.velocity_start", "body.displacement_start"),
+)
+"""Numbers that are disturbed, where a scene has them."""
+CHAOTIC = 1e-3
+"""Relative change of the motion that so small a disturbance leads to, above which the motion is taken for chaotic."""
+ROUNDING = float(np.finfo(float).eps)
+FINEST, NEXT = 1e-12, 1e-11
+"""Tolerances of contacts that are integrated: of the reference, and of the run that tells its error."""
+SAME_MOTION = 1e-9
+"""Relative distance between a run and a motion in closed form below which the run has come to it."""
+FINEST_STEP = 1.0 / 16.0
+"""Macro step of the reference of a general scene, over that of the scene."""
+SAFETY = 64.0
+"""What an estimated error is multiplied with, to be a bound in practice."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """What errors are measured against.
+
+    Attributes
+    ----------
+    observation : Observation
+    name : str
+        Where it comes from, in words.
+    error : mapping of str to float
+        By quantity, how far it may be off itself, relative.
+    sensitivity : float
+        Relative change of the motion over that of a number of the scene; NaN where none could be changed.
+    chaotic : bool
+        Whether nothing but statistics can be compared after the first impacts.
+    scales : Scales
+    """
+
+    observation: Observation
+    name: str
+    error: Mapping[str, float]
+    sensitivity: float
+    chaotic: bool
+    scales: Scales
+
+
+def _finest_exchange(scene: Scene) -> Reference:
+    """Return the reference of a general scene: iterated exchange at macro steps below those that are compared.
+
+    Its error is told by the run at twice its step, and by the order that this and the one at four times show.
+    """
+    assert scene.general is not None
+    scales, own = scales_of(scene), scene.general.macro_step
+    runs = []
+    for part in (4.0, 2.0, 1.0):
+        step = {"execution.macro_step": own * FINEST_STEP * part, "execution.exchange": "iterated"}
+        runs.append(observed(scene.with_values(step)))
+    coarse, middle, finest = runs
+    first, second = errors_of(coarse, finest, scales).of, errors_of(middle, finest, scales).of
+    error = {}
+    for name, off in second.items():
+        ratio = first[name] / off if off > 0.0 else math.nan
+        gain = max(ratio - 1.0, 1.0) if ratio > 2.0 else 1.0
+        error[name] = off / gain + SAFETY * ROUNDING
+    name = f"iterated exchange at a macro step of {own * FINEST_STEP:.3g}"
+    return Reference(finest, name, error, math.nan, False, scales)
+
+
+def scales_of(scene: Scene) -> Scales:
+    """Return what errors of a scene are relative to."""
+    if scene.general is not None:
+        begin = scene.record.transient_time
+        return Scales(scene.record.recorded_time, (begin, begin + scene.record.recorded_time))
+    window = recorded_window(scene, float_parameters(scene, None))
+    return Scales(scene.period or window[1] - window[0], window)
+
+
+def reference_of(scene: Scene) -> Reference:
+    """Return the reference of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep.
+    """
+    if scene.general is not None:
+        return _finest_exchange(scene)
+    scales = scales_of(scene)
+    integrated = any(isinstance(stop, HertzStop | HuntCrossleyStop) for stop in scene.stops)
+    best = scene.with_values({"execution.how": "fused"})
+    if integrated:
+        best = best.with_values({"execution.contact_tolerance": FINEST})
+    observation = observed(best)
+    keys = disturbed_keys(best)
+    disturbed = [best.with_values({key: best.value(key) * (1.0 + DISTURBANCE)}) for key in keys]
+    changes = [errors_of(observed(one), observation, scales) for one in disturbed]
+    largest = {
+        name: max((change.of[name] for change in changes if change.of[name] == change.of[name]), default=0.0)
+        for name in QUANTITIES
+    }
+    sensitivity = max(largest.values()) / DISTURBANCE if keys else math.nan
+    chaotic = any(change.failure for change in changes) or max(largest.values()) > CHAOTIC
+    error = {name: SAFETY * ROUNDING * (1.0 + value / DISTURBANCE) for name, value in largest.items()}
+    name = "the fused run, exact between events"
+    if integrated:
+        name = f"the fused run at a contact tolerance of {FINEST:g}"
+        next_best = observed(
+            scene.with_values({"execution.how": "fused", "execution.contact_tolerance": NEXT})
+        )
+        off = errors_of(next_best, observation, scales).of
+        error = {q: max(error[q], off[q]) if off[q] == off[q] else error[q] for q in QUANTITIES}
+    closed = None if chaotic else _closed_form(scene, observation, scales)
+    if closed is not None:
+        observation, name = closed, "the closed form of the P(1,1) motion"
+    return Reference(observation, name, error, sensitivity, chaotic, scales)
+
+
+def observed(scene: Scene) -> Observation:
+    """Return what a run of a scene by its own runner shows."""
+    trial = SceneTrial(scene)
+    try:
+        return trial.run()
+    finally:
+        trial.close()
+
+
+def disturbed_keys(scene: Scene) -> list[str]:
+    """Return numbers of a scene on which its motion depends, by their keys: of the body first.
+
+    A body's own number changes more than the scale of the motion, which is all that the force does to a stop at 0.
+    """
+    found = []
+    for key in DISTURBED:
+        with suppress(UsageError):  # a key that the scene does not have
+            if scene.value(key) != 0.0:
+                found.append(key)
+    return found
+
+
+def disturbed_scenes(scene: Scene, count: int) -> list[Scene]:
+    """Return scenes of which one number is slightly different; none where there is no such number."""
+    keys = disturbed_keys(scene)
+    return [
+        scene.with_values({key: scene.value(key) * (1.0 + k * DISTURBANCE)})
+        for key in keys[:1]
+        for k in range(1, count + 1)
+    ]
+
+
+def _closed_form(scene: Scene, observation: Observation, scales: Scales) -> Observation | None:
+    """Return the observation with the impacts of the P(1,1) motion in closed form, where that is what it does."""
+    if scene.period is None or len(observation.impacts) < 2 or scene.forcing is None:
+        return None
+    if not all(isinstance(stop, RestitutionStop) for stop in scene.stops):
+        return None
+    try:
+        oscillator = ImpactOscillator.from_scene(scene.text)
+    except DatasetError:
+        return None
+    if scene.stops[0].side != "upper" or scene.forcing.scalar_amplitude < 0.0:
+        return None
+    begin, period = scales.window[0], scene.period
+    for velocity, phase in oscillator.single_impact_motions(scene.forcing.angular_frequency):
+        turns = phase / (2.0 * math.pi)
+        periods = np.round((observation.impacts[:, 0] - begin) / period - turns)
+        times: Floats = begin + (periods + turns) * period
+        impacts = np.column_stack([times, np.full(len(times), velocity), np.ones(len(times))])
+        off = np.abs(impacts[:, :2] - observation.impacts[:, :2]) / (period, velocity)
+        if off.max() < SAME_MOTION:
+            return replace(observation, impacts=impacts)
+    return None

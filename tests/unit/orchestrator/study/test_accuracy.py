@@ -1,0 +1,171 @@
+"""Studies of accuracy: the right reference, ladders that converge at their order, failures that show as such."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from support.places import EXAMPLES
+
+import vibroimpact as vi
+from vibroimpact.analysis.landmarks import ImpactOscillator, observed_order
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.scene import Scene, load_scene
+from vibroimpact.orchestrator.study import Study, advice, dataset_of, study_accuracy
+from vibroimpact.orchestrator.study.accuracy import studied_scene
+from vibroimpact.orchestrator.study.references import reference_of
+
+pytestmark = pytest.mark.slow
+
+P11: dict[str, Any] = {
+    "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
+    "forcing": {"amplitude": 0.5, "angular_frequency": 1.0},
+    "stop": [{"law": "restitution", "position": 1.0, "restitution": 0.7}],
+    "record": {"transient_periods": 35, "recorded_periods": 5},
+}
+HERTZ: dict[str, Any] = P11 | {
+    "stop": [{"law": "hertz", "position": 1.0, "stiffness": 100.0}],
+    "record": {"transient_periods": 5, "recorded_periods": 2},
+}
+
+
+@pytest.fixture(scope="module")
+def rigid() -> Study:
+    return study_accuracy(Scene.from_dict(P11), tolerance=1e-6, budget=1.0)
+
+
+@pytest.fixture(scope="module")
+def yielding() -> Study:
+    return study_accuracy(Scene.from_dict(HERTZ), tolerance=1e-7, budget=1.0)
+
+
+def ladder(study: Study, name: str) -> tuple[np.ndarray, np.ndarray]:
+    its = [one for one in study.measured if one.way.name == name and not one.errors.failure]
+    return np.array([one.way.setting for one in its]), np.array([one.error("all") for one in its])
+
+
+def test_a_periodic_motion_is_compared_with_its_closed_form(rigid: Study) -> None:
+    assert rigid.reference.name == "the closed form of the P(1,1) motion"
+    assert not rigid.reference.chaotic
+    by_name = {one.way.name: one for one in rigid.measured}
+    for name in ("fused", "coupled, FMI 3.0", "coupled, FMI 2.0"):
+        assert by_name[name].error("all") < 1e-11, name
+    assert rigid.chosen is by_name["fused"]
+    assert advice(rigid).startswith("Take fused: a relative error of < ")
+
+
+def test_plain_steps_are_of_first_order_and_an_integrator_follows_its_tolerance(rigid: Study) -> None:
+    steps, errors = ladder(rigid, "plain steps")
+    assert len(steps) >= 3
+    assert 0.5 < observed_order(steps, errors) < 1.6
+    tolerances, errors = ladder(rigid, "model exchange, CVode")
+    assert len(tolerances) >= 3
+    assert np.all(np.diff(errors) < 0.0)
+    assert np.all(errors < 1e3 * tolerances)
+
+
+def test_another_law_of_equal_restitution_is_an_error_of_the_model_and_never_chosen(rigid: Study) -> None:
+    times, errors = ladder(rigid, "a Kelvin-Voigt stop of equal restitution")
+    assert observed_order(times, errors) == pytest.approx(1.0, abs=0.2)
+    dataset = dataset_of(rigid)
+    assert not (dataset.is_model & dataset.on_front).any()
+
+
+def test_a_tolerance_of_integrated_contacts_buys_what_it_says(yielding: Study) -> None:
+    tolerances, errors = ladder(yielding, "fused")
+    assert list(tolerances) == [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12]
+    assert np.all(errors <= np.maximum(10.0 * tolerances, 1e-11))
+    assert np.all(np.diff(errors) < 0.0)
+    assert yielding.chosen is not None
+    assert yielding.chosen.error("all") <= 1e-7
+
+
+def test_what_it_costs_is_counted_too(rigid: Study) -> None:
+    fused, coupled = rigid.measured[:2]
+    assert 0 < fused.calls < coupled.calls
+    assert all(len(one.seconds) >= 3 for one in (fused, coupled))
+    assert 0.0 < fused.cost < coupled.cost
+
+
+def test_the_dataset_says_what_was_found(rigid: Study) -> None:
+    dataset = dataset_of(rigid)
+    assert dataset.attrs["chosen"] == "fused"
+    assert dataset.attrs["motion"] == "not chaotic"
+    assert set(np.unique(dataset["name"].values)) >= {"fused", "plain steps", "model exchange, CVode"}
+    assert np.all(np.isfinite(dataset.error.values) == (dataset.failure.values == ""))
+
+
+def test_a_chaotic_motion_is_found_out_and_compared_by_its_first_impacts_and_its_statistics() -> None:
+    scene = load_scene(
+        EXAMPLES / "thesis" / "figure_2_11.toml",
+        ["record.transient_periods=50", "record.recorded_periods=400"],
+    )
+    study = study_accuracy(scene, budget=1.0)
+    assert study.reference.chaotic
+    coupled = study.measured[1]
+    assert coupled.way.name == "coupled, FMI 3.0"
+    growth = coupled.errors.growth
+    assert len(growth) >= 10
+    assert growth[0] < 1e-13
+    assert growth.max() > 10.0 * growth[0]
+    assert coupled.statistics is not None
+    assert coupled.statistics.velocity_distance < 4.0 * coupled.statistics.velocity_sampling + 1e-12
+    assert "chaotic" in advice(study)
+
+
+@pytest.mark.parametrize("frequency", [0.8, 1.0, 1.05, 2.6])
+def test_the_closed_form_is_the_orbit_to_what_the_reference_says_of_itself(frequency: float) -> None:
+    tables = P11 | {"forcing": {"amplitude": 0.5, "angular_frequency": frequency}}
+    tables |= {"record": {"transient_periods": 400, "recorded_periods": 3}}
+    scene = studied_scene(Scene.from_dict(tables))
+    reference = reference_of(scene)
+    motions = ImpactOscillator.from_scene(scene.text).single_impact_motions(frequency)
+    impacts = vi.run(scene, progress=False).vibroimpact.impacts()
+    if len(impacts.impact) != 3 or not motions:
+        assert "closed form" not in reference.name
+        return
+    velocity = float(impacts.impact_velocity[0])
+    nearest = min(motions, key=lambda motion: abs(motion[0] - velocity))
+    assert abs(nearest[0] - velocity) / velocity <= reference.error["impact_velocity"]
+    assert abs(nearest[1] - float(impacts.impact_phase[0])) <= 2.0 * math.pi * reference.error["impact_time"]
+
+
+def test_a_general_scene_is_studied_over_exchanges_and_steps() -> None:
+    scene = load_scene(
+        EXAMPLES / "two_oscillators.toml", ["record.recorded_time=2", "execution.macro_step=0.05"]
+    )
+    study = study_accuracy(scene, budget=1.0)
+    assert "iterated exchange" in study.reference.name
+    for exchange, order in (("jacobi", 1.0), ("gauss_seidel", 1.0), ("iterated", 2.0)):
+        steps, errors = ladder(study, f"coupled, {exchange}")
+        assert observed_order(steps, errors) == pytest.approx(order, abs=0.2), exchange
+
+
+def test_a_free_motion_without_stops_is_compared_by_its_end() -> None:
+    free = {
+        "body": {"mass": 1.0, "stiffness": 4.0, "displacement_start": 1.0},
+        "record": {"recorded_time": 7.0},
+    }
+    tolerances, errors = ladder(study_accuracy(Scene.from_dict(free), budget=1.0), "model exchange, CVode")
+    assert len(tolerances) >= 3
+    assert np.all(np.diff(errors) < 0.0)
+
+
+def test_misuse_is_told() -> None:
+    stop = {"law": "kelvin_voigt", "position": 1.0, "stiffness": 1e3, "damping": 1.0, "relaxation_time": 0.1}
+    body = {"kind": "chain", "masses": [1.0, 1.0], "stiffnesses": [1.0, 1.0]}
+    alone = P11 | {
+        "body": body,
+        "stop": [stop],
+        "forcing": {"amplitude": [0.0, 0.5], "angular_frequency": 1.0},
+    }
+    with pytest.raises(UsageError, match="expected all, impact_time, impact_velocity"):
+        vi.accuracy(P11, of="phase")
+    with pytest.raises(UsageError, match="expected a relative error > 0, got -1"):
+        vi.accuracy(P11, tolerance=-1.0)
+    with pytest.raises(UsageError, match="expected a scene with something to vary"):
+        vi.accuracy(alone, budget=1.0)
+    with pytest.raises(UsageError, match=r"got 1e-20; reached was .*e-1.* by "):
+        vi.accuracy(P11, tolerance=1e-20, budget=1.0)
