@@ -1,6 +1,6 @@
 """`make exchange`: every export in every tool that is here, into docs/exchange.md; exit code 1 where one differs.
 
-`python -m exchange machines` makes one of its tables: tools, pairs, systems, reference, machines.
+`python -m exchange machines` makes one of its tables: tools, pairs, integrated, systems, reference, machines.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from rich.console import Console
 from support.places import ROOT
 
-from exchange import _systems
+from exchange import _model_exchange, _systems
 from exchange._cases import (
     COUNT,
     NAMES,
@@ -30,7 +30,7 @@ from exchange._cases import (
 )
 from exchange._machines import MACHINES, HostFailedError, Machine
 from exchange._reference import BALL, EXAMPLE, VERSIONS, bounces, found, imported, missing
-from exchange._tools import TOOLS, Answer, Tool, ToolFailedError, run, run_coupled, run_system
+from exchange._tools import TOOLS, Answer, Tool, ToolFailedError, run, run_coupled, run_integrated, run_system
 
 PAGE = ROOT / "docs" / "exchange.md"
 GOAL = 1e-9
@@ -43,6 +43,7 @@ def main() -> int:
     tables = {
         "tools": lambda: _of_tools("tools", list(NAMES), _row_of_tool),
         "pairs": lambda: _of_tools("pairs", list(PAIRS), _row_of_pair),
+        "integrated": _of_integrated,
         "systems": _of_systems,
         "reference": _of_reference_fmus,
         "machines": _of_machines,
@@ -69,6 +70,32 @@ def _of_tools(table: str, names: list[str], row: Row) -> Iterator[str]:
             if not all(isinstance(cell, float) and cell <= GOAL for cell in tried):
                 yield f"{tool.name}, FMI {versions}: expected {GOAL:g} at most, got {', '.join(map(str, cells))}."
     _write(table, lines)
+
+
+def _of_integrated() -> Iterator[str]:
+    """Write the table of model exchange; yield what was not as it should be."""
+    names = list(_model_exchange.STEPS)
+    lines = ["| tool | FMI | tolerance | " + " | ".join(names) + " |", "|---" * (3 + len(names)) + "|"]
+    for tool in TOOLS:
+        for fmi in _model_exchange.VERSIONS.get(tool.name, ()):
+            if reason := tool.missing():
+                lines.append(_line(tool.name, [fmi, "", f"not tried: {reason}", *[""] * (len(names) - 1)]))
+                continue
+            for tolerance in _model_exchange.TOLERANCES:
+                cells = [_cell_of_integrated(tool, fmi, name, tolerance) for name in names]
+                lines.append(_line(tool.shown(), [fmi, f"{tolerance:.0e}", *cells]))
+                goal = _model_exchange.ALLOWED * tolerance
+                if not all(isinstance(cell, float) and cell <= goal for cell in cells):
+                    yield f"{tool.name}, FMI {fmi}, model exchange: expected {goal:g} at most, got {lines[-1]}."
+    _write("integrated", lines)
+
+
+def _cell_of_integrated(tool: Tool, fmi: str, name: str, tolerance: float) -> Cell:
+    with tempfile.TemporaryDirectory() as folder:
+        path, rows = made(name, fmi, Path(folder))
+        count, output = _model_exchange.STEPS[name], [_model_exchange.OUTPUT]
+        asked = (tool, path, output, 1.0 / RATE, count, Path(folder), tolerance)
+        return _cell(run_integrated, rows[:count, :1], *asked)
 
 
 def _of_systems() -> Iterator[str]:

@@ -22,7 +22,8 @@ from exchange._cases import (
     made_pair,
     outputs,
 )
-from exchange._tools import TOOLS, Tool, run, run_coupled
+from exchange._model_exchange import ALLOWED, OUTPUT, STEPS, TOLERANCES
+from exchange._tools import TOOLS, Tool, run, run_coupled, run_integrated
 from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.fmpy_door import read_description
 
@@ -49,6 +50,21 @@ def test_an_export_in_another_tool_is_our_own_run(tmp_path: Path, tool: Tool, fm
     assert np.ptp(expected[:, 0]) > 0.0 or name == "impact stop"
     assert difference(rows, expected) <= 1e-9
     assert not answer.complaints
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STEPS)
+def test_an_integrator_comes_to_our_own_run_as_its_tolerance_falls(tmp_path: Path, name: str) -> None:
+    tool = next(tool for tool in TRIED if tool.name == "FMPy")
+    skip_where_missing(tool)
+    path, expected = made(name, "2.0", tmp_path)
+    asked = (tool, path, [OUTPUT], 1.0 / RATE, STEPS[name], tmp_path)
+    errors = [
+        difference(np.array(run_integrated(*asked, tolerance).rows), expected[: STEPS[name], :1])
+        for tolerance in TOLERANCES
+    ]
+    assert errors[0] <= ALLOWED * TOLERANCES[0]
+    assert errors[1] <= min(ALLOWED * TOLERANCES[1], 0.1 * errors[0])
 
 
 @pytest.mark.slow

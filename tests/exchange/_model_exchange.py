@@ -1,0 +1,96 @@
+"""One FMU for model exchange in each tool that integrates. Runs in the Python that has the tool."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+from exchange._single import Request, Rows, columns, run_program
+
+TOLERANCES = (1e-6, 1e-9)
+#: Steps that are compared: of the beam, which hits its stop in each of its fast periods, fewer.
+STEPS = {"oscillator": 2000, "chain of 3": 2000, "beam of 4 modes with a stop": 100}
+#: What an error may be over the tolerance, which is one of a step and not of a motion with impacts.
+ALLOWED = 1e4
+#: What is compared; velocities jump, and differ by all of a jump between two instants of one impact.
+OUTPUT = "displacement"
+#: The versions of FMI that each tool integrates.
+VERSIONS = {
+    "FMPy": ("2.0", "3.0"),
+    "PyFMI": ("2.0", "3.0"),
+    "fmusim": ("2.0", "3.0"),
+    "OMSimulator": ("2.0",),
+}
+#: An end of a step, in steps.
+NEAR = 1e-7
+
+
+def fmpy(asked: Request) -> Rows:
+    """Integrate it by FMPy's CVode."""
+    from fmpy import simulate_fmu
+
+    step = asked["step"]
+    done = simulate_fmu(
+        asked["fmu"],
+        fmi_type="ModelExchange",
+        solver="CVode",
+        relative_tolerance=asked["tolerance"],
+        output=asked["names"],
+        output_interval=step,
+        stop_time=step * asked["count"],
+    )
+    rows = ([float(row["time"]), *(float(row[name]) for name in asked["names"])] for row in done)
+    return list(_at_steps(rows, asked))
+
+
+def pyfmi(asked: Request) -> Rows:
+    """Integrate it by the CVode of PyFMI."""
+    from pyfmi import load_fmu
+
+    model = load_fmu(asked["fmu"], kind="me")
+    options = model.simulate_options()
+    options["ncp"] = asked["count"]
+    options["CVode_options"] |= {"rtol": asked["tolerance"], "verbosity": 50}
+    options["filter"] = asked["names"]
+    found = model.simulate(final_time=asked["step"] * asked["count"], options=options)
+    rows = zip(found["time"], *(found[name] for name in asked["names"]), strict=True)
+    return list(_at_steps(([float(value) for value in row] for row in rows), asked))
+
+
+def fmusim(asked: Request) -> Rows:
+    """Integrate it by fmusim's CVode."""
+    step = asked["step"]
+    options = ["--interface-type", "me", "--solver", "cvode", "--tolerance", repr(asked["tolerance"])]
+    options += ["--stop-time", repr(step * asked["count"]), "--output-interval", repr(step)]
+    for name in asked["names"]:
+        options += ["--output-variable", name]
+    run_program(asked, *options, "--output-file", "f.csv", "--logging-on", asked["fmu"])
+    return list(_at_steps(columns(Path("f.csv"), ["time", *asked["names"]]), asked))
+
+
+def omsimulator(asked: Request) -> Rows:
+    """Integrate it by OMSimulator's CVode."""
+    step = asked["step"]
+    options = ["--mode=me", "--solver=cvode", f"--tolerance={asked['tolerance']!r}"]
+    options += [f"--stopTime={step * asked['count']!r}", f"--stepSize={step!r}", "--resultFile=r.csv"]
+    run_program(asked, *options, asked["fmu"])
+    return list(_at_steps(columns(Path("r.csv"), ["time", *asked["names"]]), asked))
+
+
+def _at_steps(rows: Iterable[list[float]], asked: Request) -> Iterator[list[float]]:
+    """Return the rows at the ends of steps; events have rows too."""
+    at: dict[int, list[float]] = {}
+    for time, *row in rows:
+        steps = time / asked["step"]
+        if abs(steps - round(steps)) < NEAR:
+            at[round(steps)] = row
+    for k in range(1, asked["count"] + 1):
+        yield at[k]
+
+
+DRIVERS: dict[str, Callable[[Request], Rows]] = {
+    "FMPy": fmpy,
+    "PyFMI": pyfmi,
+    "fmusim": fmusim,
+    "OMSimulator": omsimulator,
+}
