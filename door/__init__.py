@@ -56,6 +56,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.simulation import accuracy as accuracy
     from vibroimpact.simulation import campaign as campaign
     from vibroimpact.simulation import cost_of as cost_of
+    from vibroimpact.simulation import effects as effects
     from vibroimpact.simulation import export_fmu as export_fmu
     from vibroimpact.simulation import export_ssp as export_ssp
     from vibroimpact.simulation import import_ssp as import_ssp
@@ -88,6 +89,7 @@ _NAMES = {
         "accuracy",
         "campaign",
         "cost_of",
+        "effects",
         "export_fmu",
         "export_ssp",
         "import_ssp",

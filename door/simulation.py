@@ -31,6 +31,7 @@ from vibroimpact.orchestrator.ssp import (
 )
 from vibroimpact.orchestrator.study import BUDGET, refuse_unreached, study_accuracy
 from vibroimpact.orchestrator.study import dataset_of as accuracy_dataset
+from vibroimpact.orchestrator.study.effects import dataset_of_shares, effects_of, shares_of
 
 SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
 PathLike = str | os.PathLike[str]
@@ -232,6 +233,40 @@ def accuracy(
         write_results(dataset, _path(path), kind="accuracy")
     refuse_unreached(study)
     return dataset.assign_attrs(results_kind="accuracy")
+
+
+def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
+    """Run a scene with and without each effect that it asks for, and measure what each costs and changes.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        Its sweep is left out.
+    path : path, optional
+        The dataset to write as well (.nc).
+
+    Returns
+    -------
+    xarray.Dataset
+        `share` of the time of a run, `change` without it (relative) and `changes` (in words) of each `effect`, the
+        dearest first; `attrs["not_simulated"]` lists what the scene does not call for.
+
+    Raises
+    ------
+    SceneError
+        With all problems of the scene, each on one line.
+
+    Examples
+    --------
+    >>> effects("examples/chatter.toml").attrs["not_simulated"].split(", ")[0]    # doctest: +SKIP
+    'recorded drive'
+    """
+    chosen = _scene(scene)
+    alone = chosen.with_sweep({}) if chosen.sweep else chosen
+    dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)))
+    if path is not None:
+        write_results(dataset, _path(path), kind="effects")
+    return dataset.assign_attrs(results_kind="effects")
 
 
 def cost_of(scene: SceneLike) -> SceneCost:

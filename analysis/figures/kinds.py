@@ -11,6 +11,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.accuracy import draw_accuracy
+from vibroimpact.analysis.figures.effects import draw_effects
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
@@ -40,7 +41,7 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.wording import option
 
 Data = xr.Dataset | Recording
-Family = Literal["runs", "recording", "replay", "estimates", "spikes", "accuracy", "ladder"]
+Family = Literal["runs", "recording", "replay", "estimates", "spikes", "accuracy", "effects", "ladder"]
 _WORDS: dict[Family, str] = {
     "runs": "a dataset of runs",
     "recording": "a recording",
@@ -48,6 +49,7 @@ _WORDS: dict[Family, str] = {
     "estimates": "estimates",
     "spikes": "spikes",
     "accuracy": "a study of accuracy",
+    "effects": "a study of effects",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -144,6 +146,7 @@ KINDS: dict[str, FigureKind] = {
     "estimates": FigureKind({"estimates": lambda data, view: draw_estimates(data)}),
     "intervals": FigureKind({"spikes": lambda data, view: draw_intervals(data)}),
     "accuracy": FigureKind({"accuracy": lambda data, view: draw_accuracy(data)}),
+    "effects": FigureKind({"effects": lambda data, view: draw_effects(data)}),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
@@ -203,6 +206,7 @@ def _family(data: Data) -> Family:
         "estimates": "estimates",
         "spikes": "spikes",
         "accuracy": "accuracy",
+        "effects": "effects",
     }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:

@@ -94,6 +94,9 @@ def kinds() -> dict[str, Picture]:
         "accuracy": _of(
             "accuracy", "study", "vibroimpact accuracy examples/single_run.toml -o study.nc --tolerance 1e-6"
         ),
+        "effects": _of(
+            "effects", "parts", "vibroimpact effects examples/thesis/figure_7_11.toml -o parts.nc"
+        ),
         "convergence": _of("convergence", "ladder"),
         "work-precision": _of("work-precision", "ladder"),
     }

@@ -28,7 +28,7 @@ ssp_commands = typer.Typer(no_args_is_help=True, help="Exchange systems of FMUs 
 
 def register(app: typer.Typer) -> None:
     """Add the commands of this package to the command line."""
-    for command in (check, run, campaign, demo, accuracy, replay):
+    for command in (check, run, campaign, demo, accuracy, effects, replay):
         app.command()(command)
     fmu_commands.command()(export)
     ssp_commands.command("export")(export_ssp)
@@ -117,6 +117,25 @@ def accuracy(
     from vibroimpact.orchestrator.commands.accuracy import study_scene
 
     study_scene(scene, changes or (), output, figure, tolerance, of, write, budget, force)
+
+
+def effects(
+    scene: SceneFile,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
+    figure: FigureFile = None,
+    changes: Changes = None,
+    force: Force = False,
+) -> None:
+    """Say what a scene asks for, what each of it costs and changes, and what is not simulated.
+
+    The scene is run with and without each effect (forcing, damping, stops, modes, what is recorded, how it runs), in
+    five pairs in turn. A sweep is left out. Exit code 2: the scene has problems.
+
+    Example: vibroimpact effects examples/thesis/figure_7_11.toml --figure effects.png
+    """
+    from vibroimpact.orchestrator.commands.effects import show_effects
+
+    show_effects(scene, changes or (), output, figure, force)
 
 
 def demo(

@@ -1,0 +1,59 @@
+"""What `vibroimpact effects` does: it says what a scene asks for, what that costs, and what is not simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.orchestrator.commands.check import duration
+from vibroimpact.orchestrator.scene.summary import engine
+from vibroimpact.orchestrator.ssp import opened_scene
+from vibroimpact.orchestrator.study.effects import Share, dataset_of_shares, effects_of, not_called, shares_of
+
+
+def show_effects(
+    path: Path, changes: Sequence[str], output: Path | None, figure: Path | None, force: bool
+) -> None:
+    """Measure the effects of a scene, print them, and write what was asked for."""
+    refuse_outputs([path], output, figure)
+    scene = opened_scene(path, changes)
+    refuse_overwriting(
+        output,
+        force,
+        lambda there: (there.get("results_kind"), there.get("scene_file")) == ("effects", str(path)),
+    )
+    alone = scene.with_sweep({}) if scene.sweep else scene
+    say(f"{engine(alone)}")
+    shares = shares_of(alone, effects_of(alone))
+    rows = table(
+        f"What effects cost: {scene.title or scene.source}",
+        *("<effect", "<asked for by", ">of the time", ">spread", "<without it"),
+    )
+    for share in shares:
+        rows.add_row(share.effect.name, share.effect.asked_by, *_told(share), share.changes)
+    wide_terminal().print(rows)
+    if shares:
+        say(f"A run takes {duration(float(np.nanmedian([share.full for share in shares])))}; shares overlap.")
+    say(f"Not asked for, and not simulated: {', '.join(not_called(scene)) or 'nothing'}.")
+    dataset = dataset_of_shares(alone, shares, {"scene_file": str(path)})
+    if output is not None:
+        write_results(dataset, output, kind="effects")
+        say(f"Dataset written to {output}.")
+    if figure is not None:
+        from vibroimpact.analysis import figures  # half a second, which a table needs not
+
+        figures.save(figures.draw(dataset.assign_attrs(results_kind="effects")), figure)
+        say(f"Figure written to {figure}.")
+
+
+def _told(share: Share) -> tuple[str, str]:
+    if np.isnan(share.seconds).all():
+        return "-", "-"
+    parts = 100.0 * share.seconds / share.full
+    return f"{100.0 * share.share:.0f} %", f"{parts.min():.0f} to {parts.max():.0f} %"

@@ -1,0 +1,339 @@
+"""What a scene asks for, what that costs and what it changes: the scene with and without each effect, run in turn."""
+
+from __future__ import annotations
+
+import gc
+import json
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset.results import Rows, described
+from vibroimpact.fmus.errors import ComponentError, SceneError
+from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import BeamBody
+from vibroimpact.orchestrator.scene.fields import rule_of
+from vibroimpact.orchestrator.scene.models import DAMPING
+from vibroimpact.orchestrator.scene.summary import effects as called_effects
+from vibroimpact.orchestrator.scene.summary import laws
+from vibroimpact.orchestrator.study.errors import Scales, errors_of
+from vibroimpact.orchestrator.study.references import scales_of
+from vibroimpact.orchestrator.study.ways import SceneTrial
+
+PAIRS = 5
+"""Pairs of runs, one with the effect and one without, in turn."""
+RECORDED = ("impacts", "extrema", "strobe")
+"""Keys of `[record]` that switch off what is kept of a run."""
+SERIES = "record.time_series"
+NOT_RECORDED = "nothing but what is kept"
+NO_CHANGE = "nothing"
+
+Change = Callable[[dict[str, Any]], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """Something that a scene asks for, and the scene without it.
+
+    Attributes
+    ----------
+    name : str
+        In words.
+    asked_by : str
+        The key that asks for it.
+    base, without : Scene
+        The scene with it and without it. What moves is compared without a time series, whose samples take most of the
+        time: else nothing could be told of the rest.
+    keeps_motion : bool
+        Whether what moves is the same without it: it only says what is kept, or how points run.
+    """
+
+    name: str
+    asked_by: str
+    base: Scene
+    without: Scene
+    keeps_motion: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """An effect with what it costs and changes.
+
+    Attributes
+    ----------
+    effect : Effect
+    seconds : ndarray, shape (pair,)
+        Processor time that it costs in each pair of runs, s; negative where the run without it took longer.
+    full : float
+        Median processor time of a run of the scene, s.
+    changes : str
+        What is otherwise without it, in words.
+    change : float
+        Largest relative change of what both runs show; NaN where they cannot be compared.
+    """
+
+    effect: Effect
+    seconds: np.ndarray[Any, Any]
+    full: float
+    changes: str
+    change: float
+
+    @property
+    def share(self) -> float:
+        """Median share of the time of a run."""
+        return float(np.median(self.seconds)) / self.full
+
+
+def effects_of(scene: Scene) -> list[Effect]:
+    """Return what a scene asks for that it could leave out, each with the scene without it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep.
+    """
+    found = list(_found(scene))
+    return [effect for effect in found if effect is not None]
+
+
+def _found(scene: Scene) -> Iterator[Effect | None]:
+    general = scene.general is not None
+    if not general:
+        yield from _of_numbers(scene)
+        for number, (key, law) in enumerate(laws(scene).items()):
+            yield _without(scene, f"{law} stop", key, _removes("stop", number))
+        if isinstance(scene.body, BeamBody) and scene.body.modes > 1:
+            half = scene.body.modes // 2
+            yield _without(
+                scene, f"modes {half + 1} to {scene.body.modes}", "body.modes", _sets("body", "modes", half)
+            )
+        for name in RECORDED:
+            if getattr(scene.record, name) and (name == "impacts" or scene.period is not None):
+                yield _without(
+                    scene, f"record of {name}", f"record.{name}", _sets("record", name, False), keeps=True
+                )
+        if scene.record.time_series is not None:
+            change = _sets("record", "time_series", None)
+            yield _without(scene, "time series", SERIES, change, keeps=True)
+        if scene.execution.how == "coupled":
+            change = _only_fused
+            yield _without(scene, "stops as FMUs of their own", "execution.how", change, keeps=True)
+    else:
+        if called_effects(scene)["time series"]:
+            yield _without(scene, "samples", "record.variables", _no_samples, keeps=True)
+        for table, name in (("event", "watched event"), ("contact", "contact of bodies")):
+            for number in range(len(parse_toml(scene.text).get(table, ()))):
+                yield _without(
+                    scene, f"{name} {number + 1}", f"{table}[{number + 1}]", _removes(table, number)
+                )
+        if (
+            scene.general is not None
+            and scene.general.guard
+            and "guard" in parse_toml(scene.text).get("execution", {})
+        ):
+            yield _without(
+                scene, "guard process", "execution.guard", _sets("execution", "guard", False), keeps=True
+            )
+
+
+def _of_numbers(scene: Scene) -> Iterator[Effect | None]:
+    """Yield the effects that numbers other than 0 call for: all of one effect at once."""
+    called: dict[str, list[str]] = {}
+    for key, value in scene.constants().items():
+        effect = rule_of(scene.field(key)).effect
+        if effect and value != 0.0:
+            called.setdefault(effect, []).append(key)
+    if scene.forcing is not None and np.any(scene.forcing.amplitude):
+        called["forcing"] = ["forcing.amplitude"]
+    if getattr(scene.body_given, "rayleigh", None) is not None:
+        called.setdefault(DAMPING, []).append("body.rayleigh")
+    for name, keys in called.items():
+        yield _without(scene, name, ", ".join(keys), _zeros(keys))
+
+
+def _without(scene: Scene, name: str, key: str, change: Change, *, keeps: bool = False) -> Effect | None:
+    """Return an effect; None where the scene is none without it."""
+    document = parse_toml(scene.text)
+    document.pop("sweep", None)
+    if key != SERIES and scene.general is None:
+        document["record"].pop("time_series", None)
+    base = Scene.from_dict(document, scene.source)
+    change(document)
+    try:
+        return Effect(name, key, base, Scene.from_dict(document, scene.source), keeps)
+    except SceneError:
+        return None
+
+
+def _sets(table: str, name: str, value: object) -> Change:
+    def change(document: dict[str, Any]) -> None:
+        if value is None:
+            document[table].pop(name, None)
+        else:
+            document.setdefault(table, {})[name] = value
+
+    return change
+
+
+def _removes(table: str, number: int) -> Change:
+    def change(document: dict[str, Any]) -> None:
+        del document[table][number]
+        if not document[table]:
+            del document[table]
+
+    return change
+
+
+def _zeros(keys: Sequence[str]) -> Change:
+    def change(document: dict[str, Any]) -> None:
+        for key in keys:
+            owner, _, name = key.partition(".")
+            table, _, place = owner.partition("[")
+            within = document[table][int(place[:-1]) - 1] if place else document[table]
+            name = name.partition("[")[0]
+            value = within.get(name)
+            if name == "rayleigh":
+                within.pop(name)
+            elif isinstance(value, list):
+                within[name] = [0.0] * len(value)
+            elif value is not None:
+                within[name] = 0.0
+
+    return change
+
+
+def _no_samples(document: dict[str, Any]) -> None:
+    for name in ("variables", "rate"):
+        document["record"].pop(name, None)
+
+
+def _only_fused(document: dict[str, Any]) -> None:
+    document["execution"]["how"] = "fused"
+    for name in ("macro_step", "exchange", "guard"):
+        document["execution"].pop(name, None)
+
+
+def shares_of(
+    scene: Scene, effects: Sequence[Effect], told: Callable[[Share], None] = lambda share: None
+) -> list[Share]:
+    """Run a scene with and without each effect, in turn, and return what each costs and changes, the dearest first.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep.
+    effects : sequence of Effect
+        Of this scene.
+    told : callable
+        Given each as soon as it is known.
+    """
+    found = []
+    scales = scales_of(scene)
+    with opened(scene) as full:
+        whole = float(np.median([_timed(full) for _ in range(PAIRS)]))
+    for effect in effects:
+        share = _share(effect, whole, scales)
+        told(share)
+        found.append(share)
+    return sorted(found, key=lambda share: -share.share if share.share == share.share else math.inf)
+
+
+@contextmanager
+def opened(scene: Scene) -> Iterator[SceneTrial]:
+    """Open a scene, and close it at the end."""
+    trial = SceneTrial(scene)
+    try:
+        yield trial
+    finally:
+        trial.close()
+
+
+def _share(effect: Effect, whole: float, scales: Scales) -> Share:
+    try:
+        with opened(effect.base) as full, opened(effect.without) as trial:
+            reference, alone = full.run(), trial.run()
+            gc.collect()
+            pairs = np.array([(_timed(full), _timed(trial)) for _ in range(PAIRS)])
+    except ComponentError as error:
+        return _failed(effect, error)
+    seconds = pairs[:, 0] - pairs[:, 1]
+    if effect.keeps_motion:
+        return Share(effect, seconds, whole, NOT_RECORDED, 0.0)
+    errors = errors_of(alone, reference, scales)
+    change = errors.worst()
+    words = (
+        errors.failure.replace("missed", "loses")
+        .replace("that are none", "more")
+        .replace("that is none", "more")
+    )
+    if not words:
+        words = NO_CHANGE if change == 0.0 else f"up to {100.0 * change:.2g} %"
+    return Share(effect, seconds, whole, words, change)
+
+
+def _timed(trial: SceneTrial) -> float:
+    """Return the processor time of a run, s; wall time where another process computes it."""
+    began, processor = time.perf_counter(), time.process_time()
+    trial.run()
+    return time.perf_counter() - began if trial.is_guarded else time.process_time() - processor
+
+
+def _failed(effect: Effect, error: Exception) -> Share:
+    words = f"does not run without it: {str(error).splitlines()[0]}"
+    return Share(effect, np.full(PAIRS, math.nan), math.nan, words, math.nan)
+
+
+def not_called(scene: Scene) -> list[str]:
+    """Return the effects that a scene does not call for, which are not simulated."""
+    return [name for name, there in called_effects(scene).items() if not there]
+
+
+def dataset_of_shares(
+    scene: Scene, shares: Sequence[Share], attributes: Mapping[str, Any] | None = None
+) -> xr.Dataset:
+    """Return what effects cost and change as a dataset, for `write_results` of kind `effects` and for figures."""
+    seconds = np.array([share.seconds for share in shares]).reshape(-1, PAIRS)
+    rows: Rows = {
+        "share": (
+            "effect",
+            [share.share for share in shares],
+            "1",
+            "share of the time of a run, median",
+        ),
+        "seconds": (
+            ("effect", "pair"),
+            seconds,
+            "s",
+            "processor time with the effect less that without, pair by pair",
+        ),
+        "run_seconds": (
+            "effect",
+            [share.full for share in shares],
+            "s",
+            "median processor time of a run of the scene",
+        ),
+        "change": ("effect", [share.change for share in shares], "1", "largest relative change without it"),
+    }
+    dataset = xr.Dataset(described(rows))
+    for name, words, texts in (
+        ("name", "effect", [share.effect.name for share in shares]),
+        ("asked_by", "what asks for it", [share.effect.asked_by for share in shares]),
+        ("changes", "what is otherwise without it", [share.changes for share in shares]),
+    ):
+        dataset[name] = ("effect", np.array(texts, dtype=object), {"units": "1", "long_name": words})
+    return dataset.assign_attrs(
+        title=f"What effects cost: {scene.title or scene.source}",
+        not_simulated=", ".join(not_called(scene)),
+        scene=scene.text,
+        versions=json.dumps(versions()),
+        git_commit=git_commit(),
+        **(attributes or {}),
+    )

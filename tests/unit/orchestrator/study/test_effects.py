@@ -1,0 +1,91 @@
+"""Effects of scenes: each is found, taken away alone, timed in turn; what is kept of a run changes no motion."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from support.places import EXAMPLES
+
+import vibroimpact as vi
+from vibroimpact.orchestrator.scene import Scene, load_scene
+from vibroimpact.orchestrator.study.effects import PAIRS, effects_of, not_called, shares_of
+
+BEAM: dict[str, Any] = {
+    "body": {"kind": "beam", "modes": 4, "length": 0.3, "flexural_rigidity": 0.18, "mass_per_length": 0.16}
+    | {"damping_ratio": 0.03},
+    "forcing": {"amplitude": 0.02, "angular_frequency": 37.7},
+    "stop": [{"law": "restitution", "position": 0.0034, "restitution": 0.8, "yield_velocity": 0.5}],
+    "record": {"transient_periods": 20, "recorded_periods": 4, "time_series": {"rate": 500.0}},
+}
+
+
+def changes_of(tables: dict[str, Any]) -> dict[str, Scene]:
+    return {effect.name: effect.without for effect in effects_of(Scene.from_dict(tables))}
+
+
+def test_each_thing_that_a_scene_asks_for_is_taken_away_alone() -> None:
+    found = changes_of(BEAM)
+    assert set(found) == {
+        *("forcing", "damping", "restitution that falls with speed", "restitution stop", "modes 3 to 4"),
+        *("record of impacts", "record of extrema", "record of strobe", "time series"),
+    }
+    assert found["restitution stop"].stops == ()
+    assert found["modes 3 to 4"].body.size == 2
+    assert found["forcing"].forcing is not None
+    assert found["forcing"].forcing.scalar_amplitude == 0.0
+    assert found["time series"].record.time_series is None
+    assert found["damping"].record.time_series is None  # what moves is compared without
+    assert found["record of impacts"].stops
+
+
+def test_a_scene_without_an_effect_does_not_list_it() -> None:
+    free = {"body": {"mass": 1.0, "stiffness": 1.0}, "record": {"recorded_time": 5.0}}
+    assert set(changes_of(free)) == {"record of impacts"}
+    assert {"forcing", "damping", "stops"} <= set(not_called(Scene.from_dict(free)))
+
+
+def test_a_free_mass_needs_its_forcing() -> None:
+    rigid = {
+        "body": {"mass": 1.0, "stiffness": 0.0, "damping": 0.0},
+        "forcing": {"amplitude": 1.0, "angular_frequency": 1.0},
+        "record": {"transient_periods": 0, "recorded_periods": 3},
+    }
+    assert "forcing" in changes_of(rigid)
+
+
+@pytest.mark.slow
+def test_what_is_kept_changes_no_motion_and_what_moves_does() -> None:
+    scene = Scene.from_dict(BEAM)
+    shares = {share.effect.name: share for share in shares_of(scene, effects_of(scene))}
+    assert next(iter(shares)) == "time series"  # the dearest
+    assert shares["time series"].share > 0.2
+    assert shares["time series"].change == 0.0
+    assert shares["restitution stop"].changes.startswith("loses ")
+    assert all(share.seconds.shape == (PAIRS,) for share in shares.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "tolerance"),
+    [
+        *((f"record of {what}", 0.0) for what in ("impacts", "extrema", "strobe")),
+        ("time series", 1e-12),  # flights are cut at its samples
+    ],
+)
+def test_motion_is_the_same_whatever_is_kept(name: str, tolerance: float) -> None:
+    scene = Scene.from_dict(BEAM)
+    (effect,) = (one for one in effects_of(scene) if one.name == name)
+    full, without = (vi.run(one, progress=False) for one in (effect.base, effect.without))
+    both = set(full.data_vars) & set(without.data_vars)
+    assert {"displacement_max", "impact_velocity"} & both
+    for variable in both - {"point_seconds"}:
+        if full[variable].dtype.kind == "f":
+            a, b = full[variable].values, without[variable].values
+            assert np.allclose(a, b, rtol=tolerance, atol=0.0, equal_nan=True), variable
+
+
+def test_effects_of_a_general_scene_are_its_samples_contacts_and_events() -> None:
+    found = [effect.name for effect in effects_of(load_scene(EXAMPLES / "newtons_cradle.toml"))]
+    assert found == ["samples", *(f"contact of bodies {k}" for k in range(1, 5))]
