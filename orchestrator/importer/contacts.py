@@ -14,7 +14,8 @@ from vibroimpact.orchestrator.importer.contact_bond import (
     STIFFNESS,
     ContactBond,
 )
-from vibroimpact.orchestrator.importer.held_force import ForceInput, HeldForceBond
+from vibroimpact.orchestrator.importer.force_input import ForceInput
+from vibroimpact.orchestrator.importer.held_force import HeldForceBond
 from vibroimpact.orchestrator.importer.pairs import Pair, Pairs
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec, PairSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.wiring import Transfer
@@ -85,6 +86,7 @@ class ContactBonds:
 
     def begin_step(self, time: float, target: float) -> float:
         """Look at all contacts before a step; returns where it should end, s."""
+        target = self.pairs.pulses.begin_step(time, target)
         for bond in self._following:
             target = bond.begin_step(time, target, self._steps)
         self.active = any(bond.active for bond in self._following)
@@ -117,6 +119,7 @@ class ContactBonds:
         """The step, of `size` s, counts; returns the bodies that have come to a stop at its end, without event mode."""
         for bond in self._following:
             bond.end_step(size)
+        self.pairs.pulses.end_step(size)
         met = [pair.lower.body for pair in self.pairs.pairs if pair.arrived]
         return [*(bond.body for bond in self.held if bond.arrived), *met]
 
@@ -128,6 +131,7 @@ class ContactBonds:
         """Give back what they have saved."""
         for bond in self._all():
             bond.free()
+        self.pairs.free()
 
 
 def _is_contact_force(body: Component, variable: str) -> bool:

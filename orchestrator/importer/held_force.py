@@ -16,13 +16,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from ctypes import c_void_p
 
 import numpy as np
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.asked_stop import AskedStop, ContactWork, depth_that_stops
 from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.force_input import TRIAL_STEP, ForceInput, TrialSteps
 from vibroimpact.orchestrator.importer.revision import PRECISION, Bracket, refine
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
 from vibroimpact.orchestrator.importer.step_path import NODES, StepPath, last_true
@@ -53,29 +53,6 @@ ROOM = 1e-13
 SURE, NEARER = 1e-9, 0.75
 #: A step shorter than this times the one before says too little of accelerations.
 TELLING = 0.05
-#: Trial step: part of the communication step, change of the velocity relative to it, and rounds to get there.
-TRIAL_STEP, TRIAL_CHANGE, TRIALS = 1e-3, 1e-3, 40
-#: Change of the velocity, relative, that rounding does not blur.
-VISIBLE = 1e-9
-
-
-class ForceInput:
-    """An input that takes the sum of the forces of one or several contacts.
-
-    Attributes
-    ----------
-    parts : dict of str to float
-        The force of each contact, along the displacement, N.
-    """
-
-    def __init__(self, body: Component, name: str) -> None:
-        self._group = body.group("Float64", [name])
-        self.parts: dict[str, float] = {}
-
-    def write(self, more: float = 0.0) -> None:
-        """Give the body the sum, and `more` N."""
-        self._group.values[0] = sum(self.parts.values()) + more
-        self._group.set()
 
 
 class HeldForceBond:
@@ -113,7 +90,7 @@ class HeldForceBond:
         self._stop = AskedStop(components[spec.stop], spec)
         self._outputs = self.body.group("Float64", [spec.displacement, spec.velocity])
         self._input = inputs.setdefault((spec.body, spec.force), ForceInput(self.body, spec.force))
-        self._trial_state = c_void_p()
+        self._trials = TrialSteps(self.body, spec.velocity, self._input)
         self.revisable = self.body.has_states
         self.given_mass = spec.mass
         self.active = self.closed = self.arrived = False
@@ -130,6 +107,7 @@ class HeldForceBond:
         self._other, self._other_slope = 0.0, 0.0
         self._told: tuple[float, float, float] | None = None
         self._searched = False
+        self._checks_mass = self.revisable and self.given_mass is not None
         self._agreed = -math.inf
         self._depth: float | None = None
         self._limit = math.inf
@@ -141,6 +119,8 @@ class HeldForceBond:
         """Look at the contact before a step; returns where the step should end, s."""
         self._steps, self._time, self._room = steps, time, ROOM * (1.0 + abs(time))
         self._start = self._look()
+        if self._checks_mass and target > time:
+            self._check_mass(target - time)
         self._stop.mark(time)
         self._force = 0.0
         self._last_try: tuple[float, float] | None = None
@@ -332,28 +312,15 @@ class HeldForceBond:
             if depth is not None:
                 self._depth, self._limit = depth, math.pi * depth / velocity / self._steps
 
+    def _check_mass(self, size: float) -> None:
+        """Compare the given mass with that of trial steps, once a run."""
+        assert self.given_mass is not None
+        self._trials.check_mass(self.given_mass, self._time, size)
+        self._checks_mass = False
+
     def _found_mass(self, size: float) -> float:
         """The effective mass of the contact point, by steps with and without a small force, kg."""
-        instance = self.body.instance
-        instance.save(self._trial_state)
-        force, trial, mass = 1.0, TRIAL_STEP * size, math.nan
-        for _ in range(TRIALS):
-            reached, changed = self._trial(trial, force)
-            wanted = TRIAL_CHANGE * max(abs(self._start[1]), abs(reached))
-            if abs(changed) <= VISIBLE * abs(reached):
-                force *= 1e6
-                if changed == 0.0:
-                    trial = min(2.0 * trial, size)
-                continue
-            mass = force * trial / changed
-            if abs(changed) <= 2.0 * wanted or wanted == 0.0:
-                break
-            force *= wanted / abs(changed)
-        instance.restore(self._trial_state)
-        self._input.write()
-        instance.time = self._time
-        instance.returned_early = instance.needs_event_mode = instance.wants_to_end = False
-        instance.is_flagged = False
+        mass = self._trials.found_mass(self._time, TRIAL_STEP * size, size)
         if not (mass > 0.0 and math.isfinite(mass)):
             got = "one that does not change" if math.isnan(mass) else f"an effective mass of {mass:.3g} kg"
             raise ComponentError(
@@ -364,16 +331,6 @@ class HeldForceBond:
                 time=self._time,
             )
         return mass
-
-    def _trial(self, size: float, force: float) -> tuple[float, float]:
-        """Velocity after a step with a force more, and what the force has added to it, m/s."""
-        instance, found = self.body.instance, []
-        for more in (0.0, force):
-            instance.restore(self._trial_state)
-            self._input.write(more)
-            instance.step_undiscarded(self._time, size)
-            found.append(float(self._outputs.get()[1]))
-        return found[1], found[1] - found[0]
 
     # ---- the force ----
 
@@ -483,8 +440,7 @@ class HeldForceBond:
     def free(self) -> None:
         """Give back its saved states, before its components are freed."""
         self._stop.free()
-        if self._trial_state and not self.body.instance.is_fatal:
-            self.body.instance.free_state(self._trial_state)
+        self._trials.free()
 
 
 def _secant(force: float, answer: float, before: tuple[float, float] | None) -> float:

@@ -10,7 +10,8 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.asked_stop import LOWER_SIDE
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.held_force import ForceInput
+from vibroimpact.orchestrator.importer.force_input import ForceInput, TrialSteps
+from vibroimpact.orchestrator.importer.pulse import Pulses
 from vibroimpact.orchestrator.importer.revision import PRECISION
 from vibroimpact.orchestrator.importer.specification import BodyPoint
 
@@ -64,6 +65,9 @@ class PortEnd:
         self._direction = -1.0 if int(self._side.get()[0]) == LOWER_SIDE else 1.0
         self._input.parts.clear()
 
+    def check_mass(self, time: float, size: float) -> None:
+        """Its mass is its own."""
+
     def press(self, pair: str, force: float) -> None:
         """Hold a force of a pair along the displacement over the next step, N."""
         self._input.parts[pair] = -self._direction * force
@@ -82,14 +86,19 @@ class PortEnd:
         if self.body.event_mode and isinstance(instance, Instance3):
             instance.check(instance.update_call(), "UpdateDiscreteStates")
 
+    def free(self) -> None:
+        """It has saved nothing."""
+
 
 class PointEnd:
-    """The point of a body of any tool, as one end of a pair whose law yields: it takes a force, and no impulse.
+    """The point of a body of any tool, as one end of a pair: it takes a force, and an impulse as a pulse of that.
 
     Attributes
     ----------
-    body, name, mass
-        As those of `PortEnd`; the mass is given.
+    body, name : Component, str
+        As those of `PortEnd`.
+    pulse : Pulse or None
+        Its impulses; None where the law yields.
     """
 
     def __init__(
@@ -97,15 +106,30 @@ class PointEnd:
         components: Mapping[str, Component],
         point: BodyPoint,
         inputs: dict[tuple[str, str], ForceInput],
+        pulses: Pulses | None,
     ) -> None:
-        self.name, self.mass = point.name, point.mass
+        self.name = point.name
         self.body = components[point.component]
+        self._given = point.mass
         self._motion = self.body.group("Float64", [point.displacement, point.velocity])
-        self._input = inputs.setdefault((point.component, point.force), ForceInput(self.body, point.force))
+        place = point.component, point.force
+        self._input = inputs.setdefault(place, ForceInput(self.body, point.force))
+        self._trials = TrialSteps(self.body, point.velocity, self._input)
+        self.pulse = None if pulses is None else pulses.of(point, self._input)
+
+    @property
+    def mass(self) -> float:
+        """Impulse over the change of the velocity, kg: the given one, or what pulses have measured."""
+        return self._given if self.pulse is None else self.pulse.mass
 
     def begin(self) -> None:
         """Start a run."""
         self._input.parts.clear()
+
+    def check_mass(self, time: float, size: float) -> None:
+        """Compare the given mass with that of trial steps; pulses have measured it already."""
+        if self.pulse is None:
+            self._trials.check_mass(self._given, time, size)
 
     def press(self, pair: str, force: float) -> None:
         """Hold a force of a pair along the displacement over the next step, N."""
@@ -113,23 +137,20 @@ class PointEnd:
         self._input.write()
 
     def look(self) -> tuple[float, float]:
-        """Return displacement (m) and velocity (m/s)."""
-        displacement, velocity = self._motion.get()
-        return float(displacement), float(velocity)
+        """Return displacement (m) and velocity (m/s), with the impulse that it is still to be given."""
+        displacement, velocity = (float(value) for value in self._motion.get())
+        if self.pulse is not None:
+            velocity += self.pulse.owed / self.pulse.mass
+        return displacement, velocity
 
     def strike(self, impulse: float) -> None:
-        """Refuse an impulse, N s.
+        """Give the point an impulse along its displacement, N s: the body gets it in the next step."""
+        assert self.pulse is not None
+        self.pulse.owed += impulse
 
-        Raises
-        ------
-        ComponentError
-            Always: only forces can be given to it.
-        """
-        raise ComponentError(
-            f"{self.name}: expected a law that yields, got an impulse of {impulse:.6g} N s. A body of another tool "
-            "takes forces only: use kelvin_voigt, hertz or hunt_crossley.",
-            instance=self.body.name,
-        )
+    def free(self) -> None:
+        """Give back what trial steps have saved."""
+        self._trials.free()
 
 
 PairEnd = PortEnd | PointEnd
@@ -139,10 +160,11 @@ def end_of(
     components: Mapping[str, Component],
     end: tuple[str, str] | BodyPoint,
     inputs: dict[tuple[str, str], ForceInput],
+    pulses: Pulses | None,
 ) -> PairEnd:
-    """Return one end of a pair."""
+    """Return one end of a pair; `pulses` gives it impulses; None where the law yields."""
     if isinstance(end, BodyPoint):
-        return PointEnd(components, end, inputs)
+        return PointEnd(components, end, inputs, pulses)
     return PortEnd(components, end, inputs)
 
 

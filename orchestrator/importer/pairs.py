@@ -20,9 +20,10 @@ import numpy as np
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
-from vibroimpact.orchestrator.importer.held_force import ForceInput
+from vibroimpact.orchestrator.importer.force_input import ForceInput
 from vibroimpact.orchestrator.importer.pair_ends import BodyRate, Motion, PortEnd, Scale, end_of, precision_at
 from vibroimpact.orchestrator.importer.pair_force import PairForce
+from vibroimpact.orchestrator.importer.pulse import Pulses
 from vibroimpact.orchestrator.importer.revision import Bracket, refine
 from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.importer.step_path import StepPath
@@ -82,10 +83,13 @@ class Pair:
         spec: PairSpec,
         scale: Scale,
         inputs: dict[tuple[str, str], ForceInput],
+        pulses: Pulses,
     ) -> None:
         self.name = spec.name
-        self.lower = end_of(components, spec.lower, inputs)
-        self.upper = end_of(components, spec.upper, inputs)
+        self._pulses = pulses
+        impulses = pulses if spec.law == "restitution" else None
+        self.lower = end_of(components, spec.lower, inputs, impulses)
+        self.upper = end_of(components, spec.upper, inputs, impulses)
         for end in (self.lower, self.upper):
             if not end.body.has_states:
                 raise ComponentError(
@@ -118,8 +122,8 @@ class Pair:
         self.upper.begin()
         rate = max((rate.fastest() for rate in self._rates), default=0.0)
         self._longest = PART_OF_PERIOD * 2.0 * math.pi / rate if rate > 0.0 else math.inf
-        self._reduced = 1.0 / (1.0 / self.lower.mass + 1.0 / self.upper.mass)
         self._force.begin(self._reduced)
+        self._checks_mass = True
         self._agreed = self._last_impact = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
@@ -132,6 +136,11 @@ class Pair:
                 instance=self.lower.body.name,
                 time=time,
             )
+
+    @property
+    def _reduced(self) -> float:
+        """The reduced mass of both points, kg."""
+        return 1.0 / (1.0 / self.lower.mass + 1.0 / self.upper.mass)
 
     def look(self, seconds: float = 0.0) -> Motion:
         """Return the pair as it is now, `seconds` into a step."""
@@ -155,9 +164,14 @@ class Pair:
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
         """Look at the pair before a step; returns where it should end, s."""
+        if self.yields and self._checks_mass:
+            self._check_masses(time, target - time)
         start, self._time = self.look(), time
         self._longest_step = max(self._longest_step, target - time)
         self._room = self._scale.room(time)
+        if self._pulses.under_way and not self.yields:
+            self._start, self.closed, self.arrived = start, False, False
+            return target
         if self._surface and start.gap + self._surface > self._room:
             start, self._surface = start._replace(gap=start.gap + self._surface), 0.0
         self._start = start
@@ -179,6 +193,11 @@ class Pair:
         self._force.start(start.gap, start.closing, target - time)
         return target
 
+    def _check_masses(self, time: float, size: float) -> None:
+        for end in (self.lower, self.upper):
+            end.check_mass(time, size)
+        self._checks_mass = False
+
     def apply(self) -> None:
         """Give both bodies the force of the contact."""
         if self.closed or self._pressed:
@@ -189,7 +208,7 @@ class Pair:
     def revised_end(self, time: float, end: float) -> float | None:
         """Return where a step just made must be repeated to, s; None when it may stay as it is."""
         if not self.closed:
-            return self._meeting(time, end)
+            return None if self._pulses.under_way else self._meeting(time, end)
         if not self.yields:
             return None  # all that rest are looked at together
         now, size = self.look(end - time), end - time
@@ -387,6 +406,8 @@ class Pairs:
     ----------
     pairs : list of Pair
         In the order of their specifications.
+    pulses : Pulses
+        The impulses of bodies of other tools.
     """
 
     def __init__(
@@ -396,7 +417,8 @@ class Pairs:
         inputs: dict[tuple[str, str], ForceInput],
     ) -> None:
         self._scale = Scale()
-        self.pairs = [Pair(components, spec, self._scale, inputs) for spec in specs]
+        self.pulses = Pulses(components)
+        self.pairs = [Pair(components, spec, self._scale, inputs, self.pulses) for spec in specs]
         bodies = {body.name: body for pair in self.pairs for body in pair.bodies}
         self._instances = [
             body.instance
@@ -407,6 +429,7 @@ class Pairs:
     def begin(self, time: float) -> None:
         """Start a run: initialization has ended."""
         self._scale.displacement = self._scale.speed = 0.0
+        self.pulses.begin(time)
         for pair in self.pairs:
             pair.look()
         for pair in self.pairs:
@@ -432,6 +455,7 @@ class Pairs:
         hit: list[str] = []
         if not any(pair.is_due(pair.look(), time) for pair in self.pairs):
             return hit
+        self.pulses.measure(time)
         for instance in self._instances:
             instance.check(instance.enter_event_call(), "EnterEventMode")
         met = {pair for pair in self.pairs if pair.is_due(pair.look(), time)}
@@ -479,3 +503,10 @@ class Pairs:
             instance=self.pairs[0].lower.body.name,
             time=time,
         )
+
+    def free(self) -> None:
+        """Give back what trials have saved, before the bodies are freed."""
+        self.pulses.free()
+        for pair in self.pairs:
+            pair.lower.free()
+            pair.upper.free()

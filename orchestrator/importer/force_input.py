@@ -1,0 +1,153 @@
+"""The force input of a body of any tool, and what a force does to the body: trial steps that leave no trace."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from ctypes import c_void_p
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.importer.component import Component
+
+#: Trial step: part of the communication step, change of the velocity relative to it, and rounds to get there.
+TRIAL_STEP, TRIAL_CHANGE, TRIALS = 1e-3, 1e-3, 40
+#: Change of the velocity, relative, that rounding does not blur.
+VISIBLE = 1e-9
+#: Largest relative difference between a mass that is given and the one that a trial step finds.
+MASS_TOLERANCE = 0.05
+
+
+class ForceInput:
+    """An input that takes the sum of the forces of one or several contacts.
+
+    Attributes
+    ----------
+    name : str
+        The input.
+    parts : dict of str to float
+        The force of each contact, along the displacement, N.
+    """
+
+    def __init__(self, body: Component, name: str) -> None:
+        self._group = body.group("Float64", [name])
+        self.name = name
+        self.parts: dict[str, float] = {}
+
+    def write(self, more: float = 0.0) -> None:
+        """Give the body the sum, and `more` N."""
+        self._group.values[0] = sum(self.parts.values()) + more
+        self._group.set()
+
+
+class TrialSteps:
+    """Steps of a body with states from where it is now, each with another force.
+
+    Parameters
+    ----------
+    body : Component
+        The body.
+    velocity : str
+        The output that says the velocity of its point.
+    force : ForceInput
+        The force on that point.
+    """
+
+    def __init__(self, body: Component, velocity: str, force: ForceInput) -> None:
+        self.body = body
+        self.name = f"{body.name}.{velocity}"
+        self._velocity = body.group("Float64", [velocity])
+        self._input = force
+        self._state = c_void_p()
+        self._time = math.nan
+
+    @contextmanager
+    def untraced(self, time: float) -> Iterator[None]:
+        """Leave what is tried inside, from `time` (s) on, without a trace."""
+        instance = self.body.instance
+        instance.save(self._state)
+        self._time = time
+        try:
+            yield
+        finally:
+            if not instance.is_fatal:
+                instance.restore(self._state)
+                self._input.write()
+            instance.time = time
+            instance.returned_early = instance.needs_event_mode = instance.wants_to_end = False
+            instance.is_flagged = False
+
+    def now(self) -> float:
+        """Return the velocity before any trial, m/s."""
+        return float(self._velocity.get()[0])
+
+    def velocity(self, size: float, force: float = 0.0) -> float:
+        """Return the velocity after a step of `size` s with `force` N more, m/s."""
+        instance = self.body.instance
+        instance.restore(self._state)
+        self._input.write(force)
+        instance.step_undiscarded(self._time, size)
+        return float(self._velocity.get()[0])
+
+    def found_mass(self, time: float, trial: float, longest: float) -> float:
+        """Return the effective mass of the point, kg, by steps of `trial` s with and without a small force.
+
+        The steps grow up to `longest`, s, where no force changes the velocity; if none does, it is not a number.
+        """
+        start, force, mass = self.now(), 1.0, math.nan
+        with self.untraced(time):
+            for _ in range(TRIALS):
+                free = self.velocity(trial)
+                reached = self.velocity(trial, force)
+                changed = reached - free
+                wanted = TRIAL_CHANGE * max(abs(start), abs(reached))
+                if abs(changed) <= VISIBLE * abs(reached):
+                    force *= 1e6
+                    if changed == 0.0:
+                        trial = min(2.0 * trial, longest)
+                    continue
+                mass = force * trial / changed
+                if abs(changed) <= 2.0 * wanted or wanted == 0.0:
+                    break
+                force *= wanted / abs(changed)
+        return mass
+
+    def check_mass(self, given: float, time: float, size: float) -> None:
+        """Compare a mass that is given (kg) with what a communication step of `size` s says, whole and a part of it.
+
+        A body whose velocity answers no trial is taken at its word.
+
+        Raises
+        ------
+        ComponentError
+            Neither agrees.
+        """
+        found = [self.found_mass(time, trial, size) for trial in (TRIAL_STEP * size, size)]
+        answers = [mass for mass in found if math.isfinite(mass)]
+        if answers and not any(agrees(given, mass) for mass in answers):
+            raise self.mass_error(given, answers[0], time)
+
+    def mass_error(self, given: float, found: float, time: float) -> ComponentError:
+        """Return the error of a mass that is not the one that the body has."""
+        return ComponentError(
+            f"{self.name}: expected a body of the given mass, {given:.6g} kg, got an effective mass of {found:.6g} kg "
+            f"in a trial step at time {time:.12g}. Give [[contact]] the mass that {self._input.name} moves.",
+            instance=self.body.name,
+            time=time,
+        )
+
+    def free(self) -> None:
+        """Give back the saved state, before the body is freed."""
+        if self._state and not self.body.instance.is_fatal:
+            self.body.instance.free_state(self._state)
+
+
+def agrees(given: float, found: float) -> bool:
+    """Is a given mass the one that was found, as far as steps are chosen by it?
+
+    Examples
+    --------
+    >>> agrees(1.0, 1.01), agrees(1000.0, 1.0)
+    (True, False)
+    """
+    return abs(given - found) <= MASS_TOLERANCE * abs(found)

@@ -1,0 +1,210 @@
+"""The impulse of a body that takes forces only: a force held over one step so short that the body hardly moves in it.
+
+A pulse of J N s is the force J / size. Its size is a few times the precision to which an impact is located, so that what
+it moves the body by, J size / (2 mass), is below that at which bodies touch. What the body makes of it is tried
+before, from a saved state: twice the size with half the force must change the velocity alike, which gives the mass of
+the point (linear extrapolation to size 0), and the force is corrected until the velocity changes by J / mass.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.force_input import ForceInput, TrialSteps, agrees
+from vibroimpact.orchestrator.importer.specification import BodyPoint
+
+#: Shortest pulse, s, and in units in the last place of the time; powers of 2, so that it ends at a number.
+SHORTEST, SHORTEST_ULPS = 2.0**-39, 64.0
+#: A body that does not answer the shortest pulse is tried with ones this many times as long.
+LONGER = (1.0, 16.0, 256.0)
+#: Relative difference of the masses that two pulses find, beyond which the body takes no impulses.
+BEND = 1e-3
+#: Corrections of a force, and the misfit of the velocity, relative to it, that ends them.
+CORRECTIONS, MISFIT = 8, 1e-14
+#: A step ended before this part of its pulse has left a part of the impulse over.
+WHOLE = 1.0 - 1e-6
+#: The part of the force input that is a pulse.
+PART = "impulse"
+
+
+class Pulse:
+    """The impulses that one point of a body is given.
+
+    Attributes
+    ----------
+    owed : float
+        Impulse that the point has got and its body has not yet, N s.
+    mass : float
+        Effective mass of the point, kg, by the last measurement.
+    """
+
+    def __init__(self, body: Component, point: BodyPoint, force: ForceInput) -> None:
+        self._trials = TrialSteps(body, point.velocity, force)
+        self._input = force
+        self._given = point.mass
+        self._name = f"{point.component}.{point.force}"
+        self.owed, self.mass = 0.0, point.mass
+
+    def begin(self, time: float) -> None:
+        """Start a run: find the shortest pulse that the body answers.
+
+        Raises
+        ------
+        ComponentError
+            It answers none, or has another mass than the given one.
+        """
+        self.owed, self._size, answers = 0.0, 0.0, []
+        self._input.parts.clear()
+        for longer in LONGER:
+            self._longer = longer
+            answers.append(self._answers(time))
+            if _is_impulse(*answers[-1]):
+                break
+        else:
+            raise self._no_impulse(time, *answers[-1])
+        self.measure(time)
+        if not agrees(self._given, self.mass):
+            raise self._trials.mass_error(self._given, self.mass, time)
+
+    def measure(self, time: float) -> None:
+        """Measure the mass at an impact.
+
+        Raises
+        ------
+        ComponentError
+            Pulses of two sizes do not find the same.
+        """
+        one, two = self._answers(time)
+        if not _is_impulse(one, two):
+            raise self._no_impulse(time, one, two)
+        self.mass = 2.0 * one - two
+
+    def size(self, time: float) -> float:
+        """Return how long a pulse at `time` takes, s."""
+        return self._longer * max(SHORTEST, SHORTEST_ULPS * math.ulp(time))
+
+    def _answers(self, time: float) -> tuple[float, float]:
+        """Return the masses that a pulse and one of twice its size find, kg; infinite where nothing moves."""
+        size, impulse = self.size(time), self._given * (abs(self._trials.now()) or 1.0)
+        with self._trials.untraced(time):
+            one, two = (self._changed(s, impulse / s) for s in (size, 2.0 * size))
+        return impulse / one if one else math.inf, impulse / two if two else math.inf
+
+    def _changed(self, size: float, force: float) -> float:
+        return self._trials.velocity(size, force) - self._trials.velocity(size)
+
+    def _no_impulse(self, time: float, one: float, two: float) -> ComponentError:
+        size = self.size(time)
+        return ComponentError(
+            f"{self._name}: expected a force that acts as an impulse when it is held over a step of {size:.3g} s, as a "
+            f"rigid impact needs it, got a velocity that answers as a mass of {one:.6g} kg, and of {two:.6g} kg over "
+            f"twice as long, at time {time:.12g}; given are {self._given:.6g} kg. A body that steps by steps of its own "
+            "takes no impulse: use kelvin_voigt, hertz or hunt_crossley.",
+            instance=self._trials.body.name,
+            time=time,
+        )
+
+    # ---- a step ----
+
+    def start(self, time: float, size: float) -> None:
+        """Hold the force over the next step, of `size` s, that gives the body what it is owed.
+
+        Raises
+        ------
+        ComponentError
+            No force does.
+        """
+        self._size = size
+        self._input.parts[PART] = 0.0
+        self._input.parts[PART] = self._force(time, size)
+        self._input.write()
+
+    def _force(self, time: float, size: float) -> float:
+        """Return the force after which the velocity is the one without it, and the impulse over the mass, N."""
+        force, wanted = self.owed / size, self.owed / self.mass
+        with self._trials.untraced(time):
+            free = self._trials.velocity(size)
+            for _ in range(CORRECTIONS):
+                missed = wanted - (self._trials.velocity(size, force) - free)
+                if abs(missed) <= MISFIT * (abs(free) + abs(wanted)):
+                    return force
+                force += missed * self.mass / size
+        raise ComponentError(
+            f"{self._name}: expected a change of the velocity by {wanted:.6g} m/s, which is an impulse of "
+            f"{self.owed:.6g} N s, got one by {wanted - missed:.6g} m/s after {CORRECTIONS} tries at time {time:.12g}. "
+            "Use a law that yields: kelvin_voigt, hertz or hunt_crossley.",
+            instance=self._trials.body.name,
+            time=time,
+        )
+
+    def finish(self, size: float) -> None:
+        """The step under way counts, of `size` s: shorter than it was to be, it leaves a part of the impulse."""
+        self.owed = self.owed * (1.0 - size / self._size) if size < WHOLE * self._size else 0.0
+        del self._input.parts[PART]
+        self._input.write()
+
+    def free(self) -> None:
+        """Give back what it has saved."""
+        self._trials.free()
+
+
+class Pulses:
+    """The impulses of all points of bodies that take forces only.
+
+    Attributes
+    ----------
+    under_way : bool
+        The step under way only gives bodies their impulses: it is too short for anything else.
+    """
+
+    def __init__(self, components: Mapping[str, Component]) -> None:
+        self._components = components
+        self._pulses: dict[tuple[str, str], Pulse] = {}
+        self._held: list[Pulse] = []
+        self.under_way = False
+
+    def of(self, point: BodyPoint, force: ForceInput) -> Pulse:
+        """Return the impulses of a point; one that several pairs hit has one sum of them."""
+        pulse = Pulse(self._components[point.component], point, force)
+        return self._pulses.setdefault((point.component, point.force), pulse)
+
+    def begin(self, time: float) -> None:
+        """Start a run."""
+        self.under_way, self._held = False, []
+        for pulse in self._pulses.values():
+            pulse.begin(time)
+
+    def measure(self, time: float) -> None:
+        """Measure all masses, before an impact."""
+        for pulse in self._pulses.values():
+            pulse.measure(time)
+
+    def begin_step(self, time: float, target: float) -> float:
+        """Hold the forces of the impulses that are owed; returns where the step should end, s."""
+        self._held = [pulse for pulse in self._pulses.values() if pulse.owed]
+        self.under_way = bool(self._held)
+        if not self.under_way:
+            return target
+        size = max(pulse.size(time) for pulse in self._held)
+        for pulse in self._held:
+            pulse.start(time, size)
+        return time + size
+
+    def end_step(self, size: float) -> None:
+        """The step under way counts, of `size` s."""
+        for pulse in self._held:
+            pulse.finish(size)
+        self._held, self.under_way = [], False
+
+    def free(self) -> None:
+        """Give back what they have saved, before the bodies are freed."""
+        for pulse in self._pulses.values():
+            pulse.free()
+
+
+def _is_impulse(one: float, two: float) -> bool:
+    """Are these two masses one?"""
+    return math.isfinite(one) and one > 0.0 and abs(two - one) <= BEND * one
