@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from ctypes import c_void_p
 from itertools import pairwise
 
-from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
 from vibroimpact.orchestrator.importer.step_path import NODES, StepPath, last_true
@@ -122,6 +121,7 @@ class AskedStop:
         # an ImpactStop has no memory and answers at once
         self._is_ours = "law" in component.variables and "applied_restitution" in component.variables
         self._law = component.group("Int64", ["law"]) if self._is_ours else None
+        self._coefficient = component.group("Float64", ["applied_restitution"]) if self._is_ours else None
         self._start, self._now = c_void_p(), c_void_p()
 
     @property
@@ -129,20 +129,20 @@ class AskedStop:
         """Does it answer with a coefficient of restitution, and no force?"""
         return self._law is not None and int(self._law.get()[0]) == RESTITUTION
 
-    def begin(self) -> None:
-        """Start a run: the parameters are set.
+    def restitution(self, speed: float) -> float:
+        """Return its coefficient of restitution for an impact at this speed, m/s; it is rigid."""
+        assert self._coefficient is not None
+        self.show(self.position, speed)
+        return float(self._coefficient.get()[0])
 
-        Raises
-        ------
-        ComponentError
-            It answers with a coefficient of restitution.
-        """
-        if self.is_rigid:
-            raise ComponentError(
-                f"{self._spec.stop}.law: expected a law with a force for {self._spec.body}, whose velocity nobody can "
-                "set, got restitution. Use kelvin_voigt, hertz or hunt_crossley.",
-                instance=self._spec.stop,
-            )
+    @property
+    def position(self) -> float:
+        """Where a stop of ours is, in the direction into it, m."""
+        assert self.surface is not None
+        return self.surface
+
+    def begin(self) -> None:
+        """Start a run: the parameters are set."""
         lower = self._spec.side == "lower" if self._side is None else int(self._side.get()[0]) == LOWER_SIDE
         self.sign = -1.0 if lower else 1.0
         self.surface = None if self._position is None else self.sign * float(self._position.get()[0])

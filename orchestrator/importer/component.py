@@ -152,6 +152,20 @@ class Component:
         times = () if self.event_times is None else self.event_times.get()
         return min((float(t) for t in times if not math.isnan(t)), default=math.inf)
 
+    def first_event_in(self, time: float, target: float) -> float | None:
+        """Return the first event that was reported of the step just made from `time` to `target`, s.
+
+        It is `target` where it lies at the end, and None where it comes later. Where it lies at the end or the start,
+        the component has not gone further.
+        """
+        first = self.first_event()
+        room = SAME_INSTANT * (1.0 + abs(target))
+        if first > target + room:
+            return None
+        if first >= target - room or first <= time:
+            self.instance.time = first
+        return target if first >= target - room else first
+
     def watch_inputs(self, names: Iterable[str]) -> None:
         """Say which inputs are connected; their slopes belong to them."""
         wanted = [n for name in names for n in (name, f"{name}_rate") if n in self.variables]

@@ -17,6 +17,7 @@ from vibroimpact.orchestrator.importer.contact_bond import (
 from vibroimpact.orchestrator.importer.force_input import ForceInput
 from vibroimpact.orchestrator.importer.held_force import HeldForceBond
 from vibroimpact.orchestrator.importer.pairs import Pair, Pairs
+from vibroimpact.orchestrator.importer.rigid_stops import RigidStop
 from vibroimpact.orchestrator.importer.specification import ConnectionSpec, PairSpec, StopContactSpec
 from vibroimpact.orchestrator.importer.wiring import Transfer
 
@@ -59,6 +60,8 @@ class ContactBonds:
         inputs: dict[tuple[str, str], ForceInput] = {}
         self.held = [HeldForceBond(components, contact, inputs) for contact in contacts]
         self.pairs = Pairs(components, pairs, inputs)
+        self._components, self._inputs = components, inputs
+        self._rigid: dict[str, RigidStop] = {}
         self._following: list[ContactBond | HeldForceBond | Pair] = []
         self.active = False
 
@@ -71,7 +74,7 @@ class ContactBonds:
 
     def take_numbers(self, contacts: Sequence[StopContactSpec], pairs: Sequence[PairSpec]) -> None:
         """Take the masses of `contacts` and the numbers of `pairs`, which are the same otherwise, for the next run."""
-        for pair, spec in zip(self.pairs.pairs, pairs, strict=True):
+        for pair, spec in zip(self.pairs.specified, pairs, strict=True):
             pair.take(spec)
         for bond, contact in zip(self.held, contacts, strict=True):
             bond.given_mass = contact.mass
@@ -80,9 +83,17 @@ class ContactBonds:
         """Start a run at `time`, s: initialization has ended."""
         for bond in self._all():
             bond.begin()
-        self.pairs.begin(time)
-        self._following = [*(bond for bond in self.ports if bond.follows), *self.held, *self.pairs.pairs]
+        self.pairs.begin(time, [self._rigid_stop(bond) for bond in self.held if bond.stop.is_rigid])
+        held = [bond for bond in self.held if not bond.stop.is_rigid]
+        self._following = [*(bond for bond in self.ports if bond.follows), *held, *self.pairs.pairs]
         self.active = False
+
+    def _rigid_stop(self, bond: HeldForceBond) -> RigidStop:
+        found = self._rigid.get(bond.name)
+        if found is None:
+            found = RigidStop(self._components, bond, self.pairs, self._inputs)
+            self._rigid[bond.name] = found
+        return found
 
     def begin_step(self, time: float, target: float) -> float:
         """Look at all contacts before a step; returns where it should end, s."""
@@ -112,8 +123,9 @@ class ContactBonds:
 
     def agree(self, time: float, end: float) -> None:
         """Before the bodies without states make their step: it ends at `end`, s."""
-        for bond in self.held:
-            bond.agree(time, end)
+        for bond in self._following:
+            if isinstance(bond, HeldForceBond):
+                bond.agree(time, end)
 
     def end_step(self, size: float) -> list[Component]:
         """The step, of `size` s, counts; returns the bodies that have come to a stop at its end, without event mode."""
@@ -132,6 +144,8 @@ class ContactBonds:
         for bond in self._all():
             bond.free()
         self.pairs.free()
+        for stop in self._rigid.values():
+            stop.free()
 
 
 def _is_contact_force(body: Component, variable: str) -> bool:

@@ -14,6 +14,8 @@ from vibroimpact.orchestrator.importer.component import Component
 TRIAL_STEP, TRIAL_CHANGE, TRIALS = 1e-3, 1e-3, 40
 #: Change of the velocity, relative, that rounding does not blur.
 VISIBLE = 1e-9
+#: Deviation from the mass alone at which a trial step is short enough, and below which there is none.
+NEARLY, ALONE = 0.1, 1e-6
 #: Largest relative difference between a mass that is given and the one that a trial step finds.
 MASS_TOLERANCE = 0.05
 
@@ -126,6 +128,22 @@ class TrialSteps:
         answers = [mass for mass in found if math.isfinite(mass)]
         if answers and not any(agrees(given, mass) for mass in answers):
             raise self.mass_error(given, answers[0], time)
+
+    def rate(self, mass: float, time: float, size: float) -> float:
+        """Return a rate (rad/s) at which the body answers a force otherwise than its mass (kg) alone.
+
+        What a force adds to the velocity over a step h is below h/mass by (rate h)^2/6 for a spring. Trial steps begin
+        with `size`, s, and are halved until it is nearly h/mass; 0 where it is that to rounding, or never.
+        """
+        change = abs(self.now()) or 1.0
+        with self.untraced(time):
+            for _ in range(TRIALS):
+                force = mass * change / size
+                answer = (self.velocity(size, force) - self.velocity(size)) / change
+                if abs(1.0 - answer) <= NEARLY:
+                    return math.sqrt(6.0 * abs(1.0 - answer)) / size if abs(1.0 - answer) > ALONE else 0.0
+                size *= 0.5
+        return 0.0
 
     def mass_error(self, given: float, found: float, time: float) -> ComponentError:
         """Return the error of a mass that is not the one that the body has."""

@@ -62,8 +62,12 @@ class HeldForceBond:
     ----------
     name : str
         `stop.output -> body.input`.
-    body : Component
-        The body.
+    contact : StopContactSpec
+        The contact.
+    body, stop : Component, AskedStop
+        The body and its stop.
+    given_mass : float or None
+        Effective mass that is given, kg.
     revisable : bool
         Its steps can be repeated.
     active : bool
@@ -86,8 +90,8 @@ class HeldForceBond:
     ) -> None:
         self.name = spec.name
         self.body = components[spec.body]
-        self._spec = spec
-        self._stop = AskedStop(components[spec.stop], spec)
+        self.contact = spec
+        self.stop = AskedStop(components[spec.stop], spec)
         self._outputs = self.body.group("Float64", [spec.displacement, spec.velocity])
         self._input = inputs.setdefault((spec.body, spec.force), ForceInput(self.body, spec.force))
         self._trials = TrialSteps(self.body, spec.velocity, self._input)
@@ -98,8 +102,8 @@ class HeldForceBond:
 
     def begin(self) -> None:
         """Start a run: the parameters are set."""
-        self._stop.begin()
-        self._input.parts[self._spec.stop] = 0.0
+        self.stop.begin()
+        self._input.parts[self.contact.stop] = 0.0
         self.mass = self.given_mass
         self.active = self.closed = self.arrived = False
         self.residual = 0.0
@@ -121,7 +125,7 @@ class HeldForceBond:
         self._start = self._look()
         if self._checks_mass and target > time:
             self._check_mass(target - time)
-        self._stop.mark(time)
+        self.stop.mark(time)
         self._force = 0.0
         self._last_try: tuple[float, float] | None = None
         self._misfit = math.inf
@@ -129,9 +133,9 @@ class HeldForceBond:
         size = target - time
         if not self.revisable and self._told is None:
             size *= TRIAL_STEP  # how it is accelerated is not known yet
-        with self._stop.asking():
-            if self._stop.surface is None and not self._searched:
-                self._stop.search_surface(*self._start, size)
+        with self.stop.asking():
+            if self.stop.surface is None and not self._searched:
+                self.stop.search_surface(*self._start, size)
                 self._searched = True
             self.closed = self._touches(*self._start, size)
             if self.closed:
@@ -146,7 +150,7 @@ class HeldForceBond:
 
     def apply(self) -> None:
         """Give the body its force."""
-        self._input.parts[self._spec.stop] = -self._stop.sign * self._force
+        self._input.parts[self.contact.stop] = -self.stop.sign * self._force
         self._input.write()
 
     def revised_end(self, time: float, end: float) -> float | None:
@@ -154,7 +158,7 @@ class HeldForceBond:
         if not (self.revisable and end > time):
             return None
         path = self._path(end - time)
-        with self._stop.asking():
+        with self.stop.asking():
             if not self.closed:
                 return self._arrival(time, end, path)
             if end == self._planned and self._is_foreseen(path):
@@ -169,7 +173,7 @@ class HeldForceBond:
     def agree(self, time: float, end: float) -> None:
         """Before the step of a body that cannot repeat it: the step ends at `end`, s, wherever it was to end."""
         if not self.revisable and self.closed and end != self._planned:
-            with self._stop.asking():
+            with self.stop.asking():
                 self._force = self._foreseen_force(end - time)
             self.apply()
 
@@ -178,25 +182,25 @@ class HeldForceBond:
         if not size > 0.0:
             return
         path = self._path(size)
-        with self._stop.asking():
+        with self.stop.asking():
             touched = self.closed or self._inside(path) is not None
-            work = self._stop.work(path) if touched else 0.0
+            work = self.stop.work(path) if touched else 0.0
         self._work.count(work)
         self.residual += work - self._force * (path.end - path.start)
         self.arrived = touched and not self.closed
         self._learn(path)
-        self._stop.show(path.end, path.end_velocity)
+        self.stop.show(path.end, path.end_velocity)
 
     def remark(self) -> str:
         """What a reader of the results must know; empty where there is nothing."""
         if not abs(self.residual) > UNTOLD * self._work.energy:
             return ""
-        why = "" if self.revisable else f" of {self._spec.body}, which cannot restore its state,"
+        why = "" if self.revisable else f" of {self.contact.body}, which cannot restore its state,"
         return f"{self.name}: the held force{why} has {self._work.share(self.residual)}. Use a shorter macro_step"
 
     def _look(self) -> tuple[float, float]:
         displacement, velocity = (float(v) for v in self._outputs.get())
-        return self._stop.sign * displacement, self._stop.sign * velocity
+        return self.stop.sign * displacement, self.stop.sign * velocity
 
     def _path(self, size: float) -> StepPath:
         return StepPath(*self._start, *self._look(), size)
@@ -221,14 +225,14 @@ class HeldForceBond:
 
     def _touches(self, displacement: float, velocity: float, size: float) -> bool:
         """Is the body in the stop's force, or on the surface and on its way in?"""
-        surface = self._stop.surface
+        surface = self.stop.surface
         if surface is not None:
             rounding = SURFACE_ROUNDING * (abs(displacement) + abs(surface))
             if displacement < surface - rounding:
                 return False
             if displacement <= surface + rounding and velocity >= 0.0:
                 return True
-        return self._stop.force(displacement, velocity, size) > 0.0
+        return self.stop.force(displacement, velocity, size) > 0.0
 
     def _arrival(self, time: float, end: float, path: StepPath) -> float | None:
         """Return the instant at which a free body has come to the surface within the step just made, s."""
@@ -248,15 +252,15 @@ class HeldForceBond:
     def _inside(self, path: StepPath) -> float | None:
         """Seconds into a free step at which the body is in the stop; None where it is nowhere."""
         if self._touches(path.end, path.end_velocity, path.size):
-            if self._stop.surface is None:
-                self._stop.search_surface(path.end, path.end_velocity, path.size)
+            if self.stop.surface is None:
+                self.stop.search_surface(path.end, path.end_velocity, path.size)
             return path.size
-        turn, surface = path.turn, self._stop.surface
+        turn, surface = path.turn, self.stop.surface
         return turn * path.size if turn and surface is not None and path.at(turn)[0] > surface else None
 
     def _time_of_arrival(self, time: float, path: StepPath, inside: float, precision: float) -> float | None:
         """Search the body's own way; None where it is not inside there after all."""
-        surface = self._stop.surface
+        surface = self.stop.surface
         if surface is None:  # its force has no end on the way out
             return None
 
@@ -272,13 +276,13 @@ class HeldForceBond:
 
             def is_free(u: float) -> bool:
                 self.body.step_from_start(time, u * inside)
-                return not self._stop.force(*self._look(), u * inside) > 0.0
+                return not self.stop.force(*self._look(), u * inside) > 0.0
 
             return last_true(is_free) * inside  # it had let go within the stop, and is back on the law
 
     def _foreseen_arrival(self, size: float) -> float:
         """Seconds to the surface at the accelerations of the step before; `size` where it is farther."""
-        surface, (displacement, velocity) = self._stop.surface, self._start
+        surface, (displacement, velocity) = self.stop.surface, self._start
         if surface is None or displacement >= surface:
             return size
         gap, other = surface - displacement, self._other_after(size)
@@ -299,15 +303,15 @@ class HeldForceBond:
         if self.mass is None:
             self.mass = self._found_mass(size)
         self._largest, self._limit = 0.0, math.inf
-        surface = self._stop.surface
+        surface = self.stop.surface
         if surface is None:
-            surface = self._stop.surface = displacement  # it began in the stop: nobody has seen it free
+            surface = self.stop.surface = displacement  # it began in the stop: nobody has seen it free
         if velocity > 0.0:
             energy = self.mass * velocity * velocity
             guess = velocity * size if self._depth is None else self._depth
             origin = surface
             depth = depth_that_stops(
-                lambda depth: self._stop.force(origin + depth, velocity, size), energy, guess
+                lambda depth: self.stop.force(origin + depth, velocity, size), energy, guess
             )
             if depth is not None:
                 self._depth, self._limit = depth, math.pi * depth / velocity / self._steps
@@ -324,10 +328,10 @@ class HeldForceBond:
         if not (mass > 0.0 and math.isfinite(mass)):
             got = "one that does not change" if math.isnan(mass) else f"an effective mass of {mass:.3g} kg"
             raise ComponentError(
-                f"{self._spec.body}.{self._spec.velocity}: expected a velocity that grows with the force "
-                f"{self._spec.force}, got {got} in a trial step at time {self._time:.12g}. "
+                f"{self.contact.body}.{self.contact.velocity}: expected a velocity that grows with the force "
+                f"{self.contact.force}, got {got} in a trial step at time {self._time:.12g}. "
                 "Look at the variables and signs of [[contact]], or give its mass.",
-                instance=self._spec.body,
+                instance=self.contact.body,
                 time=self._time,
             )
         return mass
@@ -373,9 +377,9 @@ class HeldForceBond:
 
     def _force_half_way(self, size: float) -> float:
         """A first guess: the force in the middle of a way that begins with the force at its start."""
-        first = self._stop.force(*self._start, size)
+        first = self.stop.force(*self._start, size)
         displacement, velocity = self._foreseen_path(size, first).at(0.5)
-        return max(0.0, self._stop.force(displacement, velocity, size))
+        return max(0.0, self.stop.force(displacement, velocity, size))
 
     def _foresee(self, size: float) -> float:
         """Choose the step and its force; returns the size of the step, s."""
@@ -389,7 +393,7 @@ class HeldForceBond:
                     min(scale, size / SLACK), size / MOST_SHORTENED
                 )  # a step far too long says little of the right one
                 continue
-            turn, leaves = path.turn, self._stop.leaves(path)
+            turn, leaves = path.turn, self.stop.leaves(path)
             if turn is not None and NOT_AT_ONCE < turn < 1.0 - NOT_AT_ONCE:
                 size *= turn
                 continue
@@ -409,7 +413,7 @@ class HeldForceBond:
         moved = path.end - path.start
         if moved == 0.0:
             return math.inf
-        risen = self._stop.force(path.end, 0.0, path.size) - self._stop.force(path.start, 0.0, path.size)
+        risen = self.stop.force(path.end, 0.0, path.size) - self.stop.force(path.start, 0.0, path.size)
         stiffness = risen / moved
         return math.pi * math.sqrt(self.mass / stiffness) / self._steps if stiffness > 0.0 else math.inf
 
@@ -418,13 +422,13 @@ class HeldForceBond:
         moved = path.end - path.start
         slow, fast = sorted((path.start_velocity, path.end_velocity), key=abs)
         if moved != 0.0 and (slow * fast >= 0.0 or abs(slow) <= SLOW * abs(fast)):
-            return max(0.0, self._stop.work(path) / moved)
+            return max(0.0, self.stop.work(path) / moved)
         mean = 0.0
         for u, weight in NODES:
             displacement, velocity = path.at(u)
-            elastic = self._stop.force(path.start + u * moved, 0.0, path.size)
-            whole = self._stop.force(displacement, velocity, u * path.size)
-            mean += weight * (elastic + whole - self._stop.force(displacement, 0.0, u * path.size))
+            elastic = self.stop.force(path.start + u * moved, 0.0, path.size)
+            whole = self.stop.force(displacement, velocity, u * path.size)
+            mean += weight * (elastic + whole - self.stop.force(displacement, 0.0, u * path.size))
         return max(0.0, mean)
 
     def _corrects(self, wanted: float) -> bool:
@@ -439,7 +443,7 @@ class HeldForceBond:
 
     def free(self) -> None:
         """Give back its saved states, before its components are freed."""
-        self._stop.free()
+        self.stop.free()
         self._trials.free()
 
 

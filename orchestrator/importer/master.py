@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
-
-from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.fmi.instance import DISCARD, OK, Wrapper
 from vibroimpact.orchestrator.fmi.log import LogTail
@@ -33,7 +30,7 @@ from vibroimpact.orchestrator.importer.specification import (
 )
 from vibroimpact.orchestrator.importer.wiring import (
     LoopSolver,
-    equal_values,
+    SettlingInputs,
     moves_of,
     order_of,
     transfers_of,
@@ -429,15 +426,12 @@ class Importer:
 
     def _reported(self, component: Component, time: float, target: float) -> float:
         """FMI 2.0: the event time that the component reports, when it lies in the step."""
-        first = component.first_event()
-        room = SAME_INSTANT * (1.0 + abs(target))
-        if first > target + room:
+        first = component.first_event_in(time, target)
+        if first is None:
             return target
-        if first >= target - room or first <= time:
-            # at the end of the step; or where it began, and the component has stayed there
-            component.instance.time = first
+        if first == target or first <= time:  # where it began: the component has stayed there
             self._at_event.append(component)
-        return target if first >= target - room else first
+        return first
 
     def _watched(self, watch: Watch, time: float, target: float) -> float:
         size = target - time
@@ -468,14 +462,10 @@ class Importer:
         if not self._iterates:
             return None
         target = self._reached
-        previous: list[NDArray[Any]] | None = None
+        inputs = SettlingInputs(self.transfers, STEP_TOLERANCE)
         for _ in range(STEP_ITERATIONS):
-            values = [transfer.take() for transfer in self.transfers]
-            if previous is not None and all(
-                equal_values(a, b, STEP_TOLERANCE) for a, b in zip(values, previous, strict=True)
-            ):
+            if inputs.have_settled():
                 break
-            previous = values
             self._restore_start()
             for transfer in self.transfers:
                 transfer.write_over_step(target - time)

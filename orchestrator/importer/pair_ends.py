@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.asked_stop import LOWER_SIDE
 from vibroimpact.orchestrator.importer.component import Component
@@ -59,14 +58,15 @@ class PortEnd:
         self._side = self.body.group("Int64", [f"{port}.side"])
         self._input = inputs.setdefault(end, ForceInput(self.body, f"{port}.applied_force"))
 
-    def begin(self) -> None:
-        """Start a run."""
+    def begin(self, time: float) -> None:
+        """Start a run at `time`, s."""
         self.mass = float(self._mass.get()[0])
         self._direction = -1.0 if int(self._side.get()[0]) == LOWER_SIDE else 1.0
         self._input.parts.clear()
 
-    def check_mass(self, time: float, size: float) -> None:
-        """Its mass is its own."""
+    def asked_rate(self, time: float, size: float) -> float:
+        """It says all that it is asked: `BodyRate`."""
+        return 0.0
 
     def press(self, pair: str, force: float) -> None:
         """Hold a force of a pair along the displacement over the next step, N."""
@@ -122,14 +122,21 @@ class PointEnd:
         """Impulse over the change of the velocity, kg: the given one, or what pulses have measured."""
         return self._given if self.pulse is None else self.pulse.mass
 
-    def begin(self) -> None:
-        """Start a run."""
+    def begin(self, time: float) -> None:
+        """Start a run at `time`, s: impulses need a body that answers them."""
         self._input.parts.clear()
+        if self.pulse is not None:
+            self.pulse.begin(time)
 
-    def check_mass(self, time: float, size: float) -> None:
-        """Compare the given mass with that of trial steps; pulses have measured it already."""
-        if self.pulse is None:
-            self._trials.check_mass(self._given, time, size)
+    def asked_rate(self, time: float, size: float) -> float:
+        """Return its fastest rate, rad/s, by trials of at most a step of `size` s; 0 of a slower one.
+
+        Where the law yields its steps follow from the given mass: that is compared with trials, and no rate is asked.
+        """
+        if self.pulse is not None:
+            return self._trials.rate(self.pulse.mass, time, size)
+        self._trials.check_mass(self._given, time, size)
+        return 0.0
 
     def press(self, pair: str, force: float) -> None:
         """Hold a force of a pair along the displacement over the next step, N."""
@@ -153,7 +160,46 @@ class PointEnd:
         self._trials.free()
 
 
-PairEnd = PortEnd | PointEnd
+class SurfaceEnd:
+    """The surface of a rigid stop, as one end of a pair: nothing moves it.
+
+    Attributes
+    ----------
+    body, name : Component, str
+        As those of `PortEnd`: of the stop.
+    mass : float
+        Infinite.
+    position : float
+        Where it is, m.
+    """
+
+    mass, position = math.inf, 0.0
+
+    def __init__(self, stop: Component) -> None:
+        self.body, self.name = stop, stop.name
+
+    def begin(self, time: float) -> None:
+        """Start a run at `time`, s."""
+
+    def asked_rate(self, time: float, size: float) -> float:
+        """It has none."""
+        return 0.0
+
+    def press(self, pair: str, force: float) -> None:
+        """No force moves it."""
+
+    def look(self) -> tuple[float, float]:
+        """Return displacement (m) and velocity (m/s)."""
+        return self.position, 0.0
+
+    def strike(self, impulse: float) -> None:
+        """No impulse moves it."""
+
+    def free(self) -> None:
+        """It has saved nothing."""
+
+
+PairEnd = PortEnd | PointEnd | SurfaceEnd
 
 
 def end_of(

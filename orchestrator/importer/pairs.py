@@ -21,12 +21,19 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.force_input import ForceInput
-from vibroimpact.orchestrator.importer.pair_ends import BodyRate, Motion, PortEnd, Scale, end_of, precision_at
+from vibroimpact.orchestrator.importer.meeting import MeetingSearch
+from vibroimpact.orchestrator.importer.pair_ends import (
+    BodyRate,
+    Motion,
+    PairEnd,
+    PortEnd,
+    Scale,
+    end_of,
+    precision_at,
+)
 from vibroimpact.orchestrator.importer.pair_force import PairForce
 from vibroimpact.orchestrator.importer.pulse import Pulses
-from vibroimpact.orchestrator.importer.revision import Bracket, refine
 from vibroimpact.orchestrator.importer.specification import PairSpec
-from vibroimpact.orchestrator.importer.step_path import StepPath
 
 #: Likewise of bodies that rest on each other, whose force makes up for less.
 HIT_AT_REST = 1e-4
@@ -52,12 +59,6 @@ SMALL = 1e-3
 MOST_SMALL_BOUNCES = 1000
 #: A step longer than its limit by more than this factor, as its end shows, is made shorter.
 SLACK = 1.5
-#: Halvings of a step in search of a contact.
-MOST_HALVINGS = 40
-#: A gap this many times larger than what the bodies close at their speeds over a step is not looked into.
-FAR = 4.0
-#: Allowance for the error of a cubic over the defect that it has in its middle.
-MARGIN = 2.0
 
 
 class Pair:
@@ -67,7 +68,7 @@ class Pair:
     ----------
     name : str
         `lower.contact[k] - upper.contact[k]`.
-    lower, upper : PortEnd or PointEnd
+    lower, upper : PortEnd, PointEnd or SurfaceEnd
         The gap between them closes as the displacement of the lower one grows.
     active : bool
         Steps may have to be repeated: always.
@@ -79,17 +80,15 @@ class Pair:
 
     def __init__(
         self,
-        components: Mapping[str, Component],
         spec: PairSpec,
+        lower: PairEnd,
+        upper: PairEnd,
         scale: Scale,
-        inputs: dict[tuple[str, str], ForceInput],
         pulses: Pulses,
     ) -> None:
         self.name = spec.name
+        self.lower, self.upper = lower, upper
         self._pulses = pulses
-        impulses = pulses if spec.law == "restitution" else None
-        self.lower = end_of(components, spec.lower, inputs, impulses)
-        self.upper = end_of(components, spec.upper, inputs, impulses)
         for end in (self.lower, self.upper):
             if not end.body.has_states:
                 raise ComponentError(
@@ -118,12 +117,12 @@ class Pair:
         ComponentError
             The bodies overlap.
         """
-        self.lower.begin()
-        self.upper.begin()
+        self.lower.begin(time)
+        self.upper.begin(time)
         rate = max((rate.fastest() for rate in self._rates), default=0.0)
         self._longest = PART_OF_PERIOD * 2.0 * math.pi / rate if rate > 0.0 else math.inf
         self._force.begin(self._reduced)
-        self._checks_mass = True
+        self._is_new = True
         self._agreed = self._last_impact = -math.inf
         self._last_flight, self._longest_flight = math.inf, 0.0
         self._longest_step, self._small_bounces = 0.0, 0
@@ -136,6 +135,11 @@ class Pair:
                 instance=self.lower.body.name,
                 time=time,
             )
+
+    @property
+    def struck(self) -> Component:
+        """The body whose event an impact is."""
+        return self.lower.body
 
     @property
     def _reduced(self) -> float:
@@ -164,8 +168,8 @@ class Pair:
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
         """Look at the pair before a step; returns where it should end, s."""
-        if self.yields and self._checks_mass:
-            self._check_masses(time, target - time)
+        if self._is_new:
+            self._ask_bodies(time, target - time)
         start, self._time = self.look(), time
         self._longest_step = max(self._longest_step, target - time)
         self._room = self._scale.room(time)
@@ -193,10 +197,12 @@ class Pair:
         self._force.start(start.gap, start.closing, target - time)
         return target
 
-    def _check_masses(self, time: float, size: float) -> None:
-        for end in (self.lower, self.upper):
-            end.check_mass(time, size)
-        self._checks_mass = False
+    def _ask_bodies(self, time: float, size: float) -> None:
+        """Ask bodies of other tools, before their first step, what ours say of themselves."""
+        rate = max(end.asked_rate(time, size) for end in (self.lower, self.upper))
+        if rate > 0.0:
+            self._longest = min(self._longest, PART_OF_PERIOD * 2.0 * math.pi / rate)
+        self._is_new = False
 
     def apply(self) -> None:
         """Give both bodies the force of the contact."""
@@ -258,7 +264,8 @@ class Pair:
             The bodies have come deep into each other: the forces of several at rest did not agree.
         """
         end = self._time + size
-        if not self.yields and self.look().gap < -DEEP * self._scale.displacement:
+        deep = DEEP * self._scale.displacement + self._room
+        if not self.yields and not self._pulses.under_way and self.look().gap < -deep:
             raise self.pressed_error(end)
         met = abs(end - self._agreed) <= precision_at(end) or self._touches(self.look())
         self.arrived = self.yields and not self.closed and met
@@ -271,22 +278,16 @@ class Pair:
         precision = precision_at(time)
         size = end - time
         last = self.look(size)
+        search = MeetingSearch(lambda seconds: self._motion_at(time, seconds), self._scale, self._room)
         # other inputs of a step that ends elsewhere, and forces that hold others, may have moved them since
-        if abs(end - self._agreed) <= precision and last.gap >= self._level(self._start) - self._room:
+        if abs(end - self._agreed) <= precision and last.gap >= search.level(self._start) - self._room:
             return None
-        if self._keeps_clear(self._start, last):
+        if search.keeps_clear(self._start, last):
             return None
         with self._taken_back():
-            bracket = self._search(time, self._start, last, MOST_HALVINGS)
-            if bracket is None:
-                return None
-            level = self._level(bracket[0])
-            near, far = bracket[0].seconds, bracket[1].seconds
-            located = precision + refine(
-                Bracket(near, bracket[0].gap - level, far),
-                lambda u: self._motion_at(time, u).gap - level,
-                precision,
-            )
+            located = search.first(self._start, last, precision)
+        if located is None:
+            return None
         if located >= size:
             self._agreed = end
             return None
@@ -304,42 +305,6 @@ class Pair:
         for body in self.bodies:
             body.step_from_start(time, seconds)
         return self.look(seconds)
-
-    def _level(self, start: Motion) -> float:
-        """The gap at which bodies meet: 0, or a little less where they touch already and do not close."""
-        return 0.0 if start.gap > self._room else min(start.gap, 0.0) - self._room
-
-    def _keeps_clear(self, first: Motion, last: Motion) -> bool:
-        """Is the gap too large to be closed at such speeds, or do both lie idle beside each other?"""
-        is_idle = max(abs(first.closing), abs(last.closing)) <= self._scale.slow
-        if is_idle and max(abs(first.gap), abs(last.gap)) <= self._room:
-            return True
-        size = last.seconds - first.seconds
-        moved = size * max(abs(first.closing), abs(last.closing)) + abs(last.gap - first.gap)
-        return min(first.gap, last.gap) > FAR * moved + self._room
-
-    def _search(
-        self, time: float, first: Motion, last: Motion, halvings: int
-    ) -> tuple[Motion, Motion] | None:
-        """Return the ends of a part of the step in which the bodies meet for the first time; None where they do not."""
-        if self._keeps_clear(first, last):
-            return None
-        level = self._level(first)
-        path = StepPath(first.gap, -first.closing, last.gap, -last.closing, last.seconds - first.seconds)
-        middle = self._motion_at(time, first.seconds + 0.5 * path.size)
-        error = MARGIN * abs(middle.gap - path.at(0.5)[0]) + self._rounding()
-        if last.gap > level:
-            if path.lowest - error > level or halvings == 0:
-                return None
-        elif halvings == 0 or (middle.closing > 0.0 and first.closing >= 0.0 and not path.turns):
-            return first, last
-        if middle.gap <= level:
-            return self._search(time, first, middle, halvings - 1)
-        found = self._search(time, first, middle, halvings - 1)
-        return self._search(time, middle, last, halvings - 1) if found is None else found
-
-    def _rounding(self) -> float:
-        return 0.01 * self._room
 
     def strike(self, now: Motion, time: float, *, is_first: bool) -> None:
         """Give both bodies the impulse of their impact; bounces that accumulate end in rest.
@@ -404,8 +369,12 @@ class Pairs:
 
     Attributes
     ----------
-    pairs : list of Pair
+    specified : list of Pair
         In the order of their specifications.
+    pairs : list of Pair
+        These, and the bodies of other tools at the rigid stops of the run.
+    scale : Scale
+        What is small beside the motion of any of them.
     pulses : Pulses
         The impulses of bodies of other tools.
     """
@@ -416,20 +385,26 @@ class Pairs:
         specs: Sequence[PairSpec],
         inputs: dict[tuple[str, str], ForceInput],
     ) -> None:
-        self._scale = Scale()
+        self.scale = Scale()
         self.pulses = Pulses(components)
-        self.pairs = [Pair(components, spec, self._scale, inputs, self.pulses) for spec in specs]
+        self.specified = []
+        for spec in specs:
+            impulses = self.pulses if spec.law == "restitution" else None
+            lower, upper = (end_of(components, end, inputs, impulses) for end in (spec.lower, spec.upper))
+            self.specified.append(Pair(spec, lower, upper, self.scale, self.pulses))
+        self.pairs = self.specified
+
+    def begin(self, time: float, stops: Sequence[Pair] = ()) -> None:
+        """Start a run: initialization has ended, and these are its rigid stops."""
+        self.scale.displacement = self.scale.speed = 0.0
+        self.pulses.begin()
+        self.pairs = [*self.specified, *stops]
         bodies = {body.name: body for pair in self.pairs for body in pair.bodies}
         self._instances = [
             body.instance
             for body in bodies.values()
             if body.event_mode and isinstance(body.instance, Instance3)
         ]
-
-    def begin(self, time: float) -> None:
-        """Start a run: initialization has ended."""
-        self._scale.displacement = self._scale.speed = 0.0
-        self.pulses.begin(time)
         for pair in self.pairs:
             pair.look()
         for pair in self.pairs:
@@ -468,8 +443,8 @@ class Pairs:
                 raise pair.pressed_error(time)
             pair.strike(now, time, is_first=pair in met)
             met.discard(pair)
-            if closing > self._scale.slow:
-                hit.append(pair.lower.body.name)
+            if closing > self.scale.slow:
+                hit.append(pair.struck.name)
         else:
             raise self._endless(time)
         for instance in self._instances:
@@ -507,6 +482,6 @@ class Pairs:
     def free(self) -> None:
         """Give back what trials have saved, before the bodies are freed."""
         self.pulses.free()
-        for pair in self.pairs:
+        for pair in self.specified:
             pair.lower.free()
             pair.upper.free()

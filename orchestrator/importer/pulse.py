@@ -1,7 +1,7 @@
 """The impulse of a body that takes forces only: a force held over one step so short that the body hardly moves in it.
 
-A pulse of J N s is the force J / size. Its size is a few times the precision to which an impact is located, so that what
-it moves the body by, J size / (2 mass), is below that at which bodies touch. What the body makes of it is tried
+A pulse of J N s is the force J / size. Its size is a few times the precision to which an impact is located, so that
+what it moves the body by, J size / (2 mass), is below that at which bodies touch. What the body makes of it is tried
 before, from a saved state: twice the size with half the force must change the velocity alike, which gives the mass of
 the point (linear extrapolation to size 0), and the force is corrected until the velocity changes by J / mass.
 """
@@ -26,6 +26,8 @@ BEND = 1e-3
 CORRECTIONS, MISFIT = 8, 1e-14
 #: A step ended before this part of its pulse has left a part of the impulse over.
 WHOLE = 1.0 - 1e-6
+#: Mass with which the first pulse of a body is tried, kg, where none is given.
+UNKNOWN_MASS = 1.0
 #: The part of the force input that is a pulse.
 PART = "impulse"
 
@@ -37,16 +39,20 @@ class Pulse:
     ----------
     owed : float
         Impulse that the point has got and its body has not yet, N s.
+    given : float or None
+        Effective mass of the point that is given, kg, if one is.
     mass : float
-        Effective mass of the point, kg, by the last measurement.
+        Likewise by the last measurement, kg.
+    ready : bool
+        It takes part in the run.
     """
 
     def __init__(self, body: Component, point: BodyPoint, force: ForceInput) -> None:
         self._trials = TrialSteps(body, point.velocity, force)
         self._input = force
-        self._given = point.mass
+        self.given: float | None = point.mass
         self._name = f"{point.component}.{point.force}"
-        self.owed, self.mass = 0.0, point.mass
+        self.owed, self.mass, self.ready = 0.0, point.mass, False
 
     def begin(self, time: float) -> None:
         """Start a run: find the shortest pulse that the body answers.
@@ -56,8 +62,8 @@ class Pulse:
         ComponentError
             It answers none, or has another mass than the given one.
         """
-        self.owed, self._size, answers = 0.0, 0.0, []
-        self._input.parts.clear()
+        self._size, answers = 0.0, []
+        self.mass = self.given or UNKNOWN_MASS
         for longer in LONGER:
             self._longer = longer
             answers.append(self._answers(time))
@@ -66,8 +72,10 @@ class Pulse:
         else:
             raise self._no_impulse(time, *answers[-1])
         self.measure(time)
-        if not agrees(self._given, self.mass):
-            raise self._trials.mass_error(self._given, self.mass, time)
+        self.measure(time)  # again, now that the size of its change is right
+        if self.given is not None and not agrees(self.given, self.mass):
+            raise self._trials.mass_error(self.given, self.mass, time)
+        self.ready = True
 
     def measure(self, time: float) -> None:
         """Measure the mass at an impact.
@@ -88,7 +96,7 @@ class Pulse:
 
     def _answers(self, time: float) -> tuple[float, float]:
         """Return the masses that a pulse and one of twice its size find, kg; infinite where nothing moves."""
-        size, impulse = self.size(time), self._given * (abs(self._trials.now()) or 1.0)
+        size, impulse = self.size(time), self.mass * (abs(self._trials.now()) or 1.0)
         with self._trials.untraced(time):
             one, two = (self._changed(s, impulse / s) for s in (size, 2.0 * size))
         return impulse / one if one else math.inf, impulse / two if two else math.inf
@@ -97,12 +105,12 @@ class Pulse:
         return self._trials.velocity(size, force) - self._trials.velocity(size)
 
     def _no_impulse(self, time: float, one: float, two: float) -> ComponentError:
-        size = self.size(time)
+        masses = f"one as of {one:.6g} kg, and of {two:.6g} kg over twice as long"
+        got = "one that does not change" if one == two == math.inf else masses
         return ComponentError(
-            f"{self._name}: expected a force that acts as an impulse when it is held over a step of {size:.3g} s, as a "
-            f"rigid impact needs it, got a velocity that answers as a mass of {one:.6g} kg, and of {two:.6g} kg over "
-            f"twice as long, at time {time:.12g}; given are {self._given:.6g} kg. A body that steps by steps of its own "
-            "takes no impulse: use kelvin_voigt, hertz or hunt_crossley.",
+            f"{self._name}: expected a velocity that answers an impulse, a force held over a step of "
+            f"{self.size(time):.3g} s, as its mass does, got {got}, at time {time:.12g}. A body with steps or limits "
+            "of its own takes no rigid impact: use kelvin_voigt, hertz or hunt_crossley.",
             instance=self._trials.body.name,
             time=time,
         )
@@ -171,16 +179,17 @@ class Pulses:
         pulse = Pulse(self._components[point.component], point, force)
         return self._pulses.setdefault((point.component, point.force), pulse)
 
-    def begin(self, time: float) -> None:
-        """Start a run."""
+    def begin(self) -> None:
+        """Start a run; each point begins its own."""
         self.under_way, self._held = False, []
         for pulse in self._pulses.values():
-            pulse.begin(time)
+            pulse.owed, pulse.ready = 0.0, False
 
     def measure(self, time: float) -> None:
-        """Measure all masses, before an impact."""
+        """Measure the masses of the run, before an impact."""
         for pulse in self._pulses.values():
-            pulse.measure(time)
+            if pulse.ready:
+                pulse.measure(time)
 
     def begin_step(self, time: float, target: float) -> float:
         """Hold the forces of the impulses that are owed; returns where the step should end, s."""

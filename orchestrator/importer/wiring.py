@@ -231,6 +231,29 @@ class Transfer:
 SMALLEST = 1e-300
 
 
+class SettlingInputs:
+    """Inputs of a step that is repeated until those of its end are the same as before.
+
+    Parameters
+    ----------
+    transfers : sequence of Transfer
+        What gives them.
+    tolerance : float
+        Relative difference of values that are the same.
+    """
+
+    def __init__(self, transfers: Sequence[Transfer], tolerance: float) -> None:
+        self._transfers, self._tolerance = transfers, tolerance
+        self._before: list[NDArray[Any]] | None = None
+
+    def have_settled(self) -> bool:
+        """Take the inputs; are they those taken before?"""
+        before, self._before = self._before, [transfer.take() for transfer in self._transfers]
+        return before is not None and all(
+            equal_values(a, b, self._tolerance) for a, b in zip(self._before, before, strict=True)
+        )
+
+
 def equal_values(a: NDArray[Any], b: NDArray[Any], tolerance: float) -> bool:
     """Are values equal, relative to the largest? Booleans and integers count as numbers; NaN equals NaN."""
     wide_a, wide_b = a.astype(np.float64), b.astype(np.float64)

@@ -113,10 +113,11 @@ def _stops_answer_with_a_force(draft: GeneralDraft, place: int, table: StopConta
         )
         got = f"{facts.file}, which does not have canGetAndSetFMUState"
         yield Problem(where, "an FMU whose state can be kept and restored", got, hint)
-    if _is_rigid(draft, table, facts):
+    body = _facts(draft, table.body)
+    if body is not None and not body.restorable and _is_rigid(draft, table, facts):
         hint = (
-            'A body of another tool takes forces only: parameters = { law = "kelvin_voigt", stiffness = ..., '
-            "damping = ... }, hertz or hunt_crossley."
+            f"{body.file} does not have canGetAndSetFMUState, which rigid impacts need: parameters = "
+            '{ law = "kelvin_voigt", stiffness = ..., damping = ... }, hertz or hunt_crossley.'
         )
         yield Problem(where, "a stop that yields", f"{table.stop} with the law restitution", hint)
     own = _says_its_side(facts)

@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
 from vibroimpact.orchestrator.scene.general.components import DraftComponent
 from vibroimpact.orchestrator.scene.general.contact_rules import variable_problems
-from vibroimpact.orchestrator.scene.general.models import BodyPair, BodyPointTable, YieldingPair
+from vibroimpact.orchestrator.scene.general.models import BodyPair, BodyPointTable
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft
 from vibroimpact.orchestrator.scene.general.scene import component_variable
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
@@ -63,7 +63,7 @@ def plan_ports(draft: GeneralDraft) -> PortPlan:
             hint = "The points of one body are held together by its own springs: give it stops instead."
             plan.problems.append(Problem(where, "points of two bodies", f"{quoted(names[0])} twice", hint))
             continue
-        points = table.bodies if isinstance(table, YieldingPair) else {}
+        points = table.bodies
         plan.problems += _unused_points(points, table.between, place)
         for end, point in enumerate(table.between):
             if point in points:
@@ -158,7 +158,7 @@ def _body_problem(facts: ComponentFacts, name: str, where: str) -> Problem | Non
     hint = (
         "Export it with --ports external."
         if lean
-        else "A body of another tool takes forces only: give a law that yields, and its variables in bodies."
+        else "Of a body of another tool give its variables in bodies."
     )
     got = f"{name}, whose {facts.file} has no contact[1].applied_impulse"
     return Problem(where, "a body of this package: Oscillator, Chain or Beam", got, hint)

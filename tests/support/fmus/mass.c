@@ -1,13 +1,15 @@
 /* A mass on a spring of its own that knows nothing of contacts: displacement and velocity out, a force in, which is
  * held over a step.
  *
- * mass x'' + stiffness x = f + load, on its exact flow or by Euler steps. */
+ * mass x'' + stiffness x = f + load, on its exact flow or by Euler steps; as bodies are that take no impulse too. */
 #include <math.h>
 
 #include "model.h"
 
 enum { X = 1, V, F, MASS, STIFFNESS, LOAD, SCHEME, INNER_STEP };
-enum { EXACT, SYMPLECTIC_EULER, EXPLICIT_EULER };
+enum { EXACT, SYMPLECTIC_EULER, EXPLICIT_EULER, GRID, CLIPPED };
+
+static const double most_force = 1e6;
 
 #ifndef HAS_STATE
 #define HAS_STATE true
@@ -34,7 +36,8 @@ void model_calculate(model *m)
 
 static void flow(double *x, double size)
 {
-    const double force = x[F] + x[LOAD];
+    const double f = x[SCHEME] == CLIPPED ? fmin(most_force, fmax(-most_force, x[F])) : x[F];
+    const double force = f + x[LOAD];
     if (x[STIFFNESS] == 0.0) {
         const double acceleration = force / x[MASS];
         x[X] += size * (x[V] + 0.5 * acceleration * size);
@@ -60,12 +63,26 @@ static void euler(double *x, double size)
     }
 }
 
+/* Multiples of the inner step in a step. */
+static double grid_steps(const model *m, double size)
+{
+    const double before = m->time / m->value[INNER_STEP], after = (m->time + size) / m->value[INNER_STEP];
+    return floor(after + 1e-6) - floor(before + 1e-6);
+}
+
 step_answer model_step(model *m, double size, void *instance)
 {
     double *x = m->value;
     (void)instance;
-    if (x[SCHEME] == EXACT) {
+    if (x[SCHEME] == EXACT || x[SCHEME] == CLIPPED) {
         flow(x, size);
+        return STEP_DONE;
+    }
+    if (x[SCHEME] == GRID) {
+        const double steps = grid_steps(m, size);
+        for (double step = 0.0; step < steps; step += 1.0) {
+            euler(x, x[INNER_STEP]);
+        }
         return STEP_DONE;
     }
     const double parts = x[INNER_STEP] > 0.0 ? ceil(size / x[INNER_STEP]) : 1.0;

@@ -89,19 +89,19 @@ def test_a_contact_is_what_the_importer_is_asked(folder: Path) -> None:
 
 
 def test_the_mass_of_a_contact_is_swept(folder: Path) -> None:
-    sweep = '[sweep]\n"contact[1].mass" = { values = [0.5, 1.0] }\n[record]'
+    sweep = '[sweep]\n"contact[1].mass" = { values = [0.97, 1.0] }\n[record]'
     scene = scene_of(folder, CONTACT.replace("[record]", sweep).replace("mass = 1.0\n", ""))
     assert scene.general is not None
-    assert scene.general.value("contact[1].mass") == 0.5
+    assert scene.general.value("contact[1].mass") == 0.97
     assert scene.general.at({"contact[1].mass": 1.0}).contacts[0].mass == 1.0
     assert scene.general.units["contact[1].mass"] == "kg"
     runner = GeneralRunner(scene)
     steps = []
-    for mass in (0.5, 1.0):
+    for mass in (0.97, 1.0):
         runner.run({"contact[1].mass": mass})
         steps.append(runner._importer.contacts.held[0].mass)
     runner.close()
-    assert steps == [0.5, 1.0]
+    assert steps == [0.97, 1.0]
     with pytest.raises(UsageError, match=r"contact\[2\]\.mass: expected a number of a contact"):
         scene.general.value("contact[2].mass")
 
