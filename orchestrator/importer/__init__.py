@@ -7,7 +7,7 @@ Any set of co-simulation FMUs, FMI 2.0 and 3.0 mixed. An event ends the step of 
 - any FMU with states: a watched variable's crossing is found by step revision (`revision`);
 - several events in one step: the earliest wins, the others are rolled back;
 - in a contact with a stop that yields the steps are short, and body and stop agree over each (`contact_bond`; a body
-  of another tool gets a force that is held over the step, `held_force`);
+  of another tool gets a force that is held over the step, `held_force`, or a very short one as an impulse, `pulse`);
 - FMUs without states are stepped last, once the end of the step is agreed.
 
 `specification` says what an importer is made of, `component` is one FMU in it, `wiring` moves values between them and

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from ctypes import c_void_p
 
@@ -127,7 +127,7 @@ class TrialSteps:
         found = [self.found_mass(time, trial, size) for trial in (TRIAL_STEP * size, size)]
         answers = [mass for mass in found if math.isfinite(mass)]
         if answers and not any(agrees(given, mass) for mass in answers):
-            raise self.mass_error(given, answers[0], time)
+            raise self.mass_error(given, answers, time)
 
     def rate(self, mass: float, time: float, size: float) -> float:
         """Return a rate (rad/s) at which the body answers a force otherwise than its mass (kg) alone.
@@ -145,10 +145,12 @@ class TrialSteps:
                 size *= 0.5
         return 0.0
 
-    def mass_error(self, given: float, found: float, time: float) -> ComponentError:
-        """Return the error of a mass that is not the one that the body has."""
+    def mass_error(self, given: float, found: Sequence[float], time: float) -> ComponentError:
+        """Return the error of a mass that is none of those that trial steps find."""
+        least, most = min(found), max(found)
+        masses = f"{most:.6g}" if agrees(least, most) else f"{least:.6g} to {most:.6g}"
         return ComponentError(
-            f"{self.name}: expected a body of the given mass, {given:.6g} kg, got an effective mass of {found:.6g} kg "
+            f"{self.name}: expected a body of the given mass, {given:.6g} kg, got an effective mass of {masses} kg "
             f"in a trial step at time {time:.12g}. Give [[contact]] the mass that {self._input.name} moves.",
             instance=self.body.name,
             time=time,

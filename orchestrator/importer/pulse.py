@@ -74,7 +74,7 @@ class Pulse:
         self.measure(time)
         self.measure(time)  # again, now that the size of its change is right
         if self.given is not None and not agrees(self.given, self.mass):
-            raise self._trials.mass_error(self.given, self.mass, time)
+            raise self._trials.mass_error(self.given, [self.mass], time)
         self.ready = True
 
     def measure(self, time: float) -> None:
@@ -105,12 +105,15 @@ class Pulse:
         return self._trials.velocity(size, force) - self._trials.velocity(size)
 
     def _no_impulse(self, time: float, one: float, two: float) -> ComponentError:
-        masses = f"one as of {one:.6g} kg, and of {two:.6g} kg over twice as long"
-        got = "one that does not change" if one == two == math.inf else masses
+        got = f"one as of {one:.6g} kg, and of {two:.6g} kg over twice as long"
+        hint = "A body with steps or limits of its own takes no rigid impact: use kelvin_voigt, hertz or hunt_crossley."
+        if one == two == math.inf:
+            got = "one that does not change"
+        elif one < 0.0 and two < 0.0:
+            hint = "Look at the variables and signs of [[contact]]."
         return ComponentError(
             f"{self._name}: expected a velocity that answers an impulse, a force held over a step of "
-            f"{self.size(time):.3g} s, as its mass does, got {got}, at time {time:.12g}. A body with steps or limits "
-            "of its own takes no rigid impact: use kelvin_voigt, hertz or hunt_crossley.",
+            f"{self.size(time):.3g} s, as its mass does, got {got}, at time {time:.12g}. {hint}",
             instance=self._trials.body.name,
             time=time,
         )

@@ -2,8 +2,9 @@
 
 The body is a mass that holds a force over a step (`tests/support/fmus/mass.c`), free or on a spring of its own, with
 states that can be kept and without. Its contact by a plain connection of the stop's force, and by `[[contact]]`, over
-the steps per contact; then microseconds per impact beside a body of ours whose law is another FMU's, and fused. For
-each law a dataset and a figure are left.
+the steps per contact; then rigid impacts, of random masses, speeds and restitutions against the closed form, and of a
+run of many; then microseconds per impact beside a body of ours whose law is another FMU's, and fused. For each law
+that yields a dataset and a figure are left.
 
 Run with `python tests/benchmarks/bench_foreign_bodies.py [FOLDER]`.
 """
@@ -25,14 +26,16 @@ import xarray as xr
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.compliant_parts import FREE, contact_time, follows, yielding_contact, yielding_stop
-from support.coupled_parts import body, link, part, values
+from support.coupled_parts import VERSIONS, body, events_of, link, part, values
 from support.fmu_factory import mass
 from support.held_parts import held
+from support.pair_parts import hit
 
 from vibroimpact.analysis.landmarks import observed_order
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
 
 STEPS = np.array([8, 15, 30, 60, 120, 240])
 STIFFNESS = {"kelvin_voigt": 1e4, "hertz": 1e6}
@@ -138,6 +141,71 @@ def draw(dataset: xr.Dataset, figure: Path) -> None:
     print(f"  figure: {figure}")
 
 
+# ---- rigid impacts ----
+
+IMPACTS, SEED = 200, 13
+LONG_RUN = 2000.0
+"""Seconds of a run of a body of ours and a foreign one that hit each other about every 3.5 s."""
+
+
+def rigid_errors(version: str, ours: bool, folder: Path) -> tuple[float, float, float]:
+    """Return the largest relative errors of momentum, closing speed and energy over impacts with random numbers."""
+    fmu, random, worst = mass(folder, version), np.random.default_rng(SEED), np.zeros(3)
+    for _ in range(IMPACTS):
+        lower, upper, speed = (float(10.0**power) for power in random.uniform(-3.0, 3.0, 3))
+        restitution = float(random.uniform(0.0, 1.0))
+        other = hit("b", version=version, mass=upper, stiffness=0.0) if ours else part("b", fmu, m=upper)
+        ends = BodyPoint("a", "x", "v", "f", lower), BodyPoint("b", "x", "v", "f", upper)
+        pair = PairSpec(ends[0], ("b", "contact[1]") if ours else ends[1], 0.5, restitution=restitution)
+        importer = Importer([part("a", fmu, v=speed, m=lower), other], pairs=[pair], macro_step=0.3 / speed)
+        importer.begin()
+        importer.advance(0.6 / speed)
+        (one,), (two,) = values(importer, "a", "v"), values(importer, "b", "velocity" if ours else "v")
+        importer.free()
+        after = 0.5 * lower * speed**2 * (1.0 - (1.0 - restitution**2) * upper / (lower + upper))
+        found = (
+            (lower * one + upper * two) / (lower * speed) - 1.0,
+            (two - one) / speed - restitution,
+            0.5 * (lower * one**2 + upper * two**2) / after - 1.0,
+        )
+        worst = np.maximum(worst, np.abs(found))
+    return float(worst[0]), float(worst[1]), float(worst[2])
+
+
+def long_run(version: str, folder: Path) -> tuple[int, float, float]:
+    """Return impacts, relative energy gained, and seconds, of a body of ours and a foreign one on springs."""
+    theirs = part("b", mass(folder, version), m=3.0, k=3.0)
+    pair = PairSpec(("a", "contact[1]"), BodyPoint("b", "x", "v", "f", 3.0), 0.2)
+    importer = Importer(
+        [hit("a", version=version, displacement_start=-1.0), theirs], pairs=[pair], macro_step=0.5
+    )
+    importer.begin()
+    events = events_of(importer)
+    began = time.perf_counter()
+    importer.advance(LONG_RUN)
+    seconds = time.perf_counter() - began
+    v, x = values(importer, "a", "velocity", "displacement")
+    w, y = values(importer, "b", "v", "x")
+    importer.free()
+    return len(events), v * v + x * x + 3.0 * (w * w + y * y) - 1.0, seconds
+
+
+def rigid_table(folder: Path) -> None:
+    """Print the errors of rigid impacts."""
+    print(f"\nrestitution: largest errors of {IMPACTS} random impacts    momentum  closing speed  energy")
+    for version in VERSIONS:
+        for ours in (False, True):
+            label = f"FMI {version}, two foreign bodies" if not ours else f"FMI {version}, foreign and ours"
+            cells = "".join(f"{error:12.1e}" for error in rigid_errors(version, ours, folder))
+            print(f"  {label:40}{cells}")
+    for version in VERSIONS:
+        impacts, gained, seconds = long_run(version, folder)
+        print(
+            f"  FMI {version}: {impacts} impacts in a run gain {gained:.1e} of the energy, "
+            f"{seconds / impacts * 1e6:.0f} us each with the flight before it"
+        )
+
+
 # ---- microseconds per impact ----
 
 CONTACTS = 40
@@ -211,6 +279,7 @@ def main() -> None:
             print(
                 f"  [[contact]] at {DEFAULT_STEPS} steps: {worst:.1e} of the energy; goal <= {GOAL:g}: {verdict}"
             )
+        rigid_table(Path(made))
         impact_table(Path(made))
 
 

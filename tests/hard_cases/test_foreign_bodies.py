@@ -241,10 +241,12 @@ def test_a_body_whose_velocity_does_not_grow_with_its_force_is_an_error(force: s
     importer.free()
 
 
-def test_a_rigid_stop_has_no_force_for_a_foreign_body(tmp_path: Path) -> None:
+def test_a_rigid_stop_has_no_force_for_a_body_that_cannot_go_back(tmp_path: Path) -> None:
     stop = yielding_stop("s", "restitution", {"restitution": 0.7})
-    with pytest.raises(ComponentError, match=r"s\.law: expected a law with a force for b.*got restitution"):
-        held(tmp_path, [stop], ROLLS)
+    with pytest.raises(
+        ComponentError, match=r"b: expected a body that can save its state.*is found by going back"
+    ):
+        held(tmp_path, [stop], ROLLS, states=False)
 
 
 # ---- the importer around it ----

@@ -101,13 +101,8 @@ def test_a_run_begins_without_the_force_that_the_one_before_ended_with(tmp_path:
     importer.free()
 
 
-def test_a_rigid_impact_and_a_body_that_cannot_go_back_are_refused(tmp_path: Path) -> None:
+def test_a_body_that_cannot_go_back_is_refused(tmp_path: Path) -> None:
     fmu = fmu_factory.mass(tmp_path, "3.0")
-    bodies = [part("a", fmu, v=1.0, m=1.0), part("b", fmu, m=1.0)]
-    importer = run_of(bodies, PairSpec(point("a"), point("b"), 0.5))
-    with pytest.raises(ComponentError, match="takes forces only: use kelvin_voigt"):
-        importer.advance(1.0)
-    importer.free()
     stateless = fmu_factory.mass(tmp_path, "3.0", states=False)
     with pytest.raises(ComponentError, match="a: expected a body that can save its state"):
         Importer(

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 from support.fmu_factory import mass
 
+import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.campaign.single_run import run_scene
 from vibroimpact.orchestrator.importer.specification import BodyPoint, PairSpec
@@ -187,6 +188,58 @@ rate = 10
 [execution]
 macro_step = 0.1
 """
+
+
+RIGID = """
+[component.tip]
+fmu = "Oscillator"
+[component.ball]
+fmu = "Mass.fmi3.fmu"
+parameters = { x = 1.0, v = -1.0 }
+[component.other]
+fmu = "Mass.fmi2.fmu"
+parameters = { x = 2.0, v = -1.0, m = 3.0 }
+[component.floor]
+fmu = "ImpactStop"
+parameters = { restitution = 0.9, position = 3.0 }
+[[contact]]
+between = ["tip", "ball"]
+restitution = 0.7
+bodies = { ball = { displacement = "x", velocity = "v", force = "f", mass = 1.0 } }
+[[contact]]
+between = ["ball", "other"]
+restitution = 0.7
+[contact.bodies]
+ball = { displacement = "x", velocity = "v", force = "f", mass = 1.0 }
+other = { displacement = "x", velocity = "v", force = "f", mass = 3.0 }
+[[contact]]
+body = "other"
+displacement = "x"
+velocity = "v"
+force = "f"
+stop = "floor"
+[record]
+recorded_time = 14
+variables = ["ball.v", "other.x"]
+rate = 10
+[execution]
+macro_step = 0.1
+"""
+
+
+def test_rigid_impacts_of_bodies_of_other_tools_travel_as_a_system(tmp_path: Path) -> None:
+    for version in ("2.0", "3.0"):
+        mass(tmp_path, version)
+    (tmp_path / "s.toml").write_text(RIGID)
+    vi.export_ssp(tmp_path / "s.toml", tmp_path / "s.ssp")
+    vi.import_ssp(tmp_path / "s.ssp", tmp_path / "back.toml")
+    for name in ("s", "back"):
+        run_scene(load_scene(tmp_path / f"{name}.toml"), tmp_path / f"{name}.nc")
+    with xr.open_dataset(tmp_path / "s.nc") as one, xr.open_dataset(tmp_path / "back.nc") as two:
+        assert one["event_time"].values[0] == pytest.approx(1.0, abs=1e-11)
+        assert {int(who) for who in one["event_component"].values} == {1, 2, 3}
+        for name in ("event_time", "ball_v", "other_x"):
+            assert (one[name].values == two[name].values).all()
 
 
 def test_a_body_of_another_tool_is_hit_where_the_law_yields(tmp_path: Path) -> None:
