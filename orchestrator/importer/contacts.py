@@ -62,6 +62,7 @@ class ContactBonds:
         self.pairs = Pairs(components, pairs, inputs)
         self._components, self._inputs = components, inputs
         self._rigid: dict[str, RigidStop] = {}
+        self._held: list[HeldForceBond] = []
         self._following: list[ContactBond | HeldForceBond | Pair] = []
         self.active = False
 
@@ -84,8 +85,8 @@ class ContactBonds:
         for bond in self._all():
             bond.begin()
         self.pairs.begin(time, [self._rigid_stop(bond) for bond in self.held if bond.stop.is_rigid])
-        held = [bond for bond in self.held if not bond.stop.is_rigid]
-        self._following = [*(bond for bond in self.ports if bond.follows), *held, *self.pairs.pairs]
+        self._held = [bond for bond in self.held if not bond.stop.is_rigid]
+        self._following = [*(bond for bond in self.ports if bond.follows), *self._held, *self.pairs.pairs]
         self.active = False
 
     def _rigid_stop(self, bond: HeldForceBond) -> RigidStop:
@@ -98,6 +99,9 @@ class ContactBonds:
     def begin_step(self, time: float, target: float) -> float:
         """Look at all contacts before a step; returns where it should end, s."""
         target = self.pairs.pulses.begin_step(time, target)
+        if not self.pairs.pulses.under_way:
+            for held in self._held:
+                held.check_mass(time, target - time)
         for bond in self._following:
             target = bond.begin_step(time, target, self._steps)
         self.active = any(bond.active for bond in self._following)
@@ -123,9 +127,8 @@ class ContactBonds:
 
     def agree(self, time: float, end: float) -> None:
         """Before the bodies without states make their step: it ends at `end`, s."""
-        for bond in self._following:
-            if isinstance(bond, HeldForceBond):
-                bond.agree(time, end)
+        for bond in self._held:
+            bond.agree(time, end)
 
     def end_step(self, size: float) -> list[Component]:
         """The step, of `size` s, counts; returns the bodies that have come to a stop at its end, without event mode."""
@@ -133,7 +136,7 @@ class ContactBonds:
             bond.end_step(size)
         self.pairs.pulses.end_step(size)
         met = [pair.lower.body for pair in self.pairs.pairs if pair.arrived]
-        return [*(bond.body for bond in self.held if bond.arrived), *met]
+        return [*(bond.body for bond in self._held if bond.arrived), *met]
 
     def remarks(self) -> list[str]:
         """What a reader of the results must know of held forces."""

@@ -23,6 +23,7 @@ from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.asked_stop import AskedStop, ContactWork, depth_that_stops
 from vibroimpact.orchestrator.importer.component import Component
 from vibroimpact.orchestrator.importer.force_input import TRIAL_STEP, ForceInput, TrialSteps
+from vibroimpact.orchestrator.importer.pulse import PART
 from vibroimpact.orchestrator.importer.revision import PRECISION, Bracket, refine
 from vibroimpact.orchestrator.importer.specification import StopContactSpec
 from vibroimpact.orchestrator.importer.step_path import NODES, StepPath, last_true
@@ -111,7 +112,7 @@ class HeldForceBond:
         self._other, self._other_slope = 0.0, 0.0
         self._told: tuple[float, float, float] | None = None
         self._searched = False
-        self._checks_mass = self.revisable and self.given_mass is not None
+        self._checks_mass = self.revisable
         self._agreed = -math.inf
         self._depth: float | None = None
         self._limit = math.inf
@@ -123,8 +124,6 @@ class HeldForceBond:
         """Look at the contact before a step; returns where the step should end, s."""
         self._steps, self._time, self._room = steps, time, ROOM * (1.0 + abs(time))
         self._start = self._look()
-        if self._checks_mass and target > time:
-            self._check_mass(target - time)
         self.stop.mark(time)
         self._force = 0.0
         self._last_try: tuple[float, float] | None = None
@@ -206,7 +205,9 @@ class HeldForceBond:
         return StepPath(*self._start, *self._look(), size)
 
     def _learn(self, path: StepPath) -> None:
-        """What accelerates the body beside this contact, now and on the way to the next step."""
+        """What accelerates the body beside this contact, now and on the way to the next step; no impulse does."""
+        if PART in self._input.parts:
+            return
         if self.mass is None:
             if self.closed:
                 return
@@ -316,11 +317,11 @@ class HeldForceBond:
             if depth is not None:
                 self._depth, self._limit = depth, math.pi * depth / velocity / self._steps
 
-    def _check_mass(self, size: float) -> None:
-        """Compare the given mass with that of trial steps, once a run."""
-        assert self.given_mass is not None
-        self._trials.check_mass(self.given_mass, self._time, size)
-        self._checks_mass = False
+    def check_mass(self, time: float, size: float) -> None:
+        """Compare a given mass with that of trial steps of up to `size` s, at the first of a run that can be tried."""
+        if self._checks_mass and self.given_mass is not None:
+            self._trials.check_mass(self.given_mass, time, size)
+            self._checks_mass = False
 
     def _found_mass(self, size: float) -> float:
         """The effective mass of the contact point, by steps with and without a small force, kg."""

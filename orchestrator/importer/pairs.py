@@ -168,7 +168,7 @@ class Pair:
 
     def begin_step(self, time: float, target: float, steps: float) -> float:
         """Look at the pair before a step; returns where it should end, s."""
-        if self._is_new:
+        if self._is_new and not self._pulses.under_way:
             self._ask_bodies(time, target - time)
         start, self._time = self.look(), time
         self._longest_step = max(self._longest_step, target - time)

@@ -20,6 +20,7 @@ from support.pair_parts import hit
 
 from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.sampling import Sampler
 from vibroimpact.orchestrator.importer.specification import BodyPoint, ComponentSpec, PairSpec
 
 GRID, CLIPPED = 3, 4
@@ -143,6 +144,49 @@ def test_bounces_of_a_foreign_ball_end_in_rest_on_a_foreign_plate(tmp_path: Path
     assert v == pytest.approx(w, abs=1e-9)
     assert v + 1000.0 * w == pytest.approx(-30.0, rel=1e-9)
     importer.free()
+
+
+def test_a_foreign_mass_between_a_rigid_impact_and_a_stop_that_yields_keeps_the_energy(
+    tmp_path: Path,
+) -> None:
+    # it starts in contact with the other one, which throws it at a Hertz stop again and again
+    fmu = fmu_factory.mass(tmp_path, "3.0")
+    bodies = [part("a", fmu, v=1.0, k=1.0, m=2.0), part("b", fmu, k=1.0)]
+    stop = yielding_stop("s", "hertz", {"stiffness": 1e6}, 0.3)
+    importer = Importer(
+        [*bodies, stop],
+        contacts=[foreign_contact()],
+        pairs=[PairSpec(point("a", 2.0), point("b"))],
+        macro_step=0.1,
+    )
+    importer.begin()
+    events = events_of(importer)
+    importer.advance(20.0)
+    (x, v), (y, w) = values(importer, "a", "x", "v"), values(importer, "b", "x", "v")
+    assert {event.component for event in events} == {"a", "b"}
+    pressed = 0.4e6 * max(0.0, y - 0.3) ** 2.5
+    assert 0.5 * (2.0 * v * v + w * w + x * x + y * y) + pressed == pytest.approx(1.0, rel=1e-8)
+    importer.free()
+
+
+def test_a_run_that_is_sampled_is_the_run_bit_for_bit_and_begins_anew(tmp_path: Path) -> None:
+    fmu = fmu_factory.mass(tmp_path, "3.0")
+    bodies = [part("a", fmu, v=1.0, k=1.0), part("b", fmu, k=2.0)]
+    pair = PairSpec(point("a"), point("b"), 0.1, restitution=0.9)
+    ends = []
+    for rate in (None, 7.0, 1000.0):
+        importer = run_of(bodies, pair)
+        sampler = None if rate is None else Sampler(importer, [("a", "x"), ("b", "v")], rate)
+        for _ in range(2):
+            importer.begin()
+            events = events_of(importer)
+            if sampler is not None:
+                sampler.begin(0.0, 10.0)
+            importer.advance(10.0)
+            ends.append((values(importer, "a", "x", "v"), [event.time for event in events]))
+        importer.free()
+    assert len(ends[0][1]) == 4
+    assert all(end == ends[0] for end in ends)
 
 
 # ---- a stop that does not move ----
