@@ -84,7 +84,7 @@ class EventSpec:
 
 @dataclass(frozen=True, slots=True)
 class StopContactSpec:
-    """A body of any tool that meets a stop which yields.
+    """A body of any tool that meets a stop: one that yields, or an ImpactStop with restitution.
 
     Attributes
     ----------
@@ -167,7 +167,7 @@ class PairSpec:
     ----------
     lower, upper : tuple of str, or BodyPoint
         Component and contact port (`contact[k]`, of the law `pair`) of each of our bodies, or a point of one of any
-        tool where the law yields: their gap is `clearance + displacement of upper - displacement of lower`.
+        tool: their gap is `clearance + displacement of upper - displacement of lower`.
     clearance : float
         Gap where both displacements are 0, m.
     law : str
