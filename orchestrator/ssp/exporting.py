@@ -45,7 +45,7 @@ def export_system(
         Version of the description, `1.0` or `2.0`.
     fmi : str, optional
         Version of the FMUs of this package's components in the archive, `2.0` or `3.0`. By default 2.0, the version
-        that SSP 1.0 knows, and in SSP 2.0 that of the scene.
+        that SSP 1.0 knows, and in SSP 2.0 that of the scene. Components of gains are of 2.0 always.
     gains : str
         How a connection has its gain: as a `component` with units of its own (a spring between bodies is one in N/m),
         or as a `transformation` of its value, which OMSimulator leaves out and Ecos and libcosim take without a delay.

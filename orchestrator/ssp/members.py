@@ -22,6 +22,10 @@ from vibroimpact.orchestrator.scene.general.component_facts import (
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.ssp.names import GAIN
 
+FMI_OF_GAINS = "2.0"
+"""Version of each Gain. OMSimulator reads no unknowns of initialization of FMI 3.0 and so takes a circle of connections
+for an algebraic loop at the start; with a component of FMI 2.0 in it, it solves it by differences."""
+
 
 @dataclass(frozen=True, slots=True)
 class Part:
@@ -138,7 +142,7 @@ def _gain(
     file = export_fmu(
         GAIN,
         travel.folder / f"{name}.fmu",
-        fmi=travel.fmi or "3.0",
+        fmi=FMI_OF_GAINS,
         starts={"gain": connection.gain},
         stop_time=travel.stop_time,
         platform=travel.platform,

@@ -36,8 +36,6 @@ PAIRS = [
     if tool.name in GAINS
     for fmi in tool.versions
     for gains in GAINS[tool.name]
-    # with FMI 3.0 OMSimulator finds an algebraic loop at the start, which is none, and no solution of it
-    if (tool.name, fmi) != ("OMSimulator", "3.0")
 ]
 
 

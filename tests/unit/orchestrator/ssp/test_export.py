@@ -120,12 +120,13 @@ def test_a_gain_as_a_component_has_the_units_of_its_ends(tmp_path: Path) -> None
     assert not tree.findall(".//{*}LinearTransformation")
     gain = read_description(tmp_path / "resources" / "gain_1.fmu")
     assert {v.name: v.unit for v in gain.modelVariables} == {
-        "time": "s",
         "gain": "N/m",
         "input": "m",
         "output": "N",
     }
-    assert unpack(tmp_path / "resources" / "gain_1.fmu").fmi_version == "3.0"
+    # of FMI 2.0 always: OMSimulator takes a circle of FMI 3.0 for an algebraic loop, which it cannot solve
+    versions = [unpack(tmp_path / "resources" / f"{name}.fmu").fmi_version for name in ("a", "gain_1")]
+    assert versions == ["3.0", "2.0"]
 
 
 def test_one_file_travels_once_and_names_stay_apart_where_case_does_not_count(tmp_path: Path) -> None:
