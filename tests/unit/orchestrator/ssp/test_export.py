@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
 from lxml import etree
+from support.ssp_files import changed
+from support.ssp_schema import missing_schema, problems
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import UsageError
@@ -67,6 +69,30 @@ def test_an_archive_is_valid_and_fmpy_reads_what_the_scene_says(system: Path) ->
     }
     names = zipfile.ZipFile(system).namelist()
     assert all(name == "SystemStructure.ssd" or name.startswith("resources/") for name in names)
+
+
+def test_an_archive_fits_the_schema_and_leads_nowhere_else(system: Path, tmp_path: Path) -> None:
+    assert problems(system, "1.0") == []
+    text = zipfile.ZipFile(system).read("SystemStructure.ssd").decode()
+    for old, new, told in (
+        ('kind="output"', 'kind="outlet"', "outlet"),
+        ('source="resources/a.ssv"', 'source="resources/c.ssv"', "source resources/c.ssv"),
+        ('endConnector="force"', 'endConnector="mass"', "-> ('b', 'mass')"),
+        ('unit="m"', 'unit="cubit"', "unit cubit"),
+    ):
+        spoilt = changed(system, tmp_path / "s.ssp", "SystemStructure.ssd", text.replace(old, new).encode())
+        assert told in "\n".join(problems(spoilt, "1.0")), new
+
+
+def test_an_archive_of_ssp_2_fits_its_schema_with_local_variables_too(tmp_path: Path) -> None:
+    if reason := missing_schema("2.0"):
+        pytest.skip(reason)
+    recorded = [*RECORD["variables"], "b.relative_acceleration"]
+    tables = {**TWO, "record": {**RECORD, "variables": recorded}}
+    path = export_system(vi.Scene.from_dict(tables), tmp_path / "s.ssp", ssp="2.0")
+    assert problems(path, "2.0") == []
+    assert b'name="relative_acceleration" kind="local"' in zipfile.ZipFile(path).read("SystemStructure.ssd")
+    assert "resources/a.ssv: version 2.0" in problems(path, "1.0")
 
 
 def test_what_is_swept_is_one_parameter_set_of_the_system_mapped_to_its_components(
