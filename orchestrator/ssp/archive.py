@@ -30,6 +30,7 @@ from vibroimpact.orchestrator.ssp.refusal import RefusalError
 LARGEST_XML = 1 << 24
 """Bytes of an XML file; that of a system of thousands of connections is below a million."""
 _BLOCK = 1 << 20
+_INSIDE = "Pack the file into its resources folder."
 _DRIVE = re.compile(r"[A-Za-z]:")
 
 
@@ -86,14 +87,15 @@ class SspArchive:
         RefusalError
             It leads out of the archive, or there is no such member.
         """
-        parts = urlsplit(uri)
+        try:
+            parts = urlsplit(uri)
+        except ValueError:  # brackets of no address
+            raise RefusalError(where, "a file of the archive", quoted(uri), _INSIDE) from None
         name = unquote(parts.path)
         path = PurePosixPath(name)
         leaves = parts.scheme or parts.netloc or path.is_absolute() or ".." in path.parts or "\\" in name
         if leaves or _DRIVE.match(name):
-            raise RefusalError(
-                where, "a file of the archive", quoted(uri), "Pack the file into its resources folder."
-            )
+            raise RefusalError(where, "a file of the archive", quoted(uri), _INSIDE)
         if parts.fragment or parts.query or uri.startswith("#"):
             hint = "References into a file are not available in this version: write the part out."
             raise RefusalError(where, "a whole file of the archive", quoted(uri), hint)

@@ -160,7 +160,10 @@ class FlatSystem:
             if source[1] in _giving(source[0], path) and target[1] in _taking(target[0], path):
                 return _Edge(source[0], target[0], connection)
         got = f"{start[1] or 'none'} and {end[1] or 'none'}"
-        raise RefusalError(connection.where, "an end that gives a value and one that takes it", quoted(got))
+        hint = "The kinds of its connectors say it, such as output and input."
+        raise RefusalError(
+            connection.where, "an end that gives a value and one that takes it", quoted(got), hint
+        )
 
     def _end(self, path: Path, place: tuple[str | None, str], connection: Connection) -> tuple[Node, str]:
         element = path if place[0] is None else (*path, place[0])
@@ -202,7 +205,7 @@ class FlatSystem:
             connection, after = edge.connection, self._unit(edge.target)
             where, noted = connection.where, connection.gain_unit or noted
             if connection.offset:
-                hint = "Constant offsets are not available in this version."
+                hint = "Offsets are not available in this version: add it in a component."
                 raise RefusalError(where, "a transformation without offset", f"{connection.offset:g}", hint)
             changes = connection.suppressed or connection.gain_unit is not None
             gain *= 1.0 if changes else _conversion(unit, after, connection)

@@ -61,7 +61,7 @@ def load_system(
     path: str | PathLike[str],
     changes: Sequence[str] = (),
     parameters: Sequence[str | PathLike[str]] = (),
-    name: str = "system",
+    name: str | None = None,
 ) -> Imported:
     """Read an SSP archive as a scene.
 
@@ -73,8 +73,8 @@ def load_system(
         `KEY=VALUE`, made before the scene is checked.
     parameters : sequence of Path
         Parameter sets (SSV), files or members of the archive: one is applied, several become a sweep.
-    name : str
-        What the scene's file is to be called; its FMUs lie in `NAME_fmus` beside it.
+    name : str, optional
+        What the scene's file is to be called, by default as the archive; its FMUs lie in `NAME_fmus` beside it.
 
     Raises
     ------
@@ -87,6 +87,7 @@ def load_system(
     """
     folder = ScratchFolder("ssp")
     place = FilePath(folder.name)
+    name = _PLAIN.sub("_", FilePath(path).stem)[:100] if name is None else name
     source = str(place / f"{name}.toml")
     try:
         with _told_of(FilePath(path), source), SspArchive(FilePath(path)) as archive:

@@ -75,7 +75,8 @@ def scene_tables(
     noted, notes = noted_tables(structure), []
     if flat.ignored:
         more = f" and {len(flat.ignored) - 5} more" if len(flat.ignored) > 5 else ""
-        notes.append(f"parameters of no variable, which were left out: {', '.join(flat.ignored[:5])}{more}")
+        named = ", ".join(name[:100] for name in flat.ignored[:5])
+        notes.append(f"parameters of no variable, which were left out: {named}{more}")
     ours = bool(noted)
     if not ours:
         noted["scene"] = {"title": structure.name, "units": "SI"}
@@ -121,7 +122,7 @@ def _times(tables: dict[str, Any], structure: Structure, facts: Any, *, connecte
     if "macro_step" in execution or not connected:
         return
     own = [one.step for one in facts if one.step is not None]
-    step = structure.step or (min(own) if own else None)
+    step = structure.step if structure.step is not None else min(own, default=None)
     if step is not None:
         execution["macro_step"] = step
         if structure.step is None:

@@ -27,6 +27,8 @@ TRANSFORMATIONS = (
 )
 
 LONGEST_NAME = 2000
+_NUMBER = re.compile(r"\s*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?\s*", re.ASCII)
+_WHOLE = re.compile(r"\s*[+-]?0{0,100}[0-9]{1,20}\s*", re.ASCII)
 _VERSION = re.compile(r"1\.[0-9]{1,3}(-.*)?|2\.[0-9]{1,3}")
 
 
@@ -124,7 +126,7 @@ def _parameter(element: Element, where: str, units: Units) -> Parameter:
     where = f"{where}: {name[:100]}"
     if len(name) > LONGEST_NAME:
         raise RefusalError(where, f"a name of at most {LONGEST_NAME} characters", f"{len(name)}")
-    for child in element:
+    for child in element if _values_in(element) == 1 else ():
         kind, text = child.tag.rpartition("}")[2], child.get("value", "")
         if kind in _READ or kind in REAL_TYPES or kind in INTEGER_TYPES:
             read = _READ.get(kind, number if kind in REAL_TYPES else whole)
@@ -133,6 +135,12 @@ def _parameter(element: Element, where: str, units: Units) -> Parameter:
             break
     got = ", ".join(child.tag.rpartition("}")[2][:60] for child in element) or "none"
     raise RefusalError(where, "one number, truth value, text or enumeration item", got)
+
+
+def _values_in(element: Element) -> int:
+    """Return how many values a parameter has; annotations and the like are none."""
+    kinds = (child.tag.rpartition("}")[2] for child in element)
+    return sum(kind in _READ or kind in REAL_TYPES or kind in INTEGER_TYPES for kind in kinds)
 
 
 def read_mapping(root: Element, where: str) -> tuple[Mapped, ...]:
@@ -208,22 +216,18 @@ def refuse_version(root: Element, where: str) -> None:
 
 
 def number(text: str, where: str) -> float:
-    """Read a finite number."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
+    """Read a finite number as XML writes it: in ASCII, without the underscores of Python."""
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value):
         raise RefusalError(where, "a finite number", quoted(text))
     return value
 
 
 def whole(text: str, where: str) -> int:
-    """Read a whole number."""
-    try:
-        return int(text)
-    except ValueError:
-        raise RefusalError(where, "a whole number", quoted(text)) from None
+    """Read a whole number of one of the types of SSP, which have 64 bits at most."""
+    if not _WHOLE.fullmatch(text) or not -(2**63) <= int(text) < 2**64:
+        raise RefusalError(where, "a whole number of 64 bits", quoted(text))
+    return int(text)
 
 
 def truth(text: str, where: str) -> bool:

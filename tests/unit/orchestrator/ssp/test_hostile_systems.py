@@ -69,6 +69,7 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
     "a file address": (ssd(part(source="file:///etc/passwd")), "expected a file of the archive"),
     "a web address": (ssd(part(source="http://a.example/b.fmu")), "expected a file of the archive"),
     "another host": (ssd(part(source="//host/b.fmu")), "expected a file of the archive"),
+    "brackets of no address": (ssd(part(source="http://[b.fmu")), "Pack the file into its resources folder"),
     "a part of a file": (ssd(part(source="#other")), "expected a whole file of the archive"),
     "values out of it": (ssd(part(bindings=bound("../x.ssv"))), "expected a file of the archive"),
     "values in the FMU": (ssd(part(bindings=bound("x.ssv", 'sourceBase="component"'))), "Copy the file out"),
@@ -101,7 +102,10 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
         ssd(TWO, connection("a.displacement", "b.force")),
         "Give it a LinearTransformation",
     ),
-    "an offset": (ssd(TWO, connection("a.displacement", "b.force", factor(1.0, 2.0))), "without offset"),
+    "an offset": (
+        ssd(TWO, connection("a.displacement", "b.force", factor(1.0, 2.0))),
+        "add it in a component",
+    ),
     "a number that is none": (
         ssd(TWO, connection("a.displacement", "b.force", factor(float("nan")))),
         "finite",
@@ -128,6 +132,27 @@ DESCRIPTIONS: dict[str, tuple[str, str]] = {
             )
         ),
         "take it out",
+    ),
+    "ends of no kind": (
+        ssd(part("a").replace(' kind="output"', "") + part("b"), connection("a.displacement", "b.force")),
+        'got "none and input". The kinds of its connectors say it',
+    ),
+    "a whole number beyond its type": (
+        ssd(part(bindings=values({"mass": f'<ssv:Integer value="{"9" * 400}"/>'}))),
+        "expected a whole number of 64 bits",
+    ),
+    "a whole number as Python writes it": (
+        ssd(part(bindings=values({"impact_limit": '<ssv:Integer value="1_0"/>'}))),
+        'expected a whole number of 64 bits, got "1_0"',
+    ),
+    "digits of another script": (
+        ssd(part(bindings=values({"mass": '<ssv:Real value="٣"/>'}))),
+        'expected a finite number, got "٣"',
+    ),
+    "two numbers for one": (ssd(part(bindings=values({"mass": real(1.0) + real(2.0)}))), "got Real, Real"),
+    "a step of no time": (
+        ssd(TWO, connection("a.displacement", "b.force", factor(1.0)), step=0.0),
+        "macro_step: expected a number > 0, got 0.0",
     ),
     "an array": (ssd(part(bindings=values({"mass": real(1.0).replace("1.0", "1 2")}))), "finite number"),
     "a value out of range": (ssd(part(bindings=values({"mass": real(-1.0)}))), "got -1"),

@@ -147,9 +147,11 @@ def test_types_fit_their_variables_and_what_no_variable_takes_is_noted(
         "no such": real(1.0),
         "velocity": real(1.0),
     }
-    imported = load_system(archive(tmp_path / "s.ssp", ssd(body(values(given))), fmus))
+    imported = load_system(archive(tmp_path / "my rig.ssp", ssd(body(values(given))), fmus))
     assert imported.scene.general is not None
     assert dict(imported.scene.general.components[0].parameters) == {"mass": 4.0, "contact[1].law": 1}
+    # what a run says of the FMU names the system, wherever it lies unpacked
+    assert imported.scene.general.components[0].fmu.parts[-2:] == ("my_rig_fmus", "body.fmu")
     (left_out, recorded) = imported.notes
     assert "body.no such, body.velocity" in left_out
     assert "record.variables" in recorded
