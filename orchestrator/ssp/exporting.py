@@ -38,7 +38,7 @@ def export_system(
     Parameters
     ----------
     scene : Scene
-        With components. What it sweeps has its first value in other tools.
+        With components. What it sweeps has in other tools the value of its tables, its first one where they have none.
     output : path
         File to write.
     ssp : str

@@ -29,12 +29,13 @@ class Node(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A component's input that another's output feeds: gain times it."""
+    """A component's input that another's output feeds: gain times it, through components that are gains."""
 
     source: Node
     target: Node
     gain: float = 1.0
     gain_unit: str | None = None
+    through: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +84,10 @@ class FlatSystem:
                 self._add(self._directed(path, connection))
         self._values = self._start_values()
 
-    def links(self) -> list[Link]:
-        """Return what feeds the components' inputs, in the order of the file."""
+    def links(self, gains: Mapping[Path, float] | None = None) -> list[Link]:
+        """Return what feeds the components' inputs, in the order of the file; with other values of its gains."""
         ends = (target for target in self._edges if target.element in self.components)
-        return [link for link in map(self._link, ends) if link is not None]
+        return [link for link in (self._link(end, gains or {}) for end in ends) if link is not None]
 
     def start_values(self) -> dict[Path, dict[str, StartValue]]:
         """Return the start values of each component: those of an outer system go before those of an inner one."""
@@ -100,6 +101,11 @@ class FlatSystem:
                 for parameter in binding.parameters:
                     self.apply(parameter, path, values)
         return values
+
+    def named(self, parameter: Parameter) -> tuple[Parameter, ...]:
+        """Return a parameter of a set from outside by the names of the system, as its own mappings have them."""
+        mapped = [one for binding in self._systems[()].bindings for one in binding.renamed(parameter)]
+        return tuple(mapped) or (parameter,)
 
     def apply(
         self, parameter: Parameter, path: Path, values: dict[Path, dict[str, StartValue]]
@@ -183,7 +189,7 @@ class FlatSystem:
             return self._all[node.element].connectors[node.name].unit
         return self._systems[node.element].connectors[node.name].unit
 
-    def _link(self, target: Node) -> Link | None:
+    def _link(self, target: Node, gains: Mapping[Path, float]) -> Link | None:
         """Return what feeds an input; None where that is a connector of the whole system, which nothing feeds."""
         edges = [self._edges[target]]
         while edges[-1].source.element not in self.components:
@@ -195,12 +201,12 @@ class FlatSystem:
             if before in edges:
                 raise RefusalError(before.connection.where, "a value that comes from a component", "a circle")
             edges.append(before)
-        return self._gain(edges[::-1])
+        return self._gain(edges[::-1], gains)
 
-    def _gain(self, edges: list[_Edge]) -> Link:
+    def _gain(self, edges: list[_Edge], gains: Mapping[Path, float]) -> Link:
         """Return the edges from an output to an input as one gain."""
         gain, noted, source = 1.0, None, self._unit(edges[0].source)
-        unit = source
+        unit, passed = source, []
         for edge in edges:
             connection, after = edge.connection, self._unit(edge.target)
             where, noted = connection.where, connection.gain_unit or noted
@@ -213,7 +219,9 @@ class FlatSystem:
             unit = after or unit
             through = self._all.get(edge.target.element) if edge is not edges[-1] else None
             if through is not None:
-                gain *= float(self._values[edge.target.element].get("gain", 1.0))
+                own = float(self._values[edge.target.element].get("gain", 1.0))
+                gain *= gains.get(edge.target.element, own)
+                passed.append(edge.target.element)
                 unit, noted = self._unit(Node(edge.target.element, "output")), through.gain_unit
         target = self._unit(edges[-1].target)
         if noted is None and source is not None and target is not None and not agree(source, target):
@@ -221,7 +229,7 @@ class FlatSystem:
             if noted is None:
                 got = f"{source.name} to {target.name}"
                 raise RefusalError(edges[-1].connection.where, "units whose ratio is one of SI symbols", got)
-        return Link(edges[0].source, edges[-1].target, gain, noted)
+        return Link(edges[0].source, edges[-1].target, gain, noted, tuple(passed))
 
 
 def components_of(system: System, path: Path = ()) -> Iterator[tuple[Path, Component]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -12,6 +12,7 @@ from vibroimpact.fmus.packaging.zip_members import opened
 from vibroimpact.fmus.safe_xml import root_of
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, StartValue
+from vibroimpact.orchestrator.scene.general.scene import gain_place
 from vibroimpact.orchestrator.ssp.archive import LARGEST_XML, SspArchive
 from vibroimpact.orchestrator.ssp.flat import FlatSystem, Path
 from vibroimpact.orchestrator.ssp.scene_tables import names_of
@@ -50,8 +51,11 @@ def with_sets(
     names = names_of(list(flat.components))
     points = [_point(name, parameters, flat, facts, names) for name, parameters in sets.items()]
     if len(points) == 1:
+        swept = tables.get("sweep", {})
         for key, value in points[0].items():
             _give(tables, key, value)
+            if isinstance(swept, dict):  # what else it is, the scene's rules tell
+                swept.pop(key, None)
         return
     tables["sweep"] = {key: {"values": values} for key, values in _axes(points).items()}
     for key, value in points[0].items():
@@ -67,18 +71,35 @@ def _point(
     names: Mapping[Path, str],
 ) -> dict[str, StartValue]:
     """Return the start values that a set gives, by key of the scene."""
-    values: dict[Path, dict[str, StartValue]] = {path: {} for path in flat.components}
-    taken = [node for parameter in parameters for node in flat.apply(parameter, (), values)]
+    values: dict[Path, dict[str, StartValue]] = {path: {} for path in facts}
+    named = [one for parameter in parameters for one in flat.named(parameter)]
+    taken = [node for parameter in named for node in flat.apply(parameter, (), values)]
     if not taken:
         raise UsageError(
             f"{name}: expected a parameter of this system such as {_example(facts, names)}, got none."
         )
-    point = {}
+    point: dict[str, StartValue] = dict(_gains(flat, values))
     for path, variable in dict.fromkeys(taken):
+        if path not in flat.components:
+            continue
         value = values[path][variable]
         items = facts[path].variables[variable].items
         point[f"{names[path]}.{variable}"] = items.get(value, value) if isinstance(value, str) else value
     return point
+
+
+def _gains(
+    flat: FlatSystem, values: Mapping[Path, Mapping[str, StartValue]]
+) -> Iterator[tuple[str, StartValue]]:
+    """Yield the gains of connections that a set gives, where they are components of the system."""
+    given = {
+        path: float(own["gain"])
+        for path, own in values.items()
+        if path not in flat.components and "gain" in own
+    }
+    for number, link in enumerate(flat.links(given) if given else (), start=1):
+        if not given.keys().isdisjoint(link.through):
+            yield f"connection[{number}].gain", link.gain
 
 
 def _example(facts: Mapping[Path, ComponentFacts], names: Mapping[Path, str]) -> str:
@@ -120,5 +141,9 @@ def _is_number(value: StartValue) -> bool:
 
 
 def _give(tables: dict[str, Any], key: str, value: StartValue) -> None:
+    place = gain_place(key)
+    if place is not None:
+        tables["connection"][place]["gain"] = value
+        return
     component, _, variable = key.partition(".")
     tables["component"][component].setdefault("parameters", {})[variable] = value

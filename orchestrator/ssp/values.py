@@ -54,9 +54,26 @@ class Mapped:
 
 @dataclass(frozen=True, slots=True)
 class Binding:
-    """Parameters of an element by the names that they have there."""
+    """Parameters of an element by the names that they have there.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+    mapping : tuple of Mapped or None
+        How they were renamed; None where they were not.
+    prefix : str
+        What their names had before that.
+    """
 
     parameters: tuple[Parameter, ...]
+    mapping: tuple[Mapped, ...] | None = None
+    prefix: str = ""
+
+    def renamed(self, parameter: Parameter) -> tuple[Parameter, ...]:
+        """Return what its mapping makes of a parameter of another set; nothing where it does not name it."""
+        if self.mapping is None:
+            return ()
+        return binding((parameter,), self.mapping, self.prefix).parameters
 
 
 def binding(parameters: tuple[Parameter, ...], mapping: tuple[Mapped, ...] | None, prefix: str) -> Binding:
@@ -65,7 +82,7 @@ def binding(parameters: tuple[Parameter, ...], mapping: tuple[Mapped, ...] | Non
     if mapping is None:
         return Binding(tuple(replace(parameter, name=name) for name, parameter in named.items()))
     applied = (_mapped(named[entry.source], entry) for entry in mapping if entry.source in named)
-    return Binding(tuple(applied))
+    return Binding(tuple(applied), mapping, prefix)
 
 
 def _mapped(parameter: Parameter, entry: Mapped) -> Parameter:

@@ -115,6 +115,26 @@ def test_what_is_swept_is_one_parameter_set_of_the_system_mapped_to_its_componen
     assert general.connections[0].gain == (0.75 if springs else 0.25)
 
 
+def test_copies_of_the_swept_set_are_a_sweep_and_one_of_them_is_a_point(system: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(system) as archive:
+        text = archive.read("resources/system.sweep.ssv").decode()
+    springs = "gain" in text
+    sets = []
+    for mass in ("3.0", "5.0"):
+        for gain in ("0.5", "0.75") if springs else ("0.25",):
+            sets.append(tmp_path / f"{mass} {gain}.ssv")
+            sets[-1].write_text(text.replace('"2.0"', f'"{mass}"').replace('"0.25"', f'"{gain}"'))
+    gains = {"connection[1].gain": [0.5, 0.75]} if springs else {}
+    swept = {axis.key: list(axis.values) for axis in load_system(system, (), sets).scene.sweep}
+    assert swept == {**gains, "b.mass": [3.0, 5.0]}
+    one = load_system(system, (), sets[-1:]).scene
+    assert one.general is not None
+    assert one.general.components[1].parameters["mass"] == 5.0
+    assert one.general.connections[0].gain == (0.75 if springs else 0.25)
+    # what the set gives is swept no more; a gain that is no component is in no set
+    assert [axis.key for axis in one.sweep] == ([] if springs else ["connection[1].gain"])
+
+
 @pytest.mark.slow
 def test_the_scene_comes_back_with_its_sweep_and_gives_the_same_dataset(system: Path) -> None:
     ours, theirs = vi.Scene.from_dict(TWO), load_system(system).scene
