@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path as FilePath
 from pathlib import PurePosixPath
@@ -23,6 +23,7 @@ from vibroimpact.fmus.packaging.members import OWN_DIGITS
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import FOLDERS
 from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.changes import changed_document
 from vibroimpact.orchestrator.scene.file import LARGEST_FILE
 from vibroimpact.orchestrator.scene.general.component_facts import ComponentFacts, component_facts
 from vibroimpact.orchestrator.scene.problems import quoted
@@ -91,7 +92,8 @@ def load_system(
     source = str(place / f"{name}.toml")
     try:
         with _told_of(FilePath(path), source), SspArchive(FilePath(path)) as archive:
-            tables, notes = _read(archive, place / f"{name}_fmus", [FilePath(one) for one in parameters])
+            sets = [FilePath(one) for one in parameters]
+            tables, notes = _read(archive, place / f"{name}_fmus", sets, _asked_end(changes))
             scene = parse_scene(_text(tables), source, changes)
     except BaseException:
         folder.cleanup()
@@ -185,10 +187,23 @@ def _told_of(path: FilePath, source: str) -> Iterator[None]:
         raise ComponentFileError(str(error).replace(f"{place}/", f"{path}: ")) from None
 
 
+def _asked_end(changes: Sequence[str]) -> float | None:
+    """Return the end of the run that a system may leave to who runs it, where a change says it."""
+    key = "record.recorded_time"
+    document, changed = changed_document({}, [one for one in changes if one.startswith(key)])
+    if key not in changed:
+        return None
+    asked = document["record"]["recorded_time"]
+    # what else it is, the scene's rules tell
+    return float(asked) if isinstance(asked, int | float) and abs(asked) < 1e300 else 0.0
+
+
 def _read(
-    archive: SspArchive, folder: FilePath, parameters: Sequence[FilePath]
+    archive: SspArchive, folder: FilePath, parameters: Sequence[FilePath], end: float | None
 ) -> tuple[dict[str, Any], list[str]]:
     structure = read_structure(archive)
+    if structure.stop_time is None:
+        structure = replace(structure, stop_time=end)
     each = dict(components_of(structure.system))
     if not each:
         raise RefusalError(SSD_FILE, "a system with components", "none")

@@ -117,7 +117,12 @@ def _times(tables: dict[str, Any], structure: Structure, facts: Any, *, connecte
         hint = "A scene begins at 0: shift what depends on time."
         raise RefusalError(f"{SSD_FILE}: startTime", "0", f"{structure.start_time:g}", hint)
     record, execution = _table(tables, "record"), _table(tables, "execution")
-    if "recorded_time" not in record and structure.stop_time is not None:
+    if "recorded_time" not in record:
+        if structure.stop_time is None:
+            hint = "Say how long it runs: --set record.recorded_time=10."
+            raise RefusalError(
+                f"{SSD_FILE}: DefaultExperiment: stopTime", "the end of the run, s", "none", hint
+            )
         record["recorded_time"] = structure.stop_time
     if "macro_step" in execution or not connected:
         return

@@ -175,9 +175,14 @@ def test_a_system_without_an_end_or_a_step_says_which_keys_to_give(
     tmp_path: Path, fmus: dict[str, Path]
 ) -> None:
     path = archive(tmp_path / "s.ssp", ssd(body(), times=""), fmus)
-    with pytest.raises(SceneError, match=r"s\.ssp: record\.recorded_time: expected"):
+    with pytest.raises(SceneError, match=r"s\.ssp: .*stopTime: expected .*--set record\.recorded_time=10"):
         load_system(path)
-    assert load_system(path, ["record.recorded_time=3.0"]).scene.record.recorded_time == 3.0
+    scene = load_system(path, ["record.recorded_time=4.0"]).scene
+    assert scene.general is not None
+    assert (scene.record.recorded_time, scene.general.rate) == (4.0, 250.0)
+    for wrong, told in (("long", '"long"'), ("1" + "0" * 400, "a number near 1e400")):
+        with pytest.raises(SceneError, match=f"recorded_time: expected .*got {told}"):
+            load_system(path, [f"record.recorded_time={wrong}"])
 
 
 def test_the_step_is_that_of_the_master_or_the_smallest_that_an_fmu_proposes(
