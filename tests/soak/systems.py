@@ -38,6 +38,7 @@ WORDS = (
         "#a",
     ),
     *("file:///etc/passwd", "http://a.example/b", "%2e%2e/x", "C:/x", "1e999", "nan", "-1", "0", "1", "true"),
+    *("http://[a", "1_0", "\u0663", "9" * 400, "0" * 5000, "1e308"),
     *(
         "input",
         "output",
