@@ -2,8 +2,7 @@
 
 #include <math.h>
 
-/* A mode is let out only when the bound without it is smaller by this factor: each trial costs a step's arithmetic. */
-static const double WORTH_A_TRIAL = 3.0;
+#include "motion/ripple.h"
 
 void vi_flight_start(vi_flight *flight, const vi_structure_model *model, const double q[], const double p[],
                      vi_phase phase, const double held[], const double held_rate[], double length, bool local)
@@ -71,56 +70,27 @@ static vi_part particular(const vi_point *point, const vi_flight *flight, double
                      square * square * amplitude, 0.0};
 }
 
-static void add(vi_part *sum, double weight, const vi_part *part)
-{
-    sum->x += weight * part->x;
-    sum->v += weight * part->v;
-    sum->a += weight * part->a;
-    sum->j += weight * part->j;
-    sum->snap_bound += fabs(weight) * part->snap_bound;
-}
-
-static vi_approach seen_from_stop(const vi_point *point, const vi_part *sum)
-{
-    return (vi_approach){point->offset - point->sign * sum->x, point->sign * sum->v, point->sign * sum->a,
-                         point->sign * sum->j, sum->snap_bound};
-}
-
 vi_approach vi_point_approach(const vi_point *point, const vi_flight *flight, const vi_part parts[], double u)
 {
     vi_part sum = particular(point, flight, u);
     for (int j = 0; j < flight->model->modes; ++j) {
-        add(&sum, point->shape[j], &parts[j]);
+        vi_part_add(&sum, point->shape[j], &parts[j]);
     }
-    return seen_from_stop(point, &sum);
+    return vi_part_approach(&sum, point->offset, point->sign);
 }
 
 double vi_point_step(const vi_point *point, const vi_flight *flight, const vi_part parts[], double u, double horizon)
 {
     const int n = flight->model->modes;
     vi_part sum[VI_MODES + 1]; /* of the particular part and the first modes */
+    double ripple[VI_MODES];
     sum[0] = particular(point, flight, u);
     for (int j = 0; j < n; ++j) {
         sum[j + 1] = sum[j];
-        add(&sum[j + 1], point->shape[j], &parts[j]);
+        vi_part_add(&sum[j + 1], point->shape[j], &parts[j]);
+        ripple[j] = fabs(point->shape[j]) * parts[j].reach;
     }
-    vi_approach approach = seen_from_stop(point, &sum[n]);
-    approach.clearance = vi_max(0.0, approach.clearance);
-    double best = vi_certified_step(&approach, horizon), tried = approach.bound, ripple = 0.0;
-    for (int m = n - 1; m >= 0 && best < horizon; --m) {
-        ripple += fabs(point->shape[m]) * parts[m].reach;
-        if (!(WORTH_A_TRIAL * sum[m].snap_bound < tried)) {
-            continue;
-        }
-        approach = seen_from_stop(point, &sum[m]);
-        approach.clearance -= ripple;
-        if (!(approach.clearance > 0.0)) {
-            break;
-        }
-        tried = approach.bound;
-        best = vi_max(best, vi_certified_step(&approach, horizon));
-    }
-    return best;
+    return vi_rippling_step(sum, ripple, n, point->offset, point->sign, horizon);
 }
 
 bool vi_point_reach(const vi_point *point, const vi_flight *flight, double *largest)

@@ -1,0 +1,29 @@
+/* Certified steps of a sum of motions of which the fast ones ripple: small displacements, large accelerations. */
+#ifndef VIBROIMPACT_RIPPLE_H
+#define VIBROIMPACT_RIPPLE_H
+
+#include "motion/flow.h"
+#include "motion/majorant.h"
+
+/* sum += weight * part */
+static inline void vi_part_add(vi_part *sum, double weight, const vi_part *part)
+{
+    sum->x += weight * part->x;
+    sum->v += weight * part->v;
+    sum->a += weight * part->a;
+    sum->j += weight * part->j;
+    sum->snap_bound += fabs(weight) * part->snap_bound;
+}
+
+/* A motion with clearance = offset - sign * displacement, seen from its stop. */
+static inline vi_approach vi_part_approach(const vi_part *sum, double offset, double sign)
+{
+    return (vi_approach){offset - sign * sum->x, sign * sum->v, sign * sum->a, sign * sum->j, sum->snap_bound};
+}
+
+/* A certified step, as vi_certified_step, of the motion sum[n]; sum[m] is what it is without its last n - m parts, of which part m
+ * never moves it by more than ripple[m]. Where the clearance is larger than their ripple the last parts are let out and
+ * the ripple is taken off the clearance. Any number of them may be; the longest step wins. */
+double vi_rippling_step(const vi_part sum[], const double ripple[], int n, double offset, double sign, double horizon);
+
+#endif
