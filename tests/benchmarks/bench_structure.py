@@ -1,4 +1,4 @@
-"""What an impact of a beam costs: on a periodic orbit, over the number of modes, by law; and a stop out of reach.
+"""What an impact of a beam costs: on a periodic orbit, over the number of modes, by law; a rest; a stop out of reach.
 
 Clamped-free beam in units of its first mode (natural frequencies (xi_j / xi_1)^2), driven at its tip with 0.9 of
 the first natural frequency, with a stop of r = .7 at the tip. Damping ratio .02 in every mode and a stop at .98 of the
@@ -135,6 +135,26 @@ def laws(modes: int, repetitions: int) -> list[Figure]:
     ]
 
 
+def sticking(modes: int, repetitions: int, *, by_series: bool = False) -> Figure:
+    """Time a beam that a slow drive presses to its stop for half of each period, long rests by series or not."""
+    found = beam_modes("clamped_free", modes)
+    natural = (np.asarray(found.eigenvalues) / found.eigenvalues[0]) ** 2
+    tip, slow = np.asarray(found.shapes([1.0]))[0], 0.2
+    period, best = 2.0 * math.pi / slow, math.inf
+    with Structure(
+        Modes(natural, 0.1, tip, slow), [Stop(tip, 0.0, restitution=0.3)], by_series=by_series
+    ) as body:
+        body.advance(period)
+        before = len(body.impacts)
+        for _ in range(repetitions):
+            began = time.process_time()
+            body.advance(period)
+            best = min(best, time.process_time() - began)
+        per_period = (len(body.impacts) - before) / repetitions
+    name = "sticks for half of each slow period" + (", by series" if by_series else "")
+    return Figure(name, modes, 1e6 * best, "period", per_period, 0)
+
+
 def out_of_reach(modes: int, repetitions: int) -> tuple[Figure, Figure]:
     """Time samples with a stop far away and without a stop, in turns."""
     body_modes, tip, amplitude = beam(modes)
@@ -207,7 +227,8 @@ def main() -> int:
     exponent = float(np.polyfit(np.log(SIZES), np.log([f.microseconds for f in sizes]), 1)[0])
     compliant = laws(8, options.repetitions)
     far, without = out_of_reach(8, options.repetitions)
-    rows = [*sizes, eight, *compliant, far, without]
+    resting = [sticking(64, options.repetitions), sticking(64, 1, by_series=True)]
+    rows = [*sizes, eight, *compliant, *resting, far, without]
     for row in rows:
         print(row.sentence())
     call = empty_call(options.repetitions)
@@ -216,7 +237,9 @@ def main() -> int:
     )
     print(
         f"8 modes cost {eight.microseconds:.2f} us per impact; the cost grows as modes^{exponent:.2f}; "
-        f"a stop out of reach makes a sample {far.microseconds / without.microseconds:.2f} times as long as no stop."
+        f"a stop out of reach makes a sample {far.microseconds / without.microseconds:.2f} times as long as no stop. "
+        f"64 modes that stick cost {resting[0].microseconds / 1e3:.2f} ms per period, "
+        f"{resting[1].microseconds / resting[0].microseconds:.0f} times less than by series."
     )
     options.output.mkdir(parents=True, exist_ok=True)
     with (options.output / "bench_structure.csv").open("w", newline="", encoding="utf-8") as file:

@@ -26,7 +26,15 @@ STIFF_AND_PLASTIC = (
     "thesis/figure_6_5d",
     {"dampings": "[1e5, 0.1]", "restitution": "1e-3", "angular_frequency": "0.5"},
 )
-LIGHT_BEAM = ("thesis/figure_7_10", {"mass_per_length": "1e-15"})
+#: With its energies it is followed by series while it rests.
+LIGHT_BEAM = (
+    "thesis/figure_7_10",
+    {
+        "mass_per_length": "1e-15",
+        "transient_periods": "0",
+        "time_series": '{ rate = 2000.0, variables = ["energy.damping_loss"] }',
+    },
+)
 NEAR_STOP = ("thesis/figure_6_6b", {"position": "1e-300"})
 LONG_STEPS = {
     "stiff dashpot": STIFF_DASHPOT,

@@ -5,6 +5,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "body/modal/pressed_flow.h"
 #include "body/modal/structure.h"
 #include "check.h"
 
@@ -49,6 +50,7 @@ static vi_structure_model model;
 static vi_structure_state state;
 static vi_contact contacts[VI_PORTS];
 static vi_record record;
+static vi_pressed pressed;
 
 static vi_structure two_modes(double gap)
 {
@@ -72,7 +74,7 @@ static vi_structure two_modes(double gap)
     }
     state.p[0] = 1.0;
     vi_structure_prepare(&model);
-    const vi_structure s = {&model, &state, contacts, &record};
+    const vi_structure s = {&model, &state, contacts, &record, &pressed};
     vi_structure_start(&s, (vi_instant){0, 0.0, 0.0});
     return s;
 }

@@ -1,5 +1,6 @@
 /* Random bodies of up to 64 modes with up to eight stops of every law, extreme ones too: finite, never beyond a rigid
  * stop, never back in time, never for ever; stops only push. */
+#include "body/modal/pressed_flow.h"
 #include "body/modal/structure.h"
 
 #include <math.h>
@@ -24,7 +25,8 @@ static vi_structure_model model;
 static vi_structure_state state;
 static vi_contact contacts[VI_PORTS];
 static vi_record record;
-static const vi_structure body = {&model, &state, contacts, &record};
+static vi_pressed pressed;
+static const vi_structure body = {&model, &state, contacts, &record, &pressed};
 
 static void make_modes(uint64_t *seed, double root)
 {

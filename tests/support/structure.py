@@ -125,6 +125,7 @@ def _library() -> ctypes.CDLL:
         *(ctypes.POINTER(_Stop), numbers, numbers, numbers, numbers, number),
     ]
     library.vi_door_structure_free.argtypes = [ctypes.c_void_p]
+    library.vi_door_structure_by_series.argtypes = [ctypes.c_void_p]
     library.vi_door_structure_record.argtypes = [ctypes.c_void_p, numbers, integer, integer, integer, integer]
     library.vi_door_structure_advance.argtypes = [ctypes.c_void_p, number, numbers, numbers, number]
     library.vi_door_structure_state.argtypes = [
@@ -173,6 +174,8 @@ class Structure:
         Shape of the point whose extremes are recorded; None for the first stop's.
     extrema, periods, energies : bool
         Follow the extremes, write a row for each forcing period, integrate the energies.
+    by_series : bool
+        Follow long rests by series too, in place of their exact flow.
 
     Raises
     ------
@@ -199,6 +202,7 @@ class Structure:
         extrema: bool = False,
         periods: bool = False,
         energies: bool = False,
+        by_series: bool = False,
     ) -> None:
         self._library = _library()
         natural = np.atleast_1d(np.asarray(modes.natural, dtype=np.float64))
@@ -237,6 +241,8 @@ class Structure:
         self._library.vi_door_structure_record(
             self._handle, _pointer(_vector(point, n)), 1, int(extrema), int(periods), int(energies)
         )
+        if by_series:
+            self._library.vi_door_structure_by_series(self._handle)
         self._rows = Rows()
         self._read()
 

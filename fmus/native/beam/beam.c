@@ -280,6 +280,7 @@ static void fill_modes(beam *b)
         b->body.state.q[j] = b->root_mass * b->modal_displacement_start[j];
         b->body.state.p[j] = b->root_mass * b->modal_velocity_start[j];
     }
+    b->body.model.varies = b->depends_on_amplitude;
 }
 
 static bool fill_model(beam *b, char *message)

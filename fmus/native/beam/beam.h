@@ -44,7 +44,7 @@ typedef struct {
     /* outputs */
     double modal_displacement[VI_MODES], modal_velocity[VI_MODES], modal_acceleration[VI_MODES];
     beam_sensor sensor[BEAM_SENSORS];
-    vi_structure_component body; /* last: its record is saved only as far as it is used */
+    vi_structure_component body; /* last: its record is saved only as far as it is used, and nothing after that */
 } beam;
 
 #endif

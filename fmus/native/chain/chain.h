@@ -23,7 +23,7 @@ typedef struct {
     /* outputs */
     double displacement[VI_MODES], velocity[VI_MODES], acceleration[VI_MODES], relative_acceleration[VI_MODES];
     double shape[VI_MODES][VI_MODES]; /* shape[i][j]: displacement of mass i for q_j = 1, kg^(-1/2) */
-    vi_structure_component body; /* last: its record is saved only as far as it is used */
+    vi_structure_component body; /* last: its record is saved only as far as it is used, and nothing after that */
 } chain;
 
 #endif

@@ -18,7 +18,7 @@ bool oscillator_yields(const oscillator *o)
 /* The parts of the one-mode body. */
 static vi_structure parts(oscillator *o)
 {
-    return (vi_structure){&o->model, &o->state, o->body.contacts, &o->body.record};
+    return (vi_structure){&o->model, &o->state, o->body.contacts, &o->body.record, &o->pressed};
 }
 
 vi_exchange_body oscillator_exchange(oscillator *o)
@@ -63,6 +63,7 @@ static void start_structure(oscillator *o, vi_instant now)
     model->contacts = VI_BODY_CONTACTS;
     model->impact_limit = o->body.impact_limit;
     model->tolerance = o->contact_tolerance;
+    model->varies = vi_amplitude_acts(&o->amplitude);
     const double ratio = natural > 0.0 ? 0.5 * o->damping / (root * sqrt(o->stiffness)) : 0.0;
     vi_structure_mode(model, 0, natural, ratio, amplitude(o) / root, o->forcing_angular_frequency);
     for (int k = 0; k < VI_BODY_CONTACTS; ++k) {

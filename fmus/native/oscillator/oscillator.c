@@ -330,7 +330,8 @@ static double present_time(const void *self)
 
 static size_t used_size(const void *self)
 {
-    return sizeof(oscillator) - vi_record_unused(&((const oscillator *)self)->body.record);
+    const oscillator *o = self;
+    return sizeof *o - sizeof o->pressed - vi_record_unused(&o->body.record);
 }
 
 VI_EXCHANGE_TABLE(exchange, oscillator_exchange, refresh_inputs);

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "body/modal/pressed_flow.h"
 #include "body/modal/structure.h"
 #include "body/one_mass/body.h"
 #include "motion/amplitude.h"
@@ -28,7 +29,8 @@ typedef struct {
     int32_t contacts_described; /* ports of the model description */
     vi_structure_model model;
     vi_structure_state state;
-    vi_body body; /* last: its record is saved only as far as it is used */
+    vi_body body;       /* its record, its last part, is saved only as far as it is used, and nothing after it */
+    vi_pressed pressed; /* what follows from the rest */
 } oscillator;
 
 #endif

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "body/modal/pressed_flow.h"
 #include "body/modal/structure.h"
 
 struct vi_door_structure {
@@ -11,11 +12,13 @@ struct vi_door_structure {
     vi_structure_state state;
     vi_contact contacts[VI_PORTS];
     vi_record record;
+    vi_pressed pressed;
+    int by_series; /* long rests too */
 };
 
 static vi_structure parts(vi_door_structure *d)
 {
-    return (vi_structure){&d->model, &d->state, d->contacts, &d->record};
+    return (vi_structure){&d->model, &d->state, d->contacts, &d->record, d->by_series ? NULL : &d->pressed};
 }
 
 static void set_stop(vi_contact *contact, const vi_door_stop *stop)
@@ -86,6 +89,11 @@ VI_DOOR vi_door_structure *vi_door_structure_new(int modes, const double natural
 VI_DOOR void vi_door_structure_free(vi_door_structure *structure)
 {
     free(structure);
+}
+
+VI_DOOR void vi_door_structure_by_series(vi_door_structure *structure)
+{
+    structure->by_series = 1;
 }
 
 VI_DOOR void vi_door_structure_record(vi_door_structure *structure, const double observed[], int impacts, int extrema,

@@ -22,6 +22,9 @@ VI_DOOR vi_door_structure *vi_door_structure_new(int modes, const double natural
                                                  const double p[], double tolerance);
 VI_DOOR void vi_door_structure_free(vi_door_structure *structure);
 
+/* Follow long rests by series too. */
+VI_DOOR void vi_door_structure_by_series(vi_door_structure *structure);
+
 /* Record impacts and sticks, extremes of the point `observed`, periods; follow energies. */
 VI_DOOR void vi_door_structure_record(vi_door_structure *structure, const double observed[], int impacts, int extrema,
                                       int periods, int energies);

@@ -21,9 +21,9 @@ static inline vi_approach vi_part_approach(const vi_part *sum, double offset, do
     return (vi_approach){offset - sign * sum->x, sign * sum->v, sign * sum->a, sign * sum->j, sum->snap_bound};
 }
 
-/* A certified step, as vi_certified_step, of the motion sum[n]; sum[m] is what it is without its last n - m parts, of which part m
- * never moves it by more than ripple[m]. Where the clearance is larger than their ripple the last parts are let out and
- * the ripple is taken off the clearance. Any number of them may be; the longest step wins. */
+/* A certified step, as vi_certified_step, of the motion sum[n]; sum[m] is what it is without its last n - m parts,
+ * of which part m never moves it by more than ripple[m]. Where the clearance is larger than their ripple the last
+ * parts are let out and the ripple is taken off the clearance. Any number of them may be; the longest step wins. */
 double vi_rippling_step(const vi_part sum[], const double ripple[], int n, double offset, double sign, double horizon);
 
 #endif

@@ -26,7 +26,7 @@ void vi_structure_component_defaults(vi_structure_component *c)
 /* The engine's view of the parts. */
 static vi_structure parts_of(vi_structure_component *c)
 {
-    return (vi_structure){&c->model, &c->state, c->contacts, &c->record};
+    return (vi_structure){&c->model, &c->state, c->contacts, &c->record, &c->pressed};
 }
 
 void vi_structure_component_sized(vi_structure_component *c, const char *block, int count)
@@ -400,5 +400,5 @@ bool vi_structure_component_needs_events(const vi_structure_component *c)
 
 size_t vi_structure_component_unused(const vi_structure_component *c)
 {
-    return vi_record_unused(&c->record);
+    return vi_record_unused(&c->record) + sizeof c->pressed;
 }

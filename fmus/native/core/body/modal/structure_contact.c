@@ -21,6 +21,7 @@ void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_i
     vi_structure_state *state = s->state;
     state->budget.events += 1;
     state->status[k] = VI_CONTACT_HELD;
+    state->series = 0;
     state->leaving[k] = 0;
     state->tail_impulse[k] = tail_impulse;
     state->fastest_impact[k] = 0.0;
@@ -68,6 +69,7 @@ void vi_structure_touch_down(const vi_structure *s, int k)
     const double approach = v > VI_ROUNDING * vi_structure_velocity_size(s, k) ? v : 0.0;
     s->state->budget.events += 1;
     s->state->status[k] = VI_CONTACT_YIELDING;
+    s->state->series = 0;
     s->state->leaving[k] = 0;
     /* a contact that begins now begins at depth 0: a graze is over before its depth would outgrow rounding */
     if (fabs(vi_structure_clearance(s, k)) <= SAME_INSTANT * DBL_EPSILON * size) {

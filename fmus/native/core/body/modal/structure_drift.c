@@ -8,6 +8,7 @@
 #include "body/modal/structure_contact.h"
 #include "body/modal/structure_forces.h"
 #include "body/modal/structure_held.h"
+#include "body/modal/structure_pressed.h"
 #include "body/modal/structure_record.h"
 #include "body/modal/structure_thin.h"
 
@@ -156,9 +157,16 @@ static int64_t drift_evaluations(const vi_structure_model *model)
 double vi_structure_drift(const vi_structure *s, double length, double room, vi_drift_event *event, int *k)
 {
     vi_structure_state *state = s->state;
+    const double rested = vi_structure_rest_on(s, length, room);
+    if (rested > 0.0) {
+        *event = VI_DRIFT_NO_EVENT;
+        *k = -1;
+        return rested;
+    }
     const vi_phase phase = vi_structure_phase(s);
     vi_situation now;
     vi_drift drift;
+    state->series += 1;
     look(s, &now);
     vi_budget_spend(&state->budget, drift_evaluations(s->model));
     const vi_drift_start start = {state->q,   state->p, phase.cosine, phase.sine, now.held, state->held_rate,

@@ -16,6 +16,7 @@
 #include "body/complaint.h"
 #include "body/record.h"
 #include "contact/contact.h"
+#include "modes/pressed_modes.h"
 #include "motion/clock.h"
 #include "motion/flow.h"
 #include "motion/origin.h"
@@ -34,6 +35,7 @@ typedef struct {
     /* modal velocities that a unit impulse at the contact gives, kg^(-1/2); equal to shape but for collocation */
     double impulse[VI_PORTS][VI_MODES];
     double observed[VI_MODES]; /* shape of the point whose extremes and strobe the record keeps */
+    int32_t varies;            /* modes follow the amplitude: others at each step */
     int32_t coupled;           /* the damping couples the modes: coupling[][] holds all of it */
     double coupling[VI_MODES][VI_MODES]; /* modal damping matrix, 1/s; only read when coupled */
     /* derived by vi_structure_prepare */
@@ -71,12 +73,23 @@ typedef struct {
     double unresolved;             /* highest bounce that the integrator has failed to follow, as a modal displacement */
 } vi_exchange;
 
+/* Where the terms of a long rest are counted from, so that a rest that is cut is the rest in one piece; see origin.h. */
+typedef struct {
+    vi_instant at;
+    vi_complex part[VI_TERMS];                       /* then */
+    double held[VI_MODES];                           /* constant loads meanwhile */
+    double reached_q[VI_MODES], reached_p[VI_MODES]; /* at the end of the last rest counted from here */
+    double position, stiffness, damping;             /* of the stop; held: no stiffness */
+    int64_t contact;                                 /* 1-based; 0: there is none */
+} vi_rest_origin;
+
 typedef struct {
     vi_instant now;
     vi_standstill standstill;
     vi_budget budget;
     double q[VI_MODES], p[VI_MODES]; /* modal displacements and velocities */
     vi_origin origin[VI_MODES];
+    vi_rest_origin rest;
     vi_instant held_since;
     double held[VI_MODES], held_rate[VI_MODES]; /* modal forces of the inputs at held_since, and their slopes */
     int32_t status[VI_PORTS];   /* vi_contact_status */
@@ -85,6 +98,7 @@ typedef struct {
     int32_t follow_energies;    /* input: integrate `energies` */
     vi_energies energies;
     vi_exchange exchange;
+    int64_t series;             /* segments that have been followed by series since a contact came to rest, or nearly ended */
     double fastest_impact[VI_PORTS]; /* largest approach since the last stick, m/s */
     int64_t low_impacts[VI_PORTS];   /* impacts in a row that are far below it */
     double tail_impulse[VI_PORTS];   /* of the chatter summed at the last stick, N s */
@@ -98,12 +112,16 @@ typedef struct {
     double reference_penetration[VI_PORTS], reference_rate[VI_PORTS]; /* external force: where it was given */
 } vi_structure_state;
 
+/* Modes of the body at rest on a contact: pressed_flow.h. */
+typedef struct vi_pressed vi_pressed;
+
 /* The parts of one body, for the length of a call. */
 typedef struct {
     vi_structure_model *model;
     vi_structure_state *state;
     vi_contact *contacts; /* model->contacts of them */
     vi_record *record;
+    vi_pressed *pressed; /* no part of its state; NULL: long rests are followed by series, as short ones are */
 } vi_structure;
 
 /* Mode j: natural angular frequency (rad/s, >= 0), damping ratio (>= 0) and modal amplitude of the harmonic force.

@@ -1,0 +1,258 @@
+#include "body/modal/structure_pressed.h"
+
+#include <math.h>
+
+#include "body/landing.h"
+#include "body/modal/pressed_flow.h"
+#include "body/modal/structure_forces.h"
+#include "motion/majorant.h"
+
+/* Segments by series before a rest counts as long: most contacts are over by then. */
+enum { PATIENCE = 16 };
+/* Least step, in radians of the fastest rate, that is worth an evaluation of all terms; and a whole rest, times the
+ * number of modes where these must be found anew for it. */
+static const double LEAST_STEP = 8.0, LEAST_REST = 32.0;
+/* Rounding of what must not fall to zero, in roundings of its terms: nearer to zero the series decide. */
+static const double MARGIN = 16.0;
+
+/* ---- is this a long rest? ---- */
+
+static bool is_linear(const vi_structure *s, int k)
+{
+    const int32_t status = s->state->status[k];
+    return status == VI_CONTACT_HELD
+           || (status == VI_CONTACT_YIELDING && !s->state->leaving[k] && s->contacts[k].law.law == VI_LAW_KELVIN_VOIGT);
+}
+
+/* The one contact that the body rests on, all others being free; -1: none. */
+static int rests_on(const vi_structure *s)
+{
+    int found = -1;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->state->status[k] == VI_CONTACT_FREE) {
+            continue;
+        }
+        if (found >= 0 || !is_linear(s, k)) {
+            return -1;
+        }
+        found = k;
+    }
+    return found;
+}
+
+/* A body that stands still stays where it is to the last bit. */
+static bool moves(const vi_structure *s)
+{
+    for (int j = 0; j < s->model->modes; ++j) {
+        if (s->state->p[j] != 0.0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Rate that no motion of the resting body exceeds, rad/s. */
+static double fastest_rate(const vi_structure *s, int k)
+{
+    if (s->state->status[k] == VI_CONTACT_HELD) {
+        return s->model->fastest;
+    }
+    const double mobility = s->model->compliance[k][k];
+    return s->model->fastest + sqrt(s->contacts[k].law.stiffness * mobility) + s->contacts[k].law.damping * mobility;
+}
+
+/* ---- how far nothing happens ---- */
+
+typedef struct {
+    int count;
+    vi_pressed_sight sight[VI_PORTS]; /* the force of the contact, clearances of the others */
+} guard;
+
+/* Size of the terms that the contact's force is the sum of, N. */
+static double force_size(const vi_structure *s, int k)
+{
+    const vi_structure_model *model = s->model;
+    double size = 0.0;
+    if (s->state->status[k] == VI_CONTACT_YIELDING) {
+        const vi_contact_law *law = &s->contacts[k].law;
+        return law->stiffness * vi_structure_displacement_size(s, k) + law->damping * vi_structure_velocity_size(s, k);
+    }
+    for (int j = 0; j < model->modes; ++j) {
+        const vi_mode *mode = &model->mode[j];
+        const double loads = fabs(mode->force) + fabs(s->state->held[j]);
+        const double drag = vi_structure_damping(model, j, j) * fabs(s->state->p[j]);
+        size += fabs(model->shape[k][j]) * (loads + mode->stiffness * fabs(s->state->q[j]) + drag);
+    }
+    return size / model->compliance[k][k];
+}
+
+static void start_guard(const vi_structure *s, int k, const vi_pressed_flow *flow, double length, guard *g)
+{
+    const double rounding = MARGIN * VI_ROUNDING;
+    g->count = 0;
+    for (int l = 0; l < s->model->contacts; ++l) {
+        if (l != k && !vi_structure_watched(s, l)) {
+            continue;
+        }
+        vi_pressed_sight *sight = &g->sight[g->count++];
+        const double sign = vi_structure_direction(s, l);
+        if (l == k) {
+            *sight = vi_pressed_sight_of(flow, VI_SEEN_FORCE, -1.0, 0.0, length);
+            sight->offset = -rounding * (sight->scale + force_size(s, k));
+        } else {
+            *sight = vi_pressed_sight_of(flow, l, sign, sign * s->contacts[l].position, length);
+            sight->offset -= rounding * (sight->scale + vi_structure_displacement_size(s, l));
+        }
+    }
+}
+
+/* How far it is certain that the contact is pressed and no other begins, up to the length, in steps that are worth
+ * it. */
+static double certain(const vi_structure *s, const vi_pressed_flow *flow, const guard *g, double length, double least)
+{
+    vi_complex part[VI_TERMS];
+    double u = 0.0;
+    for (int evaluation = 0; evaluation < VI_MOST_EVALUATIONS; ++evaluation) {
+        double step = length - u;
+        vi_budget_spend(&s->state->budget, flow->pressed->modes.terms);
+        vi_pressed_flow_parts(flow, u, part);
+        for (int i = 0; i < g->count; ++i) {
+            const vi_approach p = vi_pressed_approach(&g->sight[i], flow, part, u);
+            if (!(p.clearance > 0.0) || !isfinite(p.bound)) {
+                return u;
+            }
+            step = vi_min(step, vi_pressed_step(&g->sight[i], flow, part, u, step));
+        }
+        if (!(step < length - u)) {
+            return length;
+        }
+        if (step < least) {
+            return u;
+        }
+        u += step;
+    }
+    return u;
+}
+
+/* ---- extremes of the observed point ---- */
+
+/* The largest displacement * sign that the record knows, and that the body has now. */
+static double largest_so_far(const vi_structure *s, double sign)
+{
+    const double here = vi_structure_at(s->model, s->model->observed, s->state->q);
+    return vi_max(sign * here, sign > 0.0 ? s->record->displacement_max : -s->record->displacement_min);
+}
+
+/* Rounding of the observed point's velocity. */
+static double speed_noise(const vi_pressed_sight *sight, double speed, double fastest)
+{
+    return VI_ROUNDING * (fabs(speed) + sight->scale * fastest);
+}
+
+/* Climb from u to the next turning point above the bar; raises the bar to it. */
+static double climb(const vi_structure *s, const vi_pressed_flow *flow, vi_pressed_sight *sight, double fastest,
+                    double u, double end)
+{
+    vi_complex part[VI_TERMS];
+    for (int evaluation = 0;; ++evaluation) {
+        vi_budget_spend(&s->state->budget, flow->pressed->modes.terms);
+        vi_pressed_flow_parts(flow, u, part);
+        const vi_approach p = vi_pressed_approach(sight, flow, part, u);
+        if (!(p.velocity > speed_noise(sight, p.velocity, fastest)) || u >= end) {
+            sight->offset += vi_max(0.0, -p.clearance);
+            return u;
+        }
+        /* the velocity falls to zero as a clearance does */
+        const vi_approach fall = {p.velocity, -p.acceleration, -p.jerk, p.bound, 0.0};
+        u = vi_min(end, u + vi_max(vi_certified_step(&fall, end - u), vi_least_step(end, 1e-12, evaluation)));
+    }
+}
+
+/* Largest displacement * sign over the rest: what stays below the bar, the largest one seen, is passed over. */
+static void extreme(const vi_structure *s, const vi_pressed_flow *flow, double sign, double fastest, double end)
+{
+    const double bar = largest_so_far(s, sign);
+    vi_pressed_sight sight = vi_pressed_sight_of(flow, VI_SEEN_OBSERVED, sign, bar, end);
+    const double least = VI_ROUNDING * sight.scale;
+    vi_complex part[VI_TERMS];
+    double u = 0.0;
+    for (int evaluation = 0; u < end; ++evaluation) {
+        const double least_step = vi_least_step(end, 1e-9, evaluation);
+        vi_budget_spend(&s->state->budget, flow->pressed->modes.terms);
+        vi_pressed_flow_parts(flow, u, part);
+        const vi_approach p = vi_pressed_approach(&sight, flow, part, u);
+        if (p.clearance <= least && p.velocity > speed_noise(&sight, p.velocity, fastest)) {
+            u = climb(s, flow, &sight, fastest, u, end) + least_step;
+            continue;
+        }
+        const double room = least + vi_max(0.0, -p.clearance);
+        sight.offset += room;
+        u += vi_max(vi_pressed_step(&sight, flow, part, u, end - u), least_step);
+        sight.offset -= room;
+    }
+    vi_record_extend(s->record, sign * sight.offset);
+}
+
+/* ---- a rest ---- */
+
+/* Is the observed point the one that is held? */
+static bool sees_only_the_stop(const vi_structure *s, int k)
+{
+    for (int j = 0; j < s->model->modes; ++j) {
+        if (s->model->observed[j] != s->model->shape[k][j]) {
+            return false;
+        }
+    }
+    return s->state->status[k] == VI_CONTACT_HELD;
+}
+
+static void rest(const vi_structure *s, int k, const vi_pressed_flow *flow, double fastest, double u)
+{
+    vi_structure_state *state = s->state;
+    vi_budget_spend(&state->budget, (int64_t)flow->pressed->modes.terms * s->model->modes / 4);
+    if (s->record->extrema && !sees_only_the_stop(s, k)) {
+        extreme(s, flow, 1.0, fastest, u);
+        extreme(s, flow, -1.0, fastest, u);
+    }
+    if (state->status[k] == VI_CONTACT_YIELDING) {
+        state->touch_down[k].impulse += vi_pressed_flow_impulse(flow, u);
+    }
+    vi_pressed_flow_end(flow, u, state->q, state->p);
+    vi_structure_project(s);
+    vi_pressed_flow_reach(s);
+    if (s->record->extrema) {
+        vi_record_extend(s->record, vi_structure_at(s->model, s->model->observed, state->q));
+    }
+}
+
+double vi_structure_rest_on(const vi_structure *s, double length, double room)
+{
+    vi_structure_state *state = s->state;
+    const int k = rests_on(s);
+    if (s->pressed == NULL || k < 0 || state->series < PATIENCE || state->follow_energies || !moves(s)
+        || (s->model->coupled && s->model->modes > 1)) {
+        return 0.0;
+    }
+    const double fastest = fastest_rate(s, k);
+    const double pays = s->model->varies ? LEAST_REST * (double)s->model->modes : LEAST_REST;
+    if (!(length * fastest >= pays)) {
+        return 0.0;
+    }
+    const vi_pressed *pressed = vi_pressed_find(s, k);
+    vi_pressed_flow flow;
+    guard g;
+    double u = 0.0;
+    if (pressed != NULL && vi_pressed_flow_start(&flow, s, k, pressed, length)) {
+        vi_pressed_flow_follow(&flow, s, k);
+        start_guard(s, k, &flow, length, &g);
+        u = certain(s, &flow, &g, length + room, LEAST_STEP / fastest);
+        u = u >= length + room ? length : u < length ? u : 0.0;
+    }
+    if (u < length) {
+        state->series = 0; /* something is about to happen */
+    }
+    if (u > 0.0) {
+        rest(s, k, &flow, fastest, u);
+    }
+    return u;
+}

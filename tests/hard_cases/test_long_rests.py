@@ -1,0 +1,151 @@
+"""Long rests, held or pressed, by their exact flow: the same motion as by series, released at the zero of the force."""
+
+import math
+import time
+
+import mpmath as mp
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from support.structure import DONE, Modes, Stop, Structure
+from support.tolerance import SEQUENCE
+
+from vibroimpact.fmus.core import beam_modes
+
+FEW = settings(max_examples=60, derandomize=True, suppress_health_check=list(HealthCheck))
+Array = np.ndarray
+
+#: Rest under a preload that a slow force overcomes once a period.
+SLOW, PRELOAD, FORCE = 0.1, 1.0, 1.2
+PERIOD = 2.0 * math.pi / SLOW
+
+
+def released_at(damping_ratio: float, stiffness: float, damping: float) -> float:
+    """Return when the force of a pressed mass of 1 falls to zero, started on its response; 30 digits."""
+    with mp.workdps(30):
+        k, c = 1 + mp.mpf(stiffness), 2 * mp.mpf(damping_ratio) + mp.mpf(damping)
+        response = mp.mpf(FORCE) / (k - mp.mpf(SLOW) ** 2 + 1j * c * mp.mpf(SLOW))
+        force = (mp.mpf(stiffness) + 1j * mp.mpf(damping) * mp.mpf(SLOW)) * response
+        level = mp.mpf(stiffness) * mp.mpf(PRELOAD) / k
+        # level + |force| cos(w t + phase) = 0
+        return float((mp.acos(-level / abs(force)) - mp.arg(force)) / mp.mpf(SLOW))
+
+
+@pytest.mark.parametrize("stiffness", [1e6, 1e9, 1e12])
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 3.0])
+def test_a_mass_at_rest_on_a_stiff_stop_is_released_at_the_zero_of_its_force(
+    stiffness: float, ratio: float
+) -> None:
+    damping = 2.0 * ratio * math.sqrt(stiffness)
+    k, c = 1.0 + stiffness, 0.1 + damping
+    response = FORCE / (k - SLOW**2 + 1j * c * SLOW)
+    stop = Stop([1.0], 0.0, law="kelvin_voigt", stiffness=stiffness, damping=damping)
+    modes = Modes([1.0], 0.05, [FORCE], SLOW)
+    with Structure(modes, [stop], PRELOAD / k + response.real, (1j * SLOW * response).real) as body:
+        began = time.process_time()
+        assert body.advance(0.5 * PERIOD, held=[PRELOAD]) == DONE
+        # by series a stop of 1e12 N/m takes 6 s
+        assert time.process_time() - began < 1.0
+        end = body.impacts[0, 1] + body.impacts[0, 7]
+        # released earlier by its ringing, which is rounding of what it starts from
+        assert end == pytest.approx(released_at(0.05, stiffness, damping), rel=1e-11)
+
+
+@pytest.mark.parametrize("stiffness", [1e9, 1e12, 1e15])
+def test_what_a_stiff_stop_carries_is_the_load_on_it(stiffness: float) -> None:
+    # a ball of 1 kg that lies on a stop, under its weight and a force that never lifts it
+    stop = Stop([1.0], 0.0, law="kelvin_voigt", stiffness=stiffness, damping=0.2 * math.sqrt(stiffness))
+    with Structure(Modes([0.0], 0.0, [1.0], 3.0), [stop], 11.0 / stiffness, 0.0) as body:
+        assert body.advance(20.0, held=[10.0]) == DONE
+        assert body.statuses == ("yielding",)
+        assert body.forces[0] == pytest.approx(10.0 + math.cos(60.0), rel=1e-6)
+
+
+def clamped_beam(modes: int) -> tuple[Modes, Array]:
+    """Return a clamped-free beam in units of its first mode, pressed and lifted at its tip; its tip's shape."""
+    found = beam_modes("clamped_free", modes)
+    natural = (np.asarray(found.eigenvalues) / found.eigenvalues[0]) ** 2
+    tip = np.asarray(found.shapes([1.0]))[0]
+    return Modes(natural, 0.1, tip, 0.2), tip
+
+
+def test_a_rest_of_many_modes_costs_like_a_flight() -> None:
+    modes, tip = clamped_beam(64)
+    seconds, ends = [], []
+    for by_series in (False, True):
+        with Structure(modes, [Stop(tip, 0.0, restitution=0.3)], extrema=True, by_series=by_series) as body:
+            began = time.process_time()
+            assert body.advance(16.0 * math.pi if not by_series else 8.0 * math.pi) == DONE
+            seconds.append(time.process_time() - began)
+            ends.append(body.sticks)
+    # twice as long; 2 ms and 0.8 s on one machine
+    assert seconds[0] < 0.1 * seconds[1]
+    early = ends[0][: len(ends[1])]
+    assert np.abs(early[:, 1:3] - ends[1][:, 1:3]).max() <= SEQUENCE
+
+
+def test_a_rest_that_is_cut_keeps_its_energy() -> None:
+    shape = np.array([1.0, -0.8, 0.5, 0.3])
+    speed = np.array([0.1, 0.2, -0.1, 0.3])
+    speed -= shape * (shape @ speed) / (shape @ shape)
+    load, errors = 20.0 * shape, []
+    for by_series in (False, True):
+        stop = Stop(shape, 0.0, restitution=0.0)
+        with Structure(Modes([0.7, 1.9, 3.1, 5.0]), [stop], 0.0, speed, by_series=by_series) as body:
+            whole = body.energy - load @ body.displacement
+            for _ in range(1000):
+                body.advance(10.0, held=load)
+            assert body.statuses == ("held",)
+            errors.append(abs(body.energy - load @ body.displacement - whole) / whole)
+    assert errors[0] <= 3e-14
+    assert errors[0] < errors[1]
+
+
+@st.composite
+def rests(draw: st.DrawFn) -> tuple[Modes, list[Stop], Array, float]:
+    """Bodies that are pressed to a rigid or a Kelvin-Voigt stop, their loads, and how long they are followed."""
+    n = draw(st.integers(1, 10))
+    numbers = st.lists(st.floats(0.1, 1.0), min_size=n, max_size=n).map(np.array)
+    natural = 0.3 + np.cumsum(draw(numbers)) * draw(st.sampled_from([1.0, 3.0]))
+    ratio = draw(st.sampled_from([0.0, 0.01, 0.3, 0.8])) * draw(numbers)
+    shape, frequency = draw(numbers), draw(st.floats(0.05, 0.5))
+    if n > 2:  # a node of one mode, or nearly
+        shape[draw(st.integers(0, n - 1))] = draw(st.sampled_from([0.5, 0.0, 1e-9, 1e-17]))
+    mobility = float(shape @ shape)
+    stop = Stop(shape, draw(st.sampled_from([0.0, 0.3])), restitution=0.2)
+    if draw(st.booleans()):
+        stiffness = 10.0 ** draw(st.floats(2.0, 6.0))
+        damping = draw(st.sampled_from([0.0, 0.1, 1.0, 3.0])) * 2.0 * math.sqrt(stiffness / mobility)
+        stop = Stop(shape, stop.position, law="kelvin_voigt", stiffness=stiffness, damping=damping)
+    stops = [stop]
+    if draw(st.booleans()):  # which others may meet
+        stops.append(Stop(draw(numbers), 1.0 + draw(st.floats(0.0, 2.0)), restitution=0.5))
+    force = 0.3 * draw(st.floats(0.0, 1.0)) * shape
+    return Modes(natural, ratio, force, frequency), stops, 1.5 * shape, draw(st.floats(0.5, 2.0)) / frequency
+
+
+@FEW
+@given(rests(), st.sampled_from([1, 3, 40]))
+def test_a_rest_is_the_same_motion_as_by_series(
+    scene: tuple[Modes, list[Stop], Array, float], steps: int
+) -> None:
+    modes, stops, load, duration = scene
+    runs = []
+    for by_series in (False, True):
+        with Structure(modes, stops, extrema=True, by_series=by_series) as body:
+            for _ in range(steps):
+                body.advance(duration / steps, held=load, most_impacts=60)
+            end = [*body.displacement, *body.velocity, body.displacement_max, body.displacement_min]
+            runs.append((body.time, body.statuses, np.array(end), body.impacts, body.sticks))
+    (at, statuses, end, impacts, sticks), (_, by, last, hits, rested) = runs
+    # what rounding has grown to after so many impacts
+    allowed = 1e-11 * 1.3 ** min(len(hits), 60)
+    if at < duration * (1.0 - 1e-9):
+        return  # as many impacts as were allowed
+    assert statuses == by
+    assert np.abs(end - last).max() <= allowed * (1.0 + np.abs(last).max())
+    assert impacts.shape == hits.shape
+    assert sticks.shape == rested.shape
+    assert np.abs(impacts[:, 1] - hits[:, 1]).max(initial=0.0) <= allowed
+    assert np.abs(sticks[:, 1:3] - rested[:, 1:3]).max(initial=0.0) <= allowed
