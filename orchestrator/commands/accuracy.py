@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+
+from rich.live import Live
+from rich.table import Table
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
 from vibroimpact.analysis.dataset.results import write_results
@@ -45,7 +50,8 @@ def study_scene(
         force,
         lambda there: (there.get("results_kind"), there.get("scene_file")) == ("accuracy", str(path)),
     )
-    study = study_accuracy(scene, tolerance=tolerance, quantity=quantity, budget=budget, told=_say_tried)
+    with _shown(scene.title or scene.source, quantity) as told:
+        study = study_accuracy(scene, tolerance=tolerance, quantity=quantity, budget=budget, told=told)
     _print(study)
     dataset = dataset_of(study).assign_attrs(scene_file=str(path))
     if output is not None:
@@ -61,31 +67,54 @@ def study_scene(
         _write_tuned(scene.text, study, write)
 
 
+@contextmanager
+def _shown(title: str, quantity: str) -> Iterator[Callable[[Measured], None]]:
+    """Show each way as soon as it has run once: in a terminal a table that grows, else a line."""
+    if not sys.stdout.isatty():
+        yield _say_tried
+        return
+    found: list[Measured] = []
+    with Live(console=wide_terminal(), transient=True) as live:
+
+        def told(one: Measured) -> None:
+            found.append(one)
+            live.update(_table(title, found, quantity, 0.0))
+
+        yield told
+
+
 def _say_tried(one: Measured) -> None:
     said = one.errors.failure or f"error {one.error('all'):.1e}"
     say(f"  {one.way.label}: {said}")
 
 
-def _print(study: Study) -> None:
+def _table(title: str, measured: Sequence[Measured], quantity: str, known: float) -> Table:
+    """Return what was measured as a table; `known` is the error of the reference."""
     rows = table(
-        f"What accuracy costs: {study.scene.title or study.scene.source}",
+        f"What accuracy costs: {title}",
         *("<way", "<set", ">value", ">error", ">a run", ">spread", ">calls", "<what is wrong"),
     )
-    known = error_of_reference(study.reference, study.quantity)
-    for one in study.measured:
+    for one in measured:
         spread = (max(one.seconds) - min(one.seconds)) / one.cost if len(one.seconds) > 1 else math.nan
         rows.add_row(
             f"{one.way.name}{' (another model)' if one.way.model else ''}",
             one.way.knob or "-",
             f"{one.way.setting:.3g}" if one.way.knob else "-",
-            one.told(study.quantity, known),
+            one.told(quantity, known),
             duration(one.cost) if one.seconds else "-",
             "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
             str(one.calls) if one.calls >= 0 else "-",
             one.errors.failure,
         )
+    return rows
+
+
+def _print(study: Study) -> None:
+    known = error_of_reference(study.reference, study.quantity)
+    rows = _table(study.scene.title or study.scene.source, study.measured, study.quantity, known)
     wide_terminal().print(rows)
-    say(f"Reference: {study.reference.name}, known to {known:.0e}.")
+    motion = f"Motion: {study.orbit}. " if study.orbit else ""
+    say(f"{motion}Reference: {study.reference.name}, known to {known:.0e}.")
     for remark in study.remarks:
         say(f"Left out: {remark}.")
     say(advice(study))

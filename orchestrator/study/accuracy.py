@@ -20,9 +20,10 @@ from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.choice import advice, cheapest, pareto_front
+from vibroimpact.orchestrator.study.choice import advice, cheapest, error_of_reference, pareto_front
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, errors_of, no_errors
 from vibroimpact.orchestrator.study.measured import Measured, Study
+from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import Reference, disturbed_scenes, observed, reference_of
 from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
 from vibroimpact.orchestrator.study.trials import far_off
@@ -80,6 +81,9 @@ def study_accuracy(
     began = time.perf_counter()
     whole, late = studied_scene(scene), max(LEAST_LATE, LATE_SHARE * budget)
     reference = reference_of(whole)
+    orbit = "chaotic" if reference.chaotic else ""
+    if not reference.chaotic and whole.general is None:
+        orbit = orbit_of(reference.observation, whole.period, reference.scales.window)
     studied = first_impacts(whole, reference) if reference.chaotic else whole
     if reference.chaotic:
         reference = replace(reference_of(studied), chaotic=True, sensitivity=reference.sensitivity)
@@ -98,7 +102,7 @@ def study_accuracy(
         _add_statistics(whole, given_up_after(whole, late), found)
     wanted = math.nan if tolerance is None else tolerance
     chosen = cheapest(found, tolerance, quantity, reference)
-    return Study(studied, reference, found, quantity, wanted, chosen, tuple(remarks_on(scene)))
+    return Study(studied, reference, found, quantity, wanted, chosen, orbit, tuple(remarks_on(scene)))
 
 
 def studied_scene(scene: Scene) -> Scene:
@@ -298,9 +302,10 @@ def dataset_of(study: Study) -> xr.Dataset:
     return dataset.assign_attrs(
         title=f"What accuracy costs: {study.scene.title or study.scene.source}",
         reference=reference.name,
-        reference_error=reference.error.get(study.quantity, max(reference.error.values())),
+        reference_error=error_of_reference(reference, study.quantity),
         sensitivity=reference.sensitivity,
         motion="chaotic" if reference.chaotic else "not chaotic",
+        orbit=study.orbit,
         quantity=study.quantity,
         tolerance=study.tolerance,
         chosen=study.chosen.way.label if study.chosen else "",

@@ -80,6 +80,8 @@ class Study:
         What was asked for; NaN where nothing was.
     chosen : Measured or None
         The cheapest way that reaches it.
+    orbit : str
+        `P(p,q)`, `chaotic`, `no impacts`, ...; empty where nothing forces it.
     remarks : tuple of str
         What was left out, and why.
     """
@@ -90,4 +92,5 @@ class Study:
     quantity: str
     tolerance: float
     chosen: Measured | None
+    orbit: str
     remarks: tuple[str, ...]

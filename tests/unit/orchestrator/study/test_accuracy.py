@@ -51,6 +51,7 @@ def ladder(study: Study, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_periodic_motion_is_compared_with_its_closed_form(rigid: Study) -> None:
+    assert rigid.orbit == "P(1,1)"
     assert rigid.reference.name == "the closed form of the P(1,1) motion"
     assert not rigid.reference.chaotic
     by_name = {one.way.name: one for one in rigid.measured}
@@ -108,6 +109,7 @@ def test_a_chaotic_motion_is_found_out_and_compared_by_its_first_impacts_and_its
     )
     study = study_accuracy(scene, budget=1.0)
     assert study.reference.chaotic
+    assert study.orbit == "chaotic"
     coupled = study.measured[1]
     assert coupled.way.name == "coupled, FMI 3.0"
     growth = coupled.errors.growth

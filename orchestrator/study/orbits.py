@@ -1,0 +1,53 @@
+"""The class of an orbit: P(p,q), p impacts in q forcing periods."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vibroimpact.orchestrator.study.observation import Observation
+
+REPEATS = 1e-6
+"""Relative difference of times and velocities below which an impact is one of a period before."""
+LEAST_TURNS = 2
+"""How often an orbit must repeat itself in the recording, to be called one."""
+
+
+def orbit_of(found: Observation, period: float | None, window: tuple[float, float]) -> str:
+    """Return the class of an orbit: `P(p,q)`, `no impacts`, `not periodic in the recording`; nothing where unforced.
+
+    Parameters
+    ----------
+    found : Observation
+    period : float or None
+        Of the forcing, s.
+    window : tuple of float
+        Start and end of the recording, s.
+
+    Examples
+    --------
+    >>> train = np.array([[0.3, 1.0, 1.0], [0.9, 0.5, 1.0], [2.3, 1.0, 1.0], [2.9, 0.5, 1.0]])
+    >>> orbit_of(Observation(train), 1.0, (0.0, 4.0)), orbit_of(Observation(), 1.0, (0.0, 4.0))
+    ('P(2,2)', 'no impacts')
+    """
+    if period is None:
+        return ""
+    if not len(found.impacts):
+        return "no impacts"
+    most = round((window[1] - window[0]) / period) // LEAST_TURNS
+    for periods in range(1, most + 1):
+        if _repeats(found, periods * period, period, window):
+            count = np.count_nonzero(found.impacts[:, 0] < window[0] + periods * period)
+            return f"P({count},{periods})"
+    return "not periodic in the recording"
+
+
+def _repeats(found: Observation, length: float, period: float, window: tuple[float, float]) -> bool:
+    """Return whether all impacts are those one length before, but for those at the edges of the recording."""
+    rows, margin = found.impacts, REPEATS * period
+    speed = float(np.abs(rows[:, 1]).max()) or 1.0
+    early = rows[rows[:, 0] < window[1] - length - margin]
+    late = rows[rows[:, 0] > window[0] + length + margin]
+    if not len(early) or len(early) != len(late):
+        return False
+    off = np.abs(late[:, :2] - early[:, :2] - (length, 0.0)) / (period, speed)
+    return bool(off.max() < REPEATS) and bool((late[:, 2] == early[:, 2]).all())
