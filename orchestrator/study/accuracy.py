@@ -181,13 +181,13 @@ def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
 
 
 def _counted(way: Way) -> tuple[int, int]:
-    """Return the calls of functions of FMUs in a run, and the largest memory that Python took for it, bytes."""
+    """Return the calls of functions of FMUs in a run (-1: not counted), and the most memory of Python for it, bytes."""
     counter = CallCounter()
     trial = way.open(counter.wrap)
     tracemalloc.start()
     try:
         trial.run()
-        return sum(counter.calls.values()), tracemalloc.get_traced_memory()[1]
+        return sum(counter.calls.values()) or -1, tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
         trial.close()

@@ -300,9 +300,11 @@ class ModelExchangeTrial:
         Of the short form.
     tolerance : float
         Of the integrator, relative.
+    wrap : callable or None
+        Not used: FMPy calls the FMU itself, and nobody counts its calls.
     """
 
-    def __init__(self, scene: Scene, tolerance: float) -> None:
+    def __init__(self, scene: Scene, tolerance: float, wrap: Wrapper | None = None) -> None:
         self._scene, self._tolerance = scene, tolerance
         self._floats = float_parameters(scene, None)
         self._values = self._floats | integer_parameters(scene)

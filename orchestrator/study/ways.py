@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from scipy.optimize import brentq
 
 from vibroimpact.fmus.errors import SceneError
+from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.library import Function
 from vibroimpact.orchestrator.run import open_runner
 from vibroimpact.orchestrator.scene import Scene
@@ -54,6 +55,9 @@ class Trial(Protocol):
         """Free what was opened."""
 
 
+Opener = Callable[[Wrapper | None], Trial]
+
+
 @dataclass(frozen=True, slots=True)
 class Way:
     """A way of simulating a scene at one setting.
@@ -78,7 +82,7 @@ class Way:
     knob: str
     setting: float
     changes: Mapping[str, Any]
-    open: Callable[[Callable[[str, Function], Function] | None], Trial]
+    open: Opener
     model: bool = False
 
     @property
@@ -90,7 +94,7 @@ class Way:
 class SceneTrial:
     """A scene that its own runner runs."""
 
-    def __init__(self, scene: Scene, wrap: Callable[[str, Function], Function] | None = None) -> None:
+    def __init__(self, scene: Scene, wrap: Wrapper | None = None) -> None:
         of = None if wrap is None else (lambda name: wrap)
         self.is_guarded = scene.general.guard if scene.general is not None else scene.execution.guard
         self._runner = open_runner(scene, scene.execution.how, wrap=of)
@@ -156,6 +160,11 @@ def _by_scene(
     return Way(name, knob, setting, changes, lambda wrap: SceneTrial(changed, wrap), **kind)
 
 
+def _opens(kind: Callable[..., Trial], *arguments: Any) -> Opener:
+    """Return what opens a kind of trial with these arguments, given a wrapper of the functions of FMUs."""
+    return lambda wrap: kind(*arguments, wrap)
+
+
 def _fused(scene: Scene) -> list[Way]:
     how = {"execution.how": "fused"}
     if not _integrates_contacts(scene):
@@ -186,7 +195,7 @@ def _coupled(scene: Scene) -> list[Way]:
                     "" if math.isnan(step) else "macro_step",
                     step,
                     own,
-                    lambda wrap, made=made, version=version: CoupledTrial(made, version, wrap),  # type: ignore[misc]
+                    _opens(CoupledTrial, made, version),
                 )
             )
     return ways
@@ -208,7 +217,7 @@ def _plain_steps(scene: Scene) -> list[Way]:
                     "step",
                     step,
                     {},
-                    lambda wrap, step=step: PlainStepsTrial(scene, step, wrap),  # type: ignore[misc]
+                    _opens(PlainStepsTrial, scene, step),
                 )
             )
         elif not any(rigid):
@@ -218,9 +227,7 @@ def _plain_steps(scene: Scene) -> list[Way]:
                     "step",
                     step,
                     {},
-                    lambda wrap, step=step, exchange=exchange: PlainForcesTrial(  # type: ignore[misc]
-                        scene, exchange, step, wrap
-                    ),
+                    _opens(PlainForcesTrial, scene, exchange, step),
                 )
                 for exchange in ("jacobi", "gauss_seidel")
             ]
@@ -236,7 +243,7 @@ def _integrated(scene: Scene) -> list[Way]:
             "tolerance",
             value,
             {},
-            lambda wrap, value=value: ModelExchangeTrial(scene, value),  # type: ignore[misc]
+            _opens(ModelExchangeTrial, scene, value),
         )
         for value in INTEGRATOR_TOLERANCES
     ]
