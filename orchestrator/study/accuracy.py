@@ -27,7 +27,7 @@ from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import Reference, disturbed_scenes, observed, reference_of
 from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
 from vibroimpact.orchestrator.study.trials import far_off
-from vibroimpact.orchestrator.study.ways import CallCounter, Trial, Way, remarks_on, ways_of
+from vibroimpact.orchestrator.study.ways import CallCounter, Trial, Way, refuse_replay, remarks_on, ways_of
 
 BUDGET = 40.0
 """Wall time of a study, s, where nobody says another."""
@@ -77,6 +77,7 @@ def study_accuracy(
     UsageError
         There is no such quantity, nothing to vary, or no tolerance > 0.
     """
+    refuse_replay(scene)
     _refuse_misuse(tolerance, quantity)
     began = time.perf_counter()
     whole, late = studied_scene(scene), max(LEAST_LATE, LATE_SHARE * budget)

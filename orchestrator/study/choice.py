@@ -11,6 +11,8 @@ from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS
 from vibroimpact.orchestrator.study.measured import Measured, Study
 from vibroimpact.orchestrator.study.references import Reference
 
+VAGUE = 1e-2
+"""Relative error of a reference above which it tells ways apart no more."""
 DEFAULT_TOLERANCE = 1e-6
 """Relative error of what is recommended where nobody asks for one."""
 
@@ -34,6 +36,8 @@ def cheapest(
     """
     own = error_of_reference(reference, quantity)
     able = [one for one in measured if not one.way.model and one.error(quantity) == one.error(quantity)]
+    if tolerance is None and own > VAGUE:
+        return None
     if tolerance is None:
         least = min((one.error(quantity) for one in able), default=math.nan)
         tolerance = max(DEFAULT_TOLERANCE, least + own)
@@ -73,7 +77,7 @@ def advice(study: Study) -> str:
     """Return what to choose, in a sentence."""
     chosen, quantity = study.chosen, study.quantity
     if chosen is None:
-        return "No way reached the tolerance."
+        return _why_none(study)
     known = error_of_reference(study.reference, quantity)
     what = "" if quantity == "all" else f" of {quantity.replace('_', ' ')}"
     told, cost = chosen.told(quantity, known), _seconds(chosen.cost)
@@ -94,6 +98,21 @@ def advice(study: Study) -> str:
             f". The motion is chaotic: after its first {FIRST_IMPACTS} impacts or so only statistics compare"
         )
     return f"{words}."
+
+
+def _why_none(study: Study) -> str:
+    """Return why there is nothing to choose."""
+    known = error_of_reference(study.reference, study.quantity)
+    if not any(one.error(study.quantity) == one.error(study.quantity) for one in study.measured):
+        if any(one.errors.failure for one in study.measured):
+            return "No way has an error that can be told: give a longer --budget where they did not finish."
+        return "Nothing that is recorded moves: there is nothing to compare."
+    if known > VAGUE:
+        return (
+            f"No way stands out, since the reference is known to {known:.0e} only: motion that is chaotic, or that "
+            "jumps at its samples, is not compared in scenes of components."
+        )
+    return "No way reached the tolerance."
 
 
 def _seconds(seconds: float) -> str:

@@ -26,7 +26,7 @@ from vibroimpact.orchestrator.scene.summary import effects as called_effects
 from vibroimpact.orchestrator.scene.summary import laws
 from vibroimpact.orchestrator.study.errors import Scales, errors_of
 from vibroimpact.orchestrator.study.references import scales_of
-from vibroimpact.orchestrator.study.ways import SceneTrial
+from vibroimpact.orchestrator.study.ways import SceneTrial, refuse_replay
 
 PAIRS = 5
 """Pairs of runs, one with the effect and one without, in turn."""
@@ -99,7 +99,13 @@ def effects_of(scene: Scene) -> list[Effect]:
     ----------
     scene : Scene
         Without a sweep.
+
+    Raises
+    ------
+    UsageError
+        Recordings drive it.
     """
+    refuse_replay(scene)
     found = list(_found(scene))
     return [effect for effect in found if effect is not None]
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from scipy.optimize import brentq
 
-from vibroimpact.fmus.errors import SceneError
+from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.library import Function
 from vibroimpact.orchestrator.run import open_runner
@@ -135,6 +135,20 @@ def ways_of(scene: Scene) -> list[Way]:
     if scene.general is not None:
         return _general_ways(scene)
     return [*_fused(scene), *_coupled(scene), *_plain_steps(scene), *_integrated(scene), *_models(scene)]
+
+
+def refuse_replay(scene: Scene) -> None:
+    """Refuse a scene that recordings drive.
+
+    Raises
+    ------
+    UsageError
+    """
+    if scene.replay is not None:
+        raise UsageError(
+            f"{scene.source}: replay: expected a scene that recordings do not drive, got one that they do. "
+            "`vibroimpact replay` compares it with what was measured."
+        )
 
 
 def remarks_on(scene: Scene) -> list[str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from support.command_line import in_this_process
+from support.places import EXAMPLES
 
 import vibroimpact as vi
 from vibroimpact.analysis.dataset import open_measured
@@ -83,6 +84,13 @@ def test_misuse_of_accuracy_is_one_line(
     assert done.returncode == 2
     assert told in done.stderr
     assert sorted(path.name for path in scene.parent.iterdir()) == ["free.toml"]
+
+
+@pytest.mark.parametrize("command", ["accuracy", "effects"])
+def test_a_scene_that_recordings_drive_is_refused(command: str) -> None:
+    done = in_this_process(command, str(EXAMPLES / "recordings" / "board.toml"))
+    assert done.returncode == 2
+    assert "expected a scene that recordings do not drive" in done.stderr
 
 
 def test_an_output_that_holds_something_else_is_kept(scene: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study import Study, advice, dataset_of, study_accuracy
 from vibroimpact.orchestrator.study.accuracy import studied_scene
+from vibroimpact.orchestrator.study.choice import cheapest
 from vibroimpact.orchestrator.study.references import reference_of
 
 pytestmark = pytest.mark.slow
@@ -158,6 +160,16 @@ def test_a_free_motion_without_stops_is_compared_by_its_end() -> None:
     tolerances, errors = ladder(study_accuracy(Scene.from_dict(free), budget=1.0), "model exchange, CVode")
     assert len(tolerances) >= 3
     assert np.all(np.diff(errors) < 0.0)
+
+
+def test_what_cannot_be_compared_is_said(rigid: Study) -> None:
+    still = {"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 1.0}}
+    assert advice(study_accuracy(Scene.from_dict(still), budget=1.0)).startswith(
+        "Nothing that is recorded moves"
+    )
+    vague = replace(rigid.reference, error=dict.fromkeys(rigid.reference.error, 1.0))
+    assert cheapest(rigid.measured, None, "all", vague) is None
+    assert "the reference is known to 1e+00 only" in advice(replace(rigid, reference=vague, chosen=None))
 
 
 def test_misuse_is_told() -> None:
