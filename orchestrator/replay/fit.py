@@ -23,6 +23,7 @@ from vibroimpact.orchestrator.replay.replayer import Replayer
 from vibroimpact.orchestrator.replay.scoring import compare_motion
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.fields import bounds_of
+from vibroimpact.orchestrator.scene.keys import MODES, numeric_key
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -100,6 +101,11 @@ def fit_keys(scene: Scene, text: str) -> tuple[str, ...]:
         )
     for key in keys:
         scene.value(key)
+        if key == MODES or numeric_key(key).table == "execution":
+            raise UsageError(
+                f"{option('fit')}: expected numbers of what moves that change without steps, got {key}. "
+                "A sweep of it is scored at each value: `vibroimpact campaign`."
+            )
     return keys
 
 

@@ -21,6 +21,8 @@ from vibroimpact.orchestrator.replay.replayer import (
     replay_table,
 )
 from vibroimpact.orchestrator.replay.scoring import compare_motion
+from vibroimpact.orchestrator.run.parameters import most_elements, padded_state
+from vibroimpact.orchestrator.run.point import built_for
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 
@@ -51,12 +53,16 @@ class ReplayRunner:
         self._paths = [recording_of(scene, number) for number in range(1, count + 1)]
         recordings = {f"recording {path.name}": _sha256(path) for path in self._paths}
         self._replayers: dict[int, Replayer] = {}
-        self.fmu_hashes = recordings | self._replayer(1).hashes
+        self._built_for = built_for(scene)
+        self.fmu_hashes = recordings | self._replayer(1, scene).hashes
 
-    def _replayer(self, number: int) -> Replayer:
+    def _replayer(self, number: int, scene: Scene) -> Replayer:
+        if self._built_for != built_for(scene):
+            self.close()
+            self._replayers, self._built_for = {}, built_for(scene)
         if number not in self._replayers:
             path = self._paths[number - 1]
-            self._replayers[number] = opened_replay(self._scene, path, self.execution)
+            self._replayers[number] = opened_replay(scene, path, self.execution)
         return self._replayers[number]
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
@@ -68,8 +74,9 @@ class ReplayRunner:
             The recording cannot be read or compared, or the body refuses its parameters.
         """
         began = time.perf_counter()
-        replayer = self._replayer(int(values.get(RECORDING_KEY, 1.0)))
         numbers = {key: value for key, value in values.items() if key != RECORDING_KEY}
+        scene = self._scene.at(numbers) if numbers else self._scene
+        replayer = self._replayer(int(values.get(RECORDING_KEY, 1.0)), scene)
         motion = replayer.simulate(numbers)
         comparisons = compare_motion(replayer, motion)
         return self._record(replayer, motion, comparisons, time.perf_counter() - began)
@@ -90,7 +97,7 @@ class ReplayRunner:
             final_displacement=displacement,
             final_velocity=velocity,
             seconds=seconds,
-            final_state=state,
+            final_state=padded_state(state, most_elements(self._scene)),
             scores=np.array([_score_row(comparison) for comparison in comparisons]) if comparisons else None,
         )
 

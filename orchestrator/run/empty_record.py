@@ -13,7 +13,7 @@ from vibroimpact.analysis.dataset import (
     Outcome,
     RunRecord,
 )
-from vibroimpact.orchestrator.run.parameters import state_variables
+from vibroimpact.orchestrator.run.parameters import most_elements
 from vibroimpact.orchestrator.scene import Scene
 
 
@@ -38,7 +38,7 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
     """
     record, names = scene.record, sample_variables(scene)
     general = scene.general is not None
-    states = state_variables(scene)
+    elements = most_elements(scene)
     periods = scene.period is not None and (record.extrema or record.strobe) and not general
     return RunRecord(
         outcome=outcome,
@@ -48,6 +48,6 @@ def empty_record(scene: Scene, outcome: Outcome, message: str, seconds: float) -
         sticks=np.empty((0, len(STICK_COLUMNS))) if record.impacts and not general else None,
         samples=np.empty((0, 1 + len(names))) if names else None,
         seconds=seconds,
-        final_state=np.full(len(states), math.nan) if states else None,
+        final_state=np.full(2 * elements, math.nan) if elements else None,
         events=np.empty((0, 3)) if record.impacts and general else None,
     )

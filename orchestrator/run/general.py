@@ -137,6 +137,7 @@ class GeneralRunner:
         for component in self._importer.components.values():
             component.instance.log.take()  # what it said in the point before is no reason for this one's end
         self._set_gains(general)
+        self._importer.macro_step = general.macro_step
         self._importer.contacts.take_numbers(general.stop_contacts, general.pairs)
         end = record.transient_time + record.recorded_time
         try:

@@ -6,11 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, cast
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.fields import fmu_variables_of
+from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import Forcing, RestitutionStop
 from vibroimpact.orchestrator.scene.places import (
     forcing_location,
@@ -23,6 +26,7 @@ from vibroimpact.orchestrator.scene.places import (
 if TYPE_CHECKING:
     from vibroimpact.fmus.core import Boundary
 
+Floats = NDArray[np.float64]
 FMU_NAMES = {"oscillator": "Oscillator", "chain": "Chain", "beam": "Beam"}
 LAW_NUMBERS = {"none": 0, "restitution": 1, "kelvin_voigt": 2, "hertz": 3, "hunt_crossley": 4}
 SIDE_NUMBERS = {"upper": 1, "lower": 2}
@@ -113,6 +117,34 @@ def state_variables(scene: Scene) -> tuple[str, ...]:
     kind = "" if isinstance(body, ChainBody) else "modal_"
     numbers = range(1, body.size + 1)
     return tuple(f"{kind}{name}[{i}]" for name in ("displacement", "velocity") for i in numbers)
+
+
+def most_elements(scene: Scene) -> int:
+    """Return how many masses or modes a structure has, where a sweep varies them the most of them; else 0."""
+    swept = [max(axis.values) for axis in scene.sweep if axis.key == MODES]
+    return int(swept[0]) if swept else len(state_variables(scene)) // 2
+
+
+def padded_state(state: Floats | None, elements: int) -> Floats | None:
+    """Return a whole state with 0 for the modes that a point has not: all states of a sweep are of one size.
+
+    Examples
+    --------
+    >>> padded_state(np.array([1.0, 2.0]), 2).tolist()
+    [1.0, 0.0, 2.0, 0.0]
+    """
+    if state is None or len(state) == 2 * elements:
+        return state
+    missing = np.zeros(elements - len(state) // 2)
+    return np.concatenate([part for half in np.split(state, 2) for part in (half, missing)])
+
+
+def without_padding(state: tuple[float, ...] | None, elements: int) -> tuple[float, ...] | None:
+    """Return a whole state as the body of its point has it, with fewer modes: see `padded_state`."""
+    if state is None or not elements:
+        return state
+    half = len(state) // 2
+    return state[:elements] + state[half : half + elements]
 
 
 def contact_floats(scene: Scene) -> dict[str, float]:

@@ -11,6 +11,7 @@ import platform
 import time
 from array import array
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,10 @@ from vibroimpact.orchestrator.run.parameters import (
     FMU_NAMES,
     float_parameters,
     integer_parameters,
+    most_elements,
+    padded_state,
     state_variables,
+    without_padding,
 )
 from vibroimpact.orchestrator.run.record import (
     ROW_PERIOD,
@@ -65,9 +69,13 @@ class PointRunner:
     def __init__(self, scene: Scene, *, execution: str = "auto", wrap: WrapOf | None = None) -> None:
         self.execution = "fused" if execution == "auto" else execution
         self.instruction_set = platform.machine()
-        self._scene = scene
+        self._scene, self._wrap = scene, wrap
         self._plan = TimeSeriesPlan(scene)
-        self._driver = driver_of(scene, self.execution, wrap=wrap)
+        self._open(scene)
+        self.fmu_hashes = self._driver.hashes
+
+    def _open(self, scene: Scene) -> None:
+        self._driver = driver_of(scene, self.execution, wrap=self._wrap)
         self._driver.watch(
             contacts=len(scene.stops),
             sampled=self._plan.variables,
@@ -75,7 +83,13 @@ class PointRunner:
             energies=self._plan.energies,
             slowest=not isinstance(scene.body, OscillatorBody),
         )
-        self.fmu_hashes = self._driver.hashes
+        self._built_for = built_for(scene)
+
+    def _reopen_if_other(self, scene: Scene) -> None:
+        """Make the components anew where they were made for another number of modes, or another step."""
+        if self._built_for != built_for(scene):
+            self._driver.close()
+            self._open(scene)
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
         """Run one point.
@@ -95,14 +109,21 @@ class PointRunner:
         """
         began = time.perf_counter()
         scene = self._scene.at(values) if values else self._scene
-        run = _Run(scene, self._driver, self._plan, start)
+        self._reopen_if_other(scene)
+        run = _Run(scene, self._driver, self._plan, without_padding(start, len(state_variables(scene)) // 2))
         outcome, message = run.run()
         message = message or "; ".join(self._driver.warnings)
-        return run.record(outcome, message, time.perf_counter() - began)
+        record = run.record(outcome, message, time.perf_counter() - began)
+        return replace(record, final_state=padded_state(record.final_state, most_elements(self._scene)))
 
     def close(self) -> None:
         """Free the components."""
         self._driver.close()
+
+
+def built_for(scene: Scene) -> tuple[object, ...]:
+    """Return what the components of a scene are made for, and no new parameter changes."""
+    return getattr(scene.body, "size", 1), scene.execution.macro_step
 
 
 def driver_of(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from vibroimpact.analysis.dataset import PERIOD_COLUMNS
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.empty_record import sample_variables
-from vibroimpact.orchestrator.run.parameters import state_variables
+from vibroimpact.orchestrator.run.parameters import most_elements
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import run_count
 
@@ -23,7 +23,7 @@ def bytes_of_a_run(scene: Scene) -> int:
     periods = record.recorded_periods if (record.extrema or record.strobe) and general is None else 0
     samples = round(_sampling_rate(scene) * _recorded_seconds(scene))
     numbers = periods * len(PERIOD_COLUMNS) + samples * (1 + len(sample_variables(scene)))
-    return _RUN_BYTES + _NUMBER_BYTES * (numbers + len(state_variables(scene)))
+    return _RUN_BYTES + _NUMBER_BYTES * (numbers + 2 * most_elements(scene))
 
 
 def _sampling_rate(scene: Scene) -> float:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
-from vibroimpact.orchestrator.run.point import driver_of
+from vibroimpact.orchestrator.run.point import built_for, driver_of
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
 from vibroimpact.orchestrator.scene import Scene
 
@@ -109,8 +109,15 @@ class Session:
         ------
         ComponentError
             The body refuses its parameters.
+        UsageError
+            A number of modes, or a step, that the components are not made for.
         """
         scene = self._scene.at(values) if values else self._scene
+        if built_for(scene) != built_for(self._scene):
+            raise UsageError(
+                "body.modes, execution.macro_step: expected what the opened scene has, got another number. "
+                "Open a scene that says so."
+            )
         self._forcing = scene.forcing
         self._parameters = float_parameters(scene, start)
         self._driver.begin(self._parameters, scene.execution.deadline)

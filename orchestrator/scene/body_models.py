@@ -211,7 +211,8 @@ class BeamBody(SceneTable):
         Literal["clamped-free", "clamped-clamped", "clamped-pinned", "pinned-pinned"], Rule()
     ] = "clamped-free"
     modes: Annotated[
-        ModeNumber, Rule(doc="a coefficient of restitution has a meaning only together with it")
+        ModeNumber,
+        Rule(sweepable=True, doc="a coefficient of restitution has a meaning only together with it"),
     ] = 4
     damping_ratio: Annotated[
         NotNegativeNumbers,

@@ -10,7 +10,7 @@ from typing import Any
 
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
-from vibroimpact.orchestrator.scene.keys import number_of, numeric_key
+from vibroimpact.orchestrator.scene.keys import MODES, number_of, numeric_key
 from vibroimpact.orchestrator.scene.models import (
     STOP_MODELS,
     Execution,
@@ -116,6 +116,11 @@ class Draft(DraftTables):
             return None
         return self.variant(BODY_MODELS, "kind", "oscillator", self.document["body"], ("body",))
 
+    @property
+    def sweeps_modes(self) -> bool:
+        """Whether the number of modes differs between points."""
+        return any(axis.key == MODES for axis in self.axes)
+
     def worst(self, *tables: str) -> str:
         """Return a note for a number that may be the worst of a sweep over keys of these tables."""
         swept = any(axis.key.startswith(tables) for axis in self.axes)
@@ -144,14 +149,19 @@ class Draft(DraftTables):
 
 
 def _with_swept_keys(document: Mapping[str, Any], axes: tuple[SweepAxis, ...]) -> dict[str, Any]:
-    """Return the document with the first swept value wherever the swept key itself is not written."""
+    """Return the document with the first swept value wherever the swept key itself is not written.
+
+    Of modes it has the least number, written or not: what names modes is to suit each of the swept numbers.
+    """
     filled = dict(document)
     for axis in axes:
         key = numeric_key(axis.key)
-        filled[key.table] = deepcopy(filled[key.table])
+        filled[key.table] = deepcopy(filled.get(key.table, {}))
         owner = key.owner_in(filled)
-        if isinstance(owner, dict):
-            owner.setdefault(key.name, axis.values[0])
+        if isinstance(owner, dict) and axis.key == MODES:
+            owner[key.name] = key.typed(min(axis.values))
+        elif isinstance(owner, dict):
+            owner.setdefault(key.name, key.typed(axis.values[0]))
     return filled
 
 

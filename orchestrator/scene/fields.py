@@ -33,8 +33,8 @@ class Rule:
         Words of the scene format that this version does not run.
     item : str
         Completes "expected ..." for one item of an array; without it the constraints say it.
-    sweepable : bool
-        Whether a sweep may vary it, if it is a number of a table with swept keys.
+    sweepable : bool or None
+        Whether a sweep may vary it, if it is in a table with swept keys; None: a number it may, a whole number not.
     fmu : str
         Real variable of the body's FMU that it is: `mass`; `mass[i]` with one element for each mass or mode;
         `contact[k].stiffness` at the port of its stop. Empty where it is none as it stands.
@@ -53,7 +53,7 @@ class Rule:
     hint: str = ""
     unavailable: tuple[str, ...] = ()
     item: str = ""
-    sweepable: bool = True
+    sweepable: bool | None = None
     fmu: str = ""
     told_if_given: bool = False
     effect: str = ""
@@ -182,8 +182,15 @@ def numeric_keys(model: type[BaseModel]) -> Iterator[str]:
     """Yield the keys of a table whose numbers, or elements of numbers, a sweep may vary."""
     for name, field in model.model_fields.items():
         is_number = float in forms_of(field.annotation) or _array_of(field) is float
-        if is_number and _written_rule(field).sweepable:
+        sweepable = _written_rule(field).sweepable
+        if is_number if sweepable is None else sweepable:
             yield field.alias or name
+
+
+def is_whole(field: FieldInfo) -> bool:
+    """Whether a field takes whole numbers, and no others."""
+    forms = forms_of(field.annotation)
+    return int in forms and float not in forms
 
 
 class FmuVariable(NamedTuple):

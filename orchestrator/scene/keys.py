@@ -11,20 +11,22 @@ from pydantic import BaseModel
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
-from vibroimpact.orchestrator.scene.fields import field_name, numeric_keys
-from vibroimpact.orchestrator.scene.models import STOP_MODELS, Forcing, Sensor
+from vibroimpact.orchestrator.scene.fields import field_name, field_of, is_whole, known_keys, numeric_keys
+from vibroimpact.orchestrator.scene.models import STOP_MODELS, Execution, Forcing, Sensor
 
 _MODELS: dict[str, tuple[type[BaseModel], ...]] = {
     "body": tuple(BODY_MODELS.values()),
     "forcing": (Forcing,),
     "sensor": (Sensor,),
     "stop": tuple(STOP_MODELS.values()),
+    "execution": (Execution,),
 }
 SWEEPABLE: dict[str, tuple[str, ...]] = {
     table: tuple(dict.fromkeys(key for model in models for key in numeric_keys(model)))
     for table, models in _MODELS.items()
 }
 """The numbers that a sweep may vary, by table."""
+MODES = "body.modes"
 START_STATE = ("body.displacement_start", "body.velocity_start")
 
 # The second of each pair has the last word in its model, so that giving the first must clear it.
@@ -32,7 +34,7 @@ OVERRIDDEN_BY = {"damping": "damping_ratio", "angular_frequency": "frequency"}
 ALTERNATIVES = OVERRIDDEN_BY | {second: first for first, second in OVERRIDDEN_BY.items()}
 """Keys of one table that say the same thing, of which a scene gives one."""
 _NUMBER = r"\[([1-9][0-9]{0,8})\]"
-_KEY = re.compile(rf"(?:(body|forcing|sensor)|(stop){_NUMBER})\.([a-z_]+)(?:{_NUMBER})?")
+_KEY = re.compile(rf"(?:(body|forcing|sensor|execution)|(stop){_NUMBER})\.([a-z_]+)(?:{_NUMBER})?")
 
 
 class Key(NamedTuple):
@@ -51,6 +53,11 @@ class Key(NamedTuple):
     def owner_in(self, document: Mapping[str, Any]) -> Any:
         """Return what a document has for its table."""
         return document[self.table] if self.place is None else document[self.table][self.place]
+
+    def typed(self, value: float) -> float:
+        """Return a number as its table has it: whole where others have no meaning."""
+        fields = [field_of(m, self.name) for m in _MODELS[self.table] if self.name in known_keys(m)]
+        return int(value) if any(map(is_whole, fields)) else value
 
 
 @lru_cache(maxsize=256)
@@ -126,7 +133,7 @@ def replacement(owner: BaseModel, key: Key, value: float) -> dict[str, Any]:
     if key.element is not None:
         numbers = getattr(owner, attribute)
         return {attribute: (*numbers[: key.element], value, *numbers[key.element + 1 :])}
-    update: dict[str, Any] = {attribute: value}
+    update: dict[str, Any] = {attribute: key.typed(value)}
     other = OVERRIDDEN_BY.get(key.name)
     if other in model.model_fields:
         update[str(other)] = None

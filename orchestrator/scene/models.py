@@ -343,6 +343,7 @@ class Execution(SceneTable):
         Positive | None,
         Rule(
             unit="s",
+            sweepable=False,
             doc="wall time per point, then its outcome is timeout; looked at every few hundredths of a second, within "
             "a long step too",
         ),

@@ -201,6 +201,7 @@ class Scene(SceneTable):
             "body_given": tables.pop("body"),
             "forcing": tables.pop("forcing"),
             "sensor": tables.pop("sensor"),
+            "execution": tables.pop("execution"),
         }
         return self.model_copy(update={**others, "stops": tuple(tables.values())})
 
@@ -322,11 +323,11 @@ class Scene(SceneTable):
         return self.text
 
     def constants(self) -> dict[str, float]:
-        """Return the numbers that a sweep could vary and this one does not, by key, defaults too."""
+        """Return the numbers of what moves that a sweep could vary and this one does not, by key, defaults too."""
         if self.general is not None:
             numbers = self.general.numbers()
         else:
-            tables = self._numbered_tables().items()
+            tables = [(name, owner) for name, owner in self._numbered_tables().items() if name != "execution"]
             numbers = chain.from_iterable(numbers_of(owner, name) for name, owner in tables if owner)
         swept = {axis.key for axis in self.sweep}
         return {key: value for key, value in numbers if key not in swept}
@@ -338,7 +339,8 @@ class Scene(SceneTable):
     def _numbered_tables(self) -> dict[str, BaseModel | None]:
         """Return the tables that hold numbers, as keys name them."""
         stops = {f"stop[{number}]": stop for number, stop in enumerate(self.stops, start=1)}
-        return {**stops, "body": self.body_given, "forcing": self.forcing, "sensor": self.sensor}
+        tables = {"body": self.body_given, "forcing": self.forcing, "sensor": self.sensor}
+        return {**stops, **tables, "execution": self.execution}
 
 
 def load_scene(path: str | PathLike[str], changes: Sequence[str] = ()) -> Scene:

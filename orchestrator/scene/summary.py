@@ -5,6 +5,7 @@ from __future__ import annotations
 from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.fields import rule_of
+from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION, RestitutionStop
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene.sampled_names import follow_energies
@@ -38,8 +39,12 @@ def _body(scene: Scene) -> str:
         if all(isinstance(stop, RestitutionStop) for stop in scene.stops):
             return "Oscillator, one mass, closed form between impacts"
         return "Oscillator, one mass, as a structure because a stop yields"
-    kind, parts = ("Chain", "masses") if isinstance(body, ChainBody) else ("Beam", "modes")
-    return f"{kind}, a structure of {body.size} {parts if body.size > 1 else parts.removesuffix('s')}"
+    kind, one, parts = (
+        ("Chain", "mass", "masses") if isinstance(body, ChainBody) else ("Beam", "mode", "modes")
+    )
+    swept = [axis.values for axis in scene.sweep if axis.key == MODES]
+    count = f"{min(swept[0]):g} to {max(swept[0]):g}" if swept else str(body.size)
+    return f"{kind}, a structure of {count} {one if count == '1' else parts}"
 
 
 def laws(scene: Scene) -> dict[str, str]:

@@ -11,9 +11,16 @@ from typing import Annotated, Any
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
-from vibroimpact.orchestrator.scene.fields import field_of, is_array_only, known_keys, listed, rule_of
+from vibroimpact.orchestrator.scene.fields import (
+    field_of,
+    is_array_only,
+    is_whole,
+    known_keys,
+    listed,
+    rule_of,
+)
 from vibroimpact.orchestrator.scene.keys import SWEEPABLE, numeric_key, parse_key
-from vibroimpact.orchestrator.scene.models import STOP_MODELS, AxisTable, Forcing, Sensor
+from vibroimpact.orchestrator.scene.models import STOP_MODELS, AxisTable, Execution, Forcing, Sensor
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     key_path,
@@ -86,7 +93,7 @@ def _key_problems(
 
 
 def _sweepable_keys(document: Mapping[str, Any]) -> list[str]:
-    """Return the keys that a sweep of this scene may vary; a table that is absent has none."""
+    """Return the keys that a sweep of this scene may vary; a table that is absent has none, but for `execution`."""
     return [key for name, table in _tables(document) for key in _keys_in(name, table)]
 
 
@@ -95,6 +102,7 @@ def _tables(document: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     for name in ("body", "forcing", "sensor"):
         if name in document:
             yield name, document[name]
+    yield "execution", document.get("execution", {})
     for number in range(1, _stop_count(document) + 1):
         yield f"stop[{number}]", document["stop"][number - 1]
 
@@ -118,6 +126,8 @@ def _model_of(name: str, table: Any) -> type[BaseModel] | None:
         return BODY_MODELS.get(str(written.get("kind", "oscillator")))
     if name.startswith("stop"):
         return STOP_MODELS.get(str(written.get("law", "restitution")))
+    if name == "execution":
+        return Execution
     return Forcing if name == "forcing" else Sensor
 
 
@@ -134,7 +144,7 @@ def _key_hint(text: str, entry: object, document: Mapping[str, Any], known: list
         key, count = parse_key(text), _stop_count(document)
         if key is None or key.place is None or key.place >= count:
             return f'Indices start at 1 and this scene has {count} [[stop]]: for example "stop[1].position".'
-    if table in SWEEPABLE and table not in document:
+    if table in SWEEPABLE and table not in (*document, "execution"):
         return f"This scene has no {'[[stop]]' if table == 'stop' else f'[{table}]'}."
     return _element_hint(text, document, known) or _nearest_key(text, known)
 
@@ -226,15 +236,19 @@ def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Proble
     All rules of sweepable fields are intervals, so the lowest and the highest value speak for the rest.
     """
     key = numeric_key(axis.key)
-    model = _model_of(key.owner, key.owner_in(document))
+    model = Execution if key.table == "execution" else _model_of(key.owner, key.owner_in(document))
     if model is None:
         return []
     field = field_of(model, key.name)
+    if is_whole(field):
+        broken = [value for value in axis.values if not value.is_integer()]
+        if broken:
+            return [value_problem(("sweep", axis.key), field, broken[0])]
     annotated: Any = Annotated
     rule = TypeAdapter(annotated[(field.annotation, *field.metadata)])
     for value in (min(axis.values), max(axis.values)):
         try:
-            rule.validate_python(value if key.element is None else (value,), strict=True)
+            rule.validate_python(key.typed(value) if key.element is None else (value,), strict=True)
         except ValidationError:
             problem = value_problem(("sweep", axis.key), field, value)
             return [problem if key.element is None else replace(problem, expected=rule_of(field).item)]

@@ -63,12 +63,14 @@ def _put_all(
 
 
 def _put(document: MutableMapping[str, Any], key: Key, value: float) -> None:
+    if key.table == "execution" and key.table not in document:
+        document[key.table] = {}
     table = key.owner_in(document)
     table.pop(OVERRIDDEN_BY.get(key.name, ""), None)
     if key.element is not None:
         table[key.name][key.element] = value
     else:
-        _set(table, key.name, value)
+        _set(table, key.name, key.typed(value))
 
 
 def _set(table: MutableMapping[str, Any], name: str, value: float | list[str]) -> None:

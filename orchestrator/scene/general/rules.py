@@ -35,7 +35,12 @@ from vibroimpact.orchestrator.scene.general.models import (
     PairTable,
     StopContactTable,
 )
-from vibroimpact.orchestrator.scene.general.scene import component_variable, contact_key, gain_place
+from vibroimpact.orchestrator.scene.general.scene import (
+    STEP_KEY,
+    component_variable,
+    contact_key,
+    gain_place,
+)
 from vibroimpact.orchestrator.scene.keys import dataset_name
 from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import KeyPath, Problem, key_path, nearest, quoted
@@ -98,12 +103,26 @@ class GeneralDraft(DraftTables):
 
     def unit(self, key: str) -> str:
         """Return the unit of a variable, gain or contact's number as it is written where it is declared; else `1`."""
+        if self.names_step(key):
+            return "s"
         named = contact_key(key)
         if named is not None and "contact" not in self.components:
             return self._contact_unit(*named)
         variable, place = self.variable(key), gain_place(key)
         connection = self.connections[place] if place is not None and variable is None else None
         return (variable.unit_name if variable else connection and connection.gain_unit) or "1"
+
+    def names_step(self, key: str) -> bool:
+        """Whether a key is the step of the exchange, and no variable of a component of that name."""
+        return key == STEP_KEY and "execution" not in self.components
+
+    def swept_steps(self) -> tuple[float, ...]:
+        """Return the numbers that a sweep gives the step of the exchange, as far as they are numbers."""
+        entry = self.written("sweep").get(STEP_KEY) if self.names_step(STEP_KEY) else None
+        given = entry if isinstance(entry, dict) else {}
+        values = given.get("values", [given.get("start"), given.get("stop")])
+        numbers = values if isinstance(values, list) else []
+        return tuple(v for v in numbers if isinstance(v, int | float) and v > 0.0)
 
     def _contact_unit(self, place: int, name: str) -> str:
         """Unit of a number of a contact, with dots between its factors as the descriptions of FMUs write it."""
@@ -320,7 +339,8 @@ def _runs_coupled(draft: GeneralDraft) -> Iterator[Problem]:
 def _exchange_has_a_step(draft: GeneralDraft) -> Iterator[Problem]:
     if draft.execution is None:
         return
-    step = draft.execution.macro_step
+    swept = draft.swept_steps()
+    step = min(swept) if swept else draft.execution.macro_step
     if step is None:
         if draft.connections or draft.contacts:
             hint = "Add macro_step = ... to [execution]: the time between two exchanges of values."

@@ -17,6 +17,7 @@ from vibroimpact.orchestrator.importer.specification import (
     StopContactSpec,
 )
 
+STEP_KEY = "execution.macro_step"
 _GAIN_KEY = re.compile(r"connection\[([1-9][0-9]{0,8})\]\.gain")
 _CONTACT_KEY = re.compile(r"contact\[([1-9][0-9]{0,8})\]\.([a-z_]+)")
 
@@ -130,6 +131,8 @@ class GeneralScene:
         UsageError
             When the scene gives no such number.
         """
+        if self.is_step(key):
+            return self.macro_step
         place = gain_place(key)
         if place is not None:
             return self._connection(place, key).gain
@@ -160,8 +163,11 @@ class GeneralScene:
             For a key that is neither swept nor given in the scene.
         """
         components, connections = list(self.components), list(self.connections)
-        contacts = list(self.contacts)
+        contacts, macro_step = list(self.contacts), self.macro_step
         for key, value in values.items():
+            if self.is_step(key):
+                macro_step = float(value)
+                continue
             place = gain_place(key)
             if place is not None:
                 self._connection(place, key)
@@ -178,8 +184,16 @@ class GeneralScene:
             typed = float(value) if isinstance(before[variable], float) else int(value)
             components[index] = replace(components[index], parameters={**before, variable: typed})
         return replace(
-            self, components=tuple(components), connections=tuple(connections), contacts=tuple(contacts)
+            self,
+            components=tuple(components),
+            connections=tuple(connections),
+            contacts=tuple(contacts),
+            macro_step=macro_step,
         )
+
+    def is_step(self, key: str) -> bool:
+        """Whether a key is the step of the exchange, and no number of a component of that name."""
+        return key == STEP_KEY and all(component.name != "execution" for component in self.components)
 
     def _connection(self, place: int, key: str) -> ConnectionSpec:
         if place < len(self.connections):

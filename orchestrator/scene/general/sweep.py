@@ -6,12 +6,15 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
+from pydantic.fields import FieldInfo
+
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, numeric_keys, rule_of
 from vibroimpact.orchestrator.scene.general.component_facts import Misfit, swept_value
 from vibroimpact.orchestrator.scene.general.components import settable_names, start_problems
 from vibroimpact.orchestrator.scene.general.rules import GeneralDraft, reference_problem
 from vibroimpact.orchestrator.scene.general.scene import component_variable, contact_key, gain_place
 from vibroimpact.orchestrator.scene.keys import coordinate_name
+from vibroimpact.orchestrator.scene.models import Execution
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, nearest, quoted
 from vibroimpact.orchestrator.scene.rules.scene import sweep_problems
 from vibroimpact.orchestrator.scene.sweep import SweepAxis
@@ -41,6 +44,8 @@ def _key_problems(key: str, entry: object, draft: GeneralDraft) -> Iterator[Prob
     hint = _quotes_hint(key, entry, draft)
     if hint:
         yield Problem(where, "a start value or a gain of this scene", quoted(key), hint)
+    elif draft.names_step(key):
+        return
     elif _names_an_entry(key, "connection", draft):
         yield from _gain_problems(key, where, draft)
     elif _names_an_entry(key, "contact", draft):
@@ -114,6 +119,9 @@ def _axis_problems(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:
         hint = "What a general scene carries from point to point is not known: every point starts anew."
         yield Problem(where, '"independent" in a general scene', quoted(axis.path), hint)
         return
+    if draft.names_step(axis.key):
+        yield from _number_problems(axis, field_of(Execution, "macro_step"))
+        return
     variable = draft.variable(axis.key)
     if variable is None:
         yield from _contact_values(axis, draft)
@@ -130,7 +138,10 @@ def _contact_values(axis: SweepAxis, draft: GeneralDraft) -> Iterator[Problem]:
     table = None if named is None else draft.contact(named[0])
     if named is None or table is None or named[1] not in type(table).model_fields:
         return
-    field = field_of(type(table), named[1])
+    yield from _number_problems(axis, field_of(type(table), named[1]))
+
+
+def _number_problems(axis: SweepAxis, field: FieldInfo) -> Iterator[Problem]:
     rule, (low, high, is_open) = rule_of(field), bounds_of(field)
     for value in axis.values:
         if not low <= value <= high or (is_open and value == low):

@@ -89,13 +89,19 @@ def _general(
         events=tuple(_event(table) for table in draft.events if table),
         variables=record.variables,
         rate=record.rate,
-        macro_step=execution.macro_step or record.transient_time + record.recorded_time,
+        macro_step=execution.macro_step
+        or _first_step(draft, axes)
+        or record.transient_time + record.recorded_time,
         exchange=execution.exchange,
         guard=execution.guard,
         units={key: draft.unit(key) for key in (*record.variables, *(axis.key for axis in axes))},
         contacts=tuple(_contact(draft, plan, place, axes) for place in range(len(draft.contacts))),
     )
     return replace(general, start_units={key: draft.unit(key) for key, _ in general.numbers()})
+
+
+def _first_step(draft: GeneralDraft, axes: tuple[SweepAxis, ...]) -> float | None:
+    return next((axis.values[0] for axis in axes if draft.names_step(axis.key)), None)
 
 
 def _component(component: DraftComponent, plan: PortPlan, axes: tuple[SweepAxis, ...]) -> ComponentSpec:

@@ -29,6 +29,14 @@ def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
         where, value = f"body.{variable.key}", getattr(body, variable.attribute)
         if isinstance(body, ChainBody):
             yield from _size_problem(where, value, body.size, "mass")
+        elif (
+            isinstance(value, tuple)
+            and value
+            and draft.sweeps_modes
+            and not is_array_only(field_of(BeamBody, variable.key))
+        ):
+            expected = "one number for all modes where a sweep varies how many there are"
+            yield Problem(where, expected, f"an array of {len(value)}", "Write the number alone.")
         elif not is_array_only(field_of(BeamBody, variable.key)):
             yield from _size_problem(where, value, body.size, "mode")
         elif len(value) > body.size:

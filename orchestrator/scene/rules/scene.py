@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.scene.draft import FREQUENCY_KEYS, Draft
-from vibroimpact.orchestrator.scene.keys import START_STATE
+from vibroimpact.orchestrator.scene.keys import MODES, START_STATE
 from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.rules.body import BODY_RULES
@@ -166,3 +166,6 @@ def sweep_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
             where = key_path(("sweep", key, "path"))
             hint = "Along a continuation each point starts from the state of the one before."
             yield Problem(where, '"independent" for a start state', "a continuation", hint)
+        if key == MODES:
+            hint = "The state of some modes is none of more or fewer: each point starts anew."
+            yield Problem(key_path(("sweep", key, "path")), '"independent" for modes', "a continuation", hint)

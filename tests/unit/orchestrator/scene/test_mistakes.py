@@ -137,7 +137,27 @@ WRONG_SWEEPS = [
         'sweep."body.length"',
         "expected a numeric key of this scene",
     ),
-    (BEAM, '"body.modes" = { values = [1] }', 'sweep."body.modes"', "cannot be swept"),
+    (BEAM, '"stop[1].mass" = { values = [1] }', 'sweep."stop[1].mass"', "cannot be swept"),
+    (
+        BEAM,
+        '"body.modes" = { values = [1, 2.5] }',
+        'sweep."body.modes"',
+        "a whole number from 1 to 64, got 2.5",
+    ),
+    (
+        BEAM,
+        '"body.modes" = { values = [1, 65] }',
+        'sweep."body.modes"',
+        "a whole number from 1 to 64, got 65",
+    ),
+    (BEAM, '"execution.deadline" = { values = [1] }', 'sweep."execution.deadline"', "cannot be swept"),
+    (
+        BEAM,
+        '"execution.contact_tolerance" = { values = [1] }',
+        'sweep."execution.contact_tolerance"',
+        "0 < tolerance <= 0.01",
+    ),
+    (BEAM, '"execution.macro_step" = { values = [1] }', "execution.macro_step", 'how = "coupled"'),
     (
         BEAM,
         '"stop[1].location" = { values = [0, 0.5] }',
