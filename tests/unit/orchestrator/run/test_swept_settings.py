@@ -135,7 +135,7 @@ def test_a_replay_is_scored_at_each_number_of_modes(tmp_path: Path) -> None:
 
 def test_what_components_are_made_for_is_neither_fitted_nor_changed_in_a_session() -> None:
     scene = Scene.from_text(BOARD, "board.toml")
-    with pytest.raises(UsageError, match="change without steps, got body.modes"):
+    with pytest.raises(UsageError, match=r"change without steps, got body\.modes"):
         fit_keys(scene, "body.frequency,body.modes")
     with Session(Scene.from_text(BEAM)) as session, pytest.raises(UsageError, match=r"body\.modes"):
         session.begin({"body.modes": 2.0})
