@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from vibroimpact.analysis.figures.page import COLOURS, MARK, canvas, page_style
 from vibroimpact.fmus.errors import DatasetError
@@ -62,12 +63,40 @@ def draw_accuracy(dataset: xr.Dataset) -> Figure:
         if tolerance > 0.0:
             axis.axhline(tolerance, color=MARK, linewidth=0.6, linestyle=":")
         axis.set(xscale="log", yscale="log", xlabel="wall time of a run (s)", ylabel=_label(dataset))
+        _show_whole_decades(axis, dataset["cost"].values)
+        _write_scores(axis, dataset, errors)
         axis.set_ylim(0.3 * _ROUNDING, 10.0 * top)
         figure.legend(
             *axis.get_legend_handles_labels(), loc="outside lower center", ncols=1, frameon=False, fontsize=6
         )
         figure.suptitle(str(dataset.attrs.get("title", "")), fontsize=8, wrap=True)
     return figure
+
+
+def _show_whole_decades(axis: Axes, costs: np.ndarray) -> None:
+    """Let the axis of times begin and end at powers of ten, which alone are labelled."""
+    known = costs[np.isfinite(costs) & (costs > 0.0)]
+    if known.size:
+        axis.set_xlim(
+            10.0 ** np.floor(np.log10(0.9 * known.min())), 10.0 ** np.ceil(np.log10(1.1 * known.max()))
+        )
+        axis.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _write_scores(axis: Axes, dataset: xr.Dataset, errors: np.ndarray) -> None:
+    """Write what a replay accounts for of its recording beside each way that is no other model."""
+    if "variance_accounted_for" not in dataset:
+        return
+    scores, costs = dataset["variance_accounted_for"].values, dataset["cost"].values
+    for place in np.flatnonzero(np.isfinite(scores) & ~dataset["is_model"].values.astype(bool)):
+        axis.annotate(
+            f"{scores[place]:.1f} %",
+            (costs[place], errors[place]),
+            xytext=(0, 5),
+            textcoords="offset points",
+            ha="center",
+            fontsize=5,
+        )
 
 
 def _label(dataset: xr.Dataset) -> str:

@@ -90,9 +90,12 @@ def _say_tried(one: Measured) -> None:
 
 def _table(title: str, measured: Sequence[Measured], quantity: str, known: float) -> Table:
     """Return what was measured as a table; `known` is the error of the reference."""
+    scored = any(one.variance == one.variance for one in measured)
     rows = table(
         f"What accuracy costs: {title}",
-        *("<way", "<set", ">value", ">error", ">a run", ">spread", ">calls", "<what is wrong"),
+        *("<way", "<set", ">value", ">error", ">a run", ">spread", ">calls"),
+        *((">accounts for",) if scored else ()),
+        "<what is wrong",
     )
     for one in measured:
         spread = (max(one.seconds) - min(one.seconds)) / one.cost if len(one.seconds) > 1 else math.nan
@@ -104,6 +107,7 @@ def _table(title: str, measured: Sequence[Measured], quantity: str, known: float
             duration(one.cost) if one.seconds else "-",
             "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
             str(one.calls) if one.calls >= 0 else "-",
+            *((f"{one.variance:.2f} %",) if scored else ()),
             one.errors.failure,
         )
     return rows

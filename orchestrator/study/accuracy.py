@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.dataset.results import Rows, described
-from vibroimpact.fmus.errors import ComponentError, SceneError, UsageError
+from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError, UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
@@ -27,7 +27,7 @@ from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import Reference, disturbed_scenes, observed, reference_of
 from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
 from vibroimpact.orchestrator.study.trials import far_off
-from vibroimpact.orchestrator.study.ways import CallCounter, Trial, Way, refuse_replay, remarks_on, ways_of
+from vibroimpact.orchestrator.study.ways import CallCounter, Trial, Way, remarks_on, ways_of
 
 BUDGET = 40.0
 """Wall time of a study, s, where nobody says another."""
@@ -77,13 +77,12 @@ def study_accuracy(
     UsageError
         There is no such quantity, nothing to vary, or no tolerance > 0.
     """
-    refuse_replay(scene)
     _refuse_misuse(tolerance, quantity)
     began = time.perf_counter()
     whole, late = studied_scene(scene), max(LEAST_LATE, LATE_SHARE * budget)
     reference = reference_of(whole)
     orbit = "chaotic" if reference.chaotic else ""
-    if not reference.chaotic and whole.general is None:
+    if not reference.chaotic and whole.general is None and whole.replay is None:
         orbit = orbit_of(reference.observation, whole.period, reference.scales.window)
     studied = first_impacts(whole, reference) if reference.chaotic else whole
     if reference.chaotic:
@@ -113,7 +112,7 @@ def studied_scene(scene: Scene) -> Scene:
     motion have nothing else to be compared by.
     """
     alone = scene.with_sweep({}) if scene.sweep else scene
-    if scene.general is not None:
+    if scene.general is not None or scene.replay is not None:
         return alone
     if scene.record.time_series is not None:
         document = parse_toml(alone.text)
@@ -161,7 +160,7 @@ def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
     """Run a way once, counting calls and memory, and compare what it shows; no trial where it failed."""
     try:
         trial = way.open(None)
-    except (ComponentError, SceneError) as error:
+    except (ComponentError, SceneError, DatasetError) as error:
         return Measured(way, no_errors(_first_line(error))), None
     try:
         found = trial.run()
@@ -171,7 +170,13 @@ def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
     errors = errors_of(found, reference.observation, reference.scales)
     if not found.failure and far_off(found, reference.observation):
         errors = no_errors("fell through")
-    one = Measured(way, errors, impacts=len(found.impacts), energy_residual=found.energy_residual)
+    one = Measured(
+        way,
+        errors,
+        impacts=len(found.impacts),
+        energy_residual=found.energy_residual,
+        variance=found.variance,
+    )
     if found.failure:
         trial.close()
         one.seconds.append(found.seconds)
@@ -281,6 +286,10 @@ def dataset_of(study: Study) -> xr.Dataset:
             "another model, not another way of solving it",
         ),
     }
+    if study.scene.replay is not None:
+        variance = [one.variance for one in found]
+        said = "variance of what was measured that is accounted for, least of the channels"
+        rows = {**rows, "variance_accounted_for": ("way", variance, "percent", said)}
     for quantity in QUANTITIES:
         values = [one.error(quantity) for one in found]
         if not all(map(math.isnan, values)):

@@ -13,6 +13,8 @@ from vibroimpact.orchestrator.study.references import Reference
 
 VAGUE = 1e-2
 """Relative error of a reference above which it tells ways apart no more."""
+SAME_SCORE = 1.0
+"""Difference of scores, percent, below which a recording does not tell two ways apart."""
 DEFAULT_TOLERANCE = 1e-6
 """Relative error of what is recommended where nobody asks for one."""
 
@@ -93,11 +95,33 @@ def advice(study: Study) -> str:
         other = min(others, key=lambda one: one.cost)
         ratio = other.cost / chosen.cost
         words += f"; {other.way.label} takes {ratio:.2g} times that and errs by {other.told(quantity, known)}"
+    words += _for_the_score(study)
     if study.reference.chaotic:
         words += (
             f". The motion is chaotic: after its first {FIRST_IMPACTS} impacts or so only statistics compare"
         )
     return f"{words}."
+
+
+def _for_the_score(study: Study) -> str:
+    """Return the cheapest way that a recording does not tell from the chosen one; empty where none is cheaper."""
+    chosen = study.chosen
+    if chosen is None or not math.isfinite(chosen.variance):
+        return ""
+    alike = [
+        one
+        for one in study.measured
+        if not (one.way.model or one.errors.failure)
+        and abs(one.variance - chosen.variance) <= SAME_SCORE
+        and one.cost < chosen.cost
+    ]
+    if not alike:
+        return f". What was measured is accounted for to {chosen.variance:.2f} %"
+    least = min(alike, key=lambda one: one.cost)
+    return (
+        f". What was measured is accounted for to {chosen.variance:.2f} %, and to {least.variance:.2f} % by "
+        f"{least.way.label} in {_seconds(least.cost)}"
+    )
 
 
 def _why_none(study: Study) -> str:

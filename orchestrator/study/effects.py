@@ -26,7 +26,8 @@ from vibroimpact.orchestrator.scene.summary import effects as called_effects
 from vibroimpact.orchestrator.scene.summary import laws
 from vibroimpact.orchestrator.study.errors import Scales, errors_of
 from vibroimpact.orchestrator.study.references import scales_of
-from vibroimpact.orchestrator.study.ways import SceneTrial, refuse_replay
+from vibroimpact.orchestrator.study.replays import ReplayTrial
+from vibroimpact.orchestrator.study.ways import SceneTrial, opened_trial
 
 PAIRS = 5
 """Pairs of runs, one with the effect and one without, in turn."""
@@ -100,12 +101,7 @@ def effects_of(scene: Scene) -> list[Effect]:
     scene : Scene
         Without a sweep.
 
-    Raises
-    ------
-    UsageError
-        Recordings drive it.
     """
-    refuse_replay(scene)
     found = list(_found(scene))
     return [effect for effect in found if effect is not None]
 
@@ -121,7 +117,7 @@ def _found(scene: Scene) -> Iterator[Effect | None]:
             yield _without(
                 scene, f"modes {half + 1} to {scene.body.modes}", "body.modes", _sets("body", "modes", half)
             )
-        for name in RECORDED:
+        for name in RECORDED if scene.replay is None else ():
             if getattr(scene.record, name) and (name == "impacts" or scene.period is not None):
                 yield _without(
                     scene, f"record of {name}", f"record.{name}", _sets("record", name, False), keeps=True
@@ -170,7 +166,7 @@ def _without(scene: Scene, name: str, key: str, change: Change, *, keeps: bool =
     document = parse_toml(scene.text)
     document.pop("sweep", None)
     if key != SERIES and scene.general is None:
-        document["record"].pop("time_series", None)
+        document.get("record", {}).pop("time_series", None)
     base = Scene.from_dict(document, scene.source)
     change(document)
     try:
@@ -253,9 +249,9 @@ def shares_of(
 
 
 @contextmanager
-def opened(scene: Scene) -> Iterator[SceneTrial]:
+def opened(scene: Scene) -> Iterator[SceneTrial | ReplayTrial]:
     """Open a scene, and close it at the end."""
-    trial = SceneTrial(scene)
+    trial = opened_trial(scene)
     try:
         yield trial
     finally:
@@ -285,7 +281,7 @@ def _share(effect: Effect, whole: float, scales: Scales) -> Share:
     return Share(effect, seconds, whole, words, change)
 
 
-def _timed(trial: SceneTrial) -> float:
+def _timed(trial: SceneTrial | ReplayTrial) -> float:
     """Return the processor time of a run, s; wall time where another process computes it."""
     began, processor = time.perf_counter(), time.process_time()
     trial.run()

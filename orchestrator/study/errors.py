@@ -103,13 +103,21 @@ def _errors_of_motion(found: Observation, reference: Observation, scales: Scales
     if 0.0 < size < math.inf:
         off = np.abs(np.subtract(found.final, reference.final)) / (size, size * rate)
         errors["final_state"] = float(off.max())
-    samples, expected = found.samples, reference.samples
+    samples, expected = found.samples, _at_the_instants_of(found, reference)
     if samples is not None and expected is not None and expected.size and samples.shape == expected.shape:
         spread = np.ptp(expected, axis=0)
         off = np.abs(samples - expected).max(axis=0)
         moving = spread > 0.0
         errors["samples"] = float((off[moving] / spread[moving]).max()) if moving.any() else math.nan
     return errors
+
+
+def _at_the_instants_of(found: Observation, reference: Observation) -> Floats | None:
+    """Return the samples of the reference where those that were found are, linear between its own."""
+    own, times, samples = reference.sample_times, found.sample_times, reference.samples
+    if samples is None or own is None or times is None or np.array_equal(own, times):
+        return samples
+    return np.column_stack([np.interp(times, own, column) for column in samples.T])
 
 
 def matched(

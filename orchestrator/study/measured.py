@@ -33,6 +33,8 @@ class Measured:
         How many it showed.
     energy_residual : float
         J; NaN where nothing is exchanged.
+    variance : float
+        Variance of a recording that a replay accounts for, percent; else NaN.
     statistics : Statistics or None
         In chaos.
     """
@@ -44,6 +46,7 @@ class Measured:
     memory: int = -1
     impacts: int = 0
     energy_residual: float = math.nan
+    variance: float = math.nan
     statistics: Statistics | None = None
 
     @property

@@ -35,11 +35,15 @@ class Observation:
     energy_residual : float
         Energy that the exchange of a contact's force added, J; NaN where nothing is exchanged.
     samples : ndarray, shape (sample, variable), or None
-        What a general scene samples, without the time.
+        What a general scene samples, or a replay reads, without the time.
+    sample_times : ndarray, shape (sample,), or None
+        When a replay reads, s; None where the samples of all ways are of the same instants.
     seconds : float
         Wall time, s.
     failure : str
         Why there is no result, or what is wrong with it; empty where it is one.
+    variance : float
+        Least variance accounted for among the channels that a replay is compared with, percent; else NaN.
     """
 
     impacts: Floats = field(default_factory=_no_impacts)
@@ -48,8 +52,10 @@ class Observation:
     final: tuple[float, float] = (math.nan, math.nan)
     energy_residual: float = math.nan
     samples: Floats | None = None
+    sample_times: Floats | None = None
     seconds: float = math.nan
     failure: str = ""
+    variance: float = math.nan
 
     @property
     def displacement_range(self) -> float:
@@ -80,4 +86,6 @@ def observation_of(record: RunRecord) -> Observation:
         residual = float(np.abs(record.energy_residual).sum())
     samples = None if record.samples is None else record.samples[:, 1:]
     final = (record.final_displacement, record.final_velocity)
-    return Observation(impacts, lowest, highest, final, residual, samples, record.seconds, failure)
+    return Observation(
+        impacts, lowest, highest, final, residual, samples, seconds=record.seconds, failure=failure
+    )

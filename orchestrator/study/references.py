@@ -17,7 +17,8 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.models import HertzStop, HuntCrossleyStop, RestitutionStop
 from vibroimpact.orchestrator.study.errors import QUANTITIES, Scales, errors_of
 from vibroimpact.orchestrator.study.observation import Floats, Observation
-from vibroimpact.orchestrator.study.ways import SceneTrial
+from vibroimpact.orchestrator.study.replays import span_of
+from vibroimpact.orchestrator.study.ways import opened_trial
 
 DISTURBANCE = 1e-9
 """Relative change of a number of the scene by which the sensitivity of its motion is measured."""
@@ -92,6 +93,9 @@ def scales_of(scene: Scene) -> Scales:
     if scene.general is not None:
         begin = scene.record.transient_time
         return Scales(scene.record.recorded_time, (begin, begin + scene.record.recorded_time))
+    if scene.replay is not None:
+        begin, end = span_of(scene)
+        return Scales(end - begin, (begin, end))
     window = recorded_window(scene, float_parameters(scene, None))
     return Scales(scene.period or window[1] - window[0], window)
 
@@ -122,7 +126,9 @@ def reference_of(scene: Scene) -> Reference:
     sensitivity = max(largest.values()) / DISTURBANCE if keys else math.nan
     chaotic = any(change.failure for change in changes) or max(largest.values()) > CHAOTIC
     error = {name: SAFETY * ROUNDING * (1.0 + value / DISTURBANCE) for name, value in largest.items()}
-    name = "the fused run, exact between events"
+    name = "the fused run, exact between events" + (
+        "" if scene.replay is None else " and between samples, which are joined by lines"
+    )
     if integrated:
         name = f"the fused run at a contact tolerance of {FINEST:g}"
         next_best = observed(
@@ -138,7 +144,7 @@ def reference_of(scene: Scene) -> Reference:
 
 def observed(scene: Scene) -> Observation:
     """Return what a run of a scene by its own runner shows."""
-    trial = SceneTrial(scene)
+    trial = opened_trial(scene)
     try:
         return trial.run()
     finally:

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 from scipy.optimize import brentq
 
-from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.fmi.instance import Wrapper
 from vibroimpact.orchestrator.fmi.library import Function
 from vibroimpact.orchestrator.run import open_runner
@@ -23,6 +23,7 @@ from vibroimpact.orchestrator.scene.models import (
     RestitutionStop,
 )
 from vibroimpact.orchestrator.study.observation import Observation, observation_of
+from vibroimpact.orchestrator.study.replays import ReplayTrial, rates_of
 from vibroimpact.orchestrator.study.trials import (
     CoupledTrial,
     ModelExchangeTrial,
@@ -43,6 +44,8 @@ CONTACT_TIMES = (1e-1, 1e-2, 1e-3)
 """Of yielding stops that stand for a rigid one, over the period."""
 EXCHANGES = ("jacobi", "gauss_seidel", "iterated")
 MOST_MODES = 64
+LEAST_TRIED_MODES = 8
+"""Modes of a beam up to which, at least, others than its own are tried."""
 
 
 class Trial(Protocol):
@@ -134,27 +137,21 @@ def ways_of(scene: Scene) -> list[Way]:
     """
     if scene.general is not None:
         return _general_ways(scene)
+    if scene.replay is not None:
+        return [*_fused(scene), *_coupled_replay(scene), *_fewer_samples(scene), *_other_modes(scene)]
     return [*_fused(scene), *_coupled(scene), *_plain_steps(scene), *_integrated(scene), *_models(scene)]
 
 
-def refuse_replay(scene: Scene) -> None:
-    """Refuse a scene that recordings drive.
-
-    Raises
-    ------
-    UsageError
-    """
-    if scene.replay is not None:
-        raise UsageError(
-            f"{scene.source}: replay: expected a scene that recordings do not drive, got one that they do. "
-            "`vibroimpact replay` compares it with what was measured."
-        )
+def opened_trial(scene: Scene, wrap: Wrapper | None = None) -> SceneTrial | ReplayTrial:
+    """Open a scene as it says itself; of a replay nobody wraps the functions."""
+    return SceneTrial(scene, wrap) if scene.replay is None else ReplayTrial(scene)
 
 
 def remarks_on(scene: Scene) -> list[str]:
     """Return what the study of a scene leaves out, and why."""
     remarks = []
-    if scene.general is None and not isinstance(scene.body, OscillatorBody) and scene.stops:
+    plain = scene.general is None and scene.replay is None and scene.stops
+    if plain and not isinstance(scene.body, OscillatorBody):
         remarks.append(
             "plain steps of equal size: for an oscillator only, whose state a step can be begun from"
         )
@@ -171,7 +168,7 @@ def _by_scene(
     name: str, knob: str, setting: float, scene: Scene, changes: Mapping[str, Any], **kind: bool
 ) -> Way:
     changed = scene.with_values(changes) if changes else scene
-    return Way(name, knob, setting, changes, lambda wrap: SceneTrial(changed, wrap), **kind)
+    return Way(name, knob, setting, changes, lambda wrap: opened_trial(changed, wrap), **kind)
 
 
 def _opens(kind: Callable[..., Trial], *arguments: Any) -> Opener:
@@ -213,6 +210,24 @@ def _coupled(scene: Scene) -> list[Way]:
                 )
             )
     return ways
+
+
+def _coupled_replay(scene: Scene) -> list[Way]:
+    """The body, its stops and the recording, each an FMU of its own."""
+    if any(getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in scene.stops):
+        return []
+    return [_by_scene("coupled, FMI 3.0", "", math.nan, scene, {"execution.how": "coupled"})]
+
+
+def _fewer_samples(scene: Scene) -> list[Way]:
+    return [
+        Way("fewer samples", "samples per s", rate, {}, _opens_replay(scene, every))
+        for every, rate in rates_of(scene).items()
+    ]
+
+
+def _opens_replay(scene: Scene, every: int) -> Opener:
+    return lambda wrap: ReplayTrial(scene, every)
 
 
 def _plain_steps(scene: Scene) -> list[Way]:
@@ -265,16 +280,9 @@ def _integrated(scene: Scene) -> list[Way]:
 
 def _models(scene: Scene) -> list[Way]:
     """Other models of the same thing: what they change is no error of a solver."""
-    ways = []
-    body = scene.body
+    body, ways = scene.body, []
     if isinstance(body, BeamBody):
-        if scene.stops and not any(isinstance(stop, RestitutionStop) for stop in scene.stops):
-            counts = {n for n in (1, 2, 4, 8, 16, 32, MOST_MODES) if n <= 4 * body.modes} | {body.modes}
-            ways += [
-                _by_scene("fewer or more modes", "modes", n, scene, {"body.modes": n}, model=True)
-                for n in sorted(counts)
-                if _can_have(scene, {"body.modes": n})
-            ]
+        ways += _other_modes(scene) if scene.stops else []
         if any(isinstance(stop, RestitutionStop) for stop in scene.stops):
             other = "collocation" if body.impact_projection == "variational" else "variational"
             ways.append(
@@ -285,6 +293,20 @@ def _models(scene: Scene) -> list[Way]:
     if isinstance(body, OscillatorBody) and len(scene.stops) == 1:
         ways += _equal_restitution(scene, body)
     return ways
+
+
+def _other_modes(scene: Scene) -> list[Way]:
+    """Fewer and more modes of a beam; with rigid stops nothing converges, and none is shown."""
+    body = scene.body
+    if not isinstance(body, BeamBody) or any(isinstance(stop, RestitutionStop) for stop in scene.stops):
+        return []
+    most = max(LEAST_TRIED_MODES, 4 * body.modes)
+    counts = {n for n in (1, 2, 4, 8, 16, 32, MOST_MODES) if n <= most} | {body.modes}
+    return [
+        _by_scene("fewer or more modes", "modes", n, scene, {"body.modes": n}, model=True)
+        for n in sorted(counts)
+        if _can_have(scene, {"body.modes": n})
+    ]
 
 
 def _equal_restitution(scene: Scene, body: OscillatorBody) -> list[Way]:

@@ -87,10 +87,10 @@ def test_misuse_of_accuracy_is_one_line(
 
 
 @pytest.mark.parametrize("command", ["accuracy", "effects"])
-def test_a_scene_that_recordings_drive_is_refused(command: str) -> None:
+def test_a_replay_that_names_no_recording_is_one_line(command: str) -> None:
     done = in_this_process(command, str(EXAMPLES / "recordings" / "board.toml"))
     assert done.returncode == 2
-    assert "expected a scene that recordings do not drive" in done.stderr
+    assert "replay.recordings: expected a recording, got none. Name it in the scene" in done.stderr
 
 
 def test_an_output_that_holds_something_else_is_kept(scene: Path) -> None:

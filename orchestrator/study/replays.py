@@ -1,0 +1,132 @@
+"""A replay as studies see it: driven by all samples of its recording, or by every second, fourth, ... of them."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from vibroimpact.analysis.recording import Recording, TimeAxis, open_signals
+from vibroimpact.fmus.errors import ComponentError, DatasetError, EstimationError
+from vibroimpact.orchestrator.replay.replayer import Replayer, recording_of
+from vibroimpact.orchestrator.replay.scoring import compare_motion
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.observation import (
+    IMPACT_CONTACT,
+    IMPACT_TIME,
+    IMPACT_VELOCITY,
+    Observation,
+)
+from vibroimpact.orchestrator.study.trials import LATE
+
+THINNED = (2, 4, 8, 16, 32)
+"""One of how many samples is kept, as a slower board without a filter would have."""
+LEAST_SAMPLES = 64
+"""Samples that are left, below which a recording is thinned no further."""
+
+
+class ReplayTrial:
+    """A replay of the first recording that a scene names.
+
+    Parameters
+    ----------
+    scene : Scene
+        With `[replay]`.
+    every : int
+        Keep one of so many samples of each channel.
+
+    Raises
+    ------
+    UsageError
+        The scene names no recording.
+    DatasetError
+        The recording cannot be read.
+    """
+
+    is_guarded = False
+
+    def __init__(self, scene: Scene, every: int = 1) -> None:
+        recording = thinned(open_signals(recording_of(scene, 1)), every)
+        self._replayer = Replayer(scene, recording, execution=scene.execution.how)
+        self._variance: float | None = None
+
+    def run(self) -> Observation:
+        """Simulate the replay once; its score, which is the same each time, is found once and not timed."""
+        began, replayer = time.perf_counter(), self._replayer
+        try:
+            motion = replayer.simulate()
+        except ComponentError as error:
+            seconds, limit = time.perf_counter() - began, replayer.scene.execution.deadline
+            late = limit is not None and seconds >= limit
+            return Observation(seconds=seconds, failure=LATE if late else str(error).splitlines()[0])
+        seconds = time.perf_counter() - began
+        if self._variance is None:
+            try:
+                self._variance = min((c.variance for c in compare_motion(replayer, motion)), default=math.nan)
+            except EstimationError:
+                self._variance = (
+                    math.nan
+                )  # too little is left to be scored; what moves is compared all the same
+        return Observation(
+            motion.impacts[:, [IMPACT_TIME, IMPACT_VELOCITY, IMPACT_CONTACT]],
+            samples=np.column_stack(motion.readings) if motion.readings else None,
+            sample_times=motion.time,
+            seconds=seconds,
+            variance=self._variance,
+        )
+
+    def close(self) -> None:
+        """Free the components."""
+        self._replayer.close()
+
+
+def thinned(recording: Recording, every: int) -> Recording:
+    """Return a recording with one of so many samples of each channel, the first among them."""
+    if every == 1:
+        return recording
+    axes = {id(channel.axis): _thinned_axis(channel.axis, every) for channel in recording.channels.values()}
+    channels = {
+        name: replace(
+            channel,
+            values=channel.values[::every],
+            quality=channel.quality[::every],
+            axis=axes[id(channel.axis)],
+        )
+        for name, channel in recording.channels.items()
+    }
+    return replace(recording, channels=channels)
+
+
+def _thinned_axis(axis: TimeAxis, every: int) -> TimeAxis:
+    return replace(
+        axis, time=axis.time[::every], interval=None if axis.interval is None else axis.interval * every
+    )
+
+
+def rates_of(scene: Scene) -> dict[int, float]:
+    """Return how far the recording of a scene can be thinned, with the rate that is left, 1/s.
+
+    It is that of the channel that drives, or of the first that is compared.
+
+    Raises
+    ------
+    DatasetError
+        The recording cannot be read, or has no such channel.
+    """
+    replay = scene.replay
+    assert replay is not None
+    recording = open_signals(recording_of(scene, 1))
+    name = replay.channel if replay.drive is not None else replay.compare[0].measured
+    axis = recording.channel(name).axis
+    if len(axis.time) < 2:
+        raise DatasetError(f"{recording.title}: {name}: expected at least two samples, got {len(axis.time)}.")
+    least = min(len(channel.time) for channel in recording.channels.values())
+    return {every: axis.rate / every for every in THINNED if least // every >= LEAST_SAMPLES}
+
+
+def span_of(scene: Scene) -> tuple[float, float]:
+    """Return when the replay of a scene begins and ends, s."""
+    with Replayer(scene, open_signals(recording_of(scene, 1)), execution="fused") as replayer:
+        return float(replayer.time[0]), float(replayer.time[-1])
