@@ -1,0 +1,121 @@
+"""What it costs to record: nothing, extremes, impacts, a time series; and what each example scene calls and writes.
+
+- Records: the motion of `examples/single_run.toml`, 4,000 periods of it, with each record in turns. Processor time,
+  medians of repetitions and their range, over that of the run which records nothing. A time series costs its samples:
+  the time of one sample is told too, at two rates.
+- Examples: calls of the functions of FMUs, and bytes of the dataset, of one point of each example scene. They are
+  counts, the same on each machine.
+
+Run with `python tests/benchmarks/bench_recording.py [--repetitions 9]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import vibroimpact as vi
+from vibroimpact.fmus.errors import SceneError
+from vibroimpact.fmus.safe_toml import parse_toml
+from vibroimpact.orchestrator.run import open_runner
+from vibroimpact.orchestrator.scene import Scene, load_scene
+from vibroimpact.orchestrator.study.ways import CallCounter
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PERIODS = 4_000
+RECORDS: dict[str, dict[str, Any]] = {
+    "nothing": {"impacts": False, "extrema": False, "strobe": False},
+    "extremes": {"impacts": False, "extrema": True, "strobe": False},
+    "impacts": {"impacts": True, "extrema": False, "strobe": False},
+    "all three": {"impacts": True, "extrema": True, "strobe": True},
+    "10 samples a period": {"impacts": False, "extrema": False, "strobe": False, "samples": 10},
+    "40 samples a period": {"impacts": False, "extrema": False, "strobe": False, "samples": 40},
+}
+
+
+def scene_of(record: dict[str, Any]) -> Scene:
+    """Return the scene with a record."""
+    document = parse_toml((EXAMPLES / "single_run.toml").read_text(encoding="utf-8"))
+    keys = {name: value for name, value in record.items() if name != "samples"}
+    document["record"] = {"transient_periods": 10, "recorded_periods": PERIODS, **keys}
+    scene = Scene.from_dict(document)
+    if "samples" not in record:
+        return scene
+    assert scene.period is not None
+    series = {"variables": ["displacement"], "rate": record["samples"] / scene.period}
+    return scene.with_values({"record.time_series": series})
+
+
+def seconds_of_records(repetitions: int) -> dict[str, list[float]]:
+    """Run all records in turns; return the processor times of each, s."""
+    runners = {name: open_runner(scene_of(record), "fused") for name, record in RECORDS.items()}
+    found: dict[str, list[float]] = {name: [] for name in runners}
+    for runner in runners.values():
+        runner.run({})
+    for _ in range(repetitions):
+        for name, runner in runners.items():
+            began = time.process_time()
+            runner.run({})
+            found[name].append(time.process_time() - began)
+    for runner in runners.values():
+        runner.close()
+    return found
+
+
+def counts_of(path: Path, folder: Path) -> tuple[int, int]:
+    """Return the calls of functions of FMUs, and the bytes of the dataset, of one point of a scene."""
+    scene = load_scene(path).with_sweep({})
+    counter = CallCounter()
+    runner = open_runner(scene, scene.execution.how, wrap=lambda name: counter.wrap)
+    counter.calls.clear()
+    try:
+        runner.run({})
+    finally:
+        runner.close()
+    target = folder / "point.nc"
+    vi.run(scene, target, progress=False)
+    return sum(counter.calls.values()), target.stat().st_size
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--repetitions", type=int, default=9)
+    repetitions = parser.parse_args().repetitions
+    found = seconds_of_records(repetitions)
+    bare = statistics.median(found["nothing"])
+    print(
+        f"{PERIODS} periods of single_run.toml, processor time over that without a record ({bare * 1e3:.2f} ms)"
+    )
+    for name, seconds in found.items():
+        middle = statistics.median(seconds)
+        line = f"  {name:20} {middle / bare:8.2f}  ({min(seconds) / bare:.2f} to {max(seconds) / bare:.2f})"
+        samples = RECORDS[name].get("samples", 0) * PERIODS
+        print(line + (f"  {(middle - bare) / samples * 1e6:.2f} us a sample" if samples else ""))
+    print("One point of each example: calls of functions of FMUs, bytes of the dataset")
+    with tempfile.TemporaryDirectory() as folder:
+        for path in sorted(EXAMPLES.glob("*.toml")):
+            try:
+                scene = load_scene(path)
+            except SceneError:
+                print(f"  {path.name:24} (needs an FMU that is not there)")
+                continue
+            if scene.general is not None and scene.general.guard:
+                print(f"  {path.name:24} (in a process of its own, where nobody counts)")
+                continue
+            calls, size = counts_of(path, Path(folder))
+            print(f"  {path.name:24} {calls:9d} {size:10d}")
+    least, *others = (
+        statistics.median(found[name]) for name in ("nothing", "extremes", "impacts", "all three")
+    )
+    held = "so it was" if least <= min(others) and others[-1] >= max(others) else "not within the noise"
+    share = 100.0 * (others[-1] / bare - 1.0)
+    print(f"Recording less costs less: {held}; all three records cost {share:.0f} % of the motion.")
+
+
+if __name__ == "__main__":
+    main()
