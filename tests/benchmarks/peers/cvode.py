@@ -51,7 +51,7 @@ def opened(method: str, problem: Problem, tolerance: float, clock: Clock) -> Run
     phases = list(Phase)[: len(problem.pieces)]
     functions = [_callbacks(problem, phase, clock) for phase in phases]
 
-    def solver(phase: Phase, first: float) -> Any:
+    def solver(phase: Phase) -> Any:
         slope, event, jacobian = functions[phase]
         longest = longest_step(problem, phase)
         return CVODE(
@@ -64,16 +64,13 @@ def opened(method: str, problem: Problem, tolerance: float, clock: Clock) -> Run
             jacfn=jacobian,
             max_num_steps=MOST_STEPS,
             max_step=0.0 if longest == math.inf else longest,
-            first_step=first,
         )
 
-    usual = [solver(phase, 0.0) for phase in phases]
+    solvers = [solver(phase) for phase in phases]
 
     def integrate(phase: Phase, t: float, y: Floats, first: float) -> tuple[float, Floats, bool]:
-        # a first step is an option of the solver: one that is made for this flight alone
-        short = 0.0 < first < 1e-2 * problem.period
-        chosen = solver(phase, min(first, problem.end - t)) if short else usual[phase]
-        found = chosen.solve([t, problem.end], y)
+        # its own first steps are short enough for any bounce; one that is asked for fails its error test
+        found = solvers[phase].solve([t, problem.end], y)
         if not found.success:
             raise ArithmeticError(str(found.message))
         return float(found.t[-1]), np.array(found.y[-1]), found.status == AT_EVENT
