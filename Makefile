@@ -1,6 +1,6 @@
 # Everything sets itself up: a virtual environment in .venv, the packages, the FMUs.
 .DEFAULT_GOAL := help
-.PHONY: help demo fast test soak coverage exchange wheel oldest sanitize bench lint docs clean
+.PHONY: help demo fast test soak coverage exchange wheel oldest sanitize bench peers lint docs clean
 
 OLDEST := $(or $(PYTHON),python3.11)
 ifneq ($(PYTHON),)
@@ -46,6 +46,9 @@ sanitize: $(VENV)/test.stamp ## run the C tests under the address and undefined-
 
 bench: $(VENV)/bench.stamp $(VENV)/fmus.stamp ## run the benchmarks; each leaves its figures and a sentence
 	@for script in tests/benchmarks/bench_*.py; do $(BIN)/python "$$script" || exit 1; done
+
+peers: $(VENV)/peers.stamp $(VENV)/fmus.stamp ## measure other people's solvers beside ours; writes the end of docs/accuracy.md
+	PYTHONPATH=tests:tests/benchmarks $(BIN)/python -m peers
 
 coverage: $(VENV)/test.stamp $(VENV)/fmus.stamp ## ask 300 records whether the intervals of estimates hold the truth; goes on where it ended; SEED= RECORDS=
 	PYTHONPATH=tests OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m interval_coverage
@@ -97,6 +100,12 @@ $(VENV)/test.stamp: $(SETUP) | $(BIN)/python
 $(VENV)/bench.stamp: $(SETUP) | $(BIN)/python
 	$(ANNOUNCE)
 	$(INSTALL) -e '.[test,bench]'
+	@touch $@ $(VENV)/test.stamp $(VENV)/demo.stamp $(VENV)/fmus.stamp
+
+# other people's solvers, which nothing else needs
+$(VENV)/peers.stamp: $(SETUP) | $(BIN)/python
+	$(ANNOUNCE)
+	$(INSTALL) -e '.[test,peers]'
 	@touch $@ $(VENV)/test.stamp $(VENV)/demo.stamp $(VENV)/fmus.stamp
 
 # other tools, and the compiler for other machines

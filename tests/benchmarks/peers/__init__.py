@@ -8,7 +8,7 @@
 | `ways` | what a way of simulating is to the measurement |
 | `fused`, `solve_ivp`, `cvode`, `jax_flights`, `fmpy_import`, `time_stepping` | the ways, one module for each package |
 | `measure` | error and processor time of each way at each setting |
-| `statement` | the goals, met or missed, and the tables of docs/accuracy.md |
+| `page` | the goals, met or missed, and the table of docs/accuracy.md |
 | `figure` | error against cost, a panel for each problem |
 
 `make peers` runs it all and writes `docs/accuracy/peers.json`, `docs/accuracy/peers.png` and the tables of the page.

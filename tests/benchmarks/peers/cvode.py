@@ -1,6 +1,6 @@
 """CVODE of SUNDIALS by scikit-sundae, with its root finding and the Jacobian; slopes are Python functions.
 
-Adams and BDF, each for all problems, though the one is advised for motion that is not stiff and the other for stiff motion.
+Adams and BDF, each for all problems, though the one is advised for motion that is not stiff, the other for stiff.
 """
 
 from __future__ import annotations

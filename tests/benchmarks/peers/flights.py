@@ -1,8 +1,8 @@
-"""The loop of a careful user around an integrator that finds events: impacts, chatter, rest, release, compliant contacts.
+"""The loop of a careful user around an integrator with events: impacts, chatter, rest, release, compliant contacts.
 
 Each event ends an integration; the state is changed by hand, and the integration begins again. A flight that starts on
 the stop is given a first step of half its ballistic length, since a step over the whole bounce shows no change of sign.
-A chatter is ended where the rebound is slow: by the geometric sum of what is left of it (equations.md 3.1, first order).
+A chatter ends where the rebound is slow: by the geometric sum of what is left of it (equations.md 3.1, first order).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""FMPy's own importer (`simulate_fmu`) with this package's FMUs: co-simulation in FMI 3.0 and 2.0, model exchange by CVode.
+"""FMPy's own importer (`simulate_fmu`) with our FMUs: co-simulation in FMI 3.0 and 2.0, model exchange by CVode.
 
-What is set is the output interval of co-simulation, which FMPy takes as its step: between two rows the FMU is exact, but
+What is set is the output interval of co-simulation, FMPy's step: between two rows the FMU is exact, but
 it tells its last impact alone, so that of several between two rows all but one are missed. And the tolerance of CVode,
 whose rows come at events too. Archives are unpacked and descriptions are read outside of the time that is measured.
 """
@@ -25,7 +25,11 @@ from vibroimpact.orchestrator.study.ways import INTEGRATOR_TOLERANCES
 
 ROWS = (1.0, 16.0, 256.0)
 """Rows of co-simulation in a period."""
-OUTPUT = ("displacement", "velocity", *(f"contact[1].{name}" for name in ("count", "last_time", "last_velocity", "stick_start")))
+OUTPUT = (
+    "displacement",
+    "velocity",
+    *(f"contact[1].{name}" for name in ("count", "last_time", "last_velocity", "stick_start")),
+)
 
 
 def _run(
@@ -59,7 +63,10 @@ def opened(version: str, kind: str, problem: Problem, setting: float, clock: Clo
     """Return what simulates a problem by one version and kind of its FMU."""
     folder = str(unpack(fmu_path(FMU_NAMES[problem.scene.body.kind], version)).folder)
     if kind == "CoSimulation":
-        options: dict[str, Any] = {"output_interval": problem.period / setting, "early_return_allowed": version == "3.0"}
+        options: dict[str, Any] = {
+            "output_interval": problem.period / setting,
+            "early_return_allowed": version == "3.0",
+        }
     else:
         interval = problem.period / (ROWS_A_PERIOD * problem.modes**2)
         options = {"solver": "CVode", "relative_tolerance": setting, "output_interval": interval}

@@ -1,4 +1,4 @@
-"""This package's own run: the stop inside the body's FMU, one step over the whole motion, impacts and rests recorded."""
+"""Our own run: the stop inside the body's FMU, one step over the whole motion, impacts and rests recorded."""
 
 from __future__ import annotations
 

@@ -1,13 +1,15 @@
 """diffrax, compiled by JAX: Dopri8 and Kvaerno5 with events, one motion or many at once (vmapped).
 
-The whole motion with all its impacts is one compiled loop. The roots of events are found by Newton's method, as its pages advise;
+The whole motion with all its impacts is one compiled loop. Events are found by Newton's method, as its pages advise;
 the motions of a batch differ in the amplitude of the force, as in a sweep, and the first is the one that is asked for.
 """
 
 from __future__ import annotations
 
+import math
 import os
-from typing import Any
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -37,55 +39,81 @@ def one_thread() -> None:
     os.environ["JAX_PLATFORMS"] = "cpu"
 
 
-def _compiled(problem: Problem, solver: Any, batch: int) -> Any:
-    """Return the compiled function: amplitudes, tolerance and slow rebound to what became of each motion."""
+class Numbers(NamedTuple):
+    """The numbers of a problem, which a compiled function is given: rungs of a ladder share it."""
+
+    matrices: Floats
+    loads: Floats
+    constants: Floats
+    rows: Floats
+    event_loads: Floats
+    event_constants: Floats
+    shape: Floats
+    direction: Floats
+    start: Floats
+    w: float
+    shift: float
+    end: float
+    position: float
+    restitution: float
+
+
+def _numbers(problem: Problem) -> Numbers:
+    pieces = problem.pieces
+    numbers: Any = Numbers  # a row of arrays, then numbers
+    found: Numbers = numbers(
+        *(
+            np.array([getattr(piece, name) for piece in pieces])
+            for name in ("matrix", "load", "constant", "event_row", "event_load", "event_constant")
+        ),
+        problem.shape,
+        problem.direction,
+        problem.start,
+        problem.angular_frequency,
+        problem.forcing_phase,
+        problem.end,
+        problem.stop.position,
+        problem.stop.restitution if problem.is_rigid else 0.0,
+    )
+    return found
+
+
+@cache
+def _compiled(modes: int, rigid: bool, method: str, batch: int) -> Any:
+    """Return the compiled function: amplitudes, tolerance, slow rebound and numbers to what became of each motion."""
     import diffrax
     import jax
     import jax.numpy as jnp
     import optimistix
 
-    n, w, shift, period, end = (
-        problem.modes,
-        problem.angular_frequency,
-        problem.forcing_phase,
-        problem.period,
-        problem.end,
-    )
-    pieces = problem.pieces
-    matrices, loads, constants, rows = (
-        jnp.array([getattr(piece, name) for piece in pieces])
-        for name in ("matrix", "load", "constant", "event_row")
-    )
-    event_loads = jnp.array([piece.event_load for piece in pieces])
-    event_constants = jnp.array([piece.event_constant for piece in pieces])
-    shape, direction = jnp.array(problem.shape), jnp.array(problem.direction)
-    rigid, position = problem.is_rigid, problem.stop.position
-    r = problem.stop.restitution if rigid else 0.0
+    n, solver = modes, getattr(diffrax, method)()
 
     def slope(t: Any, y: Any, args: Any) -> Any:
-        phase, size = args
-        return matrices[phase] @ y + loads[phase] * (size * jnp.cos(w * t + shift)) + constants[phase]
+        phase, size, p = args
+        wave = size * jnp.cos(p.w * t + p.shift)
+        return p.matrices[phase] @ y + p.loads[phase] * wave + p.constants[phase]
 
     def event(t: Any, y: Any, args: Any, **others: Any) -> Any:
-        phase, size = args
-        wave = size * jnp.cos(w * t + shift)
-        return rows[phase] @ y + event_loads[phase] * wave + event_constants[phase]
+        phase, size, p = args
+        wave = size * jnp.cos(p.w * t + p.shift)
+        return p.rows[phase] @ y + p.event_loads[phase] * wave + p.event_constants[phase]
 
-    def struck(t: Any, y: Any, size: Any, slow: Any) -> Any:
+    def struck(t: Any, y: Any, size: Any, slow: Any, p: Any) -> Any:
         """Return the state after a rigid impact, whether the body rests, when the rest began, the first step."""
-        speed = shape @ y[n:]
-        y = y.at[:n].add(direction * (position - shape @ y[:n]))
-        still = y.at[n:].add(-direction * speed)
-        pull = -event(t, still, (int(Phase.HELD), size))
+        r, speed = p.restitution, p.shape @ y[n:]
+        y = y.at[:n].add(p.direction * (p.position - p.shape @ y[:n]))
+        still = y.at[n:].add(-p.direction * speed)
+        pull = -event(t, still, (int(Phase.HELD), size, p))
         rests = (r * speed < slow) & (pull > 0.0)
-        after = jnp.where(rests, still, y.at[n:].add(-direction * (1.0 + r) * speed))
+        after = jnp.where(rests, still, y.at[n:].add(-p.direction * (1.0 + r) * speed))
         # a rest may be in no hurry; a bounce begins with half of its ballistic length
-        first = jnp.where(rests | (pull <= 0.0), FIRST_STEP * period, r * speed / pull)
+        first = jnp.where(rests | (pull <= 0.0), FIRST_STEP * _period(p), r * speed / pull)
         return after, rests, t + 2.0 * r * speed / (pull * (1.0 - r)), first
 
-    def simulated(size: Any, tolerance: Any, slow: Any) -> Any:
+    def simulated(size: Any, tolerance: Any, slow: Any, p: Any) -> Any:
+        end, period = p.end, _period(p)
         controller = diffrax.PIDController(rtol=tolerance, atol=ABSOLUTE * tolerance)
-        roots = optimistix.Newton(rtol=ROOT, atol=ROOT)
+        roots: Any = optimistix.Newton(rtol=ROOT, atol=ROOT)
 
         def more(state: Any) -> Any:
             t, _, _, _, count, rests, _, _, good = state
@@ -101,21 +129,23 @@ def _compiled(problem: Problem, solver: Any, batch: int) -> Any:
                 jnp.where(phase == Phase.HELD, jnp.minimum(t + HELD_STEP * period, end), end),
                 jnp.minimum(first, end - t),
                 y,
-                args=(phase, size),
+                args=(phase, size, p),
                 event=diffrax.Event(event, roots, direction=True),
                 stepsize_controller=controller,
                 adjoint=diffrax.ForwardMode(),
                 max_steps=MOST_STEPS,
                 throw=False,
             )
-            good = (found.result == diffrax.RESULTS.successful) | (found.result == diffrax.RESULTS.event_occurred)
+            good = (found.result == diffrax.RESULTS.successful) | (
+                found.result == diffrax.RESULTS.event_occurred
+            )
             met = found.event_mask
             t, y = found.ts[-1], found.ys[-1]
             hits = met & (phase == Phase.FREE)
-            impacts = impacts.at[count].set(jnp.where(hits, jnp.array([t, shape @ y[n:]]), impacts[count]))
+            impacts = impacts.at[count].set(jnp.where(hits, jnp.array([t, p.shape @ y[n:]]), impacts[count]))
             count = count + hits
             if rigid:
-                after, stays, began, step = struck(t, y, size, slow)
+                after, stays, began, step = struck(t, y, size, slow, p)
                 y = jnp.where(hits, after, y)
                 starts = starts.at[rests].set(jnp.where(hits & stays, began, starts[rests]))
                 rests = rests + (hits & stays)
@@ -130,7 +160,7 @@ def _compiled(problem: Problem, solver: Any, batch: int) -> Any:
 
         state = (
             jnp.zeros(()),
-            jnp.array(problem.start),
+            jnp.asarray(p.start),
             jnp.array(int(Phase.FREE)),
             jnp.array(FIRST_STEP * period),
             jnp.array(0),
@@ -144,21 +174,21 @@ def _compiled(problem: Problem, solver: Any, batch: int) -> Any:
 
     if batch == 1:
         return jax.jit(simulated)
-    return jax.jit(jax.vmap(simulated, in_axes=(0, None, None)))
+    return jax.jit(jax.vmap(simulated, in_axes=(0, None, None, None)))
 
 
 def opened(method: str, batch: int, problem: Problem, tolerance: float, clock: Clock) -> Run:
     """Return what simulates a problem with one solver of diffrax; it is compiled here, by a first run."""
-    import diffrax
     import jax
 
-    function = _kept(problem, method, batch, getattr(diffrax, method)())
+    ready: Any = jax.block_until_ready
+    function, numbers = _compiled(problem.modes, problem.is_rigid, method, batch), _numbers(problem)
     size: Any = np.float64(1.0) if batch == 1 else 1.0 + SPREAD * np.linspace(0.0, 1.0, batch)
     slow = slow_rebound(tolerance)
 
     def run() -> Found:
         clock.start()
-        result = jax.block_until_ready(function(size, tolerance, slow))
+        result = ready(function(size, tolerance, slow, numbers))
         y, count, rests, impacts, starts, good = (
             np.asarray(part) if batch == 1 else np.asarray(part)[0] for part in result
         )
@@ -170,23 +200,19 @@ def opened(method: str, batch: int, problem: Problem, tolerance: float, clock: C
         seen = [(float(t), float(v)) for t, v in rows]
         return Found(observed(seen, problem.contact(y), failure), starts[: int(rests)], batch)
 
-    run()
+    ready(function(size, tolerance, slow, numbers))
     return run
 
 
-_COMPILED: dict[tuple[int, str, int], Any] = {}
-
-
-def _kept(problem: Problem, method: str, batch: int, solver: Any) -> Any:
-    """Return the compiled function of a problem, which all tolerances share."""
-    key = (id(problem), method, batch)
-    if key not in _COMPILED:
-        _COMPILED[key] = _compiled(problem, solver, batch)
-    return _COMPILED[key]
+def _period(p: Any) -> Any:
+    return 2.0 * math.pi / p.w
 
 
 def ways() -> list[Way]:
-    """Return one motion and many, by an explicit and by an implicit solver."""
+    """Return one motion by an explicit and by an implicit solver, and many by the explicit one.
+
+    A batch by the implicit one took longer than a run may on the beam, and nothing ends what is compiled.
+    """
 
     def way(method: str, batch: int) -> Way:
         return Way(
@@ -197,4 +223,4 @@ def ways() -> list[Way]:
             lambda problem, tolerance, clock: opened(method, batch, problem, tolerance, clock),
         )
 
-    return [way(method, batch) for method in ("Dopri8", "Kvaerno5") for batch in (1, BATCH)]
+    return [way("Dopri8", 1), way("Kvaerno5", 1), way("Dopri8", BATCH)]

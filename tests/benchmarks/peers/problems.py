@@ -43,7 +43,7 @@ class Phase(IntEnum):
 
 @dataclass(frozen=True)
 class Piece:
-    """A linear piece of the motion, and the event that ends it: event_row y + event_load cos(...) + event_constant rises."""
+    """A linear piece of the motion; it ends where event_row y + event_load cos(...) + event_constant rises through 0"""
 
     matrix: Floats
     load: Floats
@@ -148,11 +148,12 @@ class Problem:
         )
         pieces = [Piece(free, load, np.zeros(2 * n), gap, 0.0, -a), held]
         if not self.is_rigid:
-            press = np.concatenate([self.stop.stiffness * phi, self.stop.damping * phi])
-            push = np.concatenate([none, phi])
-            level = self.stop.stiffness * a
+            rate = self.stop.damping / self.stop.stiffness
+            # the force over the stiffness, a length: events are looked for in the same unit
+            press = np.concatenate([phi, rate * phi])
+            push = self.stop.stiffness * np.concatenate([none, phi])
             pieces += [
-                Piece(free - np.outer(push, press), load, push * level, -press, 0.0, level),
+                Piece(free - np.outer(push, press), load, push * a, -press, 0.0, a),
                 Piece(free, load, np.zeros(2 * n), -gap, 0.0, a),
             ]
         return tuple(pieces)
@@ -181,18 +182,12 @@ class Case:
         What the error is of, as `vibroimpact accuracy --of` has it.
     rungs : mapping of str to Problem
         By a name each.
-    chaotic : Problem or None
-        The whole motion, where the rung is its first impacts alone and statistics are compared too.
-    stiff : bool
-        Whether implicit methods are worth a try.
     """
 
     key: str
     title: str
     quantity: str
     rungs: Mapping[str, Problem]
-    chaotic: Problem | None = None
-    stiff: bool = False
 
     @property
     def periods(self) -> float:
@@ -231,7 +226,7 @@ def oscillator(
 
 
 def cantilever(modes: int, periods: int) -> Problem:
-    """Return the problem of a clamped-free beam in units of its first mode and its mass, driven and stopped at its tip."""
+    """Return a clamped-free beam in units of its first mode and its mass, driven and stopped at its tip."""
     found = beam_modes("clamped_free", 1)
     rigidity, ratio, frequency = float(found.eigenvalues[0]) ** -4, 0.02, 0.9
     body = beam(modes, flexural_rigidity=rigidity, damping_ratio=ratio)
@@ -298,7 +293,9 @@ def graze(excess: float) -> Problem:
     lag = math.atan2(2.0 * zeta * frequency, 1.0 - frequency**2)
     stop = {"position": 1.0, "restitution": 0.7}
     start = (-(1.0 + excess), 0.0)
-    return oscillator(zeta, (1.0 + excess) * size, frequency, stop, 1, start, (math.pi + lag) % (2.0 * math.pi))
+    return oscillator(
+        zeta, (1.0 + excess) * size, frequency, stop, 1, start, (math.pi + lag) % (2.0 * math.pi)
+    )
 
 
 def cases() -> list[Case]:
@@ -315,7 +312,6 @@ def cases() -> list[Case]:
             "chaos, first ten impacts",
             "all",
             {"": oscillator(0.05, 1.0, 2.8, chaos, 10, start)},
-            oscillator(0.05, 1.0, 2.8, chaos, 400, start),
         ),
         Case("grazes", "ladder of grazes", "impact_time", above | below),
         Case(
@@ -324,6 +320,6 @@ def cases() -> list[Case]:
             "all",
             {"": oscillator(0.05, 1.0, 0.2, {"position": 0.0, "restitution": 0.7}, 4, (-0.1, 0.0))},
         ),
-        Case("beam", "beam of 8 modes", "all", {"": cantilever(8, 10)}, stiff=True),
-        Case("kelvin_voigt", "stiff Kelvin-Voigt stop", "all", {"": oscillator(0.1, 0.5, 1.0, stiff, 20)}, stiff=True),
+        Case("beam", "beam of 8 modes", "all", {"": cantilever(8, 10)}),
+        Case("kelvin_voigt", "stiff Kelvin-Voigt stop", "all", {"": oscillator(0.1, 0.5, 1.0, stiff, 20)}),
     ]

@@ -22,7 +22,7 @@ def opened(method: str, problem: Problem, tolerance: float, clock: Clock) -> Run
     events: list[Any] = [event_of(problem, phase, clock) for phase in phases]
     for event in events:
         event.terminal, event.direction = True, 1.0
-    options = [
+    options: list[dict[str, Any]] = [
         {
             "method": method,
             "rtol": tolerance,

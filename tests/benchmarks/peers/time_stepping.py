@@ -1,6 +1,6 @@
 """MuJoCo: steps of equal size, the stop a soft limit of a tendon that reads off the contact point, all steps in C.
 
-Each mode is a slide joint with its spring and dashpot, the force a motor on a second tendon. A limit of MuJoCo is a spring
+Each mode is a slide joint with its spring and dashpot, the force a motor on a second tendon. A limit is a spring
 and a dashpot that push only; with negative `solref` they are given directly, and with the smallest `solimp` they are
 added to the other forces. So a Kelvin-Voigt stop is the same model but for 1e-4 of the other forces. A rigid stop is
 another model: a contact of ten steps with the damping ratio that gives a rigid mass its restitution (equations.md 6.9),
@@ -18,7 +18,7 @@ from peers.problems import Problem
 from peers.ways import Clock, Found, Run, Way, observed
 from vibroimpact.orchestrator.study.ways import damping_ratio_of
 
-STEPS_A_PERIOD = (500.0, 5_000.0, 50_000.0)
+STEPS_A_PERIOD = (500.0, 5_000.0)
 CONTACT_STEPS = 10.0
 """Length of a contact that stands for a rigid one, steps."""
 IMPEDANCE = 1e-4
@@ -33,7 +33,7 @@ def model_of(problem: Problem, step: float, integrator: str) -> str:
     stiffness, damping = _limit(problem, step)
     modes = range(problem.modes)
     bodies = "".join(
-        f'<body><joint name="q{j}" type="slide" axis="1 0 0" stiffness="{problem.natural[j] ** 2!r}" '
+        f'<body><joint name="q{j}" type="slide" axis="1 0 0" stiffness="{float(problem.natural[j]) ** 2!r}" '
         f'damping="{float(problem.damping[j])!r}"/>'
         '<geom type="sphere" size="0.1" mass="1" contype="0" conaffinity="0"/></body>'
         for j in modes
@@ -48,7 +48,7 @@ def model_of(problem: Problem, step: float, integrator: str) -> str:
         f'solreflimit="{-stiffness!r} {-damping!r}" solimplimit="{solimp}">{contact}</fixed>'
         f'<fixed name="drive">{drive}</fixed></tendon>'
         '<actuator><motor tendon="drive"/></actuator></mujoco>'
-    ).replace("np.float64(", "").replace(")", "")
+    )
 
 
 def _limit(problem: Problem, step: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ import numpy as np
 from peers.problems import Problem
 from vibroimpact.orchestrator.study.observation import Floats, Observation
 
-TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-12)
+TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
 """Relative tolerances of the integrators; the absolute one is a thousandth of it."""
 ABSOLUTE = 1e-3
 
@@ -97,7 +97,9 @@ def tolerances(problem: Problem) -> tuple[float, ...]:
     return TOLERANCES
 
 
-def observed(impacts: list[tuple[float, float]], final: tuple[float, float], failure: str = "") -> Observation:
+def observed(
+    impacts: list[tuple[float, float]], final: tuple[float, float], failure: str = ""
+) -> Observation:
     """Return what a run showed from the times (s) and velocities (m/s) of its impacts on the one stop."""
     rows = np.array(impacts, dtype=float).reshape(-1, 2)
     return Observation(np.column_stack([rows, np.ones(len(rows))]), final=final, failure=failure)

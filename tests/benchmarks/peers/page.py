@@ -1,0 +1,117 @@
+"""The goals, met or missed, and the table of docs/accuracy.md, all from the record of the measurement."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+BEGIN, END = "<!-- measured beside other solvers -->\n", "<!-- end of measured -->"
+GOAL_ERROR, GOAL_RATIO = 1e-6, 100.0
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+def with_measurement(text: str, record: Mapping[str, Any]) -> str:
+    """Return a page with what is between the two markers made from the record anew.
+
+    Raises
+    ------
+    ValueError
+        The page has no such markers.
+    """
+    pattern = re.compile(re.escape(BEGIN) + ".*?" + re.escape(END), re.DOTALL)
+    if not pattern.search(text):
+        raise ValueError(f"docs/accuracy.md: expected the markers {BEGIN.strip()} and {END}, got neither.")
+    return pattern.sub(lambda _: BEGIN + measurement(record) + END, text)
+
+
+def measurement(record: Mapping[str, Any]) -> str:
+    """Return machine, goals, references and table in Markdown."""
+    host = "; ".join(f"{key} {value}" for key, value in record["machine"].items())
+    parts = [f"Measured on {record['date']}: {host}.", _goals(record), _references(record), _table(record)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _of(record: Mapping[str, Any], case: Mapping[str, Any]) -> tuple[Mapping[str, Any], Rows]:
+    rows = [row for row in record["rows"] if row["case"] == case["key"]]
+    return rows[0], rows
+
+
+def _goals(record: Mapping[str, Any]) -> str:
+    lines = [
+        f"- Goal: below an error of {GOAL_ERROR:g} the fused FMU costs {GOAL_RATIO:g} times less than any peer."
+    ]
+    for case in record["cases"]:
+        own, rows = _of(record, case)
+        near = [
+            row
+            for row in rows
+            if not row["ours"] and not row["failure"] and row["cost"] and row["error"] is not None
+            if row["error"] < GOAL_ERROR
+        ]
+        if not near:
+            lines.append(f"  - {case['title']}: **met**, no peer gets below.")
+            continue
+        best = min(near, key=lambda row: float(row["cost"]))
+        ratio = best["cost"] / own["cost"]
+        single = min(
+            (r for r in near if "vmapped" not in r["way"]), key=lambda r: float(r["cost"]), default=best
+        )
+        word = "met" if ratio >= GOAL_RATIO else "missed"
+        more = "" if single is best else f", and of single motions {_ratio(single, own)} ({single['way']})"
+        lines.append(
+            f"  - {case['title']}: **{word}**, {ratio:.2g} times ({best['way']}, {_setting(best)}){more}."
+        )
+    grazes, rungs = _of(record, next(case for case in record["cases"] if case["key"] == "grazes"))
+    rest, _ = _of(record, next(case for case in record["cases"] if case["key"] == "chatter"))
+    full = sorted({row["way"] for row in rungs if not row["ours"] and not row["failure"]})
+    found = "met" if not grazes["failure"] and rest["rest_error"] is not None else "missed"
+    seen = f"{grazes['impacts_seen']} of 11 grazes, no stop out of reach hit"
+    lines.append(
+        f"- Goal: all grazes and the end of chatter are found by ours: **{found}** ({seen}; the end of chatter to "
+        f"{rest['rest_error']:.0e} of a period). Peers that find all grazes at one setting or more: "
+        f"{', '.join(full) or 'none'}."
+    )
+    lines.append(
+        f"- A fused run of one period costs {record['one_period'] * 1e6:.0f} us through `vi.run`'s runner, whatever "
+        "it does: much of what these short motions cost, which a longer one does not pay again."
+    )
+    return "\n".join(lines)
+
+
+def _references(record: Mapping[str, Any]) -> str:
+    cells = [
+        f"{case['title']} {case['second_road']:.0e}"
+        for case in record["cases"]
+        if case["second_road"] is not None
+    ]
+    return (
+        "The reference beside a second road, DOP853 at 1e-13 with nothing of this package, on "
+        f"grazes the flow in 40 digits (largest error, of both together): {', '.join(cells)}."
+    )
+
+
+def _table(record: Mapping[str, Any]) -> str:
+    lines = ["| problem | way | setting | error | us a period | times fused |", "|---|---|---|---|---|---|"]
+    for case in record["cases"]:
+        own, rows = _of(record, case)
+        for row in rows:
+            error = row["failure"] or _error(row["error"], case["estimate"])
+            cost = "-" if row["cost"] is None else f"{row['cost'] * 1e6:.3g}"
+            cells = (case["title"], row["way"], _setting(row), error, cost, _ratio(row, own))
+            lines.append(f"| {' | '.join(cells)} |".replace("|  |", "| |"))
+    return "\n".join(lines)
+
+
+def _error(error: float, known: float) -> str:
+    """Return an error; below what the reference is known to, that."""
+    return f"{error:.0e}" if error > known else f"< {known:.0e}"
+
+
+def _setting(row: Mapping[str, Any]) -> str:
+    return "" if row["setting"] is None else f"{row['knob']} {row['setting']:g}"
+
+
+def _ratio(row: Mapping[str, Any], own: Mapping[str, Any]) -> str:
+    return "-" if row["cost"] is None else f"{row['cost'] / own['cost']:.2g}"
