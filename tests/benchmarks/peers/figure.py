@@ -24,7 +24,7 @@ def draw(record: Mapping[str, Any]) -> Figure:
     with page_style():
         figure = canvas(HEIGHT, WIDTH / 25.4)
         axes = figure.subplots(2, 3, sharey=True).flat
-        for axis, case in zip(axes, record["cases"], strict=True):
+        for axis, case in zip(axes, record["cases"], strict=False):
             for place, name in enumerate(names):
                 own = [
                     r for r in rows if r["case"] == case["key"] and r["way"] == name and r["cost"] is not None
