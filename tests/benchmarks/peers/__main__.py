@@ -26,12 +26,16 @@ from peers.figure import draw, finite  # noqa: E402
 from peers.measure import cost_of_a_run, measured  # noqa: E402
 from peers.page import with_measurement  # noqa: E402
 from peers.problems import cases, orbit  # noqa: E402
-from vibroimpact.analysis.figures.page import save  # noqa: E402
+from vibroimpact.analysis.figures.page import page_style  # noqa: E402
 
 RECORD, PICTURE, PAGE = (
     ROOT / "docs" / name for name in ("accuracy/peers.json", "accuracy/peers.png", "accuracy.md")
 )
 PACKAGES = ("numpy", "scipy", "FMPy", "scikit-sundae", "diffrax", "jax", "mujoco")
+
+
+DOTS = 110
+"""Of the picture, an inch: it is one of many on a page."""
 
 
 def machine() -> dict[str, str]:
@@ -90,7 +94,8 @@ def main() -> int:
     if not options.page:
         measure(options.only)
     record = json.loads(RECORD.read_text(encoding="utf-8"))
-    save(draw(record), PICTURE)
+    with page_style():
+        draw(record).savefig(PICTURE, dpi=DOTS)
     PAGE.write_text(with_measurement(PAGE.read_text(encoding="utf-8"), record), encoding="utf-8")
     print(f"{RECORD}, {PICTURE}, {PAGE}")
     return 0

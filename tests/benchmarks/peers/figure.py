@@ -23,7 +23,7 @@ def draw(record: Mapping[str, Any]) -> Figure:
     names = list(dict.fromkeys(row["way"] for row in rows))
     with page_style():
         figure = canvas(HEIGHT, WIDTH / 25.4)
-        axes = figure.subplots(2, 3, sharey=True).flat
+        axes = figure.subplots(2, 3, sharey=True).ravel()
         for axis, case in zip(axes, record["cases"], strict=False):
             for place, name in enumerate(names):
                 own = [
@@ -43,7 +43,10 @@ def draw(record: Mapping[str, Any]) -> Figure:
                 axis.plot(bad, [TOP] * len(bad), "x", color=style["color"], markersize=4.0)
             axis.set(xscale="log", yscale="log", title=case["title"], ylim=(0.3 * LOWEST, 10.0 * TOP))
             axis.axhline(1e-6, color="0.75", linewidth=0.5, zorder=-1)
-        figure.supxlabel("processor time of a forcing period (s)", fontsize=8)
+        for axis in axes[len(record["cases"]) :]:
+            axis.set_axis_off()
+        for axis in axes[3:]:
+            axis.set_xlabel("processor time of a period (s)")
         figure.supylabel("largest relative error (-)", fontsize=8)
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=6)

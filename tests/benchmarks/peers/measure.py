@@ -111,11 +111,16 @@ def measured(case: Case) -> tuple[list[Row], dict[str, float]]:
             if turn and row.seconds[0] * case.periods * share > LONG:
                 continue
             row.seconds.append(_seconds(runs_of) / (case.periods * share))
-    errors = [max(one.error.values()) for one in known.values()]
+    errors = [estimate(one, case.quantity) for one in known.values()]
     return rows, {
         "estimate": max(errors),
         "second_road": max((off for off in roads if off == off), default=math.nan),
     }
+
+
+def estimate(known: Reference, quantity: str) -> float:
+    """Return how far a reference may be off in a quantity, or in the worst of all."""
+    return max(known.error.values()) if quantity == "all" else known.error[quantity]
 
 
 def _tried(
