@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vibroimpact.analysis.landmarks import ImpactOscillator
-from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.scene import Scene
@@ -117,7 +117,7 @@ def reference_of(scene: Scene) -> Reference:
         best = best.with_values({"execution.contact_tolerance": FINEST})
     observation = observed(best)
     keys = disturbed_keys(best)
-    disturbed = [best.with_values({key: best.value(key) * (1.0 + DISTURBANCE)}) for key in keys]
+    disturbed = [_disturbed(best, key) for key in keys]
     changes = [errors_of(observed(one), observation, scales) for one in disturbed]
     largest = {
         name: max((change.of[name] for change in changes if change.of[name] == change.of[name]), default=0.0)
@@ -167,11 +167,16 @@ def disturbed_keys(scene: Scene) -> list[str]:
 def disturbed_scenes(scene: Scene, count: int) -> list[Scene]:
     """Return scenes of which one number is slightly different; none where there is no such number."""
     keys = disturbed_keys(scene)
-    return [
-        scene.with_values({key: scene.value(key) * (1.0 + k * DISTURBANCE)})
-        for key in keys[:1]
-        for k in range(1, count + 1)
-    ]
+    return [_disturbed(scene, key, k) for key in keys[:1] for k in range(1, count + 1)]
+
+
+def _disturbed(scene: Scene, key: str, times: int = 1) -> Scene:
+    """Return a scene with one number slightly larger, or smaller where a body that starts on its stop forbids that."""
+    number, change = scene.value(key), times * DISTURBANCE
+    try:
+        return scene.with_values({key: number * (1.0 + change)})
+    except SceneError:
+        return scene.with_values({key: number * (1.0 - change)})
 
 
 def _closed_form(scene: Scene, observation: Observation, scales: Scales) -> Observation | None:

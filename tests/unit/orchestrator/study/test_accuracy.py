@@ -188,3 +188,15 @@ def test_misuse_is_told() -> None:
         vi.accuracy(alone, budget=1.0)
     with pytest.raises(UsageError, match=r"got 1e-20; reached was .*e-1.* by "):
         vi.accuracy(FREE, tolerance=1e-20, budget=1.0)
+
+
+def test_a_body_that_starts_on_its_stop_is_disturbed_to_the_free_side() -> None:
+    scene = Scene.from_dict(
+        {
+            "body": {"mass": 1.0, "stiffness": 1.0, "displacement_start": 0.2},
+            "forcing": {"amplitude": 0.5, "angular_frequency": 1.0},
+            "stop": [{"position": 0.2, "restitution": 0.7}],
+            "record": {"recorded_periods": 2},
+        }
+    )
+    assert len(reference_of(studied_scene(scene)).observation.impacts)
