@@ -122,6 +122,102 @@ def beam_modes(boundary: Boundary, count: int) -> BeamModes:
     return BeamModes(boundary, eigenvalues, participation)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualVectors:
+    """What a beam's first modes leave out under forces at some points, as shapes orthogonal to those modes.
+
+    Attributes
+    ----------
+    boundary : str
+        The ends, s = 0 first.
+    natural : int
+        Modes that are kept.
+    points : array, shape (point,)
+        s of the forces.
+    eigenvalues : array, shape (point,)
+        xi, ascending: natural angular frequency = xi^2 sqrt(E I / (mass_per_length L^4)).
+    participation : array, shape (point,)
+        Integral of each shape over s.
+    """
+
+    boundary: Boundary
+    natural: int
+    points: Array
+    eigenvalues: Array
+    participation: Array
+
+    def shapes(self, points: float | Numbers) -> Array:
+        """Return the shapes, of unit mean square over the length, at points.
+
+        Parameters
+        ----------
+        points : float or array of floats
+            s, 0 to 1.
+
+        Returns
+        -------
+        array, shape (number of points, point)
+
+        Raises
+        ------
+        UsageError
+            A point outside of the beam.
+        """
+        s = _row(points)
+        values = np.empty((s.size, self.points.size))
+        if _library().vi_door_beam_residual_shapes(
+            BOUNDARIES[self.boundary], self.natural, self.points.size, self.points, s.size, s, values
+        ):
+            raise UsageError(f"ResidualVectors.shapes: expected points 0 <= s <= 1, got {s}.")
+        return values
+
+
+def residual_vectors(boundary: Boundary, natural: int, points: float | Numbers) -> ResidualVectors:
+    """Return what the first modes of a beam leave out under forces at some points: equations.md 6.6.
+
+    With them a beam yields to static forces there as much as with all its modes.
+
+    Parameters
+    ----------
+    boundary : str
+        clamped_free, clamped_clamped, clamped_pinned or pinned_pinned; s = 0 first.
+    natural : int
+        Number of modes that are kept, >= 1.
+    points : float or array of floats
+        s of the forces, at most 8, not on a support, no two the same.
+
+    Raises
+    ------
+    UsageError
+        Another boundary, no mode, or points that cannot be told apart.
+
+    Examples
+    --------
+    >>> tip = residual_vectors("clamped_free", 2, 1.0)
+    >>> kept = beam_modes("clamped_free", 2)
+    >>> stiff = (kept.shapes(1.0) ** 2 / kept.eigenvalues**4).sum()
+    >>> whole = stiff + (tip.shapes(1.0) ** 2 / tip.eigenvalues**4).sum()
+    >>> print(round(stiff, 6), round(whole, 6))
+    0.331799 0.333333
+    """
+    s = _row(points)
+    eigenvalues, participation = np.empty(s.size), np.empty(s.size)
+    if boundary not in BOUNDARIES or _library().vi_door_beam_residual(
+        BOUNDARIES[boundary], natural, s.size, s, eigenvalues, participation
+    ):
+        raise UsageError(
+            f"residual_vectors: expected a boundary ({', '.join(BOUNDARIES)}), natural >= 1 and 1 to 8 points that "
+            f"move and can be told apart, got {boundary!r}, {natural} and {s}."
+        )
+    for array in (s, eigenvalues, participation):
+        array.setflags(write=False)
+    return ResidualVectors(boundary, natural, s, eigenvalues, participation)
+
+
+def _row(points: float | Numbers) -> Array:
+    return np.array(np.atleast_1d(np.asarray(points, dtype=np.float64)).ravel())
+
+
 @cache
 def _library() -> ctypes.CDLL:
     library = core_library()
@@ -129,4 +225,14 @@ def _library() -> ctypes.CDLL:
     integer = ctypes.c_int
     library.vi_door_beam_modes.argtypes = [integer, integer, numbers, numbers]
     library.vi_door_beam_shapes.argtypes = [integer, integer, integer, numbers, integer, numbers]
+    library.vi_door_beam_residual.argtypes = [integer, integer, integer, numbers, numbers, numbers]
+    library.vi_door_beam_residual_shapes.argtypes = [
+        integer,
+        integer,
+        integer,
+        numbers,
+        integer,
+        numbers,
+        numbers,
+    ]
     return library

@@ -43,8 +43,13 @@ class BodyDriver(RecordedBody):
         super().__init__(self._group)
         self._floats = self._group("Float64", tuple(floats))
         self._float_names = tuple(floats)
-        self._integers = self._group("Int64", tuple(integers))
-        self._integers.values[:] = list(integers.values())
+        self._integers = []
+        for kind, is_boolean in (("Int64", False), ("Boolean", True)):
+            values = {name: v for name, v in integers.items() if isinstance(v, bool) is is_boolean}
+            if values:
+                group = self._group(kind, tuple(values))
+                group.values[:] = list(values.values())
+                self._integers.append(group)
 
     def _group(self, kind: str, names: Sequence[str], size: int | None = None) -> VariableGroup:
         return self.instance.group(kind, [self._references[name] for name in names], size=size)
@@ -67,7 +72,8 @@ class BodyDriver(RecordedBody):
         instance.reset()
         self._floats.values[:] = [floats[name] for name in self._float_names]
         self._floats.set()
-        self._integers.set()
+        for integers in self._integers:
+            integers.set()
         instance.enter_initialization(0.0)
         instance.exit_initialization()
         self.warnings = instance.log.take()

@@ -96,7 +96,7 @@ def _carried(scene: Scene, start: tuple[float, ...]) -> dict[str, float]:
 
 
 def integer_parameters(scene: Scene) -> dict[str, int]:
-    """Return the integer and enumeration parameters of the body's FMU."""
+    """Return the integer, enumeration and Boolean (`bool`) parameters of the body's FMU."""
     parameters = {"impact_limit": scene.execution.impact_limit}
     if isinstance(scene.body, ChainBody):
         parameters |= chain_integers(scene.body, scene)
@@ -263,9 +263,10 @@ def rigidity_of_frequency(body: BeamBody) -> float:
 
 
 def beam_integers(body: BeamBody, scene: Scene) -> dict[str, int]:
-    """Return the integer and enumeration parameters of the Beam."""
+    """Return the integer, enumeration and Boolean parameters of the Beam."""
     parameters = {
         "modes": body.modes,
+        "residual": body.residual,
         "boundary": BOUNDARY_NUMBERS[body.boundary],
         "impact_projection": PROJECTION_NUMBERS[body.impact_projection],
     }

@@ -214,6 +214,14 @@ class BeamBody(SceneTable):
         ModeNumber,
         Rule(sweepable=True, doc="a coefficient of restitution has a meaning only together with it"),
     ] = 4
+    residual: Annotated[
+        bool,
+        Rule(
+            hint="It needs stops that yield.",
+            doc="the last of the modes, one for each place of a stop, are not natural ones but what all modes beyond "
+            "give way under a force there, so that the beam is not too stiff for its stops; they have to yield",
+        ),
+    ] = False
     damping_ratio: Annotated[
         NotNegativeNumbers,
         Rule(hint="One number for all modes, or one for each.", fmu="damping_ratio[i]", effect=DAMPING),

@@ -138,6 +138,24 @@ static void check_inputs(const beam *b, char *message)
     vi_check_finite(message, "force_rate", b->force_rate);
 }
 
+/* Is there a stop whose force acts on the beam? Pairs are not known before the importer says what they are. */
+static bool has_stop(const beam *b, int k)
+{
+    return b->body.contacts[k].law.law != VI_LAW_NONE;
+}
+
+/* A residual vector has its full mass; a rigid stop would meet that of all modes beyond, which is none. */
+static void check_residual(const beam *b, char *message)
+{
+    for (int k = 0; b->residual && k < VI_PORTS; ++k) {
+        const int64_t law = b->body.contacts[k].law.law;
+        if (law == VI_LAW_RESTITUTION || law == VI_LAW_EXTERNAL || law == VI_LAW_PAIR) {
+            vi_complain(message, "contact[%d].law: expected a stop that yields beside residual, got one that does not",
+                        k + 1);
+        }
+    }
+}
+
 static bool parameters_are_good(const beam *b, char *message)
 {
     if (b->modes < 1 || b->modes > b->modes_described) {
@@ -150,6 +168,7 @@ static bool parameters_are_good(const beam *b, char *message)
     check_forcing(b, message);
     check_choice(message, "impact_projection", b->impact_projection, PROJECTION_COLLOCATION);
     check_places(b, message);
+    check_residual(b, message);
     vi_structure_component_check(&b->body, message);
     check_inputs(b, message);
     return message[0] == '\0';
@@ -168,11 +187,80 @@ static double linear_density(const beam *b)
     return b->mass_per_length > 0.0 ? b->mass_per_length : b->density * b->width * b->thickness;
 }
 
+/* Modes that are natural ones; residual vectors come after them. */
+static int natural_modes(const beam *b)
+{
+    return (int)b->modes - b->dropped.points;
+}
+
+static double eigenvalue_of(const beam *b, int j)
+{
+    const int natural = natural_modes(b);
+    return j < natural ? vi_beam_eigenvalue((vi_beam_boundary)b->boundary, j + 1) : b->dropped.eigenvalue[j - natural];
+}
+
+static double participation_of(const beam *b, int j)
+{
+    const int natural = natural_modes(b);
+    return j < natural ? vi_beam_participation((vi_beam_boundary)b->boundary, j + 1)
+                       : vi_beam_residual_participation(&b->dropped, j - natural);
+}
+
 /* Mass-normalised shape of a point: phi / sqrt(beam mass). equations.md 6.1 */
 static void find_shape(const beam *b, double location, double shape[VI_MODES])
 {
+    const int natural = natural_modes(b);
     for (int j = 0; j < b->modes; ++j) {
-        shape[j] = vi_beam_shape((vi_beam_boundary)b->boundary, j + 1, location, 0) / b->root_mass;
+        const double phi = j < natural ? vi_beam_shape((vi_beam_boundary)b->boundary, j + 1, location, 0)
+                                       : vi_beam_residual_shape(&b->dropped, j - natural, location);
+        shape[j] = phi / b->root_mass;
+    }
+}
+
+static int place_of(double location, int places, const double place[])
+{
+    for (int i = 0; i < places; ++i) {
+        if (place[i] == location) {
+            return i;
+        }
+    }
+    return places;
+}
+
+static bool on_support(const beam *b, double location)
+{
+    return (location == 0.0) || (location == 1.0 && b->boundary != VI_CLAMPED_FREE);
+}
+
+/* One residual vector for each place that has a stop. */
+static void find_residual(beam *b, char *message)
+{
+    double place[VI_PORTS];
+    int stop[VI_PORTS], places = 0;
+    memset(&b->dropped, 0, sizeof b->dropped);
+    for (int k = 0; b->residual && k < VI_PORTS; ++k) {
+        const double location = b->contact_location[k];
+        if (has_stop(b, k) && !on_support(b, location) && place_of(location, places, place) == places) {
+            stop[places] = k + 1;
+            place[places++] = location;
+        }
+    }
+    if (places == 0) {
+        return;
+    }
+    if (b->modes <= places) {
+        vi_complain(message, "modes: expected more than %d beside residual, one for each place that has a stop and at"
+                             " least one natural mode, got %lld", places, (long long)b->modes);
+        return;
+    }
+    const int near = vi_beam_residual_find(&b->dropped, (vi_beam_boundary)b->boundary, (int)b->modes - places, places,
+                                           place);
+    if (near != 0) {
+        vi_complain(message, "contact[%d].location: expected a place that residual can tell from those of the other"
+                             " stops and from a support, got %.17g", stop[near - 1], place[near - 1]);
+    } else if (b->forcing_kind == FORCED_AS_MODE && b->forcing_mode > natural_modes(b)) {
+        vi_complain(message, "forcing.mode: expected 1 to %d, a natural mode, got %lld: those after it are residual"
+                             " vectors", natural_modes(b), (long long)b->forcing_mode);
     }
 }
 
@@ -271,10 +359,10 @@ static void fill_modes(beam *b)
     memset(b->body.natural, 0, sizeof b->body.natural);
     b->depends_on_amplitude = 0;
     for (int j = 0; j < b->modes; ++j) {
-        const double eigenvalue = vi_beam_eigenvalue((vi_beam_boundary)b->boundary, j + 1);
+        const double eigenvalue = eigenvalue_of(b, j);
         const double natural = eigenvalue * eigenvalue * rate;
         b->body.natural[j] = natural;
-        b->participation[j] = b->root_mass * vi_beam_participation((vi_beam_boundary)b->boundary, j + 1);
+        b->participation[j] = b->root_mass * participation_of(b, j);
         set_mode(b, j, natural, mode_damping(b, j, natural));
         b->depends_on_amplitude |= vi_amplitude_acts(&b->amplitude[j]);
         b->body.state.q[j] = b->root_mass * b->modal_displacement_start[j];
@@ -289,6 +377,10 @@ static bool fill_model(beam *b, char *message)
     b->root_mass = sqrt(linear_density(b) * b->length);
     model->modes = (int32_t)b->modes;
     model->contacts = vi_structure_component_ports(&b->body);
+    find_residual(b, message);
+    if (message[0] != '\0') {
+        return false;
+    }
     find_shape(b, b->forcing_location, b->forced_shape);
     find_shape(b, b->sensor_location, model->observed);
     for (int k = 0; k < BEAM_SENSORS; ++k) {
@@ -313,7 +405,7 @@ static void warn_of_validity(const beam *b, char *message)
     }
     const double slenderness = b->thickness / sqrt(12.0) / b->length;
     const double e_over_g = 2.0 * (1.0 + b->poisson_ratio);
-    for (int j = 1; j <= b->modes; ++j) {
+    for (int j = 1; j <= natural_modes(b); ++j) {
         const double error =
             vi_beam_validity((vi_beam_boundary)b->boundary, j, slenderness, e_over_g, SHEAR_COEFFICIENT);
         if (error > VALIDITY_LIMIT) {

@@ -5,6 +5,7 @@
 #include <stdint.h>
 
 #include "body/modal/structure_component.h"
+#include "modes/beam_residual.h"
 #include "motion/amplitude.h"
 
 enum { BEAM_SENSORS = 4 };
@@ -24,6 +25,7 @@ typedef struct {
     double time;
     /* parameters */
     int64_t modes, modes_described;
+    int32_t residual;                    /* the last modes are residual vectors */
     int64_t boundary;
     double length, width, thickness, youngs_modulus, density;
     double flexural_rigidity, mass_per_length, poisson_ratio;
@@ -37,6 +39,7 @@ typedef struct {
     /* inputs */
     double force, force_rate;
     /* derived at initialization */
+    vi_beam_residual dropped;            /* residual vectors; its `points` are 0 without them */
     double root_mass;                    /* of the beam: sqrt(mass_per_length * length), kg^(1/2) */
     double forced_shape[VI_MODES];       /* of forcing_location, kg^(-1/2) */
     double participation[VI_MODES];      /* modal force of a unit acceleration of the base, kg^(1/2) */

@@ -162,10 +162,33 @@ def a_surface_that_lags_is_fused(draft: Draft) -> Iterator[Problem]:
             yield Problem(key, 'a surface that relaxes at once beside how = "coupled"', "a time", hint)
 
 
+def residual_vectors_have_stops_that_yield(draft: Draft) -> Iterator[Problem]:
+    """A rigid stop meets the mass of all modes, which falls to none as they grow in number: equations.md 6.6."""
+    body = draft.body
+    if not isinstance(body, BeamBody) or not body.residual:
+        return
+    stops = [stop for stop in draft.stops if stop is not None]
+    for number, stop in enumerate(draft.stops, start=1):
+        if isinstance(stop, RestitutionStop):
+            hint = 'Use law = "kelvin_voigt", "hertz" or "hunt_crossley".'
+            yield Problem(f"stop[{number}].law", "a stop that yields beside residual = true", "a rigid one", hint)
+    places = len({stop_location(stop) for stop in stops})
+    span = draft.span("body.modes")
+    fewest = body.modes if span is None else int(span[0])
+    if fewest <= places:
+        expected = f"more than {places}: one for each place of a stop, and natural ones before them"
+        yield Problem("body.modes", expected, f"{fewest} beside residual = true", "Use more modes.")
+    elif draft.forcing is not None and (draft.forcing.mode or 0) > fewest - places:
+        expected = f"a natural mode, 1 to {fewest - places}"
+        hint = f"The last {places} of the {fewest} are residual vectors."
+        yield Problem("forcing.mode", expected, quoted(draft.forcing.mode), hint)
+
+
 STOP_RULES = (
     stops_are_few,
     stops_are_on_the_body,
     stops_leave_room,
     start_is_on_the_free_side,
     a_surface_that_lags_is_fused,
+    residual_vectors_have_stops_that_yield,
 )

@@ -4,6 +4,7 @@
 
 #include "door/door.h"
 #include "modes/beam_modes.h"
+#include "modes/beam_residual.h"
 
 static bool in_range(int boundary, int count)
 {
@@ -43,4 +44,38 @@ VI_DOOR int vi_door_beam_shapes(int boundary, int count, int points, const doubl
         }
     }
     return 0;
+}
+
+/* 1: numbers that mean nothing; 2: points that cannot be told apart, or from a support. */
+static int find_residual(int boundary, int natural, int points, const double point[], vi_beam_residual *residual)
+{
+    if (!in_range(boundary, natural) || points < 1 || points > VI_PORTS || !on_beam(points, point)) {
+        return 1;
+    }
+    return vi_beam_residual_find(residual, (vi_beam_boundary)boundary, natural, points, point) == 0 ? 0 : 2;
+}
+
+VI_DOOR int vi_door_beam_residual(int boundary, int natural, int points, const double point[], double eigenvalue[],
+                                  double participation[])
+{
+    vi_beam_residual residual;
+    const int refused = find_residual(boundary, natural, points, point, &residual);
+    for (int i = 0; refused == 0 && i < points; ++i) {
+        eigenvalue[i] = residual.eigenvalue[i];
+        participation[i] = vi_beam_residual_participation(&residual, i);
+    }
+    return refused;
+}
+
+VI_DOOR int vi_door_beam_residual_shapes(int boundary, int natural, int points, const double point[], int places,
+                                         const double s[], double shape[])
+{
+    vi_beam_residual residual;
+    const int refused = on_beam(places, s) ? find_residual(boundary, natural, points, point, &residual) : 1;
+    for (int k = 0; refused == 0 && k < places; ++k) {
+        for (int i = 0; i < points; ++i) {
+            shape[k * points + i] = vi_beam_residual_shape(&residual, i, s[k]);
+        }
+    }
+    return refused;
 }

@@ -10,4 +10,13 @@ int vi_door_beam_modes(int boundary, int count, double eigenvalue[], double part
 /* shape[point * count + mode - 1], or a derivative of order 0 to 3. Returns 0, or 1 for a bad argument. */
 int vi_door_beam_shapes(int boundary, int count, int points, const double s[], int derivative, double shape[]);
 
+/* beam_residual.h, `points` vectors beside the first `natural` modes. Returns 0, 1 for a bad argument, 2 for points
+ * that cannot be told apart, or from a support. */
+int vi_door_beam_residual(int boundary, int natural, int points, const double point[], double eigenvalue[],
+                          double participation[]);
+
+/* shape[place * points + vector] of those vectors. Returns the same. */
+int vi_door_beam_residual_shapes(int boundary, int natural, int points, const double point[], int places,
+                                 const double s[], double shape[]);
+
 #endif
