@@ -32,6 +32,7 @@ from vibroimpact.orchestrator.ssp import (
 from vibroimpact.orchestrator.study import BUDGET, refuse_unreached, study_accuracy
 from vibroimpact.orchestrator.study import dataset_of as accuracy_dataset
 from vibroimpact.orchestrator.study.effects import dataset_of_shares, effects_of, shares_of
+from vibroimpact.orchestrator.study.preparation import prepared_scene, with_found_modes
 
 SceneLike = Scene | str | os.PathLike[str] | Mapping[str, Any]
 PathLike = str | os.PathLike[str]
@@ -69,7 +70,7 @@ def run(scene: SceneLike, path: PathLike | None = None, *, progress: bool = True
     >>> str(run(tables).outcome.item())
     '0'
     """
-    chosen, target = _scene(scene), None if path is None else _path(path)
+    chosen, target = prepared_scene(_scene(scene)), None if path is None else _path(path)
     # NetCDF's library is not for several threads at once
     with _ONE_AT_A_TIME, _shown(progress) as shown:
         if target is not None:
@@ -131,7 +132,7 @@ def campaign(
         refuse_system_elsewhere(scene, scheduler)
     with _shown(progress) as shown:
         report = run_campaign(
-            _scene(scene), _path(folder), workers=workers, scheduler=scheduler, progress=shown
+            prepared_scene(_scene(scene)), _path(folder), workers=workers, scheduler=scheduler, progress=shown
         )
     return open_dataset(report.dataset)
 
@@ -227,7 +228,7 @@ def accuracy(
     >>> accuracy("examples/single_run.toml", tolerance=1e-6).attrs["chosen"]    # doctest: +SKIP
     'fused'
     """
-    study = study_accuracy(_scene(scene), tolerance=tolerance, quantity=of, budget=budget)
+    study = study_accuracy(with_found_modes(_scene(scene)), tolerance=tolerance, quantity=of, budget=budget)
     dataset = accuracy_dataset(study)
     if path is not None:
         write_results(dataset, _path(path), kind="accuracy")
@@ -261,9 +262,9 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     >>> effects("examples/chatter.toml").attrs["not_simulated"].split(", ")[0]    # doctest: +SKIP
     'recorded drive'
     """
-    chosen = _scene(scene)
+    chosen = with_found_modes(_scene(scene))
     alone = chosen.with_sweep({}) if chosen.sweep else chosen
-    dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)))
+    dataset = dataset_of_shares(alone, shares_of(alone, effects_of(alone)), chosen.found)
     if path is not None:
         write_results(dataset, _path(path), kind="effects")
     return dataset.assign_attrs(results_kind="effects")
@@ -286,7 +287,7 @@ def cost_of(scene: SceneLike) -> SceneCost:
     >>> cost_of({"body": {"mass": 1.0, "stiffness": 4.0}, "record": {"recorded_time": 5.0}}).points
     1
     """
-    return scene_cost(_scene(scene))
+    return scene_cost(with_found_modes(_scene(scene)))
 
 
 def export_fmu(
@@ -329,7 +330,7 @@ def export_fmu(
     >>> export_fmu("rig.toml", "rig.fmu", platform="all")    # doctest: +SKIP
     """
     return export_scene(
-        _scene(scene),
+        with_found_modes(_scene(scene)),
         _path(path),
         fmi=fmi,
         full=full,

@@ -104,3 +104,8 @@ def wide_terminal() -> Terminal:
     if not console.is_terminal:
         console.width = _PIPE_WIDTH
     return console
+
+
+def note(text: str) -> None:
+    """Say what takes a while, beside what the command says."""
+    say(text, err=True)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.page import LINE, MARK, canvas, page_style
@@ -11,6 +14,9 @@ from vibroimpact.fmus.errors import DatasetError
 
 _NEEDED = ("share", "seconds", "run_seconds", "name", "changes")
 _BAR_MM = 9
+_CONVERGENCE_MM = 45
+_WORDS = 0.55
+"""Room for what is written beside the bars, over that of the bars."""
 _LONGEST = 28
 """Letters of what is written beside a bar."""
 
@@ -40,9 +46,15 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
     names = [str(name) for name in dataset["name"].values]
     places = np.arange(len(names))[::-1]
     parts = 100.0 * dataset["seconds"].values / dataset["run_seconds"].values[:, None]
+    converges = "modes_tried" in dataset.attrs
     with page_style():
-        figure = canvas(25 + _BAR_MM * len(names))
-        axis = figure.subplots()
+        bars = 25 + _BAR_MM * len(names)
+        figure = canvas(bars + (_CONVERGENCE_MM if converges else 0))
+        if converges:
+            axis, below = figure.subplots(2, 1, height_ratios=[bars, _CONVERGENCE_MM])
+            _draw_convergence(below, dataset)
+        else:
+            axis = figure.subplots()
         axis.barh(places, 100.0 * dataset["share"].values, height=0.6, color=LINE, alpha=0.5)
         axis.plot(parts, np.broadcast_to(places[:, None], parts.shape), ".", color=MARK, markersize=2.5)
         for place, words in zip(places, dataset["changes"].values, strict=True):
@@ -54,7 +66,29 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
         axis.axvline(0.0, color="0.5", linewidth=0.6)
         axis.set_yticks(places, names, fontsize=6)
         axis.tick_params(axis="y", right=False)
-        axis.set_xlim(min(-5.0, np.nanmin(parts) - 5.0), max(100.0, np.nanmax(parts)) * 1.6)
+        low, high = min(-5.0, np.nanmin(parts) - 5.0), max(100.0, np.nanmax(parts))
+        axis.set_xlim(low, high + _WORDS * (high - low))
         axis.set_xlabel("share of the time of a run (%)")
         figure.suptitle(str(dataset.attrs.get("title", "")), fontsize=8, wrap=True)
     return figure
+
+
+def _draw_convergence(axis: Axes, dataset: xr.Dataset) -> None:
+    """Draw how far each number of modes that was tried is from the most, and which was taken."""
+    tried = json.loads(dataset.attrs["modes_tried"])
+    told = {int(n): off for n, off in tried.items() if isinstance(off, float | int) and off > 0.0}
+    other = [int(n) for n, off in tried.items() if isinstance(off, str)]
+    tolerance, taken = float(dataset.attrs["tolerance"]), int(dataset.attrs["modes_found"])
+    axis.axhline(tolerance, color="0.5", linewidth=0.8, linestyle="--", label="tolerance")
+    axis.loglog(list(told), list(told.values()), "o-", color=LINE, markersize=3, linewidth=0.8)
+    if taken in told:
+        axis.plot(taken, told[taken], "o", color=MARK, markersize=5, label=f"taken: {taken}")
+    if other:
+        top = 2.0 * max([tolerance, *told.values()])
+        axis.plot(other, [top] * len(other), "x", color=LINE, markersize=4, label="another motion")
+    numbers = sorted(map(int, tried))
+    axis.set_xticks(numbers, [str(n) for n in numbers], fontsize=6)
+    axis.set_xticks([], minor=True)
+    axis.set_xlabel("number of modes")
+    axis.set_ylabel("relative error (-)")
+    axis.legend(fontsize=6, frameon=False)

@@ -13,7 +13,7 @@ from vibroimpact.fmus.packaging.export import export_fmu
 from vibroimpact.fmus.packaging.python_fmus import build_user_contact_law
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.shipped import FOLDERS, component_name, components, fmu_path
-from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.fmus.terminal import note, say, wide_terminal
 
 
 def print_components() -> None:
@@ -85,11 +85,6 @@ def export_component(
     return export_fmu(
         component, path, **counts, starts=starts, fmi=fmi, platform=platform, units=None, note=note, **kinds
     )
-
-
-def note(text: str) -> None:
-    """Say what takes a while, beside what the command says."""
-    say(text, err=True)
 
 
 def _start(change: str) -> tuple[str, str]:

@@ -31,6 +31,7 @@ def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
         "execution": identity.execution,
         "engine": in_one_line(scene),
         "instruction_set": identity.instruction_set,
+        **scene.found,
     }
 
 

@@ -10,11 +10,12 @@ import numpy as np
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.fmus.printing import table
-from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.fmus.terminal import note, say, wide_terminal
 from vibroimpact.orchestrator.commands.check import duration
 from vibroimpact.orchestrator.scene.summary import engine
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.effects import Share, dataset_of_shares, effects_of, not_called, shares_of
+from vibroimpact.orchestrator.study.preparation import with_found_modes
 
 
 def show_effects(
@@ -22,7 +23,7 @@ def show_effects(
 ) -> None:
     """Measure the effects of a scene, print them, and write what was asked for."""
     refuse_outputs([path], output, figure)
-    scene = opened_scene(path, changes)
+    scene = with_found_modes(opened_scene(path, changes), note)
     refuse_overwriting(
         output,
         force,
@@ -41,7 +42,7 @@ def show_effects(
     if shares:
         say(f"A run takes {duration(float(np.nanmedian([share.full for share in shares])))}; shares overlap.")
     say(f"Not asked for, and not simulated: {', '.join(not_called(scene)) or 'nothing'}.")
-    dataset = dataset_of_shares(alone, shares, {"scene_file": str(path)})
+    dataset = dataset_of_shares(alone, shares, {**scene.found, "scene_file": str(path)})
     if output is not None:
         write_results(dataset, output, kind="effects")
         say(f"Dataset written to {output}.")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from vibroimpact.fmus.commands.fmu import export_component, export_user_law, note
+from vibroimpact.fmus.commands.fmu import export_component, export_user_law
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.terminal import say
+from vibroimpact.fmus.terminal import note, say
 
 USER_CONTACT_LAW = "user-contact-law"
 
@@ -54,7 +54,11 @@ def _export_scene_file(
     from vibroimpact.analysis.dataset.outputs import refuse_outputs
     from vibroimpact.orchestrator.run.export import export_scene
     from vibroimpact.orchestrator.scene import load_scene
+    from vibroimpact.orchestrator.study.preparation import with_found_modes
 
-    scene, target = load_scene(scene_file, changes or ()), output or Path(f"{scene_file.stem}.fmu")
+    scene, target = (
+        with_found_modes(load_scene(scene_file, changes or ()), note),
+        output or Path(f"{scene_file.stem}.fmu"),
+    )
     refuse_outputs([scene_file], target, ending=".fmu")
     say(str(export_scene(scene, target, fmi=fmi, platform=platform, note=note, **kinds)))

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs
-from vibroimpact.fmus.commands.fmu import note
-from vibroimpact.fmus.terminal import say
+from vibroimpact.fmus.terminal import note, say
 from vibroimpact.orchestrator.scene import load_scene
 from vibroimpact.orchestrator.ssp import export_system, import_system
 

@@ -75,4 +75,4 @@ def _shapes(body: ChainBody | BeamBody, stops: list[RestitutionStop]) -> Floats:
         return np.eye(body.size)[[stop_mass(body, stop) - 1 for stop in stops]]
     locations = np.array([stop_location(stop) for stop in stops])
     boundary: Any = body.boundary.replace("-", "_")
-    return np.asarray(beam_modes(boundary, body.modes).shapes(locations))
+    return np.asarray(beam_modes(boundary, body.size).shapes(locations))

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.fields import fmu_variables_of
@@ -95,8 +96,24 @@ def _carried(scene: Scene, start: tuple[float, ...]) -> dict[str, float]:
     return dict(zip(names, on_free_side(scene, scene.body, start), strict=True))
 
 
+def refuse_unknown_modes(scene: Scene) -> None:
+    """Refuse to run a scene of which it is not yet known how many modes it has.
+
+    Raises
+    ------
+    UsageError
+        It has `modes = "auto"`.
+    """
+    if isinstance(scene.body, BeamBody) and scene.body.modes == "auto":
+        raise UsageError(
+            f'{scene.source}: body.modes: expected a number of modes, got "auto". run and campaign find it; '
+            "accuracy shows what each number costs."
+        )
+
+
 def integer_parameters(scene: Scene) -> dict[str, int]:
     """Return the integer, enumeration and Boolean (`bool`) parameters of the body's FMU."""
+    refuse_unknown_modes(scene)
     parameters = {"impact_limit": scene.execution.impact_limit}
     if isinstance(scene.body, ChainBody):
         parameters |= chain_integers(scene.body, scene)
@@ -265,8 +282,8 @@ def rigidity_of_frequency(body: BeamBody) -> float:
 def beam_integers(body: BeamBody, scene: Scene) -> dict[str, int]:
     """Return the integer, enumeration and Boolean parameters of the Beam."""
     parameters = {
-        "modes": body.modes,
-        "residual": body.residual,
+        "modes": body.size,
+        "residual": bool(body.residual),
         "boundary": BOUNDARY_NUMBERS[body.boundary],
         "impact_projection": PROJECTION_NUMBERS[body.impact_projection],
     }

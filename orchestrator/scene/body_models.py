@@ -15,6 +15,7 @@ from vibroimpact.orchestrator.scene.models import (
     MOST_MODES,
     Finite,
     FiniteNumbers,
+    ModeCount,
     ModeNumber,
     NotNegative,
     NotNegativeNumbers,
@@ -211,17 +212,23 @@ class BeamBody(SceneTable):
         Literal["clamped-free", "clamped-clamped", "clamped-pinned", "pinned-pinned"], Rule()
     ] = "clamped-free"
     modes: Annotated[
-        ModeNumber,
-        Rule(sweepable=True, doc="a coefficient of restitution has a meaning only together with it"),
+        ModeCount,
+        Rule(
+            f'a whole number from 1 to {MOST_MODES}, or "auto"',
+            sweepable=True,
+            doc="1 to 64; a coefficient of restitution has a meaning only together with it; "
+            '`"auto"`: the fewest that meet `execution.tolerance`, see [below](#how-many-modes)',
+        ),
     ] = 4
     residual: Annotated[
-        bool,
+        bool | None,
         Rule(
             hint="It needs stops that yield.",
+            default="false",
             doc="the last of the modes, one for each place of a stop, are not natural ones but what all modes beyond "
             "give way under a force there, so that the beam is not too stiff for its stops; they have to yield",
         ),
-    ] = False
+    ] = None
     damping_ratio: Annotated[
         NotNegativeNumbers,
         Rule(hint="One number for all modes, or one for each.", fmu="damping_ratio[i]", effect=DAMPING),
@@ -279,8 +286,8 @@ class BeamBody(SceneTable):
 
     @property
     def size(self) -> int:
-        """Number of modes."""
-        return self.modes
+        """Number of modes; where it is to be found, the most that it may be."""
+        return MOST_MODES if self.modes == "auto" else self.modes
 
 
 Body = OscillatorBody | ChainBody | BeamBody

@@ -8,7 +8,7 @@ from copy import deepcopy
 from dataclasses import replace
 from typing import Any
 
-from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, Body
+from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, BeamBody, Body
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.keys import MODES, number_of, numeric_key
 from vibroimpact.orchestrator.scene.models import (
@@ -118,8 +118,13 @@ class Draft(DraftTables):
 
     @property
     def sweeps_modes(self) -> bool:
-        """Whether the number of modes differs between points."""
-        return any(axis.key == MODES for axis in self.axes)
+        """Whether the number of modes differs between points, or is yet to be found."""
+        return any(axis.key == MODES for axis in self.axes) or self.finds_modes
+
+    @property
+    def finds_modes(self) -> bool:
+        """Whether the number of modes is to be found."""
+        return isinstance(self.body, BeamBody) and self.body.modes == "auto"
 
     def worst(self, *tables: str) -> str:
         """Return a note for a number that may be the worst of a sweep over keys of these tables."""

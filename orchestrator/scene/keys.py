@@ -122,7 +122,7 @@ def numbers_of(owner: BaseModel, table: str) -> Iterator[tuple[str, float]]:
             continue
         if isinstance(value, tuple):
             yield from ((f"{table}.{word}[{place}]", number) for place, number in enumerate(value, start=1))
-        elif value is not None:
+        elif value is not None and not isinstance(value, str):
             yield f"{table}.{word}", value
 
 

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 
 from vibroimpact.orchestrator.importer.specification import Exchange
 from vibroimpact.orchestrator.scene.fields import Rule
-from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, NUMBER_TAG
+from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, NUMBER_TAG, WORD_TAG
 from vibroimpact.orchestrator.scene.sweep import SweepPath
 
 MOST_SAMPLES_PER_RUN = 10**8
@@ -47,6 +47,16 @@ FiniteNumbers = Annotated[
 NotNegativeNumbers = Annotated[
     Annotated[NotNegative, Tag(NUMBER_TAG)] | Annotated[tuple[NotNegative, ...], _Array, Tag(ARRAY_TAG)],
     Discriminator(_shape),
+]
+
+
+def _word_or_number(value: object) -> str:
+    return WORD_TAG if isinstance(value, str) else NUMBER_TAG
+
+
+ModeCount = Annotated[
+    Annotated[ModeNumber, Tag(NUMBER_TAG)] | Annotated[Literal["auto"], Tag(WORD_TAG)],
+    Discriminator(_word_or_number),
 ]
 
 
@@ -374,6 +384,17 @@ class Execution(SceneTable):
             doc="relative error of hertz and hunt_crossley stops, whose contacts are integrated; the other laws are "
             "exact; not in general scenes",
             default="1e-10",
+        ),
+    ] = None
+    tolerance: Annotated[
+        Annotated[Finite, Field(gt=0, le=0.5)] | None,
+        Rule(
+            "0 < tolerance <= 0.5",
+            hint="It is the relative error that is asked of what is recorded.",
+            sweepable=False,
+            doc='relative error asked of what is recorded: `body.modes = "auto"` meets it, and datasets say how large '
+            "the error is (`estimated_error`)",
+            default="nothing is estimated",
         ),
     ] = None
 

@@ -24,7 +24,7 @@ from vibroimpact.orchestrator.scene.fields import Rule, choices_of, field_of, fo
 Table = TypeVar("Table", bound=BaseModel)
 KeyPath = tuple[str | int, ...]
 
-NUMBER_TAG, ARRAY_TAG = "number alone", "array of numbers"
+NUMBER_TAG, ARRAY_TAG, WORD_TAG = "number alone", "array of numbers", "word alone"
 """Which form of a field "a number, or an array of them" was read; part of pydantic's location, not of the key."""
 
 LONGEST_QUOTE = 60
@@ -227,7 +227,7 @@ def problems_of(error: ValidationError, model: type[BaseModel], table: KeyPath) 
 
 def _as_written(location: Sequence[str | int]) -> KeyPath:
     """Return a location without what only pydantic knows of."""
-    return (*location[:1], *(part for part in location[1:] if part not in (NUMBER_TAG, ARRAY_TAG)))
+    return (*location[:1], *(part for part in location[1:] if part not in (NUMBER_TAG, ARRAY_TAG, WORD_TAG)))
 
 
 def _is_an_echo(entry: Any, entries: Sequence[Any], model: type[BaseModel]) -> bool:

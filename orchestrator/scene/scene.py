@@ -78,6 +78,9 @@ class Scene(SceneTable):
         The swept keys in the order of the file; see `vibroimpact.orchestrator.scene.sweep.expand`.
     execution : Execution
         How the points run.
+    found : mapping
+        What was found out about the scene before it runs, by attribute of its datasets; `study.preparation`
+        does.
     """
 
     source: str
@@ -93,6 +96,7 @@ class Scene(SceneTable):
     execution: Execution
     general: GeneralScene | None = None
     replay: Replay | None = None
+    found: Mapping[str, str | float | int] = Field(default_factory=dict, exclude=True, repr=False)
 
     def __hash__(self) -> int:
         return hash((self.source, self.text))

@@ -12,6 +12,7 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
 from vibroimpact.orchestrator.scene.fields import (
+    bounds_of,
     field_of,
     is_array_only,
     is_whole,
@@ -241,9 +242,11 @@ def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Proble
         return []
     field = field_of(model, key.name)
     if is_whole(field):
-        broken = [value for value in axis.values if not value.is_integer()]
+        low, high, _ = bounds_of(field)
+        broken = [value for value in axis.values if not (value.is_integer() and low <= value <= high)]
         if broken:
-            return [value_problem(("sweep", axis.key), field, broken[0])]
+            expected = f"a whole number from {low} to {high}"
+            return [replace(value_problem(("sweep", axis.key), field, broken[0]), expected=expected)]
     annotated: Any = Annotated
     rule = TypeAdapter(annotated[(field.annotation, *field.metadata)])
     for value in (min(axis.values), max(axis.values)):

@@ -27,7 +27,7 @@ from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import Reference, disturbed_scenes, observed, reference_of
 from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
 from vibroimpact.orchestrator.study.trials import far_off
-from vibroimpact.orchestrator.study.ways import CallCounter, Trial, Way, remarks_on, ways_of
+from vibroimpact.orchestrator.study.ways import CallCounter, Trial, Way, remarks_on, told_by, ways_of
 
 BUDGET = 40.0
 """Wall time of a study, s, where nobody says another."""
@@ -88,10 +88,12 @@ def study_accuracy(
     if reference.chaotic:
         reference = replace(reference_of(studied), chaotic=True, sensitivity=reference.sensitivity)
     found: list[Measured] = []
+    finest: dict[Scene, Reference] = {}
     with ExitStack() as stack:
         measured: list[tuple[Measured, Trial]] = []
-        for way in _refuse_none(ways_of(given_up_after(studied, late)), scene):
-            one, trial = _tried(way, reference)
+        ways = _refuse_none(ways_of(given_up_after(studied, late)), scene)
+        for way in ways:
+            one, trial = _tried(way, _told_by(way, reference, finest))
             if trial is not None:
                 stack.callback(trial.close)
                 measured.append((one, trial))
@@ -102,7 +104,9 @@ def study_accuracy(
         _add_statistics(whole, given_up_after(whole, late), found)
     wanted = math.nan if tolerance is None else tolerance
     chosen = cheapest(found, tolerance, quantity, reference)
-    return Study(studied, reference, found, quantity, wanted, chosen, orbit, tuple(remarks_on(scene)))
+    return Study(
+        studied, reference, found, quantity, wanted, chosen, orbit, tuple(remarks_on(scene)), told_by(ways)
+    )
 
 
 def studied_scene(scene: Scene) -> Scene:
@@ -184,6 +188,15 @@ def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
     if found.seconds < COUNTED:
         one.calls, one.memory = _counted(way)
     return one, trial
+
+
+def _told_by(way: Way, reference: Reference, finest: dict[Scene, Reference]) -> Reference:
+    """Return what the errors of a way are measured against; the finest model of a kind runs once."""
+    if way.against is None:
+        return reference
+    if way.against not in finest:
+        finest[way.against] = replace(reference, observation=observed(way.against))
+    return finest[way.against]
 
 
 def _counted(way: Way) -> tuple[int, int]:
@@ -321,6 +334,7 @@ def dataset_of(study: Study) -> xr.Dataset:
         chosen=study.chosen.way.label if study.chosen else "",
         verdict=advice(study),
         remarks="; ".join(study.remarks),
+        modes_reference=study.modes_reference,
         scene=study.scene.text,
         versions=json.dumps(versions()),
         git_commit=git_commit(),

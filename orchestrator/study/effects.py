@@ -112,11 +112,13 @@ def _found(scene: Scene) -> Iterator[Effect | None]:
         yield from _of_numbers(scene)
         for number, (key, law) in enumerate(laws(scene).items()):
             yield _without(scene, f"{law} stop", key, _removes("stop", number))
-        if isinstance(scene.body, BeamBody) and scene.body.modes > 1:
-            half = scene.body.modes // 2
+        if isinstance(scene.body, BeamBody) and scene.body.size > 1:
+            half = scene.body.size // 2
             yield _without(
-                scene, f"modes {half + 1} to {scene.body.modes}", "body.modes", _sets("body", "modes", half)
+                scene, f"modes {half + 1} to {scene.body.size}", "body.modes", _sets("body", "modes", half)
             )
+        if isinstance(scene.body, BeamBody) and scene.body.residual:
+            yield _without(scene, "residual vectors", "body.residual", _sets("body", "residual", False))
         for name in RECORDED if scene.replay is None else ():
             if getattr(scene.record, name) and (name == "impacts" or scene.period is not None):
                 yield _without(

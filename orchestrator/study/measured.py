@@ -87,6 +87,8 @@ class Study:
         `P(p,q)`, `chaotic`, `no impacts`, ...; empty where nothing forces it.
     remarks : tuple of str
         What was left out, and why.
+    modes_reference : str
+        What other numbers of modes are compared with; empty where there are none.
     """
 
     scene: Scene
@@ -97,3 +99,4 @@ class Study:
     chosen: Measured | None
     orbit: str
     remarks: tuple[str, ...]
+    modes_reference: str = ""

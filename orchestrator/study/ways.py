@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 from scipy.optimize import brentq
@@ -79,6 +79,8 @@ class Way:
         Opens the way; given a wrapper of the functions of all FMUs, or None.
     model : bool
         Whether another model is simulated (another contact law, fewer modes), and not the same one otherwise.
+    against : Scene or None
+        The finest model of its kind, where its errors are told by that one and not by the study's reference.
     """
 
     name: str
@@ -87,6 +89,7 @@ class Way:
     changes: Mapping[str, Any]
     open: Opener
     model: bool = False
+    against: Scene | None = None
 
     @property
     def label(self) -> str:
@@ -165,10 +168,10 @@ def remarks_on(scene: Scene) -> list[str]:
 
 
 def _by_scene(
-    name: str, knob: str, setting: float, scene: Scene, changes: Mapping[str, Any], **kind: bool
+    name: str, knob: str, setting: float, scene: Scene, changes: Mapping[str, Any], *, model: bool = False
 ) -> Way:
     changed = scene.with_values(changes) if changes else scene
-    return Way(name, knob, setting, changes, lambda wrap: opened_trial(changed, wrap), **kind)
+    return Way(name, knob, setting, changes, lambda wrap: opened_trial(changed, wrap), model)
 
 
 def _opens(kind: Callable[..., Trial], *arguments: Any) -> Opener:
@@ -296,17 +299,47 @@ def _models(scene: Scene) -> list[Way]:
 
 
 def _other_modes(scene: Scene) -> list[Way]:
-    """Fewer and more modes of a beam; with rigid stops nothing converges, and none is shown."""
+    """Fewer and more modes of a beam, natural ones alone and with residual vectors, told by the most of those.
+
+    With rigid stops nothing converges, and none is shown.
+    """
     body = scene.body
     if not isinstance(body, BeamBody) or any(isinstance(stop, RestitutionStop) for stop in scene.stops):
         return []
-    most = max(LEAST_TRIED_MODES, 4 * body.modes)
-    counts = {n for n in (1, 2, 4, 8, 16, 32, MOST_MODES) if n <= most} | {body.modes}
+    most = max(LEAST_TRIED_MODES, 4 * body.size)
+    counts = sorted({n for n in (1, 2, 4, 8, 16, 32, MOST_MODES) if n <= most} | {body.size})
+    changes = [{"body.modes": n, "body.residual": residual} for residual in (False, True) for n in counts]
+    able = [change for change in changes if _can_have(scene, change)]
+    if not able:
+        return []
+    finest = scene.with_values(able[-1])
     return [
-        _by_scene("fewer or more modes", "modes", n, scene, {"body.modes": n}, model=True)
-        for n in sorted(counts)
-        if _can_have(scene, {"body.modes": n})
+        replace(
+            _by_scene(
+                "residual vectors" if change["body.residual"] else "modes",
+                *("modes", change["body.modes"]),
+                scene,
+                change,
+                model=True,
+            ),
+            against=finest,
+        )
+        for change in able[:-1]
     ]
+
+
+def told_by(ways: Sequence[Way]) -> str:
+    """Return in words what other numbers of modes are compared with; empty where there are none.
+
+    Parameters
+    ----------
+    ways : sequence of Way
+    """
+    finest = next((way.against.body for way in ways if way.against is not None), None)
+    if not isinstance(finest, BeamBody):
+        return ""
+    what = ", residual vectors among them" if finest.residual else ""
+    return f"{finest.size} modes{what}"
 
 
 def _equal_restitution(scene: Scene, body: OscillatorBody) -> list[Way]:

@@ -3,6 +3,7 @@
 
 #include "check.h"
 #include "modes/beam_modes.h"
+#include "modes/beam_residual.h"
 #include "modes/chain_modes.h"
 
 static double decades(uint64_t *seed, double low, double high)
@@ -162,6 +163,50 @@ static void collocated_impulses_move_one_point(uint64_t *seed)
     CHECK(!vi_beam_collocation(VI_CLAMPED_FREE, VI_MODES + 1, grid, 0, direction), "%s", "too many points");
 }
 
+/* With its residual vectors a beam yields to static forces at the points as much as with all its modes. */
+static void residual_vectors_make_the_flexibility_whole(uint64_t *seed)
+{
+    for (int trial = 0; trial < 300; ++trial) {
+        const vi_beam_boundary boundary = (vi_beam_boundary)(1 + choice(seed, 4));
+        const int natural = 1 + (int)choice(seed, VI_MODES - 1), points = 1 + (int)choice(seed, VI_PORTS);
+        double point[VI_PORTS];
+        for (int k = 0; k < points; ++k) { /* one in each of equal cells */
+            point[k] = (k + uniform(seed, 0.3, 0.7)) / points;
+        }
+        if (choice(seed, 2) && boundary == VI_CLAMPED_FREE) {
+            point[points - 1] = 1.0;
+        }
+        vi_beam_residual residual;
+        if (vi_beam_residual_find(&residual, boundary, natural, points, point) != 0) {
+            CHECK(points > 1, "one point at %g of mode %d was refused", point[0], natural);
+            continue;
+        }
+        double last = vi_beam_eigenvalue(boundary, natural);
+        for (int i = 0; i < points; ++i) {
+            CHECK(residual.eigenvalue[i] > last, "vector %d of %d: %g after %g", i, points, residual.eigenvalue[i], last);
+            last = residual.eigenvalue[i];
+            CHECK(isfinite(vi_beam_residual_participation(&residual, i)), "vector %d", i);
+        }
+        for (int k = 0; k < points; ++k) {
+            double sum = 0.0;
+            for (int j = 1; j <= natural; ++j) {
+                const double part = vi_beam_shape(boundary, j, point[k], 0) / pow(vi_beam_eigenvalue(boundary, j), 2.0);
+                sum += part * part;
+            }
+            for (int i = 0; i < points; ++i) {
+                const double part = vi_beam_residual_shape(&residual, i, point[k]) / pow(residual.eigenvalue[i], 2.0);
+                sum += part * part;
+            }
+            const double whole = vi_beam_static_shape(boundary, point[k], point[k]);
+            CHECK(fabs(sum - whole) <= 1e-12 * whole, "%d modes, point %g: %.17g, not %.17g", natural, point[k], sum, whole);
+        }
+    }
+    const double twice[2] = {0.5, 0.5}, support[1] = {0.0};
+    vi_beam_residual residual;
+    CHECK(vi_beam_residual_find(&residual, VI_PINNED_PINNED, 3, 2, twice) == 2, "%s", "one point twice");
+    CHECK(vi_beam_residual_find(&residual, VI_PINNED_PINNED, 3, 1, support) == 1, "%s", "a point on a support");
+}
+
 int main(void)
 {
     uint64_t seed = 20250;
@@ -169,5 +214,6 @@ int main(void)
     impossible_chains_are_refused();
     beams_stay_bounded_to_high_order(&seed);
     collocated_impulses_move_one_point(&seed);
+    residual_vectors_make_the_flexibility_whole(&seed);
     return 0;
 }

@@ -1,17 +1,20 @@
 """Beam modes against 120 digits, the thesis's tables 7.1 to 7.6, and exact statics: equations.md 6."""
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import eigh
 from scipy.optimize import brentq
 from support.exact_modes import beam_root, beam_shape
 from support.modes import collocation, frequency_error, natural_frequencies, static_stiffness
 from support.tolerance import EPSILON, PRINTED_12, ROUNDING
 
 from vibroimpact.fmus.core import beam_modes
-from vibroimpact.fmus.core.modes import BOUNDARIES, Array
+from vibroimpact.fmus.core.modes import BOUNDARIES, Array, residual_vectors
 
 ENDS = sorted(BOUNDARIES)
 MODES = 64
@@ -280,3 +283,33 @@ def test_the_frequency_of_an_aluminium_strip_is_that_of_the_reference() -> None:
     first = float(natural_frequencies(modes, rigidity, mass, 0.25)[0])
     assert first / (2.0 * math.pi) == pytest.approx(26.3207, abs=5.1e-5)
     assert static_stiffness(modes, 1.0) * rigidity / 0.25**3 == pytest.approx(179.2, rel=PRINTED_12)
+
+
+@pytest.mark.parametrize("boundary", ENDS)
+def test_residual_vectors_are_the_best_of_what_many_more_modes_do(boundary: Any) -> None:
+    # reference: the same shapes as sums over 4000 modes, orthogonalised by a general eigenvalue problem
+    natural, points = 5, np.array([0.31, 0.7])
+    many = beam_modes(boundary, 4000)
+    shapes, inverse = many.shapes(points)[:, natural:], many.eigenvalues[natural:] ** -4.0
+    stiffness, mass = (shapes * inverse**k @ shapes.T for k in (1, 2))
+    values, vectors = eigh(stiffness, mass)
+    found = residual_vectors(boundary, natural, points)
+    assert_allclose(found.eigenvalues**4, values, rtol=1e-6)  # the share of mass that is not summed
+    places = np.linspace(0.0, 1.0, 41)
+    expected = many.shapes(places)[:, natural:] * inverse @ shapes.T @ vectors
+    signs = np.sign(np.sum(expected * found.shapes(places), axis=0))
+    assert_allclose(found.shapes(places), expected * signs, atol=1e-6)
+    participation = many.participation[natural:] * inverse @ shapes.T @ vectors
+    assert_allclose(found.participation, participation * signs, atol=1e-6)
+
+
+@pytest.mark.parametrize("boundary", ENDS)
+def test_residual_vectors_are_orthogonal_to_the_modes_and_to_each_other(boundary: Any) -> None:
+    nodes, weights = gauss()
+    pieces = [0.0, 0.2, 0.55, 0.9, 1.0]  # the third derivative jumps at a point
+    s = np.concatenate([a + (b - a) * nodes for a, b in pairwise(pieces)])
+    w = np.concatenate([(b - a) * weights for a, b in pairwise(pieces)])
+    vectors = residual_vectors(boundary, 6, pieces[1:-1])
+    shapes = np.hstack([beam_modes(boundary, 6).shapes(s), vectors.shapes(s)])
+    assert_allclose(shapes.T * w @ shapes, np.eye(9), atol=1e-6)  # the mass of a vector is summed to 1e-6
+    assert_allclose(shapes[:, :6].T * w @ shapes[:, 6:], 0.0, atol=1e-9)

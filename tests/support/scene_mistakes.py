@@ -284,7 +284,7 @@ OF_A_CHAIN = [
     ),
 ]
 OF_A_BEAM = [
-    ("modes = 3", "modes = 65", "body.modes: expected a whole number from 1 to 64, got 65."),
+    ("modes = 3", "modes = 65", 'body.modes: expected a whole number from 1 to 64, or "auto", got 65.'),
     (
         "damping_ratio = [0.01, 0.02, 0.03]",
         "damping_ratio = [0.01, -0.02, 0.03]",

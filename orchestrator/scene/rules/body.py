@@ -35,7 +35,7 @@ def arrays_have_one_size(draft: Draft) -> Iterator[Problem]:
             and draft.sweeps_modes
             and not is_array_only(field_of(BeamBody, variable.key))
         ):
-            expected = "one number for all modes where a sweep varies how many there are"
+            expected = "one number for all modes where it is not yet known how many there are"
             yield Problem(where, expected, f"an array of {len(value)}", "Write the number alone.")
         elif not is_array_only(field_of(BeamBody, variable.key)):
             yield from _size_problem(where, value, body.size, "mode")

@@ -171,10 +171,12 @@ def residual_vectors_have_stops_that_yield(draft: Draft) -> Iterator[Problem]:
     for number, stop in enumerate(draft.stops, start=1):
         if isinstance(stop, RestitutionStop):
             hint = 'Use law = "kelvin_voigt", "hertz" or "hunt_crossley".'
-            yield Problem(f"stop[{number}].law", "a stop that yields beside residual = true", "a rigid one", hint)
+            yield Problem(
+                f"stop[{number}].law", "a stop that yields beside residual = true", "a rigid one", hint
+            )
     places = len({stop_location(stop) for stop in stops})
     span = draft.span("body.modes")
-    fewest = body.modes if span is None else int(span[0])
+    fewest = body.size if span is None else int(span[0])
     if fewest <= places:
         expected = f"more than {places}: one for each place of a stop, and natural ones before them"
         yield Problem("body.modes", expected, f"{fewest} beside residual = true", "Use more modes.")
@@ -184,6 +186,24 @@ def residual_vectors_have_stops_that_yield(draft: Draft) -> Iterator[Problem]:
         yield Problem("forcing.mode", expected, quoted(draft.forcing.mode), hint)
 
 
+def modes_that_are_found_converge(draft: Draft) -> Iterator[Problem]:
+    """With a rigid stop nothing converges: the mass that it meets falls as 1 / modes, equations.md 6.6."""
+    if not draft.finds_modes:
+        return
+    for number, stop in enumerate(draft.stops, start=1):
+        if isinstance(stop, RestitutionStop):
+            hint = (
+                'The mass that a rigid stop meets falls as 1 / modes: use law = "kelvin_voigt", "hertz" or '
+                '"hunt_crossley", or say how many modes.'
+            )
+            yield Problem(
+                f"stop[{number}].law", 'a stop that yields beside modes = "auto"', "a rigid one", hint
+            )
+    if draft.execution is not None and draft.execution.tolerance is None:
+        hint = "Add tolerance = 1e-3 to [execution]: the relative error of what is recorded."
+        yield Problem("execution.tolerance", 'a number beside modes = "auto"', "nothing", hint)
+
+
 STOP_RULES = (
     stops_are_few,
     stops_are_on_the_body,
@@ -191,4 +211,5 @@ STOP_RULES = (
     start_is_on_the_free_side,
     a_surface_that_lags_is_fused,
     residual_vectors_have_stops_that_yield,
+    modes_that_are_found_converge,
 )

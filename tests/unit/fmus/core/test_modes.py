@@ -1,10 +1,11 @@
-"""What `beam_modes` refuses, and in which words."""
+"""What `beam_modes` and `residual_vectors` refuse, and in which words."""
 
 import numpy as np
 import pytest
 from support.modes import collocation
 
 from vibroimpact.fmus.core import beam_modes
+from vibroimpact.fmus.core.modes import residual_vectors
 from vibroimpact.fmus.errors import UsageError
 
 
@@ -37,3 +38,16 @@ def test_a_collocation_grid_with_a_point_twice_or_on_a_support_is_refused(grid: 
 def test_modes_cannot_be_overwritten() -> None:
     with pytest.raises(ValueError, match="read-only"):
         beam_modes("clamped_free", 1).eigenvalues[0] = 2.0
+
+
+@pytest.mark.parametrize(
+    "points", [[0.5, 0.5], [0.0], [1.0], [0.5, 0.5 + 1e-9], [], [0.1] * 9, [np.nan], [1.5]]
+)
+def test_residual_vectors_of_points_that_cannot_be_told_apart_are_refused(points: list[float]) -> None:
+    with pytest.raises(UsageError, match="1 to 8 points that move and can be told apart"):
+        residual_vectors("pinned_pinned", 3, points)
+
+
+def test_residual_vectors_off_the_beam_are_refused() -> None:
+    with pytest.raises(UsageError, match="expected points 0 <= s <= 1"):
+        residual_vectors("clamped_free", 3, 1.0).shapes([0.5, -0.1])

@@ -334,3 +334,43 @@ def test_beams_beyond_the_range_of_numbers_are_refused() -> None:
     assert "natural frequencies are finite numbers" in refusal(
         {**SCENE, "youngs_modulus": 1e308, "length": 1e-100}
     )
+
+
+# ---- residual vectors ----
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_beam_with_residual_vectors_yields_as_a_whole_beam_does(version: str) -> None:
+    # a heavily damped beam settles on its stop: the static deflection of a force on a clamped beam and a spring
+    stiffness, force = 3.0 * TIP_STIFFNESS, 0.2
+    pressed = {"forcing.amplitude": force, "forcing.angular_frequency": 0.0}
+    found = {}
+    for residual in (0, 1):
+        values = {
+            **damped(3),
+            **pressed,
+            "residual": residual,
+            **stop(0.0, law=KELVIN_VOIGT, stiffness=stiffness),
+        }
+        with beam(values, version=version) as b:
+            b.step(5.0)
+            found[residual] = b.get("displacement")
+    whole = force / (TIP_STIFFNESS + stiffness)
+    assert found[1] == pytest.approx(whole, rel=1e-9)
+    assert abs(found[0] / whole - 1.0) > 1e-4
+
+
+def test_residual_vectors_beside_a_rigid_stop_or_too_few_modes_are_refused() -> None:
+    rigid = {"residual": 1, "contact[2].law": 1, "contact[2].position": 1.0}
+    assert "contact[2].law: expected a stop that yields beside residual" in refusal(rigid)
+    few = {"residual": 1, "modes": 1, **stop(1.0, law=KELVIN_VOIGT, stiffness=1e3)}
+    assert "modes: expected more than 1 beside residual" in refusal(few)
+    near = {
+        **few,
+        "modes": 4,
+        **stop(1.0, law=KELVIN_VOIGT, k=2, stiffness=1e3),
+        "contact[2].location": 1.0 - 1e-9,
+    }
+    assert "contact[2].location: expected a place that residual can tell" in refusal(near)
+    shaped = {**few, "modes": 4, "forcing.kind": MODE, "forcing.mode": 4, "forcing.amplitude": 1.0}
+    assert "forcing.mode: expected 1 to 3, a natural mode, got 4" in refusal(shaped)

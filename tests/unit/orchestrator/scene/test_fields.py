@@ -85,7 +85,7 @@ def test_every_field_says_what_it_expects(model: type[BaseModel]) -> None:
         ("damping_ratio", "a number >= 0, or an array of them", "a number >= 0"),
         ("location", "a number from 0 to 1", ""),
         ("velocity_start", "an array of finite numbers", "a finite number"),
-        ("modes", "a whole number from 1 to 64", ""),
+        ("modes", 'a whole number from 1 to 64, or "auto"', ""),
         ("side", '"upper" or "lower"', ""),
         ("exchange", '"jacobi", "gauss_seidel" or "iterated"', ""),
         ("guard", "true or false", ""),
