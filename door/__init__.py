@@ -59,6 +59,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.simulation import effects as effects
     from vibroimpact.simulation import export_fmu as export_fmu
     from vibroimpact.simulation import export_ssp as export_ssp
+    from vibroimpact.simulation import hard_cases as hard_cases
     from vibroimpact.simulation import import_ssp as import_ssp
     from vibroimpact.simulation import replay as replay
     from vibroimpact.simulation import run as run
@@ -90,6 +91,7 @@ _NAMES = {
         "campaign",
         "cost_of",
         "effects",
+        "hard_cases",
         "export_fmu",
         "export_ssp",
         "import_ssp",

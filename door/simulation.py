@@ -19,6 +19,8 @@ from vibroimpact.orchestrator.campaign import SceneCost, run_campaign, run_scene
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
 from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
+from vibroimpact.orchestrator.hard_cases import dataset_of as hard_cases_dataset
+from vibroimpact.orchestrator.hard_cases import measured_cases
 from vibroimpact.orchestrator.replay.replaying import replay_scene
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.scene import Scene
@@ -268,6 +270,39 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     if path is not None:
         write_results(dataset, _path(path), kind="effects")
     return dataset.assign_attrs(results_kind="effects")
+
+
+def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> xr.Dataset:
+    """Run what breaks solvers of impacts, and measure how well each claim about it holds on this machine.
+
+    Parameters
+    ----------
+    only : str or sequence of str
+        Names of the cases to run; none: all of docs/hard_cases.md that have one.
+    path : path, optional
+        The dataset to write as well (.nc).
+
+    Returns
+    -------
+    xarray.Dataset
+        `figure`, `bound` and `is_met` of each `case`, what is drawn of it (`x`, `y`), and its `name`, `claim` and
+        `reference` in words; `attrs["missed"]` names those whose bound is missed.
+
+    Raises
+    ------
+    UsageError
+        There is no such case.
+
+    Examples
+    --------
+    >>> found = hard_cases("grazing-from-below")
+    >>> float(found.figure[0]), bool(found.is_met[0])
+    (0.0, True)
+    """
+    found = hard_cases_dataset(measured_cases([only] if isinstance(only, str) else only))
+    if path is not None:
+        write_results(found, _path(path), kind="hard_cases")
+    return found.assign_attrs(results_kind="hard_cases")
 
 
 def cost_of(scene: SceneLike) -> SceneCost:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from vibroimpact.analysis.figures.accuracy import draw_accuracy
 from vibroimpact.analysis.figures.effects import draw_effects
 from vibroimpact.analysis.figures.estimates import draw_estimates
+from vibroimpact.analysis.figures.hard_cases import draw_hard_cases
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
 from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
@@ -41,7 +42,9 @@ from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.wording import option
 
 Data = xr.Dataset | Recording
-Family = Literal["runs", "recording", "replay", "estimates", "spikes", "accuracy", "effects", "ladder"]
+Family = Literal[
+    "runs", "recording", "replay", "estimates", "spikes", "accuracy", "effects", "hard_cases", "ladder"
+]
 _WORDS: dict[Family, str] = {
     "runs": "a dataset of runs",
     "recording": "a recording",
@@ -50,6 +53,7 @@ _WORDS: dict[Family, str] = {
     "spikes": "spikes",
     "accuracy": "a study of accuracy",
     "effects": "a study of effects",
+    "hard_cases": "hard cases",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -147,6 +151,7 @@ KINDS: dict[str, FigureKind] = {
     "intervals": FigureKind({"spikes": lambda data, view: draw_intervals(data)}),
     "accuracy": FigureKind({"accuracy": lambda data, view: draw_accuracy(data)}),
     "effects": FigureKind({"effects": lambda data, view: draw_effects(data)}),
+    "hard-cases": FigureKind({"hard_cases": lambda data, view: draw_hard_cases(data)}),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
@@ -207,6 +212,7 @@ def _family(data: Data) -> Family:
         "spikes": "spikes",
         "accuracy": "accuracy",
         "effects": "effects",
+        "hard_cases": "hard_cases",
     }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:
@@ -221,7 +227,9 @@ def _family(data: Data) -> Family:
 def _usual(data: Any, family: Family, view: View) -> str:
     """Return the kind that says most of data."""
     if family != "runs":
-        return {"spikes": "intervals", "ladder": "convergence"}.get(family, family)
+        return {"spikes": "intervals", "ladder": "convergence", "hard_cases": "hard-cases"}.get(
+            family, family
+        )
     swept = varied(data)
     if view.run is not None or not swept:
         return "run"

@@ -33,7 +33,7 @@ COMMAND_GROUP = "vibroimpact.commands"
 PANELS = {
     "Simulate": ("check", "run", "campaign", "demo"),
     "Look": ("plot", "describe"),
-    "Measure and compare": ("accuracy", "effects", "import", "replay", "estimate", "spikes"),
+    "Measure and compare": ("accuracy", "effects", "hard-cases", "import", "replay", "estimate", "spikes"),
     "Exchange": ("fmu", "ssp"),
 }
 """The commands as `--help` shows them, in the order in which they are used; those of other packages come last."""

@@ -30,6 +30,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands of this package to the command line."""
     for command in (check, run, campaign, demo, accuracy, effects, replay):
         app.command()(command)
+    app.command("hard-cases")(hard_cases)
     fmu_commands.command()(export)
     ssp_commands.command("export")(export_ssp)
     ssp_commands.command("import")(import_ssp)
@@ -136,6 +137,27 @@ def effects(
     from vibroimpact.orchestrator.commands.effects import show_effects
 
     show_effects(scene, changes or (), output, figure, force)
+
+
+def hard_cases(
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="A case to run; may be repeated. All without it.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
+    figure: FigureFile = None,
+    names: Annotated[bool, typer.Option("--list", help="Print the names of the cases and run none.")] = False,
+    force: Force = False,
+) -> None:
+    """Run what breaks solvers of impacts, and print each figure beside its bound.
+
+    Grazes, resonance, chatter into rest, stops that are next to rigid, units from nano to giga: each against a closed
+    form or a law of conservation. Exit code 1: a bound is missed on this machine.
+
+    Example: vibroimpact hard-cases --only grazing-from-above --only chatter --figure hard_cases.png
+    """
+    from vibroimpact.orchestrator.commands.hard_cases import show_hard_cases
+
+    show_hard_cases(only or (), output, figure, force, names)
 
 
 def demo(

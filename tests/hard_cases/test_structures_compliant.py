@@ -11,6 +11,8 @@ from soak.bodies import check
 from support.structure import DONE, IMPACT_LIMIT, Modes, Stop, Structure
 from support.tolerance import ROUNDING, SEQUENCE
 
+import vibroimpact as vi
+
 NATURAL, SHAPE = np.array([1.0, 2.7, 6.1, 11.0]), np.array([1.0, -0.7, 0.5, -0.3])
 FORCE, SPEED = np.array([1.0, 0.2, 0.1, 0.05]), np.array([1.0, 0.3, 0.2, 0.1])
 
@@ -352,3 +354,19 @@ def test_a_stop_whose_damping_lets_it_press_again_does_so_from_that_instant() ->
         found = np.array([body.displacement[0], body.velocity[0]])
     expected = solve_ivp(motion, (0.0, 2.0), [0.0, -0.4], rtol=1e-11, atol=1e-13, max_step=1e-3).y[:, -1]
     assert np.allclose(found, expected, rtol=1e-8, atol=0.0)
+
+
+@pytest.mark.parametrize("law", ["kelvin_voigt", "hertz", "hunt_crossley"])
+def test_an_oscillator_may_start_pressed_into_a_stop_that_yields(law: str) -> None:
+    # put where the stop's force, F = k d^n, balances a load it stays there; a rigid stop refuses such a start
+    exponent = 1.0 if law == "kelvin_voigt" else 1.5
+    depth = (1.0 / 1e4) ** (1.0 / exponent)
+    tables = {
+        "body": {"mass": 1.0, "stiffness": 0.0, "displacement_start": depth},
+        "forcing": {"amplitude": 1.0, "angular_frequency": 0.0},
+        "stop": [{"law": law, "position": 0.0, "stiffness": 1e4}],
+        "record": {"recorded_time": 5.0},
+    }
+    found = vi.run(tables)
+    assert found.outcome == 0
+    assert found.final_displacement.item() == pytest.approx(depth, rel=1e-9)

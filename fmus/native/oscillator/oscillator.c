@@ -96,7 +96,8 @@ static void check_contact(char *message, const oscillator *o, int k)
         return;
     }
     const double sign = vi_contact_direction(contact->side);
-    if (sign * (o->displacement_start - contact->position) > 0.0) {
+    const bool rigid = !vi_contact_law_is_compliant(contact->law.law) && contact->law.law != VI_LAW_EXTERNAL_FORCE;
+    if (rigid && sign * (o->displacement_start - contact->position) > 0.0) {
         vi_complain(message,
                     "displacement_start: expected a start on the free side of contact[%d] (%s %.17g), got %.17g", n,
                     sign > 0.0 ? "<=" : ">=", contact->position, o->displacement_start);

@@ -187,7 +187,7 @@ def test_the_estimated_error_of_modes_holds_against_64(
 
 def test_effects_draw_how_the_modes_that_were_found_converge() -> None:
     found = vi.effects(strip())
-    figure = vi.plot(found)
+    figure = vi.draw(found)
     bars, convergence = figure.axes
     assert convergence.get_xlabel() == "number of modes"
     errors = dict(zip(*convergence.lines[1].get_data(), strict=True))

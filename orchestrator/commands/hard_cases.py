@@ -1,0 +1,113 @@
+"""What `vibroimpact hard-cases` does: it runs what breaks solvers, and prints each figure beside its bound."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import typer
+from rich.live import Live
+from rich.table import Table
+
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.orchestrator.commands.check import duration
+from vibroimpact.orchestrator.commands.failures import counted
+from vibroimpact.orchestrator.hard_cases import CASES, Measured, cases_named, dataset_of, measured_cases
+
+
+def show_hard_cases(
+    only: Sequence[str], output: Path | None, figure: Path | None, force: bool, names: bool
+) -> None:
+    """Run hard cases, print a table, and write what was asked for.
+
+    Raises
+    ------
+    typer.Exit
+        A bound was missed, or Ctrl-C came; what was measured before is printed and written.
+    """
+    if names:
+        for case in CASES:
+            say(f"{case.name}: {case.title}")
+        return
+    cases_named(only)  # a name that is none is refused before anything is run
+    refuse_outputs([], output, figure)
+    refuse_overwriting(output, force, lambda there: there.get("results_kind") == "hard_cases")
+    measured: list[Measured] = []
+    interrupted = False
+    try:
+        with _shown() as told:
+
+            def taken(one: Measured) -> None:
+                measured.append(one)
+                told(one)
+
+            measured_cases(only, taken)
+    except KeyboardInterrupt:
+        interrupted = True
+    if measured:
+        wide_terminal().print(_table(measured))
+        _write(measured, output, figure)
+    missed = [one.case.name for one in measured if not one.is_met]
+    met = f"{len(measured) - len(missed)} of {counted(len(measured), 'bound')} met"
+    say(f"{met}{f'; missed: {chr(44).join(missed)}' if missed else ''}.")
+    if interrupted:
+        say(f"Interrupted: {len(measured)} of {len(cases_named(only))} cases were measured.", err=True)
+        raise typer.Exit(130)
+    if missed:
+        raise typer.Exit(1)
+
+
+def _write(measured: Sequence[Measured], output: Path | None, figure: Path | None) -> None:
+    dataset = dataset_of(measured)
+    if output is not None:
+        write_results(dataset, output, kind="hard_cases")
+        say(f"Dataset written to {output}.")
+    if figure is not None:
+        from vibroimpact.analysis import figures  # half a second, which a table needs not
+
+        figures.save(figures.draw(dataset.assign_attrs(results_kind="hard_cases")), figure)
+        say(f"Figure written to {figure}.")
+
+
+@contextmanager
+def _shown() -> Iterator[Callable[[Measured], None]]:
+    """Show the table as it grows on a terminal; elsewhere a line for each case."""
+    found: list[Measured] = []
+    if not sys.stderr.isatty():
+        yield lambda one: say(f"  {one.case.name}: {_told(one)}", err=True)
+        return
+    console = wide_terminal()
+    console.stderr = True
+    with Live(_table(found), console=console, transient=True, refresh_per_second=4) as live:
+
+        def grown(one: Measured) -> None:
+            found.append(one)
+            live.update(_table(found))
+
+        yield grown
+
+
+def _told(one: Measured) -> str:
+    if one.failure:
+        return f"did not run: {one.failure}"
+    return f"{one.found.figure:.1e}" if one.found.figure else "0"
+
+
+def _table(measured: Sequence[Measured]) -> Table:
+    rows = table("Hard cases", "<case", "<what is hard", ">figure", ">bound", "<figure is", ">time", "<")
+    for one in measured:
+        rows.add_row(
+            one.case.name,
+            one.case.title,
+            _told(one),
+            f"{one.case.bound:.0e}" if one.case.bound else "0",
+            one.case.of,
+            duration(one.seconds),
+            "" if one.is_met else "MISSED",
+        )
+    return rows

@@ -1,0 +1,48 @@
+"""One run of the scene of a hard case."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.run import open_runner
+from vibroimpact.orchestrator.scene import Scene
+
+IMPACT_TIME, IMPACT_VELOCITY, IMPACT_RESTITUTION, IMPACT_DURATION = 0, 2, 5, 6
+"""Columns of the impacts of a record."""
+STICK_START, STICK_END = 0, 1
+"""Columns of its sticks."""
+PLAIN: dict[str, Any] = {"mass": 1.0, "stiffness": 1.0}
+"""An oscillator with a natural frequency of 1 rad/s."""
+
+
+def run(**tables: Any) -> RunRecord:
+    """Run a nondimensional scene, fused.
+
+    Raises
+    ------
+    ComponentError
+        The run ended early.
+    """
+    scene = Scene.from_dict({"scene": {"units": "nondimensional"}, **tables}, "hard case")
+    runner = open_runner(scene, "fused")
+    try:
+        record = runner.run({})
+    finally:
+        runner.close()
+    if record.outcome not in (Outcome.ok, Outcome.stuck):
+        raise ComponentError(
+            f"hard case: expected a run to its end, got {record.outcome.name}: {record.message}"
+        )
+    return record
+
+
+def restitution(position: float, coefficient: float, **keys: Any) -> dict[str, Any]:
+    """Return the table of a rigid stop."""
+    return {"position": position, "restitution": coefficient, **keys}
+
+
+def kelvin_voigt(position: float, stiffness: float, damping: float = 0.0, **keys: Any) -> dict[str, Any]:
+    """Return the table of a Kelvin-Voigt stop."""
+    return {"law": "kelvin_voigt", "position": position, "stiffness": stiffness, "damping": damping, **keys}

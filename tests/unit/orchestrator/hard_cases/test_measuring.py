@@ -1,0 +1,96 @@
+"""Hard cases: each holds, a missed bound is told, what cannot run is told, names are names."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import vibroimpact as vi
+from vibroimpact.fmus.errors import ComponentError, UsageError
+from vibroimpact.orchestrator.hard_cases import CASES, Measured, cases_named, dataset_of, measured_cases
+from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase, relative
+from vibroimpact.orchestrator.hard_cases.finding import first_root
+
+SLOW = {"many-modes", "samples", "elastic-million"}
+
+
+@pytest.mark.parametrize("name", [case.name for case in CASES if case.name not in SLOW])
+def test_a_hard_case_holds(name: str) -> None:
+    (found,) = measured_cases([name])
+    assert found.is_met, f"{found.found.figure} above {found.case.bound} {found.failure}"
+    assert len(found.found.curve.x) == len(found.found.curve.y) > 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(SLOW))
+def test_a_hard_case_that_takes_longer_holds(name: str) -> None:
+    (found,) = measured_cases([name])
+    assert found.is_met, f"{found.found.figure} above {found.case.bound} {found.failure}"
+
+
+def test_names_are_those_of_the_page_and_differ() -> None:
+    names = [case.name for case in CASES]
+    assert len(set(names)) == len(names)
+    assert all(name == name.lower().replace(" ", "-") for name in names)
+    assert [case.name for case in cases_named(["chatter", "ripple"])] == ["ripple", "chatter"]
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (["chater"], "got 'chater'. Did you mean chatter?"),
+        (["x" * 400], "There are grazing-from-above, "),
+        (["chatter", "chatter"], "expected each name once, got 'chatter' 2 times"),
+    ],
+)
+def test_names_that_are_none_are_refused(names: list[str], message: str) -> None:
+    with pytest.raises(UsageError, match=r"only: expected") as refused:
+        vi.hard_cases(names)
+    assert message in str(refused.value)
+
+
+@pytest.fixture
+def missed(monkeypatch: pytest.MonkeyPatch) -> HardCase:
+    """Return a case whose bound nothing meets, the only one of the list."""
+    case = replace(CASES[0], name="never", bound=1e-30)
+    monkeypatch.setattr("vibroimpact.orchestrator.hard_cases.measuring.CASES", (case,))
+    return case
+
+
+def test_a_bound_that_is_missed_is_in_the_dataset_and_in_the_figure(missed: HardCase) -> None:
+    found = vi.hard_cases()
+    assert found.attrs["missed"] == "never"
+    assert not found.is_met.any()
+    assert vi.draw(found).axes[0].get_title() == "never: missed"
+
+
+def test_a_case_that_does_not_run_says_why() -> None:
+    def crash() -> Found:
+        raise ComponentError("body: fmi3DoStep returned error at time 1\nmore")
+
+    case = replace(CASES[0], measure=crash)
+    (one,) = [measured for measured in _measured(case)]
+    assert one.failure == "body: fmi3DoStep returned error at time 1"
+    assert not one.is_met
+    found = dataset_of([one])
+    assert math.isnan(found.figure[0])
+    assert found.attrs["missed"] == case.name
+
+
+def _measured(case: HardCase) -> list[Measured]:
+    from vibroimpact.orchestrator.hard_cases import measuring
+
+    return [measuring._measured(case)]
+
+
+def test_a_figure_that_is_no_number_misses_its_bound() -> None:
+    nothing = Found(math.nan, Curve(np.empty(0), np.empty(0), "", ""))
+    assert not Measured(CASES[0], nothing, 0.0).is_met
+
+
+def test_the_first_root_is_the_first() -> None:
+    assert first_root(lambda t: np.sin(t) - 0.5, 10.0) == pytest.approx(math.pi / 6.0, rel=1e-15)
+    assert relative(1.5, 1.0) == 0.5
