@@ -104,7 +104,7 @@ def refuse_unknown_modes(scene: Scene) -> None:
     UsageError
         It has `modes = "auto"`.
     """
-    if isinstance(scene.body, BeamBody) and scene.body.modes == "auto":
+    if isinstance(scene.body, BeamBody | ChainBody) and scene.body.modes == "auto":
         raise UsageError(
             f'{scene.source}: body.modes: expected a number of modes, got "auto". run and campaign find it; '
             "accuracy shows what each number costs."
@@ -138,7 +138,8 @@ def state_variables(scene: Scene) -> tuple[str, ...]:
 
 def most_elements(scene: Scene) -> int:
     """Return how many masses or modes a structure has, where a sweep varies them the most of them; else 0."""
-    swept = [max(axis.values) for axis in scene.sweep if axis.key == MODES]
+    is_beam = isinstance(scene.body_given, BeamBody)  # the state of a chain is that of its masses
+    swept = [max(axis.values) for axis in scene.sweep if axis.key == MODES and is_beam]
     return int(swept[0]) if swept else len(state_variables(scene)) // 2
 
 
@@ -248,7 +249,9 @@ def _amplitudes(body: ChainBody, forcing: Forcing) -> tuple[float, ...]:
 
 def chain_integers(body: ChainBody, scene: Scene) -> dict[str, int]:
     """Return the integer parameters of the Chain."""
-    return {"masses": body.size, "observed_mass": observed_mass(body, scene.stops)}
+    modes = 0 if body.modes is None else body.modes
+    assert modes != "auto"  # else refused
+    return {"masses": body.size, "modes": modes, "observed_mass": observed_mass(body, scene.stops)}
 
 
 def beam_floats(body: BeamBody, scene: Scene) -> dict[str, float]:

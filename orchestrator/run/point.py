@@ -123,7 +123,7 @@ class PointRunner:
 
 def built_for(scene: Scene) -> tuple[object, ...]:
     """Return what the components of a scene are made for, and no new parameter changes."""
-    return getattr(scene.body, "size", 1), scene.execution.macro_step
+    return getattr(scene.body, "size", 1), getattr(scene.body, "modes", None), scene.execution.macro_step
 
 
 def driver_of(

@@ -141,6 +141,17 @@ class ChainBody(SceneTable):
         NotNegative,
         Rule(unit="N s/m", hint=_FREE_END, fmu="far_damping", effect=DAMPING, doc="likewise a dashpot"),
     ] = 0.0
+    modes: Annotated[
+        ModeCount | None,
+        Rule(
+            f'a whole number from 1 to {MOST_MODES}, or "auto"',
+            sweepable=True,
+            hint="The slowest ones are simulated.",
+            doc='1 to the number of masses, the slowest; `"auto"`: the fewest that meet `execution.tolerance`, '
+            "see [below](#how-many-modes)",
+            default="all",
+        ),
+    ] = None
     observed_mass: Annotated[
         ModeNumber | None,
         Rule(

@@ -43,7 +43,12 @@ def _body(scene: Scene) -> str:
         ("Chain", "mass", "masses") if isinstance(body, ChainBody) else ("Beam", "mode", "modes")
     )
     swept = [axis.values for axis in scene.sweep if axis.key == MODES]
-    count = f"{min(swept[0]):g} to {max(swept[0]):g}" if swept else str(body.size)
+    modes = f"{min(swept[0]):g} to {max(swept[0]):g}" if swept else ""
+    if isinstance(body, ChainBody):
+        used = modes or body.modes
+        reduced = f" by {used} mode{'' if used == 1 else 's'}" if used and used != body.size else ""
+        return f"{kind}, a structure of {body.size} {one if body.size == 1 else parts}{reduced}"
+    count = modes or str(body.size)
     return f"{kind}, a structure of {count} {one if count == '1' else parts}"
 
 

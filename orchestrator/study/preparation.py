@@ -10,7 +10,7 @@ from itertools import islice, pairwise, product
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody
+from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
 from vibroimpact.orchestrator.scene.keys import MODES
 from vibroimpact.orchestrator.scene.models import MOST_MODES
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
@@ -155,7 +155,7 @@ def _what(points: int, truncated: bool, chaotic: bool) -> str:
 
 
 def _finds_modes(scene: Scene) -> bool:
-    return isinstance(scene.body_given, BeamBody) and scene.body_given.modes == "auto"
+    return isinstance(scene.body_given, BeamBody | ChainBody) and scene.body_given.modes == "auto"
 
 
 def _looked_at(scene: Scene) -> list[Scene]:
@@ -177,7 +177,8 @@ def converged_modes(scene: Scene, tolerance: float, note: Note = lambda text: No
 
     The number of modes is doubled until one run differs little enough from the next, and that one from the next but
     one; between the last two the fewest are then found by bisection. The estimated error is the distance from the
-    finest run plus that run's own.
+    finest run plus that run's own. Of a chain the finest has all modes, and no error; a chain that meets the tolerance
+    with none fewer takes all.
 
     Parameters
     ----------
@@ -197,11 +198,15 @@ def converged_modes(scene: Scene, tolerance: float, note: Note = lambda text: No
     for coarse, fine in pairwise(runs.ladder):
         off = runs.distance(coarse, fine)
         more = next((n for n in runs.ladder if n > fine), None)
-        if off > tolerance or (more is None and 2.0 * off > tolerance):
+        if off > tolerance or (more is None and 2.0 * off > tolerance and not runs.ends_exactly):
             continue
-        own = off if more is None else runs.distance(fine, more)
+        own = runs.distance(fine, more) if more is not None else 0.0 if runs.ends_exactly else off
         if off + own <= tolerance:
             return _fewest(runs, coarse, fine, own, tolerance, more or fine)
+    if runs.ends_exactly:
+        most = runs.ladder[-1]
+        errors = {n: runs.distance(n, most) for n in runs.ladder[:-1]}
+        return Convergence(most, 0.0, most, "motion", errors | {most: 0.0})
     raise _not_met(runs, tolerance)
 
 
@@ -230,7 +235,7 @@ def _not_met(runs: _Runs, tolerance: float) -> SceneError:
         f"{errors[best]:.2g} with {best}" if math.isfinite(errors[best]) else "other impacts with each number"
     )
     hint = "Ask for less, or record less: impact times and velocities converge last."
-    if not getattr(runs.scene.body, "residual", None):
+    if isinstance(runs.scene.body, BeamBody) and not runs.scene.body.residual:
         hint += " residual = true keeps the static flexibility of the modes that are left out."
     return SceneError(
         [
@@ -247,15 +252,18 @@ class _Runs:
     scene: Scene
     note: Note
     chaotic: bool = False
+    ends_exactly: bool = False
     ladder: list[int] = field(default_factory=list)
     tried: dict[int, Observation] = field(default_factory=dict)
     _scales: Scales | None = None
     _replicates: dict[int, list[Observation]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        fewest = next(n for n in range(1, MOST_MODES + 1) if n == MOST_MODES or self._is_valid(n))
-        self.ladder = [fewest, *(n for n in LADDER if n > fewest)]
-        judged = self._with(max(fewest, JUDGED))
+        most = getattr(self.scene.body, "size", MOST_MODES)
+        fewest = next(n for n in range(1, most + 1) if n == most or self._is_valid(n))
+        self.ladder = [fewest, *(n for n in LADDER if fewest < n < most), *([most] if most > fewest else [])]
+        self.ends_exactly = isinstance(self.scene.body, ChainBody)
+        judged = self._with(min(max(fewest, JUDGED), most))
         self._scales = scales_of(judged)
         self.chaotic = reference_of(judged).chaotic
 

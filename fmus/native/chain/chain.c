@@ -66,6 +66,11 @@ static bool parameters_are_good(const chain *c, char *message)
                     (long long)c->masses);
         return false;
     }
+    if (c->modes < 0 || c->modes > c->masses) {
+        vi_complain(message, "modes: expected 1 to %lld, or 0 for all, got %lld", (long long)c->masses,
+                    (long long)c->modes);
+        return false;
+    }
     check_masses(c, message);
     check_mass_number(message, "observed_mass", c, c->observed_mass);
     for (int k = 0; k < VI_PORTS; ++k) {
@@ -88,10 +93,15 @@ static int index_of(const chain *c, int64_t number)
     return (int)(number < 1 || number > c->masses ? c->masses : number) - 1;
 }
 
+static int modes_of(const chain *c)
+{
+    return (int)(c->modes == 0 ? c->masses : c->modes);
+}
+
 /* Sum over the masses of shape * load: the modal forces of loads on the masses. equations.md 5.2 */
 static void project(const chain *c, const double load[VI_MODES], double modal[VI_MODES])
 {
-    for (int j = 0; j < c->masses; ++j) {
+    for (int j = 0; j < modes_of(c); ++j) {
         modal[j] = 0.0;
         for (int i = 0; i < c->masses; ++i) {
             modal[j] += c->shape[i][j] * load[i];
@@ -121,11 +131,11 @@ static void fill_model(chain *c, const vi_chain_modes *modes)
     const double share = constant ? cos(c->body.forcing_phase) : 1.0;
     double force[VI_MODES];
     project(c, c->forcing_amplitude, force);
-    model->modes = (int32_t)c->masses;
+    model->modes = (int32_t)modes_of(c);
     model->contacts = vi_structure_component_ports(&c->body);
     model->coupled = !modes->classical;
     memset(c->body.natural, 0, sizeof c->body.natural);
-    for (int j = 0; j < c->masses; ++j) {
+    for (int j = 0; j < model->modes; ++j) {
         c->body.natural[j] = modes->natural[j];
         vi_structure_mode(model, j, modes->natural[j], modes->damping_ratio[j], share * force[j],
                           c->body.forcing_angular_frequency);
@@ -138,7 +148,7 @@ static void fill_model(chain *c, const vi_chain_modes *modes)
     memcpy(model->observed, c->shape[index_of(c, c->observed_mass)], sizeof model->observed);
 }
 
-/* q = Psi' M x, the inverse of x = Psi q. */
+/* q = Psi' M x, the inverse of x = Psi q where all modes are in use; else what of x those in use can do. */
 static void start_modes(chain *c)
 {
     double displacement[VI_MODES], velocity[VI_MODES];
@@ -157,6 +167,7 @@ static vi_exchange_body exchange_body(chain *c)
     body.modes = (int)c->masses_described;
     body.shape = (const double(*)[VI_MODES])c->shape;
     body.mass = c->parameter.mass;
+    body.refused = modes_of(c) < c->masses ? "modes" : body.refused;
     return body;
 }
 

@@ -12,6 +12,7 @@ typedef struct {
     double time;
     /* parameters */
     int64_t masses, masses_described;
+    int64_t modes;                       /* in use; 0: all */
     vi_chain parameter; /* masses, springs, dashpots; the far spring is put in its place at initialization */
     double far_stiffness, far_damping;
     double forcing_amplitude[VI_MODES];

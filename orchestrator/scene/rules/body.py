@@ -77,6 +77,9 @@ def beam_is_given_once(draft: Draft) -> Iterator[Problem]:
 def observed_point_is_there(draft: Draft) -> Iterator[Problem]:
     """The mass or the point whose displacement is recorded is one of the body."""
     body = draft.body
+    if isinstance(body, ChainBody) and isinstance(body.modes, int) and body.modes > body.size:
+        expected = f"at most as many modes as masses, {body.size}"
+        yield Problem("body.modes", expected, str(body.modes), "Leave it out for all of them.")
     if isinstance(body, ChainBody) and (body.observed_mass or 1) > body.size:
         yield _no_such_mass("body.observed_mass", body, body.observed_mass or 0)
     if "sensor" not in draft.document or body is None:

@@ -187,11 +187,11 @@ def residual_vectors_have_stops_that_yield(draft: Draft) -> Iterator[Problem]:
 
 
 def modes_that_are_found_converge(draft: Draft) -> Iterator[Problem]:
-    """With a rigid stop nothing converges: the mass that it meets falls as 1 / modes, equations.md 6.6."""
+    """On a beam with a rigid stop nothing converges: the mass that it meets falls as 1 / modes, equations.md 6.6."""
     if not draft.finds_modes:
         return
     for number, stop in enumerate(draft.stops, start=1):
-        if isinstance(stop, RestitutionStop):
+        if isinstance(stop, RestitutionStop) and isinstance(draft.body, BeamBody):
             hint = (
                 'The mass that a rigid stop meets falls as 1 / modes: use law = "kelvin_voigt", "hertz" or '
                 '"hunt_crossley", or say how many modes.'

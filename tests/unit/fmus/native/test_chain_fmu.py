@@ -197,6 +197,25 @@ def test_energies_balance_and_are_only_followed_when_asked_for() -> None:
         assert c.get("energy.kinetic") > 0.0
 
 
+# ---- fewer modes ----
+
+
+def test_a_chain_with_fewer_modes_moves_in_those_alone() -> None:
+    # two equal masses between equal springs with a free end: the slow mode alone, from a start that both take part in
+    golden = (math.sqrt(5.0) - 1.0) / 2.0  # its frequency, and x_1 / x_2 of its shape
+    start = np.array([0.3, 0.1])
+    shape = np.array([golden, 1.0]) / math.hypot(golden, 1.0)
+    with chain({"modes": 1, **each("displacement_start", list(start))}) as c:
+        assert c.get_each("displacement[{}]", 2) == pytest.approx(shape * (shape @ start), rel=ROUNDING)
+        c.advance(7.0)
+        expected = shape * (shape @ start) * math.cos(7.0 * golden)
+        assert c.get_each("displacement[{}]", 2) == pytest.approx(expected, rel=1e-13)
+
+
+def test_more_modes_than_masses_are_refused() -> None:
+    assert "modes: expected 1 to 2, or 0 for all, got 3" in refusal({"modes": 3})
+
+
 # ---- refusals ----
 
 

@@ -202,3 +202,43 @@ def test_a_study_of_accuracy_tells_other_numbers_of_modes_by_the_most() -> None:
     errors = dict(zip(modes.setting.values.tolist(), modes.error.values.tolist(), strict=True))
     assert errors[4] > errors[8] > errors[16]
     assert modes.is_model.all()
+
+
+CHAIN: dict[str, Any] = {
+    "body": {"kind": "chain", "masses": [1.0] * 12, "stiffnesses": 400.0, "dampings": 1.0, "modes": "auto"},
+    "forcing": {"amplitude": [*([0.0] * 11), 1.0], "angular_frequency": 1.5},
+    "stop": [{"law": "kelvin_voigt", "position": 0.01, "stiffness": 10.0, "damping": 0.5}],
+    "record": {"transient_periods": 20, "recorded_periods": 5},
+    "execution": {"tolerance": 0.05},
+}
+
+
+def test_a_chain_takes_the_fewest_modes_and_all_of_them_where_fewer_do_not_do() -> None:
+    found = prepared_scene(Scene.from_dict(CHAIN))
+    assert 1 <= int(found.found["modes_found"]) < 12
+    exact = prepared_scene(Scene.from_dict(CHAIN | {"execution": {"tolerance": 1e-9}}))
+    assert exact.found["modes_found"] == 12
+    assert exact.found["estimated_error_of_modes"] == 0.0
+
+
+def test_a_chain_with_a_rigid_stop_converges_too() -> None:
+    rigid = CHAIN | {"stop": [{"position": 0.01, "restitution": 0.5}], "execution": {"tolerance": 0.5}}
+    assert int(prepared_scene(Scene.from_dict(rigid)).found["modes_found"]) <= 12
+
+
+def test_a_chain_with_all_its_modes_is_the_chain_bit_for_bit() -> None:
+    body = {key: value for key, value in CHAIN["body"].items() if key != "modes"}
+    plain = vi.run(CHAIN | {"body": body, "execution": {}})
+    swept = vi.run(
+        Scene.from_dict(CHAIN | {"body": body, "execution": {}}).with_sweep({"body.modes": [3, 12]})
+    )
+    np.testing.assert_array_equal(plain.final_state, swept.final_state.sel(modes=12))
+    assert swept.final_state.shape[-1] == 24
+    assert not np.array_equal(swept.final_state.sel(modes=3), swept.final_state.sel(modes=12))
+
+
+def test_a_chain_has_no_more_modes_than_masses() -> None:
+    with pytest.raises(
+        SceneError, match=r"body\.modes: expected at most as many modes as masses, 12, got 13"
+    ):
+        Scene.from_dict(CHAIN | {"body": CHAIN["body"] | {"modes": 13}})
