@@ -54,11 +54,13 @@ def _export_scene_file(
     from vibroimpact.analysis.dataset.outputs import refuse_outputs
     from vibroimpact.orchestrator.run.export import export_scene
     from vibroimpact.orchestrator.scene import load_scene
-    from vibroimpact.orchestrator.study.preparation import with_found_modes
 
-    scene, target = (
-        with_found_modes(load_scene(scene_file, changes or ()), note),
-        output or Path(f"{scene_file.stem}.fmu"),
-    )
+    scene, target = load_scene(scene_file, changes or ()), output or Path(f"{scene_file.stem}.fmu")
+    if scene.execution.tolerance is not None:
+        from vibroimpact.orchestrator.study.preparation import (
+            with_found_modes,
+        )  # datasets, which others need not
+
+        scene = with_found_modes(scene, note)
     refuse_outputs([scene_file], target, ending=".fmu")
     say(str(export_scene(scene, target, fmi=fmi, platform=platform, note=note, **kinds)))

@@ -230,12 +230,11 @@ class GuardedRunner:
 
     def _lost(self, outcome: Outcome, what: str) -> _Loss:
         """Give up a child that is gone or does not answer and say what it was doing."""
+        if self._child is not None:  # first: it may still be writing what is read then
+            self._end_child(at_once=True)
         known = self._noting or outcome is Outcome.timeout
         message = self._what_happened(what) if known else f"guard: {what}"
-        loss = _Loss(outcome, message, self._notes.last_call()[1])
-        if self._child is not None:
-            self._end_child(at_once=True)
-        return loss
+        return _Loss(outcome, message, self._notes.last_call()[1])
 
     def _end_child(self, *, at_once: bool = False) -> int:
         assert self._child is not None
@@ -250,7 +249,9 @@ class GuardedRunner:
         if math.isnan(at):
             # no run has begun: the file is what a user can do something about
             function = f"{function} of {self._file_of(instance) or instance}"
-        lines = self._notes.last_lines()
+        lines = [
+            line for line in self._notes.last_lines() if line
+        ]  # one was perhaps cut off before its first letter
         logged = " | ".join(lines[-5:]) if lines else "nothing"
         when = "" if math.isnan(at) else f" at time {at:.17g}"
         return f"{instance}: {function}{when}: {what}; the component logged last: {logged}"
