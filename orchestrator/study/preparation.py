@@ -89,7 +89,8 @@ def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
     scene = with_found_modes(scene, note)
     truncation = scene.found.get("estimated_error_of_modes")
     points = _looked_at(scene)
-    solution = max(_error_of_solution(point) for point in points)
+    told = [error for error in map(_error_of_solution, points) if not math.isnan(error)]
+    solution = max(told, default=math.nan)
     error = solution if truncation is None else float(truncation)
     if truncation is not None and not math.isnan(solution):
         error += solution
@@ -97,7 +98,7 @@ def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
         **scene.found,
         "tolerance": tolerance,
         "estimated_error": error,
-        "estimated_error_of": _what(len(points), truncation is not None, math.isnan(solution)),
+        "estimated_error_of": _what(len(points), truncation is not None, len(told)),
     }
     if math.isnan(error):
         note("the motion is chaotic: no error of single impacts is estimated")
@@ -145,13 +146,20 @@ def round_off(error: float) -> float | str:
     return float(f"{error:.3g}") if math.isfinite(error) else "another motion"
 
 
-def _what(points: int, truncated: bool, chaotic: bool) -> str:
+def _what(points: int, truncated: bool, told: int) -> str:
+    """Return what an error is estimated of: in words, with how many of the points looked at are chaotic."""
     parts = [
         *(["the number of modes"] if truncated else []),
-        *([] if chaotic else ["the solution of the motion"]),
+        *(["the solution of the motion"] if told else []),
     ]
     where = "" if points == 1 else f", the largest of {points} points of the sweep"
-    return (" and ".join(parts) or "nothing: the motion is chaotic") + where
+    chaotic = points - told
+    left_out = (
+        ""
+        if not chaotic or not told
+        else f"; of {chaotic}, which are chaotic, that of the solution means nothing"
+    )
+    return (" and ".join(parts) or "nothing: the motion is chaotic") + where + left_out
 
 
 def _finds_modes(scene: Scene) -> bool:
@@ -231,6 +239,11 @@ def _not_met(runs: _Runs, tolerance: float) -> SceneError:
     finest = runs.ladder[-1]
     errors = {n: runs.distance(n, finest) for n in runs.ladder[:-1]}
     best = min(errors, key=lambda n: errors[n])
+    failure = next((run.failure for run in runs.tried.values() if run.failure), "")
+    if failure and not math.isfinite(errors[best]):
+        return SceneError(
+            [f"{runs.scene.source}: body.modes: expected runs to compare, got one that failed: {failure}."]
+        )
     reached = (
         f"{errors[best]:.2g} with {best}" if math.isfinite(errors[best]) else "other impacts with each number"
     )

@@ -156,6 +156,27 @@ def test_chaotic_motion_is_compared_by_its_statistics() -> None:
     assert found.error <= 0.2
 
 
+def test_a_scene_that_does_not_run_says_so() -> None:
+    with pytest.raises(
+        SceneError, match=r"body\.modes: expected runs to compare, got one that failed: impact_limit"
+    ):
+        prepared_scene(strip(**{"execution.impact_limit": 1}))
+
+
+def test_points_of_a_sweep_that_are_chaotic_are_told_apart() -> None:
+    tables = {
+        "body": {"mass": 1.0, "stiffness": 1.0, "damping": 0.01},
+        "forcing": {"amplitude": 1.0, "angular_frequency": 2.8},
+        "stop": [{"position": 0.0, "restitution": 0.95}],
+        "record": {"transient_periods": 100, "recorded_periods": 100},
+        "execution": {"tolerance": 1e-6},
+        "sweep": {"forcing.angular_frequency": {"values": [2.0, 2.8]}},
+    }
+    found = prepared_scene(Scene.from_dict(tables)).found
+    assert float(found["estimated_error"]) < 1e-6 or math.isnan(float(found["estimated_error"]))
+    assert "points of the sweep" in str(found["estimated_error_of"])
+
+
 @pytest.mark.slow
 @settings(max_examples=4, deadline=None)
 @given(
