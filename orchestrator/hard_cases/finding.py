@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -59,6 +61,19 @@ def first_root(function: Callable[[Floats], Floats], end: float) -> float:
     return found
 
 
+def _off_time(expected: float, **tables: Any) -> float:
+    """Return the relative error of the time of the first impact."""
+    record = run(**tables)
+    assert record.impacts is not None
+    return largest(relative(record.impacts[:1, IMPACT_TIME], expected))
+
+
+def _by_number(off: Floats, words: str) -> Found:
+    """Return what was measured of some settings, drawn one beside the other."""
+    places = np.arange(len(off), dtype=np.float64)
+    return Found(largest(off), Curve(places, off, words, "relative error of the time (-)"))
+
+
 def _ripple() -> Found:
     """A beam whose slow mode carries a fast one past its stop: which ripple meets it first?"""
     modes = beam_modes("clamped_free", 8)
@@ -78,9 +93,8 @@ def _ripple() -> Found:
             **{"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0, "modes": 8},
             "displacement_start": start.tolist(),
         }
-        record = run(body=body, stop=[restitution(0.9, 0.5)], record={"recorded_time": 1.01 * expected})
-        assert record.impacts is not None
-        errors.append(largest(relative(record.impacts[:1, IMPACT_TIME], expected)))
+        asked = {"recorded_time": 1.01 * expected}
+        errors.append(_off_time(expected, body=body, stop=[restitution(0.9, 0.5)], record=asked))
         ratios.append(rates[fast] / rates[0])
     off = np.array(errors)
     curve = Curve(
@@ -104,22 +118,15 @@ def _resonance() -> Found:
             return np.asarray(np.sin(0.5 * (1.0 + w) * t) * beat / (1.0 + w) - 5.0)
 
         expected = first_root(over, 60.0)
-        record = run(
+        off = _off_time(
+            expected,
             body=PLAIN,
             forcing={"amplitude": 0.5, "angular_frequency": frequency},
             stop=[restitution(2.5, 0.5)],
             record={"recorded_periods": 10},
         )
-        assert record.impacts is not None
-        errors.append(largest(relative(record.impacts[:1, IMPACT_TIME], expected)))
-    off = np.array(errors)
-    curve = Curve(
-        np.arange(len(off), dtype=float),
-        off,
-        "detuning: 0, 1e-12, -1e-12, 1e-9, -1e-6, 1e-3",
-        "relative error of the time (-)",
-    )
-    return Found(largest(off), curve)
+        errors.append(off)
+    return _by_number(np.array(errors), "detuning: 0, 1e-12, -1e-12, 1e-9, -1e-6, 1e-3")
 
 
 RATIOS = np.array([0.0, 1e-9, 0.5, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 3.0, 100.0])
@@ -140,25 +147,23 @@ def _released(ratio: float, t: Floats) -> Floats:
     return np.asarray((fast * np.exp(slow * t) - slow * np.exp(fast * t)) / (slow - fast))
 
 
+def _above(ratio: float, t: Floats) -> Floats:
+    """Return how far the free motion has passed -0.3."""
+    return _released(ratio, t) + 0.3
+
+
 def _dampings() -> Found:
     errors = []
     for ratio in RATIOS:
-        expected = first_root(lambda t, z=ratio: _released(z, t) + 0.3, max(8.0, 4.0 * ratio))  # type: ignore[misc]
-        record = run(
+        expected = first_root(partial(_above, float(ratio)), max(8.0, 4.0 * ratio))
+        off = _off_time(
+            expected,
             body=PLAIN | {"damping_ratio": float(ratio), "displacement_start": -1.0},
             stop=[restitution(-0.3, 0.5)],
             record={"recorded_time": 1.01 * expected},
         )
-        assert record.impacts is not None
-        errors.append(largest(relative(record.impacts[:1, IMPACT_TIME], expected)))
-    off = np.array(errors)
-    curve = Curve(
-        np.arange(len(off), dtype=float),
-        off,
-        "damping: 0, 1e-9, .5, 1-1e-9, 1, 1+1e-9, 3, 100",
-        "relative error of the time (-)",
-    )
-    return Found(largest(off), curve)
+        errors.append(off)
+    return _by_number(np.array(errors), "damping: 0, 1e-9, .5, 1-1e-9, 1, 1+1e-9, 3, 100")
 
 
 CASES = (

@@ -140,14 +140,16 @@ def matched(
     pairs: list[tuple[int, int]] = []
     if len(other):
         gap = _reach(reference[other], scales)
-        taken = 0
+        taken, times = 0, found[own, 0]
         for j in other:
-            same = [i for i in own[taken:] if found[i, 2] == reference[j, 2]]
-            near = [i for i in same if abs(found[i, 0] - reference[j, 0]) <= gap]
-            if near:
-                best = min(near, key=lambda i: abs(found[i, 0] - reference[j, 0]))
-                pairs.append((int(best), int(j)))
-                taken = int(np.searchsorted(own, best)) + 1
+            time = reference[j, 0]
+            first = max(taken, int(np.searchsorted(times, time - gap, "left")))
+            last = int(np.searchsorted(times, time + gap, "right"))
+            same = [place for place in range(first, last) if found[own[place], 2] == reference[j, 2]]
+            if same:
+                best = min(same, key=lambda place: abs(times[place] - time))
+                pairs.append((int(own[best]), int(j)))
+                taken = best + 1
     margin = max((abs(found[i, 0] - reference[j, 0]) for i, j in pairs), default=0.0) * 2.0 + 1e-9
     missed = _inside(reference, other, {j for _, j in pairs}, scales, margin)
     extra = 0 if most is not None else _inside(found, own, {i for i, _ in pairs}, scales, margin)

@@ -89,7 +89,15 @@ def prepared_scene(scene: Scene, note: Note = lambda text: None) -> Scene:
     scene = with_found_modes(scene, note)
     truncation = scene.found.get("estimated_error_of_modes")
     points = _looked_at(scene)
-    told = [error for error in map(_error_of_solution, points) if not math.isnan(error)]
+    ran = [observed(point) for point in points]
+    unfinished = [run.failure for run in ran if run.failure]
+    if unfinished:
+        note(f"no error is estimated: {unfinished[0]}")
+        of = f"nothing: {unfinished[0]}"
+        found = {**scene.found, "tolerance": tolerance, "estimated_error": math.nan, "estimated_error_of": of}
+        return scene.model_copy(update={"found": found})
+    errors = [_error_of_solution(point, run) for point, run in zip(points, ran, strict=True)]
+    told = [error for error in errors if not math.isnan(error)]
     solution = max(told, default=math.nan)
     error = solution if truncation is None else float(truncation)
     if truncation is not None and not math.isnan(solution):
@@ -241,9 +249,7 @@ def _not_met(runs: _Runs, tolerance: float) -> SceneError:
     best = min(errors, key=lambda n: errors[n])
     failure = next((run.failure for run in runs.tried.values() if run.failure), "")
     if failure and not math.isfinite(errors[best]):
-        return SceneError(
-            [f"{runs.scene.source}: body.modes: expected runs to compare, got one that failed: {failure}."]
-        )
+        return _failed(runs.scene, failure)
     reached = (
         f"{errors[best]:.2g} with {best}" if math.isfinite(errors[best]) else "other impacts with each number"
     )
@@ -255,6 +261,12 @@ def _not_met(runs: _Runs, tolerance: float) -> SceneError:
             f"{runs.scene.source}: body.modes: expected a number of modes that meets execution.tolerance = "
             f"{tolerance:g}, got {reached} modes (compared with {finest}). {hint}"
         ]
+    )
+
+
+def _failed(scene: Scene, failure: str) -> SceneError:
+    return SceneError(
+        [f"{scene.source}: body.modes: expected runs to compare, got one that failed: {failure}."]
     )
 
 
@@ -276,7 +288,10 @@ class _Runs:
         fewest = next(n for n in range(1, most + 1) if n == most or self._is_valid(n))
         self.ladder = [fewest, *(n for n in LADDER if fewest < n < most), *([most] if most > fewest else [])]
         self.ends_exactly = isinstance(self.scene.body, ChainBody)
-        judged = self._with(min(max(fewest, JUDGED), most))
+        count = min(max(fewest, JUDGED), most)
+        if self.of(count).failure:  # ten more such runs would tell nothing else
+            raise _failed(self.scene, self.tried[count].failure)
+        judged = self._with(count)
         self._scales = scales_of(judged)
         self.chaotic = reference_of(judged).chaotic
 
@@ -320,12 +335,12 @@ class _Runs:
         return max(interval, compared.velocity_distance - compared.velocity_sampling, 0.0)
 
 
-def _error_of_solution(scene: Scene) -> float:
+def _error_of_solution(scene: Scene, run: Observation) -> float:
     """Return the estimated error of how the motion of a scene is solved for; NaN where it is chaotic."""
     reference = reference_of(scene)
     if reference.chaotic:
         return math.nan
-    errors = errors_of(observed(scene), reference.observation, reference.scales)
+    errors = errors_of(run, reference.observation, reference.scales)
     told = [name for name, error in errors.of.items() if not math.isnan(error)]
     if errors.failure or not told:
         return math.inf

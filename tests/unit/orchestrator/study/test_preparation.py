@@ -163,6 +163,15 @@ def test_a_scene_that_does_not_run_says_so() -> None:
         prepared_scene(strip(**{"execution.impact_limit": 1}))
 
 
+def test_no_error_is_estimated_of_a_run_that_does_not_finish() -> None:
+    notes: list[str] = []
+    scene = strip(**{"body.modes": 4, "execution.impact_limit": 3})
+    found = prepared_scene(scene, notes.append).found
+    assert math.isnan(float(found["estimated_error"]))
+    assert str(found["estimated_error_of"]).startswith("nothing: impact_limit")
+    assert "chaotic" not in notes[0]
+
+
 def test_points_of_a_sweep_that_are_chaotic_are_told_apart() -> None:
     tables = {
         "body": {"mass": 1.0, "stiffness": 1.0, "damping": 0.01},
