@@ -16,13 +16,13 @@ from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
-from vibroimpact.fmus.terminal import note, say, wide_terminal
+from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.commands.check import duration
+from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study import Measured, Study, dataset_of, study_accuracy
 from vibroimpact.orchestrator.study.choice import advice, error_of_reference, refuse_unreached
-from vibroimpact.orchestrator.study.preparation import with_found_modes
 from vibroimpact.orchestrator.study.tuned import tuned_text
 
 
@@ -45,7 +45,7 @@ def study_scene(
     refuse_outputs([path], output, figure)
     if write is not None:
         refuse_outputs([path], write, ending=".toml")
-    scene = with_found_modes(opened_scene(path, changes), note)
+    scene = with_modes(opened_scene(path, changes))
     refuse_overwriting(
         output,
         force,

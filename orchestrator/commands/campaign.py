@@ -8,14 +8,14 @@ from pathlib import Path
 import typer
 
 from vibroimpact.analysis.dataset.outputs import refuse_folder
-from vibroimpact.fmus.terminal import note, say
+from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, CampaignReport, run_campaign
 from vibroimpact.orchestrator.campaign.cluster import refuse_two_kinds_of_workers
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.failures import counted, outcome_lines
+from vibroimpact.orchestrator.commands.preparing import prepared
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene, refuse_system_elsewhere
-from vibroimpact.orchestrator.study.preparation import prepared_scene
 
 
 def run_to_folder(
@@ -26,7 +26,7 @@ def run_to_folder(
     refuse_system_elsewhere(scene, scheduler)
     loaded = opened_scene(scene, changes)
     refuse_folder(output)
-    compute(prepared_scene(loaded, note), output, workers, scheduler)
+    compute(prepared(loaded), output, workers, scheduler)
 
 
 def compute(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.fmus.terminal import note, say
+from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import SceneCost, cost_of
 from vibroimpact.orchestrator.campaign.check import (
     BYTES_BESIDE,
@@ -19,11 +19,11 @@ from vibroimpact.orchestrator.campaign.check import (
 )
 from vibroimpact.orchestrator.campaign.cluster import processor_count
 from vibroimpact.orchestrator.commands.failures import FAILED, counted
+from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.run.result_size import refuse_large_results, size
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.summary import contacts, effects, engine, laws
 from vibroimpact.orchestrator.ssp import opened_scene
-from vibroimpact.orchestrator.study.preparation import with_found_modes
 
 _WIDTH = 10
 _DURATIONS = (
@@ -45,7 +45,7 @@ def check_scene(path: Path, changes: Sequence[str]) -> None:
     typer.Exit
         The point failed.
     """
-    scene = with_found_modes(opened_scene(path, changes), note)
+    scene = with_modes(opened_scene(path, changes))
     say(f"{path}: no problems")
     _say_aligned(_what_runs(scene))
     cost = cost_of(scene)

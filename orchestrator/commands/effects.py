@@ -10,12 +10,12 @@ import numpy as np
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.fmus.printing import table
-from vibroimpact.fmus.terminal import note, say, wide_terminal
+from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.commands.check import duration
+from vibroimpact.orchestrator.commands.preparing import with_modes
 from vibroimpact.orchestrator.scene.summary import engine
 from vibroimpact.orchestrator.ssp import opened_scene
 from vibroimpact.orchestrator.study.effects import Share, dataset_of_shares, effects_of, not_called, shares_of
-from vibroimpact.orchestrator.study.preparation import with_found_modes
 
 
 def show_effects(
@@ -23,7 +23,7 @@ def show_effects(
 ) -> None:
     """Measure the effects of a scene, print them, and write what was asked for."""
     refuse_outputs([path], output, figure)
-    scene = with_found_modes(opened_scene(path, changes), note)
+    scene = with_modes(opened_scene(path, changes))
     refuse_overwriting(
         output,
         force,

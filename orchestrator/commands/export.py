@@ -52,15 +52,13 @@ def _export_scene_file(
 ) -> None:
     # half a second of libraries that a component needs none of
     from vibroimpact.analysis.dataset.outputs import refuse_outputs
+    from vibroimpact.orchestrator.commands.preparing import with_modes
     from vibroimpact.orchestrator.run.export import export_scene
     from vibroimpact.orchestrator.scene import load_scene
 
-    scene, target = load_scene(scene_file, changes or ()), output or Path(f"{scene_file.stem}.fmu")
-    if scene.execution.tolerance is not None:
-        from vibroimpact.orchestrator.study.preparation import (
-            with_found_modes,
-        )  # datasets, which others need not
-
-        scene = with_found_modes(scene, note)
+    scene, target = (
+        with_modes(load_scene(scene_file, changes or ())),
+        output or Path(f"{scene_file.stem}.fmu"),
+    )
     refuse_outputs([scene_file], target, ending=".fmu")
     say(str(export_scene(scene, target, fmi=fmi, platform=platform, note=note, **kinds)))

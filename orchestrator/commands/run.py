@@ -9,14 +9,14 @@ from pathlib import Path
 import typer
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
-from vibroimpact.fmus.terminal import note, say
+from vibroimpact.fmus.terminal import say
 from vibroimpact.orchestrator.campaign import run_scene
 from vibroimpact.orchestrator.campaign.manifest import holds_scene
 from vibroimpact.orchestrator.campaign.progress import shown_progress
 from vibroimpact.orchestrator.commands.failures import FAILED, counted, outcome_lines
+from vibroimpact.orchestrator.commands.preparing import prepared
 from vibroimpact.orchestrator.scene.summary import in_one_line
 from vibroimpact.orchestrator.ssp import opened_scene
-from vibroimpact.orchestrator.study.preparation import prepared_scene
 
 
 def run_to_dataset(scene: Path, output: Path, changes: Sequence[str], force: bool) -> None:
@@ -30,7 +30,7 @@ def run_to_dataset(scene: Path, output: Path, changes: Sequence[str], force: boo
     began = time.perf_counter()
     loaded = opened_scene(scene, changes)
     refuse_outputs([scene], output)
-    loaded = prepared_scene(loaded, note)
+    loaded = prepared(loaded)
     refuse_overwriting(output, force, lambda there: holds_scene(there, loaded))
     with shown_progress() as progress:
         outcomes = run_scene(loaded, output, progress=progress)

@@ -76,6 +76,21 @@ finally:
         assert done.stdout.splitlines() == [output, "[]"], done.stderr
 
 
+def test_a_run_without_a_tolerance_loads_no_studies(tmp_path: Path) -> None:
+    # they bring scipy.stats and more, longer than the run takes
+    program = f"""
+import sys
+from vibroimpact.orchestrator.commands.cli import main
+try:
+    main(["run", sys.argv[1], "-o", {str(tmp_path / "run.nc")!r}])
+finally:
+    print([name for name in sys.modules if "orchestrator.study" in name or name == "scipy.stats"])
+"""
+    scene = str(EXAMPLES / "single_run.toml")
+    done = subprocess.run([sys.executable, "-c", program, scene], capture_output=True, text=True)
+    assert done.stdout.splitlines()[-1] == "[]", done.stderr
+
+
 def test_every_command_has_help_with_an_example() -> None:
     load_commands()
     group = typer.main.get_command(app)
