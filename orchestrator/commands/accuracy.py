@@ -89,12 +89,17 @@ def _say_tried(one: Measured) -> None:
     say(f"  {one.way.label}: {said}")
 
 
-def _table(title: str, measured: Sequence[Measured], quantity: str, known: float) -> Table:
-    """Return what was measured as a table; `known` is the error of the reference."""
+def _table(
+    title: str, measured: Sequence[Measured], quantity: str, known: float, periods: float = math.nan
+) -> Table:
+    """Return what was measured as a table; `known` is the error of the reference, `periods` how many a run has."""
     scored = any(one.variance == one.variance for one in measured)
+    of_periods = periods == periods
     rows = table(
         f"What accuracy costs: {title}",
-        *("<way", "<set", ">value", ">error", ">a run", ">spread", ">calls"),
+        *("<way", "<set", ">value", ">error", ">a run", ">spread"),
+        *((">a period",) if of_periods else ()),
+        *(">an impact", ">calls"),
         *((">accounts for",) if scored else ()),
         "<what is wrong",
     )
@@ -107,6 +112,8 @@ def _table(title: str, measured: Sequence[Measured], quantity: str, known: float
             one.told(quantity, known),
             duration(one.cost) if one.seconds else "-",
             "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
+            *((_known_duration(one.cost_of_one(periods)),) if of_periods else ()),
+            _known_duration(one.cost_of_one(one.impacts)),
             str(one.calls) if one.calls >= 0 else "-",
             *((f"{one.variance:.2f} %",) if scored else ()),
             one.errors.failure,
@@ -114,9 +121,15 @@ def _table(title: str, measured: Sequence[Measured], quantity: str, known: float
     return rows
 
 
+def _known_duration(seconds: float) -> str:
+    return "-" if math.isnan(seconds) else duration(seconds)
+
+
 def _print(study: Study) -> None:
     known = error_of_reference(study.reference, study.quantity)
-    rows = _table(study.scene.title or study.scene.source, study.measured, study.quantity, known)
+    rows = _table(
+        study.scene.title or study.scene.source, study.measured, study.quantity, known, study.periods
+    )
     wide_terminal().print(rows)
     motion = f"Motion: {study.orbit}. " if study.orbit else ""
     say(f"{motion}Reference: {study.reference.name}, known to {known:.0e}.")

@@ -84,6 +84,10 @@ class OscillatorBody(SceneTable):
             return self.damping_given
         return 2.0 * self.damping_ratio * math.sqrt(self.stiffness * self.mass)
 
+    def mass_at(self, number: int | None) -> float:
+        """Return the mass that a stop limits, kg."""
+        return self.mass
+
 
 _ARRAY_OR_ONE = "an array of numbers >= 0, or one number for all"
 _SPRING_HINT = "Element i lies between mass i - 1 (the ground for i = 1) and mass i."
@@ -178,6 +182,10 @@ class ChainBody(SceneTable):
     def size(self) -> int:
         """Number of masses."""
         return len(self.masses)
+
+    def mass_at(self, number: int | None) -> float:
+        """Return the mass that a stop limits, kg: that of its number, or the last."""
+        return self.masses[(number or self.size) - 1]
 
 
 class Rayleigh(SceneTable):

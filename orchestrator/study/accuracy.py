@@ -23,11 +23,13 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.choice import advice, cheapest, error_of_reference, pareto_front
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, errors_of, no_errors
 from vibroimpact.orchestrator.study.measured import Measured, Study
+from vibroimpact.orchestrator.study.models import told_by
 from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import Reference, disturbed_scenes, observed, reference_of
 from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
 from vibroimpact.orchestrator.study.trials import far_off
-from vibroimpact.orchestrator.study.ways import CallCounter, Trial, Way, remarks_on, told_by, ways_of
+from vibroimpact.orchestrator.study.way import CallCounter, Trial, Way
+from vibroimpact.orchestrator.study.ways import remarks_on, ways_of
 
 BUDGET = 40.0
 """Wall time of a study, s, where nobody says another."""
@@ -91,7 +93,8 @@ def study_accuracy(
     finest: dict[Scene, Reference] = {}
     with ExitStack() as stack:
         measured: list[tuple[Measured, Trial]] = []
-        ways = _refuse_none(ways_of(given_up_after(studied, late)), scene)
+        given = {"speed": _typical_speed(reference), "rate": _rate_of(scene)}
+        ways = _refuse_none(ways_of(given_up_after(studied, late), **given), scene)
         for way in ways:
             one, trial = _tried(way, _told_by(way, reference, finest))
             if trial is not None:
@@ -142,6 +145,18 @@ def first_impacts(scene: Scene, reference: Reference) -> Scene:
         if len(observed(short).impacts) >= FIRST_IMPACTS:
             break
     return short
+
+
+def _typical_speed(reference: Reference) -> float:
+    """Return the median speed of the impacts of a motion, m/s; NaN without one."""
+    speeds = np.abs(reference.observation.impacts[:, 1])
+    return float(np.median(speeds)) if len(speeds) else math.nan
+
+
+def _rate_of(scene: Scene) -> float:
+    """Return the rate of the time series that a scene asks for, samples per s; NaN without one."""
+    series = scene.record.time_series
+    return math.nan if series is None else series.rate
 
 
 def _refuse_misuse(tolerance: float | None, quantity: str) -> None:
@@ -266,9 +281,15 @@ def dataset_of(study: Study) -> xr.Dataset:
         ),
         "cost_per_impact": (
             "way",
-            [one.cost / one.impacts if one.impacts else math.nan for one in found],
+            [one.cost_of_one(one.impacts) for one in found],
             "s",
             "median wall time of a run over the impacts recorded",
+        ),
+        "cost_per_period": (
+            "way",
+            [one.cost_of_one(study.periods) for one in found],
+            "s",
+            "median wall time of a run over the forcing periods simulated",
         ),
         "rounds": ("way", [len(one.seconds) for one in found], "1", "runs that were timed"),
         "calls": ("way", [one.calls for one in found], "1", "calls of functions of FMUs in a run"),

@@ -27,7 +27,7 @@ from vibroimpact.orchestrator.scene.summary import laws
 from vibroimpact.orchestrator.study.errors import Scales, errors_of
 from vibroimpact.orchestrator.study.references import scales_of
 from vibroimpact.orchestrator.study.replays import ReplayTrial
-from vibroimpact.orchestrator.study.ways import SceneTrial, opened_trial
+from vibroimpact.orchestrator.study.way import SceneTrial, opened_trial
 
 PAIRS = 5
 """Pairs of runs, one with the effect and one without, in turn."""

@@ -10,7 +10,10 @@ import numpy as np
 
 from vibroimpact.orchestrator.study.observation import Floats, Observation
 
-QUANTITIES = ("impact_time", "impact_velocity", "displacement_range", "final_state", "samples")
+QUANTITIES = (
+    *("impact_time", "impact_velocity", "displacement_range", "final_state", "samples"),
+    "interface_energy",
+)
 """What errors are given of."""
 FIRST_IMPACTS = 10
 """Impacts over which the growth of errors is shown where motion is chaotic."""
@@ -28,10 +31,13 @@ class Scales:
         The forcing period, or the time recorded where there is none, s.
     window : tuple of float
         Start and end of the recording, s: an impact at its edge may be in one way and not in another.
+    masses : tuple of float
+        What hits each stop, kg: energy is relative to that of the impacts; empty where nobody knows.
     """
 
     time: float
     window: tuple[float, float]
+    masses: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +96,7 @@ def errors_of(
         errors["impact_velocity"] = float(growth.max()) if growth.size else math.nan
     if impacts is None:
         errors |= _errors_of_motion(found, reference, scales)
+    errors["interface_energy"] = _error_of_energy(found, reference, scales)
     return Errors(errors, failure, growth)
 
 
@@ -110,6 +117,16 @@ def _errors_of_motion(found: Observation, reference: Observation, scales: Scales
         moving = spread > 0.0
         errors["samples"] = float((off[moving] / spread[moving]).max()) if moving.any() else math.nan
     return errors
+
+
+def _error_of_energy(found: Observation, reference: Observation, scales: Scales) -> float:
+    """Return the energy that an exchange of forces added, over the kinetic energy of all impacts."""
+    impacts = reference.impacts
+    if not len(impacts) or impacts[:, 2].max() > len(scales.masses):
+        return math.nan
+    masses = np.array(scales.masses)[impacts[:, 2].astype(int) - 1]
+    energy = 0.5 * float(masses @ impacts[:, 1] ** 2)
+    return found.energy_residual / energy if energy > 0.0 else math.nan
 
 
 def _at_the_instants_of(found: Observation, reference: Observation) -> Floats | None:

@@ -12,7 +12,8 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.errors import Errors
 from vibroimpact.orchestrator.study.references import Reference
 from vibroimpact.orchestrator.study.statistics import Statistics
-from vibroimpact.orchestrator.study.ways import Way
+from vibroimpact.orchestrator.study.trials import LATE
+from vibroimpact.orchestrator.study.way import Way
 
 
 @dataclass(slots=True)
@@ -53,6 +54,10 @@ class Measured:
     def cost(self) -> float:
         """Median wall time of a run, s."""
         return float(np.median(self.seconds)) if self.seconds else math.nan
+
+    def cost_of_one(self, count: float) -> float:
+        """Return the median wall time of a run over what it simulates, s; NaN for nothing, or an early end."""
+        return self.cost / count if count > 0.0 and self.errors.failure != LATE else math.nan
 
     def error(self, quantity: str) -> float:
         """Relative error of a quantity, or the largest of all; NaN where the way failed."""
@@ -100,3 +105,10 @@ class Study:
     orbit: str
     remarks: tuple[str, ...]
     modes_reference: str = ""
+
+    @property
+    def periods(self) -> float:
+        """Forcing periods that a run simulates, those before the recording among them; NaN where nothing forces it."""
+        if self.scene.general is not None or self.scene.replay is not None or self.scene.period is None:
+            return math.nan
+        return self.reference.scales.window[1] / self.scene.period

@@ -14,11 +14,12 @@ from vibroimpact.fmus.errors import DatasetError, SceneError, UsageError
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.models import HertzStop, HuntCrossleyStop, RestitutionStop
 from vibroimpact.orchestrator.study.errors import QUANTITIES, Scales, errors_of
 from vibroimpact.orchestrator.study.observation import Floats, Observation
 from vibroimpact.orchestrator.study.replays import span_of
-from vibroimpact.orchestrator.study.ways import opened_trial
+from vibroimpact.orchestrator.study.way import opened_trial
 
 DISTURBANCE = 1e-9
 """Relative change of a number of the scene by which the sensitivity of its motion is measured."""
@@ -97,7 +98,9 @@ def scales_of(scene: Scene) -> Scales:
         begin, end = span_of(scene)
         return Scales(end - begin, (begin, end))
     window = recorded_window(scene, float_parameters(scene, None))
-    return Scales(scene.period or window[1] - window[0], window)
+    body = scene.body
+    masses = () if isinstance(body, BeamBody) else tuple(body.mass_at(stop.mass) for stop in scene.stops)
+    return Scales(scene.period or window[1] - window[0], window, masses)
 
 
 def reference_of(scene: Scene) -> Reference:

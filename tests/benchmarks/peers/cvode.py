@@ -13,7 +13,7 @@ import numpy as np
 
 from peers.flights import event_of, follow, longest_step, slope_of, slow_rebound
 from peers.problems import Phase, Problem
-from peers.ways import ABSOLUTE, Clock, Found, Run, Way, tolerances
+from peers.ways import ABSOLUTE, Clock, Found, Run, Way, with_tolerances
 from vibroimpact.orchestrator.study.observation import Floats
 
 METHODS = ("Adams", "BDF")
@@ -84,14 +84,4 @@ def opened(method: str, problem: Problem, tolerance: float, clock: Clock) -> Run
 
 def ways() -> list[Way]:
     """Return one way for each method."""
-
-    def way(method: str) -> Way:
-        return Way(
-            f"CVODE {method}",
-            "scikit-sundae",
-            "rtol",
-            tolerances,
-            lambda problem, tolerance, clock: opened(method, problem, tolerance, clock),
-        )
-
-    return [way(method) for method in METHODS]
+    return [with_tolerances("CVODE", "scikit-sundae", method, opened) for method in METHODS]

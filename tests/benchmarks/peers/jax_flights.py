@@ -211,7 +211,7 @@ def _period(p: Any) -> Any:
 def ways() -> list[Way]:
     """Return one motion by an explicit and by an implicit solver, and many by the explicit one.
 
-    A batch by the implicit one took longer than a run may on the beam, and nothing ends what is compiled.
+    A batch by the implicit one takes minutes on the beam, and nothing ends what is compiled.
     """
 
     def way(method: str, batch: int) -> Way:
@@ -221,6 +221,7 @@ def ways() -> list[Way]:
             "rtol",
             tolerances,
             lambda problem, tolerance, clock: opened(method, batch, problem, tolerance, clock),
+            batch=batch,
         )
 
     return [way("Dopri8", 1), way("Kvaerno5", 1), way("Dopri8", BATCH)]

@@ -16,7 +16,7 @@ from peers import cvode, fmpy_import, fused, jax_flights, solve_ivp, time_steppi
 from peers.problems import Case, Problem
 from peers.references import off_second_road, reference
 from peers.ways import Clock, Found, LateError, Run, Way
-from vibroimpact.orchestrator.study.errors import Errors, errors_of
+from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, Errors, errors_of
 from vibroimpact.orchestrator.study.references import Reference
 
 CAP = 2.0
@@ -51,6 +51,8 @@ class Row:
         Of the end of the first chatter, over the period; NaN where none was seen, or there is none.
     impacts_seen : int
         Of a ladder: the rungs above the stop whose impact was found.
+    growth : list of float
+        Relative error of the velocity of each of the first impacts of chaotic motion; empty elsewhere.
     """
 
     case: str
@@ -63,6 +65,7 @@ class Row:
     seconds: list[float] = field(default_factory=list)
     rest_error: float = math.nan
     impacts_seen: int = 0
+    growth: list[float] = field(default_factory=list)
 
     @property
     def cost(self) -> float:
@@ -73,6 +76,7 @@ class Row:
         """Return the row for JSON, where NaN is None."""
         own = {key: None if value != value else value for key, value in asdict(self).items()}
         own["seconds"] = [float(f"{value:.4g}") for value in self.seconds]
+        own["growth"] = [float(f"{value:.2g}") for value in self.growth]
         own["error"] = None if self.error != self.error else float(f"{self.error:.3g}")
         return own
 
@@ -131,7 +135,7 @@ def _tried(
     found: list[Found] = []
     try:
         for problem in case.rungs.values():
-            run = way.open(problem, setting, Clock(CAP))
+            run = way.open(problem, setting, Clock(CAP * way.batch))
             runs.append(run)
             found.append(run())
     except LateError:
@@ -147,6 +151,8 @@ def _tried(
     row.failure, row.impacts_seen = _failure(case, known, errors)
     if not row.failure:
         row.error = max((e for e in (one.worst(case.quantity) for one in errors) if e == e), default=math.nan)
+    if case.key == "chaos":
+        row.growth = errors[0].growth[:FIRST_IMPACTS].tolist()
     if case.key == "chatter" and len(found[0].rests):
         row.rest_error = (
             abs(float(found[0].rests[0]) - END_OF_CHATTER) / next(iter(case.rungs.values())).period

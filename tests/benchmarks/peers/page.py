@@ -29,7 +29,13 @@ def with_measurement(text: str, record: Mapping[str, Any]) -> str:
 def measurement(record: Mapping[str, Any]) -> str:
     """Return machine, goals, references and table in Markdown."""
     host = "; ".join(f"{key} {value}" for key, value in record["machine"].items())
-    parts = [f"Measured on {record['date']}: {host}.", _goals(record), _references(record), _table(record)]
+    parts = [
+        f"Measured on {record['date']}: {host}.",
+        _goals(record),
+        _references(record),
+        _growth(record),
+        _table(record),
+    ]
     return "\n\n".join(parts) + "\n"
 
 
@@ -90,6 +96,23 @@ def _references(record: Mapping[str, Any]) -> str:
         "The reference beside a second road, DOP853 at 1e-13 with nothing of this package, on "
         f"grazes the flow in 40 digits (largest error, of both together): {', '.join(cells)}."
     )
+
+
+def _growth(record: Mapping[str, Any]) -> str:
+    """Return how the error of chaotic motion grows from impact to impact, of each way at its finest setting."""
+    finest = {row["way"]: row for row in record["rows"] if row["growth"] and not row["failure"]}
+    most = max((len(row["growth"]) for row in finest.values()), default=0)
+    lines = [
+        "Error growth in chaos, of each way at its finest setting that misses no impact: relative error of the",
+        "velocity of the first impacts.",
+        "",
+        "| way | setting | " + " | ".join(str(place + 1) for place in range(most)) + " |",
+        "|---|---|" + "---|" * most,
+    ]
+    for way, row in finest.items():
+        cells = [f"{error:.0e}" if error else "0" for error in row["growth"]]
+        lines.append(f"| {' | '.join([way, _setting(row), *cells])} |".replace("|  |", "| |"))
+    return "\n".join(lines)
 
 
 def _table(record: Mapping[str, Any]) -> str:

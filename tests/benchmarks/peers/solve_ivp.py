@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from peers.flights import event_of, follow, longest_step, slope_of, slow_rebound
 from peers.problems import Phase, Problem
-from peers.ways import ABSOLUTE, Clock, Found, Run, Way, tolerances
+from peers.ways import ABSOLUTE, Clock, Found, Run, Way, with_tolerances
 from vibroimpact.orchestrator.study.observation import Floats
 
 METHODS = ("RK45", "DOP853", "Radau")
@@ -52,14 +52,4 @@ def opened(method: str, problem: Problem, tolerance: float, clock: Clock) -> Run
 
 def ways() -> list[Way]:
     """Return one way for each method."""
-
-    def way(method: str) -> Way:
-        return Way(
-            f"solve_ivp {method}",
-            "scipy",
-            "rtol",
-            tolerances,
-            lambda problem, tolerance, clock: opened(method, problem, tolerance, clock),
-        )
-
-    return [way(method) for method in METHODS]
+    return [with_tolerances("solve_ivp", "scipy", method, opened) for method in METHODS]

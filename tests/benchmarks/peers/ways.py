@@ -82,6 +82,8 @@ class Way:
         outside of the time that is measured.
     ours : bool
         Whether the fused FMU does the work, whoever drives it.
+    batch : int
+        Motions in one run, each of which may take the time of a run.
     """
 
     name: str
@@ -90,11 +92,25 @@ class Way:
     settings: Callable[[Problem], tuple[float, ...]]
     open: Callable[[Problem, float, Clock], Run]
     ours: bool = False
+    batch: int = 1
 
 
 def tolerances(problem: Problem) -> tuple[float, ...]:
     """Return the ladder of tolerances, the same for all problems."""
     return TOLERANCES
+
+
+def with_tolerances(
+    name: str, package: str, method: str, opened: Callable[[str, Problem, float, Clock], Run]
+) -> Way:
+    """Return one method of an integrator at the ladder of tolerances."""
+    return Way(
+        f"{name} {method}",
+        package,
+        "rtol",
+        tolerances,
+        lambda problem, tolerance, clock: opened(method, problem, tolerance, clock),
+    )
 
 
 def observed(

@@ -73,8 +73,11 @@ def test_plain_steps_are_of_first_order_and_an_integrator_follows_its_tolerance(
     assert np.all(errors < 1e3 * tolerances)
 
 
-def test_another_law_of_equal_restitution_is_an_error_of_the_model_and_never_chosen(rigid: Study) -> None:
-    times, errors = ladder(rigid, "a Kelvin-Voigt stop of equal restitution")
+@pytest.mark.parametrize("law", ["Kelvin-Voigt", "Hunt-Crossley"])
+def test_another_law_of_equal_restitution_is_an_error_of_the_model_and_never_chosen(
+    rigid: Study, law: str
+) -> None:
+    times, errors = ladder(rigid, f"{law} stops of equal restitution")
     assert observed_order(times, errors) == pytest.approx(1.0, abs=0.2)
     dataset = dataset_of(rigid)
     assert not (dataset.is_model & dataset.on_front).any()
@@ -87,6 +90,58 @@ def test_a_tolerance_of_integrated_contacts_buys_what_it_says(yielding: Study) -
     assert np.all(np.diff(errors) < 0.0)
     assert yielding.chosen is not None
     assert yielding.chosen.error("all") <= 1e-7
+
+
+def test_step_revision_finds_rigid_stops_to_rounding_and_follows_yielding_ones_at_second_order(
+    rigid: Study, yielding: Study
+) -> None:
+    _, errors = ladder(rigid, "step revision")
+    assert len(errors) == 2
+    assert np.all(errors < 1e-10)
+    steps, errors = ladder(yielding, "step revision")
+    assert observed_order(1.0 / steps, errors) == pytest.approx(2.0, abs=0.2)
+
+
+def test_samples_tell_impacts_as_late_as_they_are_apart() -> None:
+    tables = P11 | {"record": P11["record"] | {"time_series": {"rate": 20.0}}}
+    study = study_accuracy(Scene.from_dict(tables), budget=1.0)
+    its = [one for one in study.measured if one.way.name == "read off samples"]
+    assert [one.way.setting for one in its] == [5.0, 20.0, 80.0, 320.0]
+    assert all(one.way.model for one in its)
+    for one in its:
+        assert one.errors.of["impact_time"] <= 1.0 / one.way.setting / (2.0 * math.pi)
+
+
+def test_a_chain_is_studied_with_fewer_modes_and_with_stops_of_other_laws() -> None:
+    tables = {
+        "body": {"kind": "chain", "masses": [2.0, 1.0], "stiffnesses": [3.0, 1.0], "dampings": 0.1},
+        "forcing": {"amplitude": [0.0, 1.0], "angular_frequency": 0.8},
+        "stop": [
+            {"law": "kelvin_voigt", "position": 0.5, "stiffness": 1e4, "damping": 20.0, "mass": 1},
+            {"law": "hunt_crossley", "position": 0.5, "stiffness": 1e5, "damping": 0.2, "mass": 2},
+        ],
+        "record": {"recorded_periods": 1},
+    }
+    study = study_accuracy(Scene.from_dict(tables), budget=1.0)
+    names = {one.way.name for one in study.measured if one.way.model}
+    assert names == {
+        "modes",
+        *(f"{law} stops of equal restitution" for law in ("rigid", "Kelvin-Voigt", "Hunt-Crossley")),
+    }
+    assert study.modes_reference == "all 2 modes"
+
+
+def test_the_energy_that_held_forces_add_is_an_error_too() -> None:
+    tables = P11 | {
+        "stop": [{"law": "kelvin_voigt", "position": 1.0, "stiffness": 1e3, "damping": 3.0}],
+        "record": {"transient_periods": 2, "recorded_periods": 1},
+    }
+    study = study_accuracy(Scene.from_dict(tables), budget=1.0)
+    energies = {
+        one.way.name: one.errors.of["interface_energy"] for one in study.measured if not one.errors.failure
+    }
+    assert math.isnan(energies["fused"])  # nothing is exchanged
+    assert 0.0 <= energies["coupled, FMI 3.0"] < 1e-5
 
 
 def test_what_it_costs_is_counted_too(rigid: Study) -> None:

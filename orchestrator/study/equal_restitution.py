@@ -1,0 +1,179 @@
+"""Contact laws that throw a rigid mass back with the same coefficient of restitution: equations.md 6.9 and 6.10."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from scipy.optimize import brentq
+
+from vibroimpact.orchestrator.scene.models import (
+    HertzStop,
+    HuntCrossleyStop,
+    KelvinVoigtStop,
+    RestitutionStop,
+)
+
+Stop = RestitutionStop | KelvinVoigtStop | HertzStop | HuntCrossleyStop
+
+LEAST_RESTITUTION = 0.01
+"""Coefficient of restitution below which no law that yields stands for another."""
+MOST_RATIO = 100.0
+"""Damping ratio of a mass on a Kelvin-Voigt stop up to which one of a given restitution is looked for."""
+NEARLY_ELASTIC = 1e-4
+"""1 - restitution below which that of a Hunt-Crossley stop is 1 - 2 p / 3: rounding leaves nothing of the whole law."""
+LEAST = 1e-12
+"""Coefficient of restitution from which a Hunt-Crossley stop's is looked for."""
+CLOSEST = 1e-14
+"""How close p e comes to 1, relative: a strongly damped Hunt-Crossley stop has e = 1 / p to rounding."""
+POWER_LAW_TIME = 3.218065
+"""Contact time of a Hertz stop over (mass^2 / (stiffness^2 speed))^(1/5)."""
+
+
+def restitution_at(stop: Stop, mass: float, speed: float) -> float:
+    """Return the coefficient of restitution that a stop gives a rigid mass; NaN for a law that none is known of.
+
+    Parameters
+    ----------
+    stop : RestitutionStop or KelvinVoigtStop or HertzStop or HuntCrossleyStop
+    mass : float
+        kg.
+    speed : float
+        Of the mass when it touches the stop, m/s.
+    """
+    match stop:
+        case RestitutionStop():
+            return stop.restitution if stop.yield_velocity == 0.0 else math.nan
+        case KelvinVoigtStop():
+            if stop.relaxation_time > 0.0:
+                return math.nan
+            return restitution_of(stop.damping / (2.0 * math.sqrt(stop.stiffness * mass)))
+        case HertzStop():
+            return 1.0
+    return restitution_of_product(stop.damping * speed)
+
+
+def laws_of_equal_restitution(
+    restitution: float, mass: float, speed: float, duration: float
+) -> dict[str, dict[str, Any]]:
+    """Return the laws that yield, by their names in words, with the numbers that a `[[stop]]` has for them.
+
+    Parameters
+    ----------
+    restitution : float
+        `LEAST_RESTITUTION` to 1.
+    mass : float
+        kg.
+    speed : float
+        At which a Hunt-Crossley stop, whose restitution falls with it, has that one, m/s.
+    duration : float
+        Of a contact, s; of a power law that of the same stop without damping.
+    """
+    ratio = damping_ratio_of(restitution)
+    rate = _angle(ratio) / duration
+    power_law = mass / math.sqrt(speed) * (POWER_LAW_TIME / duration) ** 2.5
+    laws: dict[str, dict[str, Any]] = {
+        "Kelvin-Voigt": {
+            "law": "kelvin_voigt",
+            "stiffness": mass * rate**2,
+            "damping": 2.0 * ratio * rate * mass,
+        }
+    }
+    if restitution == 1.0:
+        laws["Hertz"] = {"law": "hertz", "stiffness": power_law}
+    else:
+        damping = product_of_restitution(restitution) / speed
+        laws["Hunt-Crossley"] = {"law": "hunt_crossley", "stiffness": power_law, "damping": damping}
+    return laws
+
+
+def contact_time(stop: Stop, mass: float, speed: float) -> float:
+    """Return how long a rigid mass touches a stop, s; of a power law as if it had no damping; 0 of a rigid one."""
+    match stop:
+        case RestitutionStop():
+            return 0.0
+        case KelvinVoigtStop():
+            rate = math.sqrt(stop.stiffness / mass)
+            return _angle(stop.damping / (2.0 * mass * rate)) / rate
+    n = 1.0 + (stop.exponent if isinstance(stop, HuntCrossleyStop) else 1.5)
+    depth: float = (n * mass * speed**2 / (2.0 * stop.stiffness)) ** (1.0 / n)
+    return 2.0 * depth / speed * math.sqrt(math.pi) * math.gamma(1.0 + 1.0 / n) / math.gamma(0.5 + 1.0 / n)
+
+
+def restitution_of(ratio: float) -> float:
+    """Return the coefficient of restitution of a rigid mass on a Kelvin-Voigt stop that never pulls.
+
+    Parameters
+    ----------
+    ratio : float
+        Damping ratio of the mass on the stop, >= 0 (equations.md 6.9).
+
+    Examples
+    --------
+    >>> [round(restitution_of(ratio), 8) for ratio in (0.1, 0.5, 1.0, 2.0)]
+    [0.7440794, 0.29843606, 0.13533528, 0.04776873]
+    """
+    return math.exp(-ratio * _angle(ratio))
+
+
+def damping_ratio_of(restitution: float) -> float:
+    """Return the damping ratio at which a Kelvin-Voigt stop has a coefficient of restitution.
+
+    >>> round(damping_ratio_of(0.7440794), 6), round(damping_ratio_of(0.04776873), 6)
+    (0.1, 2.0)
+    """
+    found: float = brentq(lambda ratio: restitution_of(ratio) - restitution, 0.0, MOST_RATIO, xtol=1e-15)
+    return found
+
+
+def restitution_of_product(product: float) -> float:
+    """Return the coefficient of restitution of a Hunt-Crossley stop: p (1 + e) = ln((1 + p) / (1 - p e)).
+
+    Parameters
+    ----------
+    product : float
+        p, its damping times the speed (equations.md 6.10).
+
+    Examples
+    --------
+    >>> round(restitution_of_product(0.2), 9)
+    0.882189986
+    """
+    if product < 1.5 * NEARLY_ELASTIC:
+        return 1.0 - 2.0 * product / 3.0
+    most = min(1.0, (1.0 - CLOSEST) / product)
+    return _root(lambda e: _off(product, e), LEAST, most)
+
+
+def product_of_restitution(restitution: float) -> float:
+    """Return damping times speed at which a Hunt-Crossley stop has a coefficient of restitution.
+
+    >>> round(product_of_restitution(0.882189986), 9)
+    0.2
+    """
+    if 1.0 - restitution < NEARLY_ELASTIC:
+        return 1.5 * (1.0 - restitution)
+    least, most = 0.5 * (1.0 - restitution), (1.0 - CLOSEST) / restitution
+    return _root(lambda product: _off(product, restitution), least, most)
+
+
+def _root(off: Callable[[float], float], least: float, most: float) -> float:
+    """Return where a function rises through 0; `most`, below which it is negative, where it comes too close to that."""
+    if off(most) < 0.0:
+        return most
+    found: float = brentq(off, least, most, xtol=1e-15)
+    return found
+
+
+def _off(product: float, restitution: float) -> float:
+    return math.log1p(product) - math.log1p(-product * restitution) - product * (1.0 + restitution)
+
+
+def _angle(ratio: float) -> float:
+    """Return contact time times the undamped angular frequency of a mass on a Kelvin-Voigt stop."""
+    if ratio < 1.0:
+        return 2.0 * math.acos(ratio) / math.sqrt(1.0 - ratio**2)
+    if ratio == 1.0:
+        return 2.0
+    return 2.0 * math.acosh(ratio) / math.sqrt(ratio**2 - 1.0)

@@ -1,0 +1,151 @@
+"""Other models of the same thing, which are no ways of solving it: other laws of contact, fewer or more modes, ..."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
+from vibroimpact.orchestrator.scene.models import RestitutionStop
+from vibroimpact.orchestrator.study.equal_restitution import (
+    LEAST_RESTITUTION,
+    Stop,
+    contact_time,
+    laws_of_equal_restitution,
+    restitution_at,
+)
+from vibroimpact.orchestrator.study.references import scales_of
+from vibroimpact.orchestrator.study.way import Way, can_have, time_scale, way_by_scene
+
+CONTACT_TIMES = (1e-1, 1e-2, 1e-3)
+"""Of yielding stops that stand for a rigid one, over the period."""
+MOST_MODES = 64
+LEAST_TRIED_MODES = 8
+"""Modes of a beam up to which, at least, others than its own are tried."""
+MODES_TRIED = (1, 2, 4, 8, 16, 32, MOST_MODES)
+
+
+def other_models(scene: Scene, speed: float) -> list[Way]:
+    """Return other models of a scene of the short form.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep.
+    speed : float
+        Of its impacts, typically, m/s; NaN where there are none.
+    """
+    body, ways = scene.body, []
+    if scene.stops:
+        ways += other_modes(scene)
+    if isinstance(body, BeamBody) and any(isinstance(stop, RestitutionStop) for stop in scene.stops):
+        other = "collocation" if body.impact_projection == "variational" else "variational"
+        change = {"body.impact_projection": other}
+        ways.append(way_by_scene(f"{other} projection", "", math.nan, scene, change, model=True))
+    if not isinstance(body, BeamBody) and scene.stops:
+        ways += _equal_restitution(scene, speed)
+    return ways
+
+
+def other_modes(scene: Scene) -> list[Way]:
+    """Return fewer and more modes: of a beam natural ones, and with residual vectors; of a chain fewer than all.
+
+    They are told by the most of them. With rigid stops on a beam nothing converges, and none is shown.
+    """
+    body = scene.body
+    if isinstance(body, ChainBody):
+        return _fewer_modes(scene, body)
+    if not isinstance(body, BeamBody) or any(isinstance(stop, RestitutionStop) for stop in scene.stops):
+        return []
+    most = max(LEAST_TRIED_MODES, 4 * body.size)
+    counts = sorted({n for n in MODES_TRIED if n <= most} | {body.size})
+    changes = [{"body.modes": n, "body.residual": residual} for residual in (False, True) for n in counts]
+    able = [change for change in changes if can_have(scene, change)]
+    if not able:
+        return []
+    finest = scene.with_values(able[-1])
+    return [
+        replace(
+            way_by_scene(
+                "residual vectors" if change["body.residual"] else "modes",
+                *("modes", change["body.modes"]),
+                scene,
+                change,
+                model=True,
+            ),
+            against=finest,
+        )
+        for change in able[:-1]
+    ]
+
+
+def _fewer_modes(scene: Scene, body: ChainBody) -> list[Way]:
+    """Return fewer modes of a chain, whose reference has all of them."""
+    whole = scene.with_values({"body.modes": body.size})
+    changes = [{"body.modes": n} for n in MODES_TRIED if n < body.size]
+    return [
+        replace(
+            way_by_scene("modes", "modes", change["body.modes"], scene, change, model=True), against=whole
+        )
+        for change in changes
+        if can_have(scene, change)
+    ]
+
+
+def told_by(ways: Sequence[Way]) -> str:
+    """Return in words what other numbers of modes are compared with; empty where there are none.
+
+    Parameters
+    ----------
+    ways : sequence of Way
+    """
+    finest = next((way.against.body for way in ways if way.against is not None), None)
+    if isinstance(finest, ChainBody):
+        return f"all {finest.size} modes"
+    if not isinstance(finest, BeamBody):
+        return ""
+    what = ", residual vectors among them" if finest.residual else ""
+    return f"{finest.size} modes{what}"
+
+
+def _equal_restitution(scene: Scene, speed: float) -> Iterator[Way]:
+    """Yield stops of other laws that give the mass that hits them the same coefficient of restitution."""
+    stops: Sequence[Stop] = scene.stops
+    masses = scales_of(scene).masses
+    if not speed > 0.0:
+        speed = 1.0  # at which nothing hits: of a law that depends on it, any
+    found = [restitution_at(stop, mass, speed) for stop, mass in zip(stops, masses, strict=True)]
+    if not all(LEAST_RESTITUTION <= one <= 1.0 for one in found):
+        return
+    own = [contact_time(stop, mass, speed) for stop, mass in zip(stops, masses, strict=True)]
+    if any(own):
+        tables = [
+            _table(stop, law="restitution", restitution=r) for stop, r in zip(stops, found, strict=True)
+        ]
+        change = {"stop": tables}
+        if can_have(scene, change):
+            yield way_by_scene("rigid stops of equal restitution", "", math.nan, scene, change, model=True)
+    scale = time_scale(scene)
+    times = [part * scale for part in CONTACT_TIMES] if not any(own) else [max(own)]
+    for duration in times:
+        laws = [
+            laws_of_equal_restitution(r, mass, speed, duration if time == 0.0 else time)
+            for r, mass, time in zip(found, masses, own, strict=True)
+        ]
+        for name in dict.fromkeys(name for of in laws for name in of):
+            if not all(name in of for of in laws) or all(
+                of[name]["law"] == stop.law for of, stop in zip(laws, stops, strict=True)
+            ):
+                continue
+            change = {"stop": [_table(stop, **of[name]) for stop, of in zip(stops, laws, strict=True)]}
+            if can_have(scene, change):
+                words = f"{name} stops of equal restitution"
+                yield way_by_scene(words, "contact time", duration, scene, change, model=True)
+
+
+def _table(stop: Stop, **law: Any) -> dict[str, Any]:
+    place = {} if stop.mass is None else {"mass": stop.mass}
+    return {"position": stop.position, "side": stop.side, **place, **law}

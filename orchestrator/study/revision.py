@@ -1,0 +1,115 @@
+"""A trial in which the body is a stranger to its stops: the importer finds its arrivals by step revision."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+
+from vibroimpact.fmus import fmu_path
+from vibroimpact.orchestrator.fmi.instance import Wrapper
+from vibroimpact.orchestrator.importer.component import Value
+from vibroimpact.orchestrator.importer.contacts import CONTACT_STEPS
+from vibroimpact.orchestrator.importer.events import Event
+from vibroimpact.orchestrator.importer.master import Importer
+from vibroimpact.orchestrator.importer.specification import ComponentSpec, StopContactSpec
+from vibroimpact.orchestrator.run.coupled import BODY, stop_name, stop_of, stop_parameters
+from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters, integer_parameters
+from vibroimpact.orchestrator.run.point import recorded_window
+from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.observation import Observation
+from vibroimpact.orchestrator.study.trials import LATE
+
+
+class RevisedTrial:
+    """An oscillator that knows nothing of its stops, as the FMU of another tool: the `[[contact]]` of general scenes.
+
+    Steps that end beyond a stop are made again until they end at it; a stop that yields answers with the force, held
+    over each step, that closes the energy of the contact; a rigid one throws the body back over a very short step.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of an oscillator with stops.
+    step : float
+        Longest step, s.
+    contact_steps : float
+        Steps in a contact with a stop that yields.
+    wrap : callable or None
+        Wraps the functions of the FMUs.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        step: float,
+        contact_steps: float = CONTACT_STEPS,
+        wrap: Wrapper | None = None,
+    ) -> None:
+        floats, integers = float_parameters(scene, None), integer_parameters(scene)
+        self._window = recorded_window(scene, floats)
+        count = len(scene.stops)
+        own = {name: v for name, v in floats.items() if not name.startswith("contact[")}
+        self._values: dict[tuple[str, str], Value] = {(BODY, name): value for name, value in own.items()}
+        self._values |= {target: floats[source] for target, source in stop_parameters(count, floats).items()}
+        body = ComponentSpec(BODY, fmu_path(FMU_NAMES[scene.body.kind]), {})
+        names = [stop_name(k) for k in range(1, count + 1)]
+        contacts = [StopContactSpec(BODY, "displacement", "velocity", "force", name) for name in names]
+        self._importer = Importer(
+            [body, *(stop_of(k, integers) for k in range(1, count + 1))],
+            contacts=contacts,
+            macro_step=step,
+            contact_steps=contact_steps,
+            wrap=None if wrap is None else (lambda name: wrap),
+        )
+        component = self._importer.components[BODY]
+        self._motion = component.group("Float64", ["displacement", "velocity"])
+        self._switch = component.group("Boolean", ["record.extrema"])
+        self._extremes = component.group("Float64", ["record.displacement_min", "record.displacement_max"])
+        self._positions = np.array([stop.position for stop in scene.stops])
+        self._signs = np.array([1.0 if stop.side == "upper" else -1.0 for stop in scene.stops])
+        self._deadline, self._seconds = Deadline(), scene.execution.deadline
+        self._importer.on_event = self._note
+        self._importer.on_pause = self._deadline.refuse_late
+        self._importer.watchers.append(self._deadline.watcher)
+
+    def run(self) -> Observation:
+        """Simulate the scene once."""
+        began = time.perf_counter()
+        self._impacts: list[tuple[float, float, float]] = []
+        self._recording, failure = False, ""
+        self._deadline.begin(self._seconds)
+        begin, end = self._window
+        try:
+            self._importer.begin(0.0, self._values)
+            self._importer.advance(begin)
+            self._recording = True
+            self._switch.values[:] = True
+            self._switch.set()
+            self._importer.advance(end)
+        except DeadlineReached:
+            failure = LATE
+        lowest, highest = map(float, self._extremes.get())
+        displacement, velocity = map(float, self._motion.get())
+        return Observation(
+            np.array(self._impacts).reshape(-1, 3),
+            lowest,
+            highest,
+            (displacement, velocity),
+            seconds=time.perf_counter() - began,
+            failure=failure,
+        )
+
+    def _note(self, event: Event) -> None:
+        """Note an arrival, which is told before it is answered: at the stop that the body is at and moves towards."""
+        if not self._recording:
+            return
+        displacement, velocity = map(float, self._motion.get())
+        off = np.where(self._signs * velocity > 0.0, np.abs(displacement - self._positions), math.inf)
+        self._impacts.append((event.time, abs(velocity), float(off.argmin()) + 1.0))
+
+    def close(self) -> None:
+        """Free the components."""
+        self._importer.free()

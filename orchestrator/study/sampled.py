@@ -1,0 +1,58 @@
+"""A trial that knows the motion by its samples only, as a recording does."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+
+from vibroimpact.orchestrator.fmi.instance import Wrapper
+from vibroimpact.orchestrator.run import open_runner
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.observation import Observation, observation_of
+
+
+class SampledTrial:
+    """A scene whose impacts and extremes are read off samples of its motion.
+
+    An impact is where the last sample before it is, with the velocity there: what a recording tells without a model.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of the short form.
+    rate : float
+        Samples per s.
+    wrap : callable or None
+        Wraps the functions of the FMUs.
+    """
+
+    def __init__(self, scene: Scene, rate: float, wrap: Wrapper | None = None) -> None:
+        series = {"rate": rate, "variables": ["displacement", "velocity"]}
+        sampled = scene.with_values({"record.time_series": series})
+        of = None if wrap is None else (lambda name: wrap)
+        self._runner = open_runner(sampled, sampled.execution.how, wrap=of)
+
+    def run(self) -> Observation:
+        """Simulate the scene once, and read its samples."""
+        began = time.perf_counter()
+        record = self._runner.run({})
+        whole = replace(observation_of(record), samples=None)
+        rows = record.samples
+        if whole.failure or rows is None or not len(rows):
+            return whole
+        places = np.searchsorted(rows[:, 0], whole.impacts[:, 0], side="right") - 1
+        seen = rows[np.maximum(places, 0)]
+        impacts = np.column_stack([seen[:, 0], np.abs(seen[:, 2]), whole.impacts[:, 2]])
+        return replace(
+            whole,
+            impacts=impacts,
+            lowest=float(rows[:, 1].min()),
+            highest=float(rows[:, 1].max()),
+            seconds=time.perf_counter() - began,
+        )
+
+    def close(self) -> None:
+        """Free the components."""
+        self._runner.close()

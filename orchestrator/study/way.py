@@ -1,0 +1,132 @@
+"""What a way of simulating a scene is, and how one is opened."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from vibroimpact.fmus.errors import SceneError
+from vibroimpact.orchestrator.fmi.instance import Wrapper
+from vibroimpact.orchestrator.fmi.library import Function
+from vibroimpact.orchestrator.run import open_runner
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+from vibroimpact.orchestrator.study.observation import Observation, observation_of
+from vibroimpact.orchestrator.study.replays import ReplayTrial
+
+
+class Trial(Protocol):
+    """A way of simulating a scene, opened: it can be run again and again."""
+
+    def run(self) -> Observation:
+        """Simulate the scene once."""
+
+    def close(self) -> None:
+        """Free what was opened."""
+
+
+Opener = Callable[[Wrapper | None], Trial]
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """A way of simulating a scene at one setting.
+
+    Attributes
+    ----------
+    name : str
+        What differs in kind: `fused`, `coupled, FMI 2.0`, `model exchange, CVode`, ...
+    knob : str
+        The key, or the number, that is set; empty where there is nothing to set.
+    setting : float
+        Its value; NaN without a knob.
+    changes : mapping of str to Any
+        Keys of the scene, with the values that make it run this way; empty where no scene says it.
+    open : callable
+        Opens the way; given a wrapper of the functions of all FMUs, or None.
+    model : bool
+        Whether another model is simulated (another contact law, fewer modes), and not the same one otherwise.
+    against : Scene or None
+        The finest model of its kind, where its errors are told by that one and not by the study's reference.
+    """
+
+    name: str
+    knob: str
+    setting: float
+    changes: Mapping[str, Any]
+    open: Opener
+    model: bool = False
+    against: Scene | None = None
+
+    @property
+    def label(self) -> str:
+        """The way with its setting, in words."""
+        return f"{self.name}, {self.knob} {self.setting:.3g}" if self.knob else self.name
+
+
+class SceneTrial:
+    """A scene that its own runner runs."""
+
+    def __init__(self, scene: Scene, wrap: Wrapper | None = None) -> None:
+        of = None if wrap is None else (lambda name: wrap)
+        self.is_guarded = scene.general.guard if scene.general is not None else scene.execution.guard
+        self._runner = open_runner(scene, scene.execution.how, wrap=of)
+
+    def run(self) -> Observation:
+        """Simulate the scene once."""
+        return observation_of(self._runner.run({}))
+
+    def close(self) -> None:
+        """Free the components."""
+        self._runner.close()
+
+
+class CallCounter:
+    """Counts calls of FMUs by function."""
+
+    def __init__(self) -> None:
+        self.calls: Counter[str] = Counter()
+
+    def wrap(self, name: str, function: Function) -> Function:
+        """Return a function that is counted."""
+
+        def counted(*arguments: Any) -> Any:
+            self.calls[name] += 1
+            return function(*arguments)
+
+        return counted
+
+
+def opened_trial(scene: Scene, wrap: Wrapper | None = None) -> SceneTrial | ReplayTrial:
+    """Open a scene as it says itself; of a replay nobody wraps the functions."""
+    return SceneTrial(scene, wrap) if scene.replay is None else ReplayTrial(scene)
+
+
+def way_by_scene(
+    name: str, knob: str, setting: float, scene: Scene, changes: Mapping[str, Any], *, model: bool = False
+) -> Way:
+    """Return the way in which the scene's own runner runs it, with other values of some keys."""
+    changed = scene.with_values(changes) if changes else scene
+    return Way(name, knob, setting, changes, lambda wrap: opened_trial(changed, wrap), model)
+
+
+def can_have(scene: Scene, changes: Mapping[str, Any]) -> bool:
+    """Return whether a scene is one with these values, too."""
+    try:
+        scene.with_values(changes)
+    except SceneError:
+        return False
+    return True
+
+
+def time_scale(scene: Scene) -> float:
+    """Return the forcing period, or that of the slowest motion of an unforced oscillator, or a hundredth, s."""
+    if scene.period is not None:
+        return scene.period
+    body = scene.body
+    if isinstance(body, OscillatorBody) and body.stiffness > 0.0:
+        return 2.0 * math.pi * math.sqrt(body.mass / body.stiffness)
+    return (scene.record.transient_time + scene.record.recorded_time) / 100.0
