@@ -20,11 +20,17 @@ from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase
 from vibroimpact.orchestrator.hard_cases.finding import CASES as FINDING
 from vibroimpact.orchestrator.hard_cases.impacts import CASES as IMPACTS
+from vibroimpact.orchestrator.hard_cases.limits import CASES as LIMITS
+from vibroimpact.orchestrator.hard_cases.places import CASES as PLACES
 from vibroimpact.orchestrator.hard_cases.rests import CASES as RESTS
 from vibroimpact.orchestrator.hard_cases.scales import CASES as SCALES
+from vibroimpact.orchestrator.hard_cases.several import CASES as SEVERAL
 from vibroimpact.orchestrator.hard_cases.yielding import CASES as YIELDING
 
-CASES: tuple[HardCase, ...] = (*FINDING, *IMPACTS, *RESTS, *YIELDING, *SCALES)
+CASES: tuple[HardCase, ...] = (
+    *(*FINDING, *IMPACTS, *PLACES, *RESTS),
+    *(*YIELDING, *SEVERAL, *SCALES, *LIMITS),
+)
 """In the order of docs/hard_cases.md."""
 
 

@@ -17,20 +17,25 @@ PLAIN: dict[str, Any] = {"mass": 1.0, "stiffness": 1.0}
 """An oscillator with a natural frequency of 1 rad/s."""
 
 
+def recorded(**tables: Any) -> RunRecord:
+    """Run a nondimensional scene, fused, to whatever end it comes."""
+    scene = Scene.from_dict({"scene": {"units": "nondimensional"}, **tables}, "hard case")
+    runner = open_runner(scene, "fused")
+    try:
+        return runner.run({})
+    finally:
+        runner.close()
+
+
 def run(**tables: Any) -> RunRecord:
-    """Run a nondimensional scene, fused.
+    """Run a nondimensional scene, fused, to its end.
 
     Raises
     ------
     ComponentError
         The run ended early.
     """
-    scene = Scene.from_dict({"scene": {"units": "nondimensional"}, **tables}, "hard case")
-    runner = open_runner(scene, "fused")
-    try:
-        record = runner.run({})
-    finally:
-        runner.close()
+    record = recorded(**tables)
     if record.outcome not in (Outcome.ok, Outcome.stuck):
         raise ComponentError(
             f"hard case: expected a run to its end, got {record.outcome.name}: {record.message}"

@@ -1,0 +1,152 @@
+"""Stops in awkward places: at nodes, at the start, two of them for one motion to rest on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.orchestrator.hard_cases.case import Curve, Found, HardCase, largest, relative
+from vibroimpact.orchestrator.hard_cases.runs import (
+    IMPACT_TIME,
+    IMPACT_VELOCITY,
+    PLAIN,
+    STICK_START,
+    restitution,
+    run,
+)
+
+THEME = "Stops in awkward places"
+MIRRORED: dict[str, Any] = {
+    **{"kind": "chain", "masses": [1.0, 1.0, 1.0], "stiffnesses": 1.0, "far_stiffness": 1.0}
+}
+"""Three equal masses between two walls."""
+
+
+def _at_a_node() -> Found:
+    """The outer masses swing against each other, sqrt(2) rad/s: the middle one, at its stop, stays."""
+    end, samples = 100.0, 100
+    record = run(
+        body=MIRRORED | {"displacement_start": [0.3, 0.0, -0.3]},
+        stop=[restitution(0.0, 0.5, mass=2)],
+        record={
+            "recorded_time": end,
+            "time_series": {"rate": samples / end, "variables": ["displacement[1]"]},
+        },
+    )
+    assert record.samples is not None
+    time, place = record.samples.T
+    off = np.abs(place - 0.3 * np.cos(math.sqrt(2.0) * time)) / 0.3
+    return Found(largest(off), Curve(time, off, "time (-)", "relative error of the motion (-)"))
+
+
+def _driven_at_a_node() -> Found:
+    """A force that is the same on both sides: the masses part at the first impact, and not before."""
+    periods, rate = 5, 10.0
+    record = run(
+        body=MIRRORED,
+        forcing={"amplitude": [1.0, 0.0, 1.0], "angular_frequency": 0.5},
+        stop=[restitution(1.5, 0.7, mass=1)],
+        record={
+            "recorded_periods": periods,
+            "time_series": {"rate": rate, "variables": ["displacement[1]", "displacement[3]"]},
+        },
+    )
+    assert record.samples is not None
+    assert record.impacts is not None
+    time, one, other = record.samples.T
+    off = np.abs(one - other)
+    before = time < record.impacts[0, IMPACT_TIME]
+    parted = off[~before].max() > 0.1
+    curve = Curve(time, off, "time (-)", "asymmetry (-)", is_bounded=False)
+    return Found(largest(off[before]) if parted else math.inf, curve)
+
+
+def _starts() -> Found:
+    """On the stop from the start: moving into it, at rest and pulled off it, at rest and pressed to it."""
+    record = {"recorded_time": 0.5}
+    into = run(body=PLAIN | {"velocity_start": 2.0}, stop=[restitution(0.0, 0.25)], record=record).impacts
+    assert into is not None
+    first = into[0]
+    errors = [max(abs(first[IMPACT_TIME]), float(relative(first[IMPACT_VELOCITY], 2.0)))]
+    for load in (-1.0, 1.0):
+        found = run(
+            body=PLAIN,
+            forcing={"amplitude": load, "angular_frequency": 0.0},
+            stop=[restitution(0.0, 0.5)],
+            record=record,
+        )
+        assert found.impacts is not None
+        assert found.sticks is not None
+        expected = 0.0 if load > 0.0 else math.cos(0.5) - 1.0
+        off = abs(found.final_displacement - expected)
+        held = len(found.sticks) == 1 and found.sticks[0, STICK_START] == 0.0
+        errors.append(off if not len(found.impacts) and held == (load > 0.0) else math.inf)
+    off_all = np.array(errors)
+    words = "1 moves into it, 2 is pulled off, 3 is pressed"
+    return Found(largest(off_all), Curve(np.arange(1.0, 4.0), off_all, words, "error (-)"))
+
+
+def _rocking() -> Found:
+    """Two masses on dead stops that a spring makes rock: at rest on both after infinitely many impacts, in 10 s."""
+    loads = 10.0 ** np.arange(-3.0, 4.0)
+    errors = []
+    for load in loads:
+        record = run(
+            body={
+                **{"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0},
+                **{"modes": 2, "damping_ratio": 0.3, "velocity_start": [-0.1, -0.1]},
+            },
+            forcing={"amplitude": float(load), "angular_frequency": 0.0, "location": 0.8},
+            stop=[restitution(0.0, 0.0, location=1.0), restitution(0.0, 0.0, location=0.6)],
+            record={"recorded_time": 30.0 + 30.0 / math.sqrt(load)},
+        )
+        assert record.final_state is not None
+        errors.append(float(np.abs(record.final_state).max()))
+    off = np.array(errors)
+    return Found(largest(off), Curve(loads, off, "load (-)", "what is left of the motion (-)", x_log=True))
+
+
+CASES = (
+    HardCase(
+        "stop-at-a-node",
+        THEME,
+        "a stop at the node of a chain that swings",
+        "changes nothing",
+        "closed form",
+        "relative error of the motion",
+        1e-12,
+        _at_a_node,
+    ),
+    HardCase(
+        "driven-at-a-node",
+        THEME,
+        "a symmetric force on a symmetric chain, one stop on one side",
+        "the masses move alike until the first impact",
+        "symmetry",
+        "asymmetry before the impact",
+        1e-14,
+        _driven_at_a_node,
+    ),
+    HardCase(
+        "starts",
+        THEME,
+        "on the stop from the start, moving into it, pulled off it, pressed to it",
+        "an impact at time 0; leaves without one; holds",
+        "closed forms",
+        "error of time, speed or place",
+        1e-14,
+        _starts,
+    ),
+    HardCase(
+        "rocking",
+        THEME,
+        "a beam of two modes that a load of 1e-3 to 1e3 presses to two dead stops",
+        "comes to rest on both after infinitely many impacts",
+        "statics",
+        "what is left of the motion",
+        1e-12,
+        _rocking,
+    ),
+)
