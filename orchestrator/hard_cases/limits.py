@@ -135,7 +135,7 @@ CASES = (
         "the deadline is kept within the step",
         "-",
         "time after the deadline in s",
-        0.5,
+        2.0,
         _deadlines,
     ),
     HardCase(

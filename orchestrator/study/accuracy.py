@@ -25,7 +25,15 @@ from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, err
 from vibroimpact.orchestrator.study.measured import Measured, Study
 from vibroimpact.orchestrator.study.models import told_by
 from vibroimpact.orchestrator.study.orbits import orbit_of
-from vibroimpact.orchestrator.study.references import Reference, disturbed_scenes, observed, reference_of
+from vibroimpact.orchestrator.study.references import (
+    DISTURBANCE,
+    Reference,
+    disturbed_scenes,
+    observed,
+    reference_of,
+    scales_of,
+    sensitivity_of,
+)
 from vibroimpact.orchestrator.study.statistics import Statistics, statistics_of
 from vibroimpact.orchestrator.study.trials import far_off
 from vibroimpact.orchestrator.study.way import CallCounter, Trial, Way
@@ -43,6 +51,10 @@ COUNTED = 0.25
 """Wall time of a run, s, above which its calls are not counted: that takes several times as long."""
 REPLICATES = 6
 """Runs of chaotic motion, each from a slightly different number, that tell the sampling error of its statistics."""
+MOST_HALVINGS = 24
+"""Of the time that a chaotic general scene records, until its motion is comparable."""
+COMPARABLE = 1e-6
+"""Relative change of the motion that a disturbance leads to, below which it is."""
 MOST_FIRST_PERIODS = 4096
 """Periods within which the first impacts are looked for."""
 
@@ -136,6 +148,8 @@ def given_up_after(scene: Scene, seconds: float) -> Scene:
 
 def first_impacts(scene: Scene, reference: Reference) -> Scene:
     """Return a scene that ends after its first impacts, from its start: all that chaos leaves comparable."""
+    if scene.general is not None:
+        return _comparable(scene)
     if scene.period is None:
         return scene
     periods = 1
@@ -145,6 +159,20 @@ def first_impacts(scene: Scene, reference: Reference) -> Scene:
         if len(observed(short).impacts) >= FIRST_IMPACTS:
             break
     return short
+
+
+def _comparable(scene: Scene) -> Scene:
+    """Return a general scene from its start to where a small change of a number has not grown to that of a motion."""
+    part = scene.record.transient_time + scene.record.recorded_time
+    for _ in range(MOST_HALVINGS):
+        part /= 2.0
+        short = scene.with_values({"record.transient_time": 0.0, "record.recorded_time": part})
+        try:
+            if sensitivity_of(short, scales_of(short)) < COMPARABLE / DISTURBANCE:
+                return short
+        except ComponentError:  # it samples what has no value before a first impact
+            return scene
+    return scene
 
 
 def _typical_speed(reference: Reference) -> float:
@@ -382,13 +410,18 @@ def _rows_of_chaos(found: Sequence[Measured]) -> Rows:
             "1",
             "sampling error of the mean interval, relative",
         ),
-        "velocity_distance": (
+        "distribution_distance": (
             "way",
-            [one.velocity_distance for one in of],
+            [one.distribution_distance for one in of],
             "1",
-            "largest distance between the distributions of impact velocity",
+            "distance between the distributions of impact velocity, or of what is sampled, the largest",
         ),
-        "velocity_sampling": ("way", [one.velocity_sampling for one in of], "1", "its sampling error"),
+        "distribution_sampling": (
+            "way",
+            [one.distribution_sampling for one in of],
+            "1",
+            "its sampling error",
+        ),
     }
     return {
         **rows,

@@ -97,9 +97,13 @@ def advice(study: Study) -> str:
         words += f"; {other.way.label} takes {ratio:.2g} times that and errs by {other.told(quantity, known)}"
     words += _for_the_score(study)
     if study.reference.chaotic:
-        words += (
-            f". The motion is chaotic: after its first {FIRST_IMPACTS} impacts or so only statistics compare"
+        begin, end = study.reference.scales.window
+        part = (
+            f"first {FIRST_IMPACTS} impacts or so"
+            if study.scene.general is None
+            else f"first {end - begin:.3g} s"
         )
+        words += f". The motion is chaotic: after its {part} only statistics compare"
     return f"{words}."
 
 
@@ -133,8 +137,8 @@ def _why_none(study: Study) -> str:
         return "Nothing that is recorded moves: there is nothing to compare."
     if known > VAGUE:
         return (
-            f"No way stands out, since the reference is known to {known:.0e} only: motion that is chaotic, or that "
-            "jumps at its samples, is not compared in scenes of components."
+            f"No way stands out, since the reference is known to {known:.0e} only: motion that "
+            "jumps at its samples is not compared in scenes of components."
         )
     return "No way reached the tolerance."
 

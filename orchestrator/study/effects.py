@@ -107,8 +107,7 @@ def effects_of(scene: Scene) -> list[Effect]:
 
 
 def _found(scene: Scene) -> Iterator[Effect | None]:
-    general = scene.general is not None
-    if not general:
+    if scene.general is None:
         yield from _of_numbers(scene)
         for number, (key, law) in enumerate(laws(scene).items()):
             yield _without(scene, f"{law} stop", key, _removes("stop", number))
@@ -130,22 +129,77 @@ def _found(scene: Scene) -> Iterator[Effect | None]:
         if scene.execution.how == "coupled":
             change = _only_fused
             yield _without(scene, "stops as FMUs of their own", "execution.how", change, keeps=True)
+        if scene.replay is not None:
+            yield from _of_replay(scene)
     else:
         if called_effects(scene)["time series"]:
             yield _without(scene, "samples", "record.variables", _no_samples, keeps=True)
+        for component in scene.general.components:
+            yield _without_component(scene, component.name)
         for table, name in (("event", "watched event"), ("contact", "contact of bodies")):
             for number in range(len(parse_toml(scene.text).get(table, ()))):
                 yield _without(
                     scene, f"{name} {number + 1}", f"{table}[{number + 1}]", _removes(table, number)
                 )
-        if (
-            scene.general is not None
-            and scene.general.guard
-            and "guard" in parse_toml(scene.text).get("execution", {})
-        ):
+        if scene.general.guard and "guard" in parse_toml(scene.text).get("execution", {}):
             yield _without(
                 scene, "guard process", "execution.guard", _sets("execution", "guard", False), keeps=True
             )
+
+
+def _of_replay(scene: Scene) -> Iterator[Effect | None]:
+    """Yield what a recording does to the body, and what a reading makes of its motion."""
+    assert scene.replay is not None
+    if scene.replay.drive is not None:
+        yield _without(scene, "what the recording drives", "replay.drive", _no_drive)
+    sensor = parse_toml(scene.text).get("sensor", {})
+    numbers = [name for name in ("gain", "offset") if name in sensor]
+    if numbers:
+        keys = ", ".join(f"sensor.{name}" for name in numbers)
+        yield _without(scene, "numbers of the sensor", keys, _drops("sensor", numbers))
+
+
+def _no_drive(document: dict[str, Any]) -> None:
+    for name in ("drive", "from", "drive_offset"):
+        document["replay"].pop(name, None)
+
+
+def _drops(table: str, names: Sequence[str]) -> Change:
+    def change(document: dict[str, Any]) -> None:
+        for name in names:
+            del document[table][name]
+
+    return change
+
+
+def _without_component(scene: Scene, name: str) -> Effect | None:
+    """Return a component with all that it is joined by; compared are the variables of the others."""
+    document = parse_toml(scene.text)
+    document.pop("sweep", None)
+    record = document.get("record", {})
+    others = [variable for variable in record.get("variables", ()) if not variable.startswith(f"{name}.")]
+    if not others:
+        return None
+    record["variables"] = others
+    base = Scene.from_dict(document, scene.source)
+    del document["component"][name]
+    for table in ("connection", "contact", "event"):
+        kept = [entry for entry in document.pop(table, ()) if name not in _owners(entry)]
+        if kept:
+            document[table] = kept
+    try:
+        return Effect(f"component {name}", f"component.{name}", base, Scene.from_dict(document, scene.source))
+    except SceneError:
+        return None
+
+
+def _owners(entry: Mapping[str, Any]) -> set[str]:
+    """Return the components that a connection, a contact or an event names."""
+    named = [
+        *(entry.get(key) for key in ("from", "to", "variable", "body", "stop")),
+        *entry.get("between", ()),
+    ]
+    return {str(one).partition(".")[0] for one in named if one is not None}
 
 
 def _of_numbers(scene: Scene) -> Iterator[Effect | None]:
@@ -279,7 +333,7 @@ def _share(effect: Effect, whole: float, scales: Scales) -> Share:
         .replace("that is none", "more")
     )
     if not words:
-        words = NO_CHANGE if change == 0.0 else f"up to {100.0 * change:.2g} %"
+        words = NO_CHANGE if change == 0.0 else f"up to {100.0 * change:.3g} %"
     return Share(effect, seconds, whole, words, change)
 
 

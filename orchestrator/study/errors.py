@@ -17,6 +17,8 @@ QUANTITIES = (
 """What errors are given of."""
 FIRST_IMPACTS = 10
 """Impacts over which the growth of errors is shown where motion is chaotic."""
+STILL = 1e-6
+"""Spread of a sampled variable, over its size, below which it stands still but for rounding."""
 COMPARED = 1e-3
 """Speed of an impact, over that of the fastest, below which it is not compared: ways end a chatter differently."""
 
@@ -112,10 +114,11 @@ def _errors_of_motion(found: Observation, reference: Observation, scales: Scales
         errors["final_state"] = float(off.max())
     samples, expected = found.samples, _at_the_instants_of(found, reference)
     if samples is not None and expected is not None and expected.size and samples.shape == expected.shape:
-        spread = np.ptp(expected, axis=0)
+        spread, size = np.ptp(expected, axis=0), np.abs(expected).max(axis=0)
+        scale = np.where(spread > STILL * size, spread, size)  # what stands still is told by its own size
         off = np.abs(samples - expected).max(axis=0)
-        moving = spread > 0.0
-        errors["samples"] = float((off[moving] / spread[moving]).max()) if moving.any() else math.nan
+        moving = scale > 0.0
+        errors["samples"] = float((off[moving] / scale[moving]).max()) if moving.any() else math.nan
     return errors
 
 

@@ -332,7 +332,7 @@ class _Runs:
         if found.failure or compared is None:
             return math.inf
         interval = max(compared.mean_interval_error - compared.mean_interval_sampling, 0.0)
-        return max(interval, compared.velocity_distance - compared.velocity_sampling, 0.0)
+        return max(interval, compared.distribution_distance - compared.distribution_sampling, 0.0)
 
 
 def _error_of_solution(scene: Scene, run: Observation) -> float:

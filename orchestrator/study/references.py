@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.models import HertzStop, HuntCrossleyStop, RestitutionStop
 from vibroimpact.orchestrator.study.errors import QUANTITIES, Scales, errors_of
 from vibroimpact.orchestrator.study.observation import Floats, Observation
@@ -70,7 +72,8 @@ class Reference:
 def _finest_exchange(scene: Scene) -> Reference:
     """Return the reference of a general scene: iterated exchange at macro steps below those that are compared.
 
-    Its error is told by the run at twice its step, and by the order that this and the one at four times show.
+    Its error is told by the run at twice its step, and by the order that this and the one at four times show; whether
+    the motion is chaotic by runs at the scene's own step.
     """
     assert scene.general is not None
     scales, own = scales_of(scene), scene.general.macro_step
@@ -86,7 +89,17 @@ def _finest_exchange(scene: Scene) -> Reference:
         gain = max(ratio - 1.0, 1.0) if ratio > 2.0 else 1.0
         error[name] = off / gain + SAFETY * ROUNDING
     name = f"iterated exchange at a macro step of {own * FINEST_STEP:.3g}"
-    return Reference(finest, name, error, math.nan, False, scales)
+    sensitivity = sensitivity_of(scene, scales)
+    return Reference(finest, name, error, sensitivity, sensitivity > CHAOTIC / DISTURBANCE, scales)
+
+
+def sensitivity_of(scene: Scene, scales: Scales) -> float:
+    """Return the relative change of a motion over that of a number of its scene, the largest; NaN without a number."""
+    base = observed(scene)
+    changes = [errors_of(observed(_disturbed(scene, key)), base, scales) for key in disturbed_keys(scene)]
+    if any(change.failure for change in changes):
+        return math.inf
+    return max((change.worst() for change in changes), default=math.nan) / DISTURBANCE
 
 
 def scales_of(scene: Scene) -> Scales:
@@ -159,11 +172,24 @@ def disturbed_keys(scene: Scene) -> list[str]:
 
     A body's own number changes more than the scale of the motion, which is all that the force does to a stop at 0.
     """
-    found = []
+    found: list[str] = []
+    if scene.general is not None:
+        return _disturbed_parameters(scene.general)
     for key in DISTURBED:
         with suppress(UsageError):  # a key that the scene does not have
             if scene.value(key) != 0.0:
                 found.append(key)
+    return found
+
+
+def _disturbed_parameters(general: GeneralScene) -> list[str]:
+    """Return the first number of each component that is not 0, in the order of the scene."""
+    found = []
+    for component in general.components:
+        numbers = (
+            n for n, value in component.parameters.items() if isinstance(value, float) and value != 0.0
+        )
+        found += [f"{component.name}.{name}" for name in islice(numbers, 1)]
     return found
 
 
@@ -176,6 +202,8 @@ def disturbed_scenes(scene: Scene, count: int) -> list[Scene]:
 def _disturbed(scene: Scene, key: str, times: int = 1) -> Scene:
     """Return a scene with one number slightly larger, or smaller where a body that starts on its stop forbids that."""
     number, change = scene.value(key), times * DISTURBANCE
+    if scene.general is not None:
+        return scene.at({key: number * (1.0 + change)})
     try:
         return scene.with_values({key: number * (1.0 + change)})
     except SceneError:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import ks_2samp
 
-from vibroimpact.orchestrator.study.observation import Floats, Observation
+from vibroimpact.orchestrator.study.observation import Observation
 
 LEAST_IMPACTS = 20
 """Impacts below which there are no statistics."""
@@ -23,14 +23,15 @@ class Statistics:
     ----------
     mean_interval_error, mean_interval_sampling : float
         Relative difference of the mean interval between impacts, and the largest among runs of the reference.
-    velocity_distance, velocity_sampling : float
-        Largest distance between the distributions of impact velocity (Kolmogorov-Smirnov), and likewise.
+    distribution_distance, distribution_sampling : float
+        Distance between the distributions of impact velocity (Kolmogorov-Smirnov), and likewise; where no impacts are
+        known, of what is sampled, the largest.
     """
 
     mean_interval_error: float
     mean_interval_sampling: float
-    velocity_distance: float
-    velocity_sampling: float
+    distribution_distance: float
+    distribution_sampling: float
 
 
 def statistics_of(
@@ -49,19 +50,32 @@ def statistics_of(
     Statistics or None
         None where there are too few impacts.
     """
-    if min(len(one.impacts) for one in (found, reference, *replicates)) < LEAST_IMPACTS:
+    apart = _off if len(reference.impacts) else _off_samples
+    if min(_told(one) for one in (found, reference, *replicates)) < LEAST_IMPACTS:
         return None
-    interval, speed = _off(found.impacts, reference.impacts)
-    by_chance = [_off(one.impacts, reference.impacts) for one in replicates]
+    interval, distance = apart(found, reference)
+    by_chance = [apart(one, reference) for one in replicates]
     return Statistics(
         interval,
         max((one[0] for one in by_chance), default=math.nan),
-        speed,
+        distance,
         max((one[1] for one in by_chance), default=math.nan),
     )
 
 
-def _off(impacts: Floats, others: Floats) -> tuple[float, float]:
-    own, other = (float(np.diff(rows[:, 0]).mean()) for rows in (impacts, others))
-    distance = float(ks_2samp(impacts[:, 1], others[:, 1]).statistic)
-    return abs(own - other) / other, distance
+def _told(found: Observation) -> int:
+    """Return how many impacts, or samples where there are none, a run tells."""
+    return len(found.impacts) or (0 if found.samples is None else len(found.samples))
+
+
+def _off(found: Observation, other: Observation) -> tuple[float, float]:
+    own, others = (float(np.diff(one.impacts[:, 0]).mean()) for one in (found, other))
+    distance = float(ks_2samp(found.impacts[:, 1], other.impacts[:, 1]).statistic)
+    return abs(own - others) / others, distance
+
+
+def _off_samples(found: Observation, other: Observation) -> tuple[float, float]:
+    assert found.samples is not None
+    assert other.samples is not None
+    pairs = zip(found.samples.T, other.samples.T, strict=True)
+    return math.nan, max(float(ks_2samp(own, others).statistic) for own, others in pairs)

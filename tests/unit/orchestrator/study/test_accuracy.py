@@ -175,7 +175,7 @@ def test_a_chaotic_motion_is_found_out_and_compared_by_its_first_impacts_and_its
     assert growth[0] < 1e-13
     assert growth.max() > 10.0 * growth[0]
     assert coupled.statistics is not None
-    assert coupled.statistics.velocity_distance < 4.0 * coupled.statistics.velocity_sampling + 1e-12
+    assert coupled.statistics.distribution_distance < 4.0 * coupled.statistics.distribution_sampling + 1e-12
     assert "chaotic" in advice(study)
 
 
@@ -205,6 +205,41 @@ def test_a_general_scene_is_studied_over_exchanges_and_steps() -> None:
     for exchange, order in (("jacobi", 1.0), ("gauss_seidel", 1.0), ("iterated", 2.0)):
         steps, errors = ladder(study, f"coupled, {exchange}")
         assert observed_order(steps, errors) == pytest.approx(order, abs=0.2), exchange
+
+
+CHAOTIC_COMPONENTS: dict[str, Any] = {
+    "component": {
+        "body": {
+            "fmu": "Oscillator",
+            "parameters": {
+                **{"mass": 1.0, "stiffness": 1.0, "damping": 0.1},
+                **{"forcing.amplitude": 1.0, "forcing.angular_frequency": 2.8},
+                **{"contact[1].law": "external", "contact[1].position": 0.0},
+            },
+        },
+        "stop": {"fmu": "ImpactStop", "parameters": {"law": "restitution", "restitution": 0.8}},
+    },
+    "connection": [
+        {"from": f"body.contact[1].{name}", "to": f"stop.{name}"} for name in ("displacement", "velocity")
+    ]
+    + [
+        {"from": f"stop.{name}", "to": f"body.contact[1].{name}"}
+        for name in ("applied_restitution", "applied_force")
+    ],
+    "record": {"recorded_time": 400.0, "variables": ["body.displacement"], "rate": 5.0},
+    "execution": {"macro_step": 1.0},
+}
+
+
+def test_chaos_of_a_general_scene_is_compared_from_its_start_and_then_by_what_it_samples() -> None:
+    study = study_accuracy(Scene.from_dict(CHAOTIC_COMPONENTS), budget=1.0)
+    assert study.reference.chaotic
+    assert study.scene.record.recorded_time < 100.0
+    assert all(one.error("all") < 1e-10 for one in study.measured)
+    told = [one.statistics for one in study.measured if one.statistics is not None]
+    assert len(told) > 10
+    assert all(one.distribution_distance < 3.0 * one.distribution_sampling for one in told)
+    assert "only statistics compare" in advice(study)
 
 
 def test_a_free_motion_without_stops_is_compared_by_its_end() -> None:

@@ -86,6 +86,26 @@ def test_motion_is_the_same_whatever_is_kept(name: str, tolerance: float) -> Non
             assert np.allclose(a, b, rtol=tolerance, atol=0.0, equal_nan=True), variable
 
 
-def test_effects_of_a_general_scene_are_its_samples_contacts_and_events() -> None:
+def test_effects_of_a_general_scene_are_its_components_samples_contacts_and_events() -> None:
     found = [effect.name for effect in effects_of(load_scene(EXAMPLES / "newtons_cradle.toml"))]
-    assert found == ["samples", *(f"contact of bodies {k}" for k in range(1, 5))]
+    contacts = [f"contact of bodies {k}" for k in range(1, 5)]
+    assert found == ["samples", *(f"component ball{k}" for k in range(1, 6)), *contacts]
+
+
+def test_a_component_is_taken_away_with_all_that_joins_it_and_the_others_are_compared() -> None:
+    scene = load_scene(EXAMPLES / "two_oscillators.toml", ["record.recorded_time=20"])
+    effect = next(one for one in effects_of(scene) if one.name == "component b")
+    assert effect.without.general is not None
+    assert [one.name for one in effect.without.general.components] == ["a"]
+    assert not effect.without.general.connections
+    (share,) = shares_of(scene, [effect])
+    # alone a goes on as cos sqrt(1.1) t; coupled it is half of cos t + cos sqrt(1.2) t
+    time, (slow, fast, alone) = np.arange(0.0, 20.0, 0.05), np.sqrt([1.0, 1.2, 1.1])
+    coupled = 0.5 * np.array(
+        [
+            np.cos(slow * time) + np.cos(fast * time),
+            -slow * np.sin(slow * time) - fast * np.sin(fast * time),
+        ]
+    )
+    off = np.abs(coupled - [np.cos(alone * time), -alone * np.sin(alone * time)]).max(axis=1)
+    assert share.change == pytest.approx((off / np.ptp(coupled, axis=1)).max(), rel=0.02)

@@ -90,11 +90,12 @@ def test_a_replay_without_a_recording_is_one_error() -> None:
         study_accuracy(parse_scene(BOARD, "board.toml"))
 
 
-def test_damping_of_a_replay_is_an_effect(scene: Scene) -> None:
+def test_damping_drive_and_sensor_of_a_replay_are_effects(scene: Scene) -> None:
     effects = effects_of(scene)
-    assert [effect.asked_by for effect in effects] == ["body.damping_ratio"]
-    (share,) = shares_of(scene, effects)
-    assert 0.0 < share.change < 10.0
+    assert [effect.asked_by for effect in effects] == ["body.damping_ratio", "replay.drive", "sensor.gain"]
+    changes = {share.effect.asked_by: share.change for share in shares_of(scene, effects)}
+    assert all(0.0 < change < 10.0 for change in changes.values())
+    assert changes["sensor.gain"] == pytest.approx(0.1 / 0.9 * changes["replay.drive"], rel=1e-3)
 
 
 def test_a_replay_that_is_given_up_is_a_way_that_did_not_finish(scene: Scene) -> None:
