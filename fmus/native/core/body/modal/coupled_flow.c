@@ -130,10 +130,7 @@ static void scale_of_holding(vi_drift *drift, const vi_drift_start *start)
         for (int j = 0; j < model->modes; ++j) {
             const vi_mode *mode = &model->mode[j];
             double terms = fabs(mode->force) + fabs(start->held[j]) + mode->stiffness * fabs(start->q[j]);
-            for (int i = 0; i < model->modes; ++i) {
-                const double damping = vi_structure_damping(model, j, i);
-                terms += fabs(damping * start->p[i]);
-            }
+            terms += vi_structure_drag_size(model, j, start->p);
             for (int l = 0; l < model->contacts; ++l) { /* of stops that yield, and of the others that hold */
                 terms += l == k ? 0.0 : fabs(model->shape[l][j] * drift->force[l][0]);
             }

@@ -93,13 +93,10 @@ static void carry(vi_series_noise *noise)
     }
     for (int j = 0; j < model->modes; ++j) {
         const double stiffness = model->mode[j].stiffness;
-        double terms = load_size(noise, j) + stiffness * fabs(noise->drift->modal[n - 2][j]);
-        double carried = stiffness * noise->before[j];
-        for (int i = 0; i < model->modes; ++i) {
-            const double damping = fabs(vi_structure_damping(model, j, i)) * (double)(n - 1);
-            terms += damping * fabs(noise->drift->modal[n - 1][i]);
-            carried += damping * noise->last[i];
-        }
+        const double terms = load_size(noise, j) + stiffness * fabs(noise->drift->modal[n - 2][j])
+                             + (double)(n - 1) * vi_structure_drag_size(model, j, noise->drift->modal[n - 1]);
+        double carried =
+            stiffness * noise->before[j] + (double)(n - 1) * vi_structure_drag_size(model, j, noise->last);
         for (int l = 0; l < model->contacts; ++l) {
             carried += fabs(model->shape[l][j]) * forces[l];
         }

@@ -147,6 +147,19 @@ static inline double vi_structure_damping(const vi_structure_model *model, int i
     return model->coupled ? model->coupling[i][j] : i == j ? 2.0 * model->mode[j].decay : 0.0;
 }
 
+/* Size of the damping force on mode i where the modes move at these rates. */
+static inline double vi_structure_drag_size(const vi_structure_model *model, int i, const double rates[])
+{
+    double size = 0.0;
+    if (!model->coupled) {
+        return fabs(2.0 * model->mode[i].decay * rates[i]);
+    }
+    for (int j = 0; j < model->modes; ++j) {
+        size += fabs(model->coupling[i][j] * rates[j]);
+    }
+    return size;
+}
+
 /* shape . vector */
 double vi_structure_at(const vi_structure_model *model, const double shape[], const double vector[]);
 
