@@ -9,12 +9,9 @@ import numpy as np
 
 from vibroimpact.orchestrator.hard_cases.case import Curve, Floats, Found, HardCase, largest, relative
 from vibroimpact.orchestrator.hard_cases.runs import IMPACT_VELOCITY, kelvin_voigt, restitution, run
+from vibroimpact.orchestrator.study.balance import BALANCED, off_balance
 
 THEME = "Several stops"
-BALANCED = (
-    *("energy.kinetic", "energy.potential"),
-    *("energy.forcing_work", "energy.damping_loss", "energy.contact_loss"),
-)
 BEAM: dict[str, Any] = {**{"kind": "beam", "length": 1.0, "flexural_rigidity": 1.0, "mass_per_length": 1.0}}
 
 
@@ -24,17 +21,13 @@ def _balance(record_table: dict[str, Any], **tables: Any) -> tuple[Floats, Float
     record = run(**tables, record={**record_table, "time_series": series})
     assert record.samples is not None
     assert record.impacts is not None
-    time, kinetic, potential, work, damping, contact = record.samples.T
-    energy = kinetic + potential
-    turned = np.maximum.accumulate(energy + np.abs(work) + damping + np.abs(contact))
-    off = np.abs(energy - energy[0] - work + damping + contact) / np.maximum(turned, 1e-300)
-    return time, np.asarray(off, dtype=np.float64), len(record.impacts)
+    return record.samples[1:, 0], off_balance(record.samples), len(record.impacts)
 
 
 def _balanced(least_impacts: int, record_table: dict[str, Any], **tables: Any) -> Found:
     time, off, impacts = _balance(record_table, **tables)
-    figure = largest(off[1:]) if impacts >= least_impacts else math.inf
-    return Found(figure, Curve(time[1:], off[1:], "time (-)", "relative error of the balance (-)"))
+    figure = largest(off) if impacts >= least_impacts else math.inf
+    return Found(figure, Curve(time, off, "time (-)", "relative error of the balance (-)"))
 
 
 def _all_laws() -> Found:

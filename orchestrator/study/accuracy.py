@@ -20,6 +20,7 @@ from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.wording import option
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.balance import balance_of
 from vibroimpact.orchestrator.study.choice import advice, cheapest, error_of_reference, pareto_front
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, errors_of, no_errors
 from vibroimpact.orchestrator.study.measured import Measured, Study
@@ -76,7 +77,7 @@ def study_accuracy(
     tolerance : float, optional
         Relative error that is asked for.
     quantity : str
-        `impact_time`, `impact_velocity`, `displacement_range`, `final_state`, `samples`, or `all`, the worst of those.
+        One of `errors.QUANTITIES`, or `all`, the worst of those.
     budget : float
         Wall time that the study takes, about, s.
     told : callable
@@ -214,6 +215,8 @@ def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
     except ComponentError as error:
         trial.close()
         return Measured(way, no_errors(_first_line(error))), None
+    if way.scene is not None and not found.failure:
+        found = replace(found, energy_balance=balance_of(way.scene))
     errors = errors_of(found, reference.observation, reference.scales)
     if not found.failure and far_off(found, reference.observation):
         errors = no_errors("fell through")

@@ -12,7 +12,7 @@ from vibroimpact.orchestrator.study.observation import Floats, Observation
 
 QUANTITIES = (
     *("impact_time", "impact_velocity", "displacement_range", "final_state", "samples"),
-    "interface_energy",
+    *("interface_energy", "energy_balance"),
 )
 """What errors are given of."""
 FIRST_IMPACTS = 10
@@ -99,6 +99,7 @@ def errors_of(
     if impacts is None:
         errors |= _errors_of_motion(found, reference, scales)
     errors["interface_energy"] = _error_of_energy(found, reference, scales)
+    errors["energy_balance"] = found.energy_balance
     return Errors(errors, failure, growth)
 
 

@@ -34,6 +34,8 @@ class Observation:
         Displacement (m) and velocity (m/s) at the end.
     energy_residual : float
         Energy that the exchange of a contact's force added, J; NaN where nothing is exchanged.
+    energy_balance : float
+        Largest error of the balance of a body's energies, relative; NaN where nobody followed them.
     samples : ndarray, shape (sample, variable), or None
         What a general scene samples, or a replay reads, without the time.
     sample_times : ndarray, shape (sample,), or None
@@ -51,6 +53,7 @@ class Observation:
     highest: float = math.nan
     final: tuple[float, float] = (math.nan, math.nan)
     energy_residual: float = math.nan
+    energy_balance: float = math.nan
     samples: Floats | None = None
     sample_times: Floats | None = None
     seconds: float = math.nan
@@ -87,5 +90,5 @@ def observation_of(record: RunRecord) -> Observation:
     samples = None if record.samples is None else record.samples[:, 1:]
     final = (record.final_displacement, record.final_velocity)
     return Observation(
-        impacts, lowest, highest, final, residual, samples, seconds=record.seconds, failure=failure
+        impacts, lowest, highest, final, residual, samples=samples, seconds=record.seconds, failure=failure
     )

@@ -51,6 +51,8 @@ class Way:
         Whether another model is simulated (another contact law, fewer modes), and not the same one otherwise.
     against : Scene or None
         The finest model of its kind, where its errors are told by that one and not by the study's reference.
+    scene : Scene or None
+        What is simulated, where its own runner does it.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Way:
     open: Opener
     model: bool = False
     against: Scene | None = None
+    scene: Scene | None = None
 
     @property
     def label(self) -> str:
@@ -110,7 +113,7 @@ def way_by_scene(
 ) -> Way:
     """Return the way in which the scene's own runner runs it, with other values of some keys."""
     changed = scene.with_values(changes) if changes else scene
-    return Way(name, knob, setting, changes, lambda wrap: opened_trial(changed, wrap), model)
+    return Way(name, knob, setting, changes, lambda wrap: opened_trial(changed, wrap), model, scene=changed)
 
 
 def can_have(scene: Scene, changes: Mapping[str, Any]) -> bool:

@@ -123,6 +123,10 @@ def test_a_chain_is_studied_with_fewer_modes_and_with_stops_of_other_laws() -> N
         "record": {"recorded_periods": 1},
     }
     study = study_accuracy(Scene.from_dict(tables), budget=1.0)
+    fused = [one for one in study.measured if one.way.name == "fused"]
+    balances = [one.errors.of["energy_balance"] for one in fused]
+    assert balances[0] > 1e-9  # at a contact tolerance of .01
+    assert balances[-1] < 1e-13
     names = {one.way.name for one in study.measured if one.way.model}
     assert names == {
         "modes",
