@@ -12,7 +12,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-PACKAGES = ("fmus", "orchestrator", "analysis", "hardware")
+PACKAGES = ("fmus", "orchestrator", "analysis", "hardware", "service")
 DOOR = "door"
 PACKAGE = "vibroimpact"
 ZIG = "ziglang>=0.13"

@@ -53,6 +53,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.hardware.recordings import ImportSettings as ImportSettings
     from vibroimpact.hardware.recordings import import_recording as import_recording
     from vibroimpact.orchestrator.scene import Scene as Scene
+    from vibroimpact.service.client import Service as Service
     from vibroimpact.simulation import accuracy as accuracy
     from vibroimpact.simulation import campaign as campaign
     from vibroimpact.simulation import cost_of as cost_of
@@ -86,6 +87,7 @@ _NAMES = {
     "fmus.errors": ("VibroimpactError",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
     "orchestrator.scene": ("Scene",),
+    "service.client": ("Service",),
     "simulation": (
         "accuracy",
         "campaign",

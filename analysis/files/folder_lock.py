@@ -28,8 +28,14 @@ else:
 
 
 @contextmanager
-def locked_folder(folder: Path) -> Iterator[None]:
+def locked_folder(folder: Path, holder: str = "campaign") -> Iterator[None]:
     """Hold a folder for this process.
+
+    Parameters
+    ----------
+    folder : Path
+    holder : str
+        What holds it, in words.
 
     Raises
     ------
@@ -45,7 +51,7 @@ def locked_folder(folder: Path) -> Iterator[None]:
             try_lock(handle)
         except OSError as error:
             raise UsageError(
-                f"{folder}: expected a folder of its own, got one in which another campaign is running. "
+                f"{folder}: expected a folder of its own, got one in which another {holder} is running. "
                 "Wait for it, or choose another folder."
             ) from error
         yield

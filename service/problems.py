@@ -1,0 +1,65 @@
+"""Answers to what cannot be done: problem details (RFC 9457), one clear text each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException
+
+MEDIA_TYPE = "application/problem+json"
+
+
+class ProblemError(Exception):
+    """A request that is refused.
+
+    Parameters
+    ----------
+    status : HTTPStatus
+    detail : str
+        What is wrong, what was expected.
+    headers : mapping, optional
+    members
+        Further members of the answer.
+    """
+
+    def __init__(
+        self, status: HTTPStatus, detail: str, headers: Mapping[str, str] | None = None, **members: Any
+    ) -> None:
+        self.status, self.detail, self.headers, self.members = status, detail, dict(headers or {}), members
+        super().__init__(detail)
+
+
+def answer(
+    status: int, detail: str, headers: Mapping[str, str] | None = None, **members: Any
+) -> JSONResponse:
+    """Return a problem as a response."""
+    content = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail}
+    return JSONResponse(content | members, status, dict(headers or {}), MEDIA_TYPE)
+
+
+def answer_problems(app: FastAPI) -> None:
+    """Let an application answer all of its errors in this form."""
+
+    @app.exception_handler(ProblemError)
+    def of_ours(_: Request, problem: ProblemError) -> JSONResponse:
+        return answer(problem.status, problem.detail, problem.headers, **problem.members)
+
+    @app.exception_handler(HTTPException)
+    def of_routing(request: Request, error: HTTPException) -> JSONResponse:
+        return answer(
+            error.status_code, f"{request.method} {request.url.path}: {error.detail}", error.headers
+        )
+
+    @app.exception_handler(RequestValidationError)
+    def of_validation(_: Request, error: RequestValidationError) -> JSONResponse:
+        problems = [
+            {"message": f"{'.'.join(str(part) for part in one['loc'])}: {one['msg']}"}
+            for one in error.errors()
+        ]
+        detail = problems[0]["message"] if problems else "the request does not fit"
+        return answer(HTTPStatus.UNPROCESSABLE_ENTITY, detail, problems=problems)

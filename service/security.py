@@ -1,0 +1,109 @@
+"""Who may ask, and what any answer says to a browser: the token, the size of requests, headers."""
+
+from __future__ import annotations
+
+import hmac
+import os
+import secrets
+from collections.abc import Awaitable, Callable, MutableMapping
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.service.problems import answer
+
+OPEN_PATHS = ("/healthz",)
+"""What is answered without a token."""
+MOST_BYTES = 4 * 2**20
+"""Size of a request, byte."""
+HEADERS = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"x-frame-options", b"DENY"),
+    (b"content-security-policy", b"default-src 'none'; frame-ancestors 'none'"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cache-control", b"no-store"),
+)
+
+Scope = MutableMapping[str, Any]
+Message = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[Message]]
+Send = Callable[[Message], Awaitable[None]]
+Application = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+
+def token_of(folder: Path) -> str:
+    """Return the token of a service, made at its first start in a file that only its owner reads.
+
+    Raises
+    ------
+    UsageError
+        Others may read the file, or it is empty.
+    """
+    path = folder / "token"
+    try:
+        handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError:
+        if os.name == "posix" and path.stat().st_mode & 0o077:
+            raise UsageError(
+                f"{path}: expected a file that only you can read, got mode {path.stat().st_mode & 0o777:04o}. "
+                "Others may know the token: delete the file, and a new one is made."
+            ) from None
+        token = path.read_text(encoding="utf-8").strip()
+        if not token:
+            raise UsageError(f"{path}: expected a token, got an empty file. Delete it.") from None
+        return token
+    token = secrets.token_urlsafe(32)
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(f"{token}\n")
+    return token
+
+
+class Guarded:
+    """An application behind its token: asks for it, limits what is sent, and adds headers to all answers.
+
+    Parameters
+    ----------
+    app : ASGI application
+    token : str
+    """
+
+    def __init__(self, app: Application, token: str) -> None:
+        self._app, self._expected = app, f"Bearer {token}".encode()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+
+        async def with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                known = {name for name, _ in message["headers"]}
+                extra = [(name, value) for name, value in HEADERS if name not in known]
+                message["headers"] = [*message["headers"], *extra]
+            await send(message)
+
+        headers = dict(scope["headers"])
+        if scope["path"] not in OPEN_PATHS and not self._is_known(headers.get(b"authorization", b"")):
+            refused = answer(
+                HTTPStatus.UNAUTHORIZED,
+                "Authorization: expected Bearer and the token of this service, which is in the file `token` of its "
+                "folder.",
+                {"WWW-Authenticate": "Bearer"},
+            )
+            await refused(scope, receive, with_headers)
+            return
+        length = headers.get(b"content-length", b"0")
+        if not length.isdigit() or int(length) > MOST_BYTES or b"transfer-encoding" in headers:
+            refused = answer(
+                HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+                f"expected a request of at most {MOST_BYTES} byte with its Content-Length, got "
+                f"{length.decode('latin-1')!r}.",
+            )
+            await refused(scope, receive, with_headers)
+            return
+        await self._app(scope, receive, with_headers)
+
+    def _is_known(self, given: bytes) -> bool:
+        return hmac.compare_digest(given, self._expected)

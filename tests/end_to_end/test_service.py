@@ -1,0 +1,375 @@
+"""The service as its clients see it: real processes, killed, cancelled, asked wrongly."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx
+import psutil
+import pytest
+from support.command_line import ENTRY, ENVIRONMENT, in_this_process
+from support.places import EXAMPLES
+
+import vibroimpact as vi
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.service.client import RemoteJob, Service, ServiceError
+
+pytestmark = pytest.mark.slow
+
+SWEEP = """
+[scene]
+title = "short sweep"
+units = "nondimensional"
+[body]
+mass = 1.0
+stiffness = 1.0
+damping_ratio = 0.1
+[forcing]
+amplitude = 0.5
+angular_frequency = 1.0
+[[stop]]
+position = 1.0
+restitution = 0.7
+[record]
+transient_periods = {transient}
+recorded_periods = 5
+[sweep]
+"forcing.angular_frequency" = {{ start = 0.8, stop = 1.2, points = {points} }}
+"""
+SHORT = SWEEP.format(transient=50, points=40)
+LONG = SWEEP.format(transient=20000, points=300)
+ENDLESS = """
+[scene]
+units = "nondimensional"
+[body]
+mass = 1.0
+stiffness = 1.0
+[forcing]
+amplitude = 1.0
+angular_frequency = 1.0
+[[stop]]
+position = 1e-300
+restitution = 1.0
+[[stop]]
+position = -1e-300
+side = "lower"
+restitution = 1.0
+[record]
+transient_periods = 1000000000
+recorded_periods = 1
+[execution]
+impact_limit = 1000000000000
+"""
+
+
+class Served:
+    """A service in a process of its own."""
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", ENTRY, "serve", "--data", str(folder), "--port", "0", *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=os.environ | ENVIRONMENT,
+        )
+        assert self.process.stdout is not None
+        said = self.process.stdout.readline()
+        found = re.search(r"http://\S+:\d+", said)
+        assert found, said + self.process.stdout.read()
+        self.url = found[0]
+
+    def client(self) -> Service:
+        return Service(self.url, folder=self.folder)
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+    def stop(self) -> None:
+        self.process.send_signal(signal.SIGTERM)
+        self.process.communicate(timeout=20)
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[Served]:
+    service = Served(tmp_path / "service")
+    yield service
+    service.stop()
+
+
+@pytest.fixture
+def raw(served: Served) -> Iterator[httpx.Client]:
+    token = (served.folder / "token").read_text(encoding="utf-8").strip()
+    headers = {"Authorization": f"Bearer {token}"}
+    with httpx.Client(base_url=f"{served.url}/api/v1", headers=headers, timeout=30.0) as client:
+        yield client
+
+
+def scene_file(folder: Path, text: str) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def until(job: RemoteJob, *states: str, seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while job.refresh().status["state"] not in states:
+        assert time.monotonic() < end, job.status
+        time.sleep(0.05)
+
+
+def processes_of(folder: Path) -> list[psutil.Process]:
+    """Return the processes that name a folder in their command, and what these have started."""
+    found: list[psutil.Process] = []
+    for process in psutil.process_iter():
+        try:
+            if "job_process" in " ".join(process.cmdline()) and str(folder) in " ".join(process.cmdline()):
+                found += [process, *process.children(recursive=True)]
+        except (psutil.NoSuchProcess, psutil.AccessDenied):
+            continue
+    return found
+
+
+def test_a_campaign_of_the_service_is_that_of_the_command_line(served: Served, tmp_path: Path) -> None:
+    scene = scene_file(tmp_path, SHORT)
+    with served.client() as service:
+        job = service.submit(scene, workers=1).wait()
+        assert job.status["done"] == job.status["total"] == 40
+        found = job.dataset()
+        assert [one.id for one in service.jobs()] == [job.id]
+    expected = vi.campaign(scene, tmp_path / "own", workers=1, progress=False)
+    for name in ("displacement_range", "impact_time", "impact_velocity"):
+        assert found[name].equals(expected[name]), name
+    folder = served.folder / "jobs" / job.id / "campaign"
+    again = in_this_process("campaign", str(scene), "-o", str(folder))
+    assert again.returncode == 0
+    assert "Nothing to do" in again.stdout + again.stderr
+
+
+def test_a_scene_without_a_sweep_is_one_run(served: Served, tmp_path: Path) -> None:
+    with served.client() as service:
+        job = service.submit(EXAMPLES / "single_run.toml").wait()
+        assert job.status["kind"] == "run"
+        assert job.dataset().sizes["sample"] > 1000
+
+
+def test_a_service_that_is_killed_goes_on_where_it_was(tmp_path: Path) -> None:
+    scene, folder = scene_file(tmp_path, LONG), tmp_path / "service"
+    first = Served(folder)
+    with first.client() as service:
+        job = service.submit(scene, workers=2)
+        for event in job.events():
+            if event["done"] > 0:
+                break
+        seen = event["id"]
+    first.kill()
+    second = Served(folder)
+    try:
+        with second.client() as service:
+            again = service.job(job.id)
+            rest = list(again.events(after=seen))
+            assert again.status["state"] == "done"
+            identifiers = [one["id"] for one in rest]
+            assert identifiers == sorted(set(identifiers))
+            assert identifiers[0] > seen
+            assert "restarted" in " ".join(one["message"] for one in rest)
+            found = again.dataset()
+    finally:
+        second.stop()
+    expected = vi.campaign(scene, tmp_path / "own", workers=2, progress=False)
+    for name in ("displacement_range", "impact_time"):
+        assert found[name].equals(expected[name]), name
+    assert not processes_of(folder)
+
+
+def test_cancel_takes_effect_within_a_second_in_a_step_that_never_ends(
+    served: Served, tmp_path: Path
+) -> None:
+    with served.client() as service:
+        job = service.submit(scene_file(tmp_path, ENDLESS))
+        until(job, "running")
+        while not processes_of(served.folder):
+            time.sleep(0.05)
+        time.sleep(3.0)  # well within its step
+        began = time.monotonic()
+        job.cancel()
+        until(job, "cancelled")
+        assert time.monotonic() - began < 1.0
+        assert not processes_of(served.folder)
+        with pytest.raises(
+            ServiceError, match="expected a campaign that waits or runs, got one that is cancelled"
+        ):
+            job.cancel()
+
+
+def test_what_was_cancelled_is_resumed_and_deleted(served: Served, tmp_path: Path, raw: httpx.Client) -> None:
+    with served.client() as service:
+        job = service.submit(scene_file(tmp_path, LONG), workers=2)
+        for event in job.events():
+            if event["done"] > 0:
+                job.cancel()
+                break
+        until(job, "cancelled")
+        assert raw.delete(f"/campaigns/{job.id}").status_code == 204
+        assert not (served.folder / "jobs" / job.id).exists()
+        job = service.submit(scene_file(tmp_path, SHORT), workers=1)
+        waiting = service.submit(scene_file(tmp_path, SHORT), workers=1).cancel()
+        assert waiting.status["state"] == "cancelled"
+        assert raw.get(f"/campaigns/{waiting.id}/dataset").status_code == 409
+        waiting.resume().wait()
+        assert waiting.status["done"] == 40
+
+
+def test_the_same_key_is_the_same_campaign_and_another_body_is_refused(raw: httpx.Client) -> None:
+    header = {"Idempotency-Key": "mine"}
+    first = raw.post("/campaigns", json={"scene": SHORT}, headers=header)
+    second = raw.post("/campaigns", json={"scene": SHORT}, headers=header)
+    other = raw.post("/campaigns", json={"scene": SHORT, "workers": 3}, headers=header)
+    assert first.status_code == second.status_code == 202
+    assert first.headers["location"] == second.headers["location"]
+    assert other.status_code == 422
+    assert "got that of another request" in other.json()["detail"]
+    assert other.headers["content-type"] == "application/problem+json"
+
+
+def test_events_that_were_read_in_parts_are_those_read_at_once(served: Served, tmp_path: Path) -> None:
+    with served.client() as service:
+        job = service.submit(scene_file(tmp_path, SHORT), workers=1).wait()
+        whole = list(job.events())
+        parts, last = [], 0
+        while len(parts) < len(whole):
+            event = next(job.events(after=last))
+            parts.append(event)
+            last = event["id"]
+        assert parts == whole
+        assert [one["state"] for one in whole][:2] == ["queued", "running"]
+        assert whole[-1]["state"] == "done"
+
+
+def test_lists_are_read_in_pages(raw: httpx.Client) -> None:
+    names = [raw.post("/campaigns", json={"scene": SHORT, "workers": 1}).json()["id"] for _ in range(5)]
+    found, cursor = [], None
+    while True:
+        page = raw.get(
+            "/campaigns", params={"limit": 2, **({} if cursor is None else {"cursor": cursor})}
+        ).json()
+        found += [one["id"] for one in page["items"]]
+        cursor = page["next"]
+        if cursor is None:
+            break
+    assert found == names[::-1]
+    assert raw.get("/campaigns", params={"cursor": "?!"}).status_code == 422
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "line"),
+    [
+        ("[body]\nmass = -1", "expected a number > 0, got -1", 2),
+        ("[body", "expected valid TOML", 1),
+        ("\n[component.a]\nfmu = '/tmp/own.fmu'\n", "This service loads no FMU but those of the package", 3),
+        ("\n\n[replay]\nrecordings = ['/etc/passwd']\n", "expected a scene without recordings", 3),
+    ],
+)
+def test_a_scene_with_problems_says_where_they_are(
+    raw: httpx.Client, text: str, message: str, line: int
+) -> None:
+    refused = raw.post("/campaigns", json={"scene": text})
+    assert refused.status_code == 422
+    (first, *_) = refused.json()["problems"]
+    assert message in first["message"]
+    assert first["line"] == line
+    assert raw.post("/scenes/validate", json={"scene": text}).json()["problems"][0] == first
+
+
+def test_nobody_without_the_token_is_answered(served: Served, raw: httpx.Client) -> None:
+    assert httpx.get(f"{served.url}/healthz").text == "ok\n"
+    for path in ("/api/v1/campaigns", "/api/v1/openapi.json", "/metrics", "/anything"):
+        for headers in ({}, {"Authorization": "Bearer wrong"}, {"Authorization": "Basic eDp5"}):
+            refused = httpx.get(f"{served.url}{path}", headers=headers)
+            assert refused.status_code == 401, path
+            assert refused.headers["x-frame-options"] == "DENY"
+    with Service(served.url, "wrong") as stranger, pytest.raises(ServiceError, match="expected Bearer"):
+        stranger.job("x")
+    assert oct((served.folder / "token").stat().st_mode)[-3:] == "600"
+    assert raw.post("/campaigns", content=b"x" * 5_000_000).status_code == 413
+
+
+def test_results_are_drawn_and_ranges_of_them_answered(
+    raw: httpx.Client, served: Served, tmp_path: Path
+) -> None:
+    with served.client() as service:
+        job = service.submit(scene_file(tmp_path, SHORT), workers=1).wait()
+    figure = raw.get(f"/campaigns/{job.id}/figure", params={"format": "svg"})
+    assert figure.headers["content-type"].startswith("image/svg+xml")
+    assert b"<svg" in figure.content
+    assert raw.get(f"/campaigns/{job.id}/figure", params={"kind": "nothing"}).status_code == 422
+    part = raw.get(f"/campaigns/{job.id}/dataset", headers={"Range": "bytes=0-7"})
+    assert part.status_code == 206
+    assert part.content == b"\x89HDF\r\n\x1a\n"
+    assert "attempt 1" in raw.get(f"/campaigns/{job.id}/log").text
+    assert raw.get(f"/campaigns/{job.id}/scene").text == SHORT
+    assert 'vibroimpact_jobs{state="done"} 1.0' in raw.get(f"{served.url}/metrics").text
+    assert raw.get("/fmus/Oscillator").content[:2] == b"PK"
+
+
+def test_misuse_of_serve_is_one_error(served: Served, tmp_path: Path) -> None:
+    def refused(*options: str) -> str:
+        done = in_this_process("serve", *options)
+        assert done.returncode == 2
+        return done.stderr
+
+    assert "got one in which another service is running" in refused(
+        "--data", str(served.folder), "--port", "0"
+    )
+    port = served.url.rpartition(":")[2]
+    assert "expected a free port" in refused("--data", str(tmp_path / "other"), "--port", port)
+    assert "whoever reaches it" in refused("--data", str(tmp_path / "other"), "--host", "0.0.0.0")
+    assert "with other things in it" in refused("--data", str(tmp_path))
+    open_token = tmp_path / "open"
+    open_token.mkdir()
+    (open_token / "service.sqlite").touch()
+    (open_token / "token").write_text("known to all\n", encoding="utf-8")
+    os.chmod(open_token / "token", 0o644)
+    assert "only you can read" in refused("--data", str(open_token), "--port", "0")
+
+
+def test_a_client_without_a_service_or_a_token_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("VIBROIMPACT_TOKEN", raising=False)
+    with pytest.raises(UsageError, match="expected the token of the service"):
+        Service()
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        url = f"http://127.0.0.1:{free.getsockname()[1]}"
+    with Service(url, "token") as service, pytest.raises(ServiceError, match="a service that answers"):
+        service.job("x")
+
+
+def test_the_commands_of_the_client(served: Served, tmp_path: Path) -> None:
+    scene = scene_file(tmp_path, SHORT)
+    where = ("--service", served.url, "--data", str(served.folder))
+    submitted = in_this_process("submit", str(scene), *where, "--workers", "1", "--wait")
+    assert submitted.returncode == 0, submitted.stdout
+    name = re.search(r"[0-9a-f]{32}", submitted.stdout)
+    assert name
+    status = in_this_process("status", name[0], *where)
+    assert "done  40 of 40 points  short sweep" in status.stdout
+    target = tmp_path / "fetched.nc"
+    assert in_this_process("fetch", name[0], "-o", str(target), *where).returncode == 0
+    with vi.open_dataset(target) as found:
+        assert found.sizes["angular_frequency"] == 40
+    bad = in_this_process("submit", str(scene_file(tmp_path, "[body]\nmass = -1")), *where)
+    assert bad.returncode == 2
+    assert "line 2: body.mass: expected a number > 0, got -1" in bad.stderr
+    assert in_this_process("cancel", name[0], *where).returncode == 2
