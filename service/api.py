@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import base64
-import binascii
 import hashlib
 import io
 import json
@@ -100,7 +98,7 @@ class JobPage(BaseModel):
     """Jobs, the newest first, and where the next page begins."""
 
     items: list[JobAnswer]
-    next: str | None
+    next: int | None
 
 
 class Component(BaseModel):
@@ -121,7 +119,7 @@ class ProblemAnswer(BaseModel):
 def problems(*statuses: HTTPStatus) -> dict[int | str, dict[str, Any]]:
     """Return how a route is described to refuse."""
     content = {MEDIA_TYPE: {"schema": ProblemAnswer.model_json_schema()}}
-    always = (HTTPStatus.UNAUTHORIZED, HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+    always = (HTTPStatus.BAD_REQUEST, HTTPStatus.UNAUTHORIZED, HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
     return {int(one): {"description": one.phrase, "content": content} for one in (*always, *statuses)}
 
 
@@ -219,11 +217,10 @@ def _campaigns(store: Store, supervisor: Supervisor) -> APIRouter:
     )
     def campaigns(
         limit: Annotated[int, Query(ge=1, le=MOST_PAGE)] = 50,
-        cursor: Annotated[str | None, Query(max_length=40, description="`next` of the page before")] = None,
+        cursor: Annotated[int | None, Query(ge=0, le=2**62, description="`next` of the page before")] = None,
     ) -> JobPage:
-        before = None if cursor is None else _number_of(cursor)
-        found = store.jobs(before=before, most=limit + 1)
-        more = _cursor_of(found[limit - 1]) if len(found) > limit else None
+        found = store.jobs(before=cursor, most=limit + 1)
+        more = found[limit - 1].number if len(found) > limit else None
         return JobPage(items=[_answer(job) for job in found[:limit]], next=more)
 
     @router.get(
@@ -328,23 +325,6 @@ def _event_lines(event: Event) -> str:
     return f"id: {event.id}\nevent: {event.kind}\ndata: {data}\n\n"
 
 
-def _cursor_of(job: Job) -> str:
-    return base64.urlsafe_b64encode(str(job.number).encode()).decode().rstrip("=")
-
-
-def _number_of(cursor: str) -> int:
-    try:
-        text = base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode("ascii")
-        number = int(text) if text.isdigit() else -1
-    except (binascii.Error, ValueError):
-        number = -1
-    if not 0 <= number < 2**62:
-        raise ProblemError(
-            HTTPStatus.UNPROCESSABLE_ENTITY, f"cursor: expected `next` of the page before, got {cursor!r}."
-        )
-    return number
-
-
 def _results(store: Store) -> APIRouter:
     router = APIRouter(tags=["results"])
     absent = problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY)
@@ -379,7 +359,6 @@ def _results(store: Store) -> APIRouter:
             200: {"content": {"application/x-netcdf": {}}},
             206: {"description": "Partial Content", "content": {"application/x-netcdf": {}}},
             416: {"description": "Range Not Satisfiable"},
-            400: {"description": "Bad Request"},
             **absent,
         },
     )
@@ -395,7 +374,7 @@ def _results(store: Store) -> APIRouter:
     )
     def figure(
         name: str,
-        kind: Annotated[str, Query(max_length=40, description=f"auto, {', '.join(KINDS)}")] = "auto",
+        kind: Annotated[str, Query(json_schema_extra={"enum": ["auto", *KINDS]})] = "auto",
         file_format: Annotated[Literal["png", "svg"], Query(alias="format")] = "png",
         run: Annotated[int | None, Query(ge=0, le=2**31)] = None,
     ) -> Response:
@@ -438,7 +417,6 @@ def _others() -> APIRouter:
             200: {"content": {"application/zip": {}}},
             206: {"description": "Partial Content"},
             416: {"description": "Range Not Satisfiable"},
-            400: {"description": "Bad Request"},
             **problems(HTTPStatus.NOT_FOUND, HTTPStatus.UNPROCESSABLE_ENTITY),
         },
         tags=["fmus"],

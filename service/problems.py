@@ -10,7 +10,9 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
+METHODS = ("GET", "POST", "DELETE")
 MEDIA_TYPE = "application/problem+json"
 
 
@@ -40,6 +42,16 @@ def answer(
     """Return a problem as a response."""
     content = {"type": "about:blank", "title": HTTPStatus(status).phrase, "status": status, "detail": detail}
     return JSONResponse(content | members, status, dict(headers or {}), MEDIA_TYPE)
+
+
+def allowed_methods(request: Request) -> list[str]:
+    """Return the methods that some route of an application takes at the path of a request."""
+    scope, found = dict(request.scope), set[str]()
+    for method in METHODS:
+        scope["method"] = method
+        if any(route.matches(scope)[0] == Match.FULL for route in request.app.routes):
+            found.add(method)
+    return sorted(found)
 
 
 def answer_problems(app: FastAPI) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import signal
 import socket
 import subprocess
 import sys
@@ -15,8 +14,9 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
-from support.command_line import ENTRY, ENVIRONMENT, in_this_process
+from support.command_line import in_this_process
 from support.places import EXAMPLES
+from support.served import Served, sweep_text
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import UsageError
@@ -24,28 +24,10 @@ from vibroimpact.service.client import RemoteJob, Service, ServiceError
 
 pytestmark = pytest.mark.slow
 
-SWEEP = """
-[scene]
-title = "short sweep"
-units = "nondimensional"
-[body]
-mass = 1.0
-stiffness = 1.0
-damping_ratio = 0.1
-[forcing]
-amplitude = 0.5
-angular_frequency = 1.0
-[[stop]]
-position = 1.0
-restitution = 0.7
-[record]
-transient_periods = {transient}
-recorded_periods = 5
-[sweep]
-"forcing.angular_frequency" = {{ start = 0.8, stop = 1.2, points = {points} }}
-"""
-SHORT = SWEEP.format(transient=50, points=40)
-LONG = SWEEP.format(transient=20000, points=300)
+EXAMPLES_OF_EACH = os.environ.get("VIBROIMPACT_SERVICE_EXAMPLES", "5")
+"""Random requests of each route, beside those that its description itself suggests."""
+SHORT = sweep_text(40, 50)
+LONG = sweep_text(300, 20_000)
 ENDLESS = """
 [scene]
 units = "nondimensional"
@@ -68,36 +50,6 @@ recorded_periods = 1
 [execution]
 impact_limit = 1000000000000
 """
-
-
-class Served:
-    """A service in a process of its own."""
-
-    def __init__(self, folder: Path, *options: str) -> None:
-        self.folder = folder
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", ENTRY, "serve", "--data", str(folder), "--port", "0", *options],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=os.environ | ENVIRONMENT,
-        )
-        assert self.process.stdout is not None
-        said = self.process.stdout.readline()
-        found = re.search(r"http://\S+:\d+", said)
-        assert found, said + self.process.stdout.read()
-        self.url = found[0]
-
-    def client(self) -> Service:
-        return Service(self.url, folder=self.folder)
-
-    def kill(self) -> None:
-        self.process.kill()
-        self.process.communicate()
-
-    def stop(self) -> None:
-        self.process.send_signal(signal.SIGTERM)
-        self.process.communicate(timeout=20)
 
 
 @pytest.fixture
@@ -320,6 +272,27 @@ def test_results_are_drawn_and_ranges_of_them_answered(
     assert raw.get(f"/campaigns/{job.id}/scene").text == SHORT
     assert 'vibroimpact_jobs{state="done"} 1.0' in raw.get(f"{served.url}/metrics").text
     assert raw.get("/fmus/Oscillator").content[:2] == b"PK"
+
+
+def test_every_answer_is_as_the_service_describes_it(served: Served, tmp_path: Path) -> None:
+    checks = ("not_a_server_error", "status_code_conformance", "content_type_conformance")
+    checks += ("response_headers_conformance", "response_schema_conformance", "unsupported_method")
+    token = (served.folder / "token").read_text(encoding="utf-8").strip()
+    found = subprocess.run(
+        [
+            *(sys.executable, "-m", "schemathesis.cli", "run", f"{served.url}/api/v1/openapi.json"),
+            *("--header", f"Authorization: Bearer {token}", "--checks", ",".join(checks)),
+            *("--max-examples", EXAMPLES_OF_EACH, "--no-color", "--phases", "coverage,fuzzing"),
+            "--generation-database=none",
+        ],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        timeout=600,
+    )
+    assert found.returncode == 0, found.stdout + found.stderr
+    (cases,) = re.findall(r"(\d+) generated", found.stdout)
+    assert int(cases) >= 100
 
 
 def test_misuse_of_serve_is_one_error(served: Served, tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def check(seed: int) -> str | None:
     left = [entry.name for entry in scratch.iterdir()]
     if left:
         return f"left behind in the folder for temporary files: {left}"
-    return _difference(expected, _content(Path("campaign", "dataset.nc")))
+    return difference(expected, content(Path("campaign", "dataset.nc")))
 
 
 Content = tuple[dict[str, tuple[str, bytes]], dict[str, str]]
@@ -66,10 +66,10 @@ def _undisturbed(path: str) -> Content:
     code, err = _command(str(scene), str(folder / "campaign"), folder, None)
     if code != 0:
         raise RuntimeError(f"the undisturbed campaign ended with {code}: {err}")
-    return _content(folder / "campaign" / "dataset.nc")
+    return content(folder / "campaign" / "dataset.nc")
 
 
-def _content(dataset: Path) -> Content:
+def content(dataset: Path) -> Content:
     """Return the bits of each variable, and the attributes, without what tells one computation from another."""
     flat = read_flat(dataset)
     bits = {
@@ -85,7 +85,7 @@ def _content(dataset: Path) -> Content:
     return bits, {key: str(value) for key, value in flat.attrs.items() if key not in STAMPS}
 
 
-def _difference(expected: Content, got: Content) -> str | None:
+def difference(expected: Content, got: Content) -> str | None:
     for kind, one, other in zip(("variable", "attribute"), expected, got, strict=True):
         for name in sorted(one.keys() | other.keys()):
             if one.get(name) != other.get(name):

@@ -1,0 +1,90 @@
+"""A service, or processes of its jobs, killed at random moments: what it accepted ends bit for bit as undisturbed."""
+
+from __future__ import annotations
+
+import random
+import time
+from functools import lru_cache
+from pathlib import Path
+
+import psutil
+from support.served import Served, sweep_text
+
+import vibroimpact as vi
+from soak.kills import Content, content, difference
+from vibroimpact.service.client import ServiceError
+
+CASES = 20
+SAMPLE = 1
+SECONDS = 300.0
+WAIT_SECONDS = 120.0
+POINTS = {"independent": 240, "up-down": 120}
+TRANSIENT = 20_000
+"""Periods before the recording: a point takes some ten milliseconds."""
+MOST_KILLS = 4
+
+
+def check(seed: int) -> str | None:
+    """Submit, kill, start again, and compare with a campaign that nothing disturbed."""
+    chance = random.Random(seed)
+    path = chance.choice(sorted(POINTS))
+    expected = _undisturbed(path)
+    scene, folder = Path("scene.toml"), Path("service").absolute()
+    scene.write_text(sweep_text(POINTS[path], TRANSIENT, path))
+    served = Served(folder)
+    try:
+        with served.client() as service:
+            name = service.submit(scene, workers=2).id
+        for _ in range(chance.randint(1, MOST_KILLS)):
+            time.sleep(chance.expovariate(0.5))
+            if chance.random() < 0.5:
+                served.kill()
+                served = Served(folder)
+            elif victims := _descendants(served.process.pid):
+                _kill(chance.choice(victims))
+        return _end_of(served, name, folder, expected)
+    finally:
+        served.stop()
+
+
+def _end_of(served: Served, name: str, folder: Path, expected: Content) -> str | None:
+    with served.client() as service:
+        job, end = service.job(name), time.monotonic() + WAIT_SECONDS
+        while job.status["state"] in ("queued", "running"):
+            if time.monotonic() > end:
+                return f"had not ended after {WAIT_SECONDS:.0f} s: {job.status}"
+            time.sleep(0.2)
+            try:
+                job.refresh()
+            except ServiceError as error:
+                return f"the service does not answer: {error}"
+        if job.status["state"] != "done":
+            return f"{job.status}"
+        numbers = [event["id"] for event in job.events()]
+        if numbers != sorted(set(numbers)):
+            return f"events are not each once and in order: {numbers}"
+    return difference(expected, content(folder / "jobs" / name / "campaign" / "dataset.nc"))
+
+
+@lru_cache(maxsize=2)
+def _undisturbed(path: str) -> Content:
+    folder = Path(f"undisturbed-{path}")
+    folder.mkdir()
+    scene = folder / "scene.toml"
+    scene.write_text(sweep_text(POINTS[path], TRANSIENT, path))
+    vi.campaign(scene, folder / "campaign", workers=2, progress=False).close()
+    return content(folder / "campaign" / "dataset.nc")
+
+
+def _descendants(process: int) -> list[psutil.Process]:
+    try:
+        return psutil.Process(process).children(recursive=True)
+    except psutil.Error:
+        return []
+
+
+def _kill(process: psutil.Process) -> None:
+    try:
+        process.kill()
+    except psutil.Error:
+        return  # it ended by itself

@@ -1,0 +1,69 @@
+"""A service in a process of its own, as tests start, stop and kill it."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+from support.command_line import ENTRY, ENVIRONMENT
+from vibroimpact.service.client import Service
+
+SWEEP = """
+[scene]
+title = "short sweep"
+units = "nondimensional"
+[body]
+mass = 1.0
+stiffness = 1.0
+damping_ratio = 0.1
+[forcing]
+amplitude = 0.5
+angular_frequency = 1.0
+[[stop]]
+position = 1.0
+restitution = 0.7
+[record]
+transient_periods = {transient}
+recorded_periods = 5
+[sweep]
+"forcing.angular_frequency" = {{ start = 0.8, stop = 1.2, points = {points}, path = "{path}" }}
+"""
+
+
+def sweep_text(points: int, transient: int, path: str = "independent") -> str:
+    """Return a scene of so many points, each after so many periods."""
+    return SWEEP.format(points=points, transient=transient, path=path)
+
+
+class Served:
+    """A service in a process of its own."""
+
+    def __init__(self, folder: Path, *options: str) -> None:
+        self.folder = folder
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", ENTRY, "serve", "--data", str(folder), "--port", "0", *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=os.environ | ENVIRONMENT,
+        )
+        assert self.process.stdout is not None
+        said = self.process.stdout.readline()
+        found = re.search(r"http://\S+:\d+", said)
+        assert found, said + self.process.stdout.read()
+        self.url = found[0]
+
+    def client(self) -> Service:
+        return Service(self.url, folder=self.folder)
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+
+    def stop(self) -> None:
+        self.process.send_signal(signal.SIGTERM)
+        self.process.communicate(timeout=20)
