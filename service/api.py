@@ -34,6 +34,8 @@ MOST_QUEUED = 100
 """Jobs that wait, above which no more are accepted."""
 RETRY_AFTER = 30
 """Seconds after which a client that was refused may ask again."""
+MOST_WORKERS = 256
+"""Processes that one campaign may ask for."""
 MOST_PAGE = 200
 """Jobs on one page of a list."""
 _DRAWING = threading.Lock()
@@ -52,7 +54,7 @@ class Submission(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
     scene: Annotated[str, Field(min_length=1, max_length=2**20, description="The scene file, TOML.")]
-    workers: Annotated[int | None, Field(ge=1, le=1024, description="Worker processes.")] = None
+    workers: Annotated[int | None, Field(ge=1, le=MOST_WORKERS, description="Worker processes.")] = None
 
 
 class SceneText(BaseModel):

@@ -21,8 +21,8 @@ from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.preparation import prepared_scene
 
-SAID_EVERY = 0.25
-"""Seconds between two lines of progress."""
+SAID_EVERY, SAID_PART = 0.25, 1.0 / 500.0
+"""Seconds between two lines of progress, at least, and part of all points: each becomes an event that is kept."""
 INTERRUPTED = 130
 """Exit code of a job that was interrupted in good order."""
 
@@ -38,18 +38,20 @@ class Told(Progress):
 
     def __init__(self) -> None:
         super().__init__()
-        self._last = 0.0
+        self._last, self._told = 0.0, 0
 
     def begin(self, total: int, done: int) -> None:
         """Say it at once."""
         super().begin(total, done)
+        self._told = done
         say(total=total, done=done)
 
     def advance(self, points: int) -> None:
         """Say it now and then, and at the end."""
         super().advance(points)
-        if time.monotonic() - self._last >= SAID_EVERY or self._done == self._total:
-            self._last = time.monotonic()
+        news = self._done - self._told >= SAID_PART * self._total
+        if (news and time.monotonic() - self._last >= SAID_EVERY) or self._done == self._total:
+            self._last, self._told = time.monotonic(), self._done
             say(total=self._total, done=self._done)
 
     def note(self, text: str) -> None:

@@ -27,6 +27,10 @@ _SCAN_POINTS = 4001
 _FLIGHT_SAMPLES = 4001
 
 
+_RETURNS = 1e-8
+"""Distance of the forcing period from a multiple of the natural one below which an undamped oscillator returns."""
+
+
 @dataclass(frozen=True, slots=True)
 class ImpactOscillator:
     """A harmonically forced oscillator with one impulsive stop, in consistent units.
@@ -77,7 +81,8 @@ class ImpactOscillator:
         -------
         tuple of (float, float)
             Impact velocity (m/s) and forcing phase at impact (rad, from 0 to 2 pi) of each that passes no stop
-            between two impacts; stable or not.
+            between two impacts; stable or not. None for an undamped oscillator that is back after one period whatever
+            it did: its motions have no closed form, since they are not isolated.
 
         Examples
         --------
@@ -86,6 +91,8 @@ class ImpactOscillator:
         0.95248614777472 0.21056066189221
         """
         w, a, zeta = angular_frequency / self.natural_frequency, self.stop_position, self.damping_ratio
+        if zeta == 0.0 and abs(math.sin(math.pi / w)) < _RETURNS:
+            return ()
         alpha, after = (float(value) for value in _homogeneous(self, w))
         slope = -(after + self.restitution) / w
         steady = self.force / complex(1.0 - w**2, 2.0 * zeta * w)
@@ -122,6 +129,8 @@ class ImpactOscillator:
                 f"scene: expected an impulsive stop at a positive distance, got law {stop['law']!r}."
             )
         sign = -1.0 if stop.get("side", "upper") == "lower" else 1.0
+        if float(body["stiffness"]) <= 0.0:
+            raise DatasetError(f"scene: expected stiffness > 0, got {body['stiffness']}.")
         oscillator = cls(
             mass=float(body["mass"]),
             damping=_damping(body),

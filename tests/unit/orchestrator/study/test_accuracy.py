@@ -200,6 +200,24 @@ def test_the_closed_form_is_the_orbit_to_what_the_reference_says_of_itself(frequ
     assert abs(nearest[1] - float(impacts.impact_phase[0])) <= 2.0 * math.pi * reference.error["impact_time"]
 
 
+@pytest.mark.parametrize(
+    ("damping", "frequency"), [(0.0, 1.0), (0.0, 0.5), (0.0, 1.0 / 3.0), (2.0, 1.0), (4.0, 1.0)]
+)
+def test_motions_without_a_closed_form_have_a_reference_all_the_same(
+    damping: float, frequency: float
+) -> None:
+    # a scene that the service was sent: undamped, in resonance, with a tolerance
+    scene = Scene.from_dict(
+        {
+            "body": {"mass": 1.0, "stiffness": 1.0, "damping": damping},
+            "forcing": {"amplitude": 1.0, "angular_frequency": frequency},
+            "stop": [{"position": 0.2, "restitution": 0.5}],
+            "record": {"transient_periods": 1, "recorded_periods": 2},
+        }
+    )
+    assert reference_of(studied_scene(scene)).name == "the fused run, exact between events"
+
+
 def test_a_general_scene_is_studied_over_exchanges_and_steps() -> None:
     scene = load_scene(
         EXAMPLES / "two_oscillators.toml", ["record.recorded_time=2", "execution.macro_step=0.05"]
