@@ -35,6 +35,8 @@ _CROWD, _DOT, _FAINTEST, _TOLD_APART = 20, 0.7, 0.3, 1e-3
 _DARK = 0.15
 # Quantile of the values at which a logarithmic scale begins, so that one grazing impact does not stretch it.
 _LOWEST = 0.01
+# Ratio of the ends of a swept range from which a logarithmic axis tells more.
+_WIDE = 8.0
 # Largest ratio of the ends of a logarithmic scale.
 _WIDEST = 1e6
 _NEITHER = (
@@ -76,6 +78,31 @@ def one_value(values: Any) -> float | None:
     return low if high - low <= _NOISE * max(abs(low), abs(high)) else None
 
 
+def is_logarithmic(values: Any) -> bool:
+    """Return whether values are those of a sweep with `spacing = "log"`: one ratio, one sign, and a wide range.
+
+    Examples
+    --------
+    >>> is_logarithmic([10.0, 100.0, 1000.0]), is_logarithmic([1.0, 2.0, 3.0]), is_logarithmic([2.0, 2.2, 2.42])
+    (True, False, False)
+    """
+    ordered = np.sort(np.asarray(values, dtype=np.float64))
+    if ordered.size < 3 or not ordered[0] > 0.0 or ordered[-1] < _WIDE * ordered[0]:
+        return False
+    steps = np.diff(np.log(ordered))
+    return bool(np.ptp(steps) <= _NOISE * abs(float(steps.max())))
+
+
+def _edges(values: Any) -> Any:
+    """Return the edges of the cells around ascending or descending values, in their own spacing."""
+    logarithmic = is_logarithmic(values)
+    places = np.log(values) if logarithmic else np.asarray(values, dtype=np.float64)
+    half = np.diff(places) / 2.0
+    inner = places[:-1] + half
+    found = np.concatenate([[places[0] - half[0]], inner, [places[-1] + half[-1]]])
+    return np.exp(found) if logarithmic else found
+
+
 def draw_bifurcation(dataset: xr.Dataset) -> Figure:
     """Draw displacement range and impact velocity against the swept parameter, up and down told apart."""
     panels = [q for q in ("displacement_range", "impact_velocity") if q in dataset.variables]
@@ -106,6 +133,8 @@ def draw_diagram(dataset: xr.Dataset, panels: list[str]) -> Figure:
             said = f"one value, to {_NOISE:g} of it: {one_value(drawn):.9g}"
             axis.set_title(said, fontsize=7, loc="left")
     axes[-1].set_xlabel(label(dataset[name]))
+    if is_logarithmic(dataset[name].values):
+        axes[-1].set_xscale("log")
     axes[-1].margins(x=0.02)
     if len(directions) > 1:
         legend_outside(figure, axes[0], ncols=2, markerscale=2.2)
@@ -253,16 +282,18 @@ def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[s
     # a logarithm leaves what is below its scale without a colour
     lowest = float(norm.vmin or 0.0) if isinstance(norm, LogNorm) else -math.inf
     mesh = axis.pcolormesh(
-        values[along].values,
-        values[across].values,
+        _edges(values[along].values),
+        _edges(values[across].values),
         np.maximum(values.values, lowest),
-        shading="nearest",
         cmap="viridis",
         norm=norm,
         rasterized=True,
     )
     # Long numbers of small distances would run into each other.
     axis.xaxis.set_major_locator(MaxNLocator(4))
+    for name, set_scale in ((along, axis.set_xscale), (across, axis.set_yscale)):
+        if is_logarithmic(values[name].values):
+            set_scale("log")
     axis.set(xlabel=label(values[along]), ylabel=label(values[across]))
     axis.label_outer()
     bar = axis.figure.colorbar(mesh, ax=axis)

@@ -407,8 +407,15 @@ class AxisTable(SceneTable):
     points: Annotated[
         int | None,
         Field(ge=1, le=MOST_POINTS_PER_AXIS),
-        Rule(doc="number of values of a range, evenly spaced; at least 2 unless start = stop"),
+        Rule(doc="number of values of a range; at least 2 unless start = stop"),
     ] = None
+    spacing: Annotated[
+        Literal["linear", "log"],
+        Rule(
+            hint="log: each value over the one before is the same.",
+            doc='`"linear"`; `"log"`: each value of a range over the one before is the same, with ends of one sign',
+        ),
+    ] = "linear"
     values: Annotated[
         tuple[Finite, ...] | None,
         Field(strict=False, min_length=1),

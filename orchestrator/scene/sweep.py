@@ -72,6 +72,22 @@ def axis_of_range(key: str, start: float, stop: float, points: int, path: SweepP
     return SweepAxis(key, tuple(ordered), path, (start, stop, points))
 
 
+def log_axis(key: str, start: float, stop: float, points: int, path: SweepPath) -> SweepAxis:
+    """Return an axis of values of which each over the one before is the same, both ends included.
+
+    Its values go to workers one by one, and not as a span: another machine's logarithm may end in another bit.
+
+    Examples
+    --------
+    >>> log_axis("body.stiffness", 1e2, 1e8, 4, "independent").values
+    (100.0, 10000.0, 1000000.0, 100000000.0)
+    """
+    # 15 digits: what rounding has left of a ratio is no part of a value
+    inner = (float(f"{value:.15g}") for value in np.geomspace(start, stop, points)[1:-1])
+    values = (start, *inner, stop) if points > 1 else (start,)
+    return SweepAxis(key, values if path == "independent" else tuple(sorted(values)), path)
+
+
 @dataclass(frozen=True, slots=True)
 class Point:
     """One point of a sweep: its place in the `run` dimension and the value of every swept key."""

@@ -30,7 +30,7 @@ from vibroimpact.orchestrator.scene.problems import (
     quoted,
     value_problem,
 )
-from vibroimpact.orchestrator.scene.sweep import SweepAxis, axis_of_range
+from vibroimpact.orchestrator.scene.sweep import SweepAxis, axis_of_range, log_axis
 
 _FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
 
@@ -193,7 +193,8 @@ def _read_axis(key: str, entry: object) -> tuple[SweepAxis | None, list[Problem]
         assert table.start is not None
         assert table.stop is not None
         assert table.points is not None
-        axis = axis_of_range(key, table.start, table.stop, table.points, table.path)
+        make = log_axis if table.spacing == "log" else axis_of_range
+        axis = make(key, table.start, table.stop, table.points, table.path)
     problem = _distinct_problem(key, table.values or axis.values)
     return (None, [problem]) if problem else (axis, [])
 
@@ -204,6 +205,9 @@ def _form_problem(key: str, table: AxisTable) -> Problem | None:
     given = [name for name, value in ends.items() if value is not None]
     where = key_path(("sweep", key))
     if table.values is not None:
+        if table.spacing != "linear":
+            hint = "A list says its values itself: remove spacing."
+            return Problem(where, "a range beside spacing", "values", hint)
         if given:
             return Problem(
                 where,
@@ -215,6 +219,12 @@ def _form_problem(key: str, table: AxisTable) -> Problem | None:
     if len(given) < len(ends):
         missing = [name for name in ends if name not in given]
         return Problem(where, _FORMS, listed(given, "and") or "neither", f"Add {listed(missing, 'and')}.")
+    assert table.start is not None
+    assert table.stop is not None
+    if table.spacing == "log" and not table.start * table.stop > 0.0:
+        got = f"start = {quoted(table.start)} and stop = {quoted(table.stop)}"
+        expected = 'ends that are both > 0, or both < 0, of a range with spacing = "log"'
+        return Problem(where, expected, got, 'No ratio leads from one to the other: use spacing = "linear".')
     if table.points == 1 and table.start != table.stop:
         hint = "One point cannot be at both ends; make stop equal to start, or give values."
         return Problem(key_path(("sweep", key, "points")), "a whole number >= 2", "1", hint)

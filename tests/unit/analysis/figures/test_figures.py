@@ -12,6 +12,7 @@ from support.dataset_examples import coupled_dataset, coupled_record, dataset_of
 from support.impact_sweep import SCENE, Oscillator
 from typer.testing import CliRunner
 
+import vibroimpact as vi
 from vibroimpact.analysis import commands, figures, open_dataset, write_dataset
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord
 from vibroimpact.analysis.figures.scene_text import limits
@@ -484,3 +485,23 @@ def test_a_stop_at_another_point_than_the_observed_one_is_not_drawn_as_its_limit
     ):
         dataset = dataset_of([record(1.0)], coordinates={}, attrs={"scene": text})
         assert limits(dataset, "displacement") == shown
+
+
+def test_a_logarithmic_sweep_has_a_logarithmic_axis_in_diagrams_and_maps() -> None:
+    tables = {
+        "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
+        "forcing": {"amplitude": 0.5, "angular_frequency": 1.0},
+        "stop": [{"law": "kelvin_voigt", "position": 1.0, "stiffness": 100.0, "damping": 1.0}],
+        "record": {"transient_periods": 5, "recorded_periods": 2},
+    }
+    stiffness = {"start": 10.0, "stop": 1e5, "points": 5, "spacing": "log"}
+    scene = vi.Scene.from_dict(tables | {"sweep": {"stop[1].stiffness": stiffness}})
+    diagram = vi.draw(vi.run(scene, progress=False))
+    assert {axis.get_xscale() for axis in diagram.axes} == {"log"}
+    frequency = {"start": 0.9, "stop": 1.1, "points": 3}
+    both = {"stop[1].stiffness": stiffness, "forcing.angular_frequency": frequency}
+    field = vi.draw(vi.run(vi.Scene.from_dict(tables | {"sweep": both}), progress=False)).axes[0]
+    assert (field.get_xscale(), field.get_yscale()) == ("log", "linear")
+    low, high = field.get_xlim()
+    assert low == pytest.approx(10.0 / 10.0**0.5)  # half a cell beside the first value, in its own spacing
+    assert high == pytest.approx(1e5 * 10.0**0.5)

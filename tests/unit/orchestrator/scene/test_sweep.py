@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import pickle
+import re
 from dataclasses import dataclass
 
+import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from vibroimpact.fmus.errors import SceneError
+from vibroimpact.orchestrator.scene import parse_scene
 from vibroimpact.orchestrator.scene.sweep import (
     Branch,
     SweepAxis,
     SweepPath,
     axis_of_range,
     expand,
+    log_axis,
     run_count,
 )
 
@@ -112,3 +120,35 @@ def test_a_range_of_a_million_values_is_a_short_message_to_a_worker(path: SweepP
     assert len(message) < 200
     axis_of_range.cache_clear()
     assert pickle.loads(message) == axis
+
+
+@given(st.floats(1e-300, 1e300), st.floats(1e-300, 1e300), st.integers(2, 50), st.sampled_from([1.0, -1.0]))
+def test_values_of_a_logarithmic_range_keep_one_ratio_and_both_ends(
+    start: float, stop: float, points: int, sign: float
+) -> None:
+    axis = log_axis("body.stiffness", sign * start, sign * stop, points, "independent")
+    assert (axis.values[0], axis.values[-1]) == (sign * start, sign * stop)
+    logarithms = np.log(np.abs(axis.values))
+    assert np.diff(logarithms) == pytest.approx(
+        (math.log(stop) - math.log(start)) / (points - 1), rel=1e-9, abs=1e-12
+    )
+
+
+def test_a_logarithmic_range_in_a_scene_and_what_is_none() -> None:
+    text = "[body]\nmass = 1\nstiffness = 1\n[record]\nrecorded_time = 1\n[sweep]\n"
+    scene = parse_scene(text + '"body.stiffness" = {start = 1, stop = 1e6, points = 7, spacing = "log"}', "a")
+    assert scene.sweep[0].values == (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
+    for entry, message in (
+        (
+            '{start = -1, stop = 1, points = 3, spacing = "log"}',
+            "expected ends that are both > 0, or both < 0",
+        ),
+        (
+            '{start = 0, stop = 1, points = 3, spacing = "log"}',
+            "expected ends that are both > 0, or both < 0",
+        ),
+        ('{values = [1.0, 2.0], spacing = "log"}', "expected a range beside spacing, got values"),
+        ('{start = 1, stop = 2, points = 3, spacing = "cubic"}', 'got "cubic"'),
+    ):
+        with pytest.raises(SceneError, match=re.escape(message)):
+            parse_scene(f'{text}"body.velocity_start" = {entry}', "a")
