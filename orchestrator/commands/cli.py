@@ -35,6 +35,7 @@ PANELS = {
     "Look": ("plot", "describe"),
     "Measure and compare": ("accuracy", "effects", "hard-cases", "import", "replay", "estimate", "spikes"),
     "Exchange": ("fmu", "ssp"),
+    "Serve": ("serve", "submit", "status", "fetch", "cancel"),
 }
 """The commands as `--help` shows them, in the order in which they are used; those of other packages come last."""
 DEBUG = "--debug"
