@@ -80,7 +80,11 @@ class Supervisor:
             if job is None:
                 self._closing.wait(IDLE)
                 continue
-            self._run(job)
+            try:
+                self._run(job)
+            except OSError as error:  # of its folder; the queue goes on with the next
+                message = f"its folder cannot be used: {error}"
+                self._store.change(job.id, state=State.failed, ended=time.time(), message=message)
 
     def _run(self, job: Job) -> None:
         started = self._store.change(

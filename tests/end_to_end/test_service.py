@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import socket
 import subprocess
 import sys
@@ -180,6 +181,17 @@ def test_what_was_cancelled_is_resumed_and_deleted(served: Served, tmp_path: Pat
         assert raw.get(f"/campaigns/{waiting.id}/dataset").status_code == 409
         waiting.resume().wait()
         assert waiting.status["done"] == 40
+
+
+def test_a_job_whose_folder_is_gone_fails_and_the_queue_goes_on(served: Served, tmp_path: Path) -> None:
+    with served.client() as service:
+        first = service.submit(scene_file(tmp_path, sweep_text(300, 20_000)), workers=1)
+        lost = service.submit(scene_file(tmp_path, SHORT), workers=1)
+        shutil.rmtree(served.folder / "jobs" / lost.id)
+        first.cancel()
+        until(lost, "failed")
+        assert "its folder cannot be used" in lost.status["message"]
+        service.submit(scene_file(tmp_path, SHORT), workers=1).wait()
 
 
 def test_the_same_key_is_the_same_campaign_and_another_body_is_refused(raw: httpx.Client) -> None:
