@@ -1,0 +1,59 @@
+"""Scenes that are checked and not run."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from typing import Annotated
+
+from fastapi import APIRouter
+from pydantic import BaseModel, ConfigDict, Field
+
+from vibroimpact.fmus.errors import SceneError
+from vibroimpact.service.problems import ProblemError
+from vibroimpact.service.routes.described import problems
+from vibroimpact.service.scenes import located, taken_scene
+
+
+class SceneText(BaseModel):
+    """A scene to be checked."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    scene: Annotated[str, Field(max_length=2**20, description="The scene file, TOML.")]
+
+
+class SceneProblem(BaseModel):
+    """One problem of a scene, and where it is."""
+
+    message: str
+    line: int
+    column: int
+
+
+class Validation(BaseModel):
+    """What is wrong with a scene: nothing, where there are no problems."""
+
+    problems: list[SceneProblem]
+
+
+def scenes_router() -> APIRouter:
+    """Return the route that checks a scene."""
+    router = APIRouter(tags=["scenes"])
+
+    @router.post("/scenes/validate", responses=problems(HTTPStatus.UNPROCESSABLE_ENTITY))
+    def validate(given: SceneText) -> Validation:
+        """Return all problems of a scene, with their lines and columns."""
+        try:
+            taken_scene(given.scene)
+        except SceneError as error:
+            found = [SceneProblem(**located(problem, given.scene)) for problem in error.problems]
+            return Validation(problems=found)
+        return Validation(problems=[])
+
+    return router
+
+
+def refused_scene(error: SceneError, text: str) -> ProblemError:
+    """Return the refusal of a scene, with all of its problems."""
+    found = [located(problem, text) for problem in error.problems]
+    return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, found[0]["message"], problems=found)
