@@ -7,11 +7,10 @@ import hashlib
 import io
 import json
 import shutil
-import threading
 from collections.abc import AsyncIterator
 from http import HTTPStatus
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, FastAPI, Header, Query, Request, Response
 from fastapi.responses import FileResponse, PlainTextResponse, StreamingResponse
@@ -23,9 +22,14 @@ from vibroimpact.analysis.figures import KINDS
 from vibroimpact.fmus.errors import SceneError, VibroimpactError
 from vibroimpact.fmus.shipped import components, fmu_path
 from vibroimpact.orchestrator.campaign.provenance import versions
+from vibroimpact.service.landed import READING
 from vibroimpact.service.metrics import CONTENT_TYPE, exposition
-from vibroimpact.service.problems import MEDIA_TYPE, ProblemError, answer_problems
+from vibroimpact.service.page_api import page_routes
+from vibroimpact.service.page_files import serve_page
+from vibroimpact.service.problems import ProblemError, answer_problems
+from vibroimpact.service.problems import described as problems
 from vibroimpact.service.scenes import located, taken_scene, title_of
+from vibroimpact.service.sessions import Sessions
 from vibroimpact.service.store import ENDED, Event, Job, KeyReusedError, State, Store
 from vibroimpact.service.supervisor import Supervisor
 
@@ -38,8 +42,6 @@ MOST_WORKERS = 256
 """Processes that one campaign may ask for."""
 MOST_PAGE = 200
 """Jobs on one page of a list."""
-_DRAWING = threading.Lock()
-"""Held while a figure is drawn: the style of a page is one for the process."""
 LOOKS = 0.2
 """Seconds between two looks for new events."""
 HEARTBEAT = 15.0
@@ -109,24 +111,8 @@ class Component(BaseModel):
     name: str
 
 
-class ProblemAnswer(BaseModel):
-    """RFC 9457."""
-
-    type: str
-    title: str
-    status: int
-    detail: str
-
-
-def problems(*statuses: HTTPStatus) -> dict[int | str, dict[str, Any]]:
-    """Return how a route is described to refuse."""
-    content = {MEDIA_TYPE: {"schema": ProblemAnswer.model_json_schema()}}
-    always = (HTTPStatus.BAD_REQUEST, HTTPStatus.UNAUTHORIZED, HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
-    return {int(one): {"description": one.phrase, "content": content} for one in (*always, *statuses)}
-
-
-def application(store: Store, supervisor: Supervisor) -> FastAPI:
-    """Return the application over a store and what runs its jobs."""
+def application(store: Store, supervisor: Supervisor, sessions: Sessions) -> FastAPI:
+    """Return the application over a store, what runs its jobs, and the sessions of its page."""
     app = FastAPI(
         title="vibroimpact",
         version=versions()["vibroimpact"],
@@ -148,6 +134,8 @@ def application(store: Store, supervisor: Supervisor) -> FastAPI:
     app.include_router(_campaigns(store, supervisor), prefix=PREFIX)
     app.include_router(_results(store), prefix=PREFIX)
     app.include_router(_others(), prefix=PREFIX)
+    app.include_router(page_routes(store, sessions), prefix=PREFIX)
+    serve_page(app)
     return app
 
 
@@ -384,7 +372,7 @@ def _results(store: Store) -> APIRouter:
         _, path = dataset_of(name)
         try:
             buffer = io.BytesIO()
-            with _DRAWING, open_dataset(path) as found:
+            with READING, open_dataset(path) as found:
                 figures.draw(found, kind, run).savefig(buffer, format=file_format)
         except VibroimpactError as error:
             raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from None
