@@ -7,6 +7,8 @@ from fastapi.responses import PlainTextResponse
 
 from vibroimpact.orchestrator.campaign.provenance import versions
 from vibroimpact.service.metrics import CONTENT_TYPE, exposition
+from vibroimpact.service.page_api import page_routes
+from vibroimpact.service.page_files import serve_page
 from vibroimpact.service.problems import answer_problems
 from vibroimpact.service.routes.campaigns import campaigns_router
 from vibroimpact.service.routes.described import PREFIX, problems
@@ -14,12 +16,13 @@ from vibroimpact.service.routes.events import events_router
 from vibroimpact.service.routes.fmus import fmus_router
 from vibroimpact.service.routes.results import results_router
 from vibroimpact.service.routes.scenes import scenes_router
+from vibroimpact.service.sessions import Sessions
 from vibroimpact.service.store import Store
 from vibroimpact.service.supervisor import Supervisor
 
 
-def application(store: Store, supervisor: Supervisor) -> FastAPI:
-    """Return the application over a store and what runs its jobs."""
+def application(store: Store, supervisor: Supervisor, sessions: Sessions) -> FastAPI:
+    """Return the application over a store, what runs its jobs, and the sessions of its page."""
     app = FastAPI(
         title="vibroimpact",
         version=versions()["vibroimpact"],
@@ -44,7 +47,9 @@ def application(store: Store, supervisor: Supervisor) -> FastAPI:
         results_router(store),
         scenes_router(),
         fmus_router(),
+        page_routes(store, sessions),
     )
     for router in routers:
         app.include_router(router, prefix=PREFIX)
+    serve_page(app)
     return app

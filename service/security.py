@@ -11,9 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.service.page_files import page_files
 from vibroimpact.service.problems import answer
+from vibroimpact.service.sessions import Sessions
 
-OPEN_PATHS = ("/healthz",)
+OPEN_PATHS = ("/healthz", *page_files())
 """What is answered without a token."""
 MOST_BYTES = 4 * 2**20
 """Size of a request, byte."""
@@ -66,10 +68,12 @@ class Guarded:
     ----------
     app : ASGI application
     token : str
+    sessions : Sessions
+        Of its page, which are as good as the token.
     """
 
-    def __init__(self, app: Application, token: str) -> None:
-        self._app, self._expected = app, f"Bearer {token}".encode()
+    def __init__(self, app: Application, token: str, sessions: Sessions) -> None:
+        self._app, self._expected, self._sessions = app, f"Bearer {token}".encode(), sessions
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer one request."""
@@ -85,7 +89,7 @@ class Guarded:
             await send(message)
 
         headers = dict(scope["headers"])
-        if scope["path"] not in OPEN_PATHS and not self._is_known(headers.get(b"authorization", b"")):
+        if scope["path"] not in OPEN_PATHS and not self._is_known(headers, scope["method"]):
             refused = answer(
                 HTTPStatus.UNAUTHORIZED,
                 "Authorization: expected Bearer and the token of this service, which is in the file `token` of its "
@@ -105,5 +109,6 @@ class Guarded:
             return
         await self._app(scope, receive, with_headers)
 
-    def _is_known(self, given: bytes) -> bool:
-        return hmac.compare_digest(given, self._expected)
+    def _is_known(self, headers: dict[bytes, bytes], method: str) -> bool:
+        given = headers.get(b"authorization", b"")
+        return hmac.compare_digest(given, self._expected) or self._sessions.are_in(headers, method)

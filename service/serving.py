@@ -15,6 +15,7 @@ from vibroimpact.fmus.terminal import say
 from vibroimpact.fmus.wording import option
 from vibroimpact.service.api import application
 from vibroimpact.service.security import Guarded, token_of
+from vibroimpact.service.sessions import Sessions
 from vibroimpact.service.store import DATABASE, Store
 from vibroimpact.service.supervisor import Supervisor
 
@@ -36,6 +37,7 @@ def serve(folder: Path, *, host: str, port: int, scheduler: str | None, allow_re
     _make_own(folder)
     with locked_folder(folder, "service"):
         token = token_of(folder)
+        sessions = Sessions(token)
         with _bound(host, port) as listening:
             store = Store(folder)
             supervisor = Supervisor(store, scheduler)
@@ -45,7 +47,7 @@ def serve(folder: Path, *, host: str, port: int, scheduler: str | None, allow_re
                 say(f"Serving {folder} on {address}; the token is in {folder / 'token'}.")
                 logging.getLogger("uvicorn.access").disabled = True
                 config = uvicorn.Config(
-                    Guarded(application(store, supervisor), token),
+                    Guarded(application(store, supervisor, sessions), token, sessions),
                     log_level="warning",
                     timeout_graceful_shutdown=LAST_SECONDS,
                     server_header=False,

@@ -108,7 +108,7 @@ class Supervisor:
                 code = process.wait()
         with self._lock:
             self._running = None
-        _kill_group(process)  # workers that outlived it
+        kill_group(process)  # workers that outlived it
         self._note_end(job, code, failed, last)
 
     def _open(self, job: Job, folder: Path) -> subprocess.Popen[str]:
@@ -191,10 +191,10 @@ class Supervisor:
         try:
             process.wait(timeout=GRACE)
         except subprocess.TimeoutExpired:
-            _kill_group(process)
+            kill_group(process)
 
 
-def _kill_group(process: subprocess.Popen[str]) -> None:
+def kill_group(process: subprocess.Popen[str]) -> None:
     """Kill a process with all that it has started in its session."""
     if sys.platform == "win32":
         process.kill()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import threading
 from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated, Literal
@@ -15,12 +14,11 @@ from vibroimpact.analysis import figures
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.figures import KINDS
 from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.service.landed import READING
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import known_job, problems
 from vibroimpact.service.store import Job, State, Store
 
-_DRAWING = threading.Lock()
-"""Held while a figure is drawn: the style of a page is one for the process."""
 MOST_LOG = 2**20
 """Of a log, the end that is shown, byte."""
 
@@ -83,7 +81,7 @@ def results_router(store: Store) -> APIRouter:
         _, path = dataset_of(name)
         try:
             buffer = io.BytesIO()
-            with _DRAWING, open_dataset(path) as found:
+            with READING, open_dataset(path) as found:
                 figures.draw(found, kind, run).savefig(buffer, format=file_format)
         except VibroimpactError as error:
             raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from None

@@ -1,0 +1,246 @@
+"""What has landed of a campaign: a variable of all its points, from its parts while it runs, then from its dataset."""
+
+from __future__ import annotations
+
+import threading
+from collections import OrderedDict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import RULES
+from vibroimpact.analysis.files.opening import opened_netcdf
+from vibroimpact.fmus.errors import DatasetError
+
+READING = threading.Lock()
+"""Held while a file is read or drawn: neither the library of NetCDF nor the style of a page is made for threads."""
+RANGE = "displacement_range"
+"""Not in a file: the largest displacement of a run less the smallest."""
+RANGE_ENDS = ("displacement_max", "displacement_min")
+ALONG = ("period", "impact", "stick", "comparison", "interface")
+"""Dimensions, besides that of runs, whose values are shown run by run."""
+_NO_VALUES = ("run_index", "direction", "message", "final_state", "connection", "compared")
+MOST_CACHED = 2**27
+"""Of what was read, kept in memory, byte."""
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A variable, or a swept parameter; `along` is the dimension besides that of runs, or empty."""
+
+    name: str
+    label: str
+    units: str
+    along: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Landed:
+    """One variable of some runs; a row is a value, so a run has several where it has several periods or impacts.
+
+    Attributes
+    ----------
+    quantities : tuple of Quantity
+        All that could have been asked for.
+    axes : tuple of Quantity
+        The swept parameters, in the order of the scene.
+    runs : ndarray of int, shape (run,)
+        Index of each run in its campaign.
+    directions, outcomes : ndarray of int, shape (run,)
+    coordinates : ndarray of float, shape (axis, run)
+    owners : ndarray of int, shape (row,)
+        Which of the runs a row belongs to, by its place.
+    values : ndarray of float, shape (row,)
+    """
+
+    quantities: tuple[Quantity, ...]
+    axes: tuple[Quantity, ...]
+    runs: NDArray[np.int64]
+    directions: NDArray[np.int8]
+    outcomes: NDArray[np.int8]
+    coordinates: NDArray[np.float64]
+    owners: NDArray[np.int64]
+    values: NDArray[np.float64]
+
+    @property
+    def size(self) -> int:
+        """Bytes in memory."""
+        arrays = (
+            self.runs,
+            self.directions,
+            self.outcomes,
+            self.coordinates,
+            self.owners,
+            self.values,
+        )
+        return sum(array.nbytes for array in arrays)
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A run that did not come to its end."""
+
+    run: int
+    outcome: int
+    message: str
+    coordinates: dict[str, float]
+
+
+class LandedReader:
+    """Reads what has landed, and remembers the files that it read last.
+
+    Examples
+    --------
+    >>> LandedReader().read([Path("campaign/dataset.nc")], "displacement_range")     # doctest: +SKIP
+    """
+
+    def __init__(self) -> None:
+        self._known: OrderedDict[tuple[Any, ...], Landed] = OrderedDict()
+
+    def read(self, files: Sequence[Path], variable: str) -> Landed | None:
+        """Return a variable from files of the same campaign; None where there are no files yet.
+
+        Raises
+        ------
+        KeyError
+            There is no such variable.
+        DatasetError
+            A file is damaged.
+        """
+        pieces = []
+        for path in files:
+            try:
+                pieces.append(self._piece(path, variable))
+            except (FileNotFoundError, DatasetError):
+                if path.exists():
+                    raise
+                # the campaign has made one dataset of its parts in the meantime; the next look finds that
+        return _joined(pieces) if pieces else None
+
+    def _piece(self, path: Path, variable: str) -> Landed:
+        state = path.stat()
+        key = (path, state.st_mtime_ns, state.st_size, variable)
+        with READING:
+            if key in self._known:
+                self._known.move_to_end(key)
+            else:
+                with opened_netcdf(path) as file:
+                    self._known[key] = _read(file, variable)
+                while (
+                    sum(piece.size for piece in self._known.values()) > MOST_CACHED and len(self._known) > 1
+                ):
+                    self._known.popitem(last=False)
+            return self._known[key]
+
+
+def files_of(campaign: Path) -> list[Path]:
+    """Return the files with what has landed of a campaign: its dataset, else its parts in the order of their runs."""
+    dataset = campaign / "dataset.nc"
+    if dataset.is_file():
+        return [dataset]
+    return sorted((campaign / "parts").glob("*.nc"), key=lambda path: path.name.partition("_runs-")[2])
+
+
+def axes_of(file: netCDF4.Dataset) -> list[str]:
+    """Return the names of the swept parameters of an open file, in the order of its scene."""
+    linked = getattr(file["outcome"], "coordinates", "").split()
+    return [name for name in linked if name not in RULES and file[name].dimensions == ("run",)]
+
+
+def failures_in(path: Path, outcomes: Sequence[int]) -> list[Failure]:
+    """Return the runs of a file with one of these outcomes, in the order of their index."""
+    with READING, opened_netcdf(path) as file:
+        names = axes_of(file)
+        places = np.flatnonzero(np.isin(file["outcome"][:], outcomes))
+        return [
+            Failure(
+                int(file["run_index"][place]),
+                int(file["outcome"][place]),
+                str(file["message"][place]),
+                {name: float(file[name][place]) for name in names},
+            )
+            for place in places[np.argsort(file["run_index"][:][places])]
+        ]
+
+
+def _read(file: netCDF4.Dataset, variable: str) -> Landed:
+    axes = axes_of(file)
+    quantities = tuple(_quantities(file, axes))
+    found = next((one for one in quantities if one.name == variable), None)
+    if found is None:
+        raise KeyError(variable)
+    runs = file["run_index"][:].astype(np.int64)
+    owners, values = _rows(file, found, runs.size)
+    return Landed(
+        quantities,
+        tuple(_quantity(file[name]) for name in axes),
+        runs,
+        file["direction"][:],
+        file["outcome"][:],
+        np.array([file[name][:] for name in axes], dtype=np.float64).reshape(len(axes), runs.size),
+        owners,
+        values,
+    )
+
+
+def _quantities(file: netCDF4.Dataset, axes: Sequence[str]) -> list[Quantity]:
+    shown = [
+        _quantity(variable)
+        for name, variable in file.variables.items()
+        if name not in (*_NO_VALUES, *axes)
+        and variable.dimensions
+        and variable.dtype is not str
+        and (variable.dimensions == ("run",) or variable.dimensions[-1] in ALONG)
+    ]
+    if all(name in file.variables for name in RANGE_ENDS):
+        units = _quantity(file[RANGE_ENDS[0]]).units
+        shown.append(Quantity(RANGE, "range of the displacement in a run", units))
+    return sorted(shown, key=lambda one: one.name)
+
+
+def _quantity(variable: netCDF4.Variable[Any]) -> Quantity:
+    name, last = variable.name, variable.dimensions[-1]
+    label = str(getattr(variable, "long_name", name))
+    return Quantity(name, label, str(getattr(variable, "units", "1")), "" if last == "run" else last)
+
+
+def _rows(
+    file: netCDF4.Dataset, asked: Quantity, count: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return of each value of a variable the run that it belongs to, and the value."""
+    places = np.arange(count, dtype=np.int64)
+    if asked.name == RANGE:
+        high, low = (file[name][:] for name in RANGE_ENDS)
+        empty = np.isnan(high).all(axis=1)
+        largest = np.where(empty, np.nan, np.max(high, axis=1, initial=-np.inf, where=~np.isnan(high)))
+        smallest = np.where(empty, np.nan, np.min(low, axis=1, initial=np.inf, where=~np.isnan(low)))
+        return places, largest - smallest
+    variable = file[asked.name]
+    values = np.asarray(variable[...], dtype=np.float64)
+    if variable.dimensions[0] == "run":
+        width = 1 if values.ndim == 1 else values.shape[1]
+        return np.repeat(places, width), values.reshape(-1)
+    counts = file[f"{asked.along}_count"][:]
+    return np.repeat(places, counts), values
+
+
+def _joined(pieces: Sequence[Landed]) -> Landed:
+    first = pieces[0]
+    offsets = np.cumsum([0, *(piece.runs.size for piece in pieces[:-1])])
+    join = partial(np.concatenate, axis=-1)
+    return Landed(
+        first.quantities,
+        first.axes,
+        join([piece.runs for piece in pieces]),
+        join([piece.directions for piece in pieces]),
+        join([piece.outcomes for piece in pieces]),
+        join([piece.coordinates for piece in pieces]),
+        join([piece.owners + offset for piece, offset in zip(pieces, offsets, strict=True)]),
+        join([piece.values for piece in pieces]),
+    )

@@ -1,0 +1,79 @@
+// Requests to the service. The session is a cookie that no script can read; the token is sent once and forgotten.
+
+const PREFIX = "/api/v1";
+
+/** A request that was refused; `problems` are those of a scene, `status` is 0 where nobody answered. */
+export class Refusal extends Error {
+  constructor(message, status, problems = []) {
+    super(message);
+    this.status = status;
+    this.problems = problems;
+  }
+}
+
+const listeners = { lost: () => {}, unknown: () => {} };
+
+/** Say what happens when the service falls silent or answers again, and when it does not know us. */
+export function watch(lost, unknown) {
+  Object.assign(listeners, { lost, unknown });
+}
+
+export function address(path) {
+  return PREFIX + path;
+}
+
+export function campaignPath(id, rest = "") {
+  return `/campaigns/${encodeURIComponent(id)}${rest}`;
+}
+
+async function send(method, path, headers, body, signal) {
+  let answer;
+  try {
+    answer = await fetch(PREFIX + path, { method, headers, body, signal, cache: "no-store" });
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    listeners.lost(true);
+    throw new Refusal("The service does not answer. Is it running?", 0);
+  }
+  listeners.lost(false);
+  if (answer.ok) return answer;
+  const told = await answer.json().catch(() => ({}));
+  if (answer.status === 401 && path !== "/session") listeners.unknown();
+  throw new Refusal(told.detail ?? `${answer.status} ${answer.statusText}`, answer.status, told.problems);
+}
+
+/** Return the JSON that a request is answered with; null where there is none. */
+export async function ask(method, path, { body, headers = {}, signal } = {}) {
+  const raw = body instanceof Blob;
+  const sent = body === undefined || raw ? body : JSON.stringify(body);
+  const kind = sent === undefined ? {} : { "Content-Type": raw ? "application/octet-stream" : "application/json" };
+  const answer = await send(method, path, { ...kind, ...headers }, sent, signal);
+  return answer.status === 204 ? null : answer.json();
+}
+
+export async function askText(path) {
+  return (await send("GET", path, {})).text();
+}
+
+export async function beginSession(token) {
+  await send("POST", "/session", { Authorization: `Bearer ${token}` });
+}
+
+export async function endSession() {
+  await send("DELETE", "/session", {});
+}
+
+/** Follow the events of a campaign; the browser reconnects with Last-Event-ID. Returns how to stop. */
+export function follow(id, seen) {
+  const source = new EventSource(PREFIX + campaignPath(id, "/events"));
+  const take = (event) => {
+    listeners.lost(false);
+    const told = JSON.parse(event.data);
+    seen(told);
+    if (["done", "failed", "cancelled"].includes(told.state)) source.close();
+  };
+  source.addEventListener("state", take);
+  source.addEventListener("progress", take);
+  source.addEventListener("error", () => listeners.lost(true));
+  return () => source.close();
+}

@@ -1,0 +1,175 @@
+// One campaign: how far it is, its diagram, a point of it, what failed, and what can be done with it.
+
+import { address, ask, askText, campaignPath, follow } from "./api.js";
+import { Diagram } from "./diagram.js";
+import { button, duration, element, moment, short, stateBadge, table, tell } from "./dom.js";
+import { Pace } from "./pace.js";
+import { showPoint } from "./point.js";
+
+const ENDED = ["done", "failed", "cancelled"];
+const TENTHS = 10; // a screen reader hears of every tenth of a campaign
+
+export function showCampaign(main, id) {
+  const view = new CampaignView(main, id);
+  view.begin();
+  return () => view.close();
+}
+
+class CampaignView {
+  constructor(main, id) {
+    Object.assign(this, { main, id, pace: new Pace(), stop: () => {}, ended: false, toldTenth: 0 });
+    this.progress = element("progress", { max: 1, value: 0, "aria-label": "Points that are done" });
+    this.state = element("span");
+    this.acts = element("div", { class: "row" });
+    this.facts = element("dl", { class: "facts" });
+    this.message = element("p", { class: "small muted" });
+    this.said = element("p", { class: "problem", role: "alert" });
+    this.point = element("section", { class: "card", "aria-label": "The chosen point", hidden: true });
+    this.failures = element("section", { class: "card", hidden: true, "aria-labelledby": "failures-title" });
+    this.results = element("section", { class: "card", hidden: true, "aria-labelledby": "results-title" });
+  }
+
+  async begin() {
+    try {
+      this.job = await ask("GET", campaignPath(this.id));
+    } catch (error) {
+      this.main.append(element("div", { class: "card empty" }, element("h1", {}, "No such campaign"), element("p", {}, error.message),
+        element("a", { class: "button", href: "#/campaigns" }, "All campaigns")));
+      return;
+    }
+    if (this.ended) return;
+    const title = this.job.title || this.id.slice(0, 8);
+    document.title = `${title} · vibroimpact`;
+    this.main.append(
+      element("div", { class: "head" }, element("h1", {}, title), this.state, this.acts),
+      element("section", { class: "card", "aria-label": "Progress" }, this.progress, this.facts, this.message, this.said));
+    if (this.job.kind === "campaign") {
+      this.diagram = new Diagram(this.id, "Diagram", (run) => showPoint(this.point, this.id, run, () => { this.point.hidden = true; }));
+      this.main.append(element("section", { class: "card", "aria-label": "Diagram" }, element("h2", {}, "Diagram"),
+        element("p", { class: "small muted" }, "Choose a point to see its motion. Drag to zoom."), this.diagram.node));
+      this.diagram.refresh();
+    }
+    this.main.append(this.point, this.failures, this.results);
+    this.seen(this.job);
+    this.watchEvents();
+  }
+
+  watchEvents() {
+    this.stop();
+    this.stop = ENDED.includes(this.job.state) ? () => {} : follow(this.id, (told) => this.seen({ ...this.job, ...told }));
+  }
+
+  close() {
+    this.ended = true;
+    this.stop();
+    this.diagram?.close();
+  }
+
+  seen(job) {
+    const before = this.shown;
+    Object.assign(this, { job, shown: job.state });
+    this.pace.note(job);
+    this.progress.max = job.total || 1;
+    this.progress.value = job.done;
+    this.state.replaceChildren(stateBadge(job.state));
+    this.message.textContent = job.message;
+    this.message.className = job.state === "failed" ? "problem" : "small muted";
+    this.showFacts();
+    this.diagram?.refresh();
+    if (before === job.state) return this.tellTenth();
+    if (before) tell(`The campaign is ${job.state}.`);
+    this.showActs();
+    if (before && !job.started) this.ask("GET").then((fresh) => fresh && this.seen(fresh));
+    if (ENDED.includes(job.state)) this.finish();
+  }
+
+  tellTenth() {
+    const tenth = this.job.total ? Math.floor((TENTHS * this.job.done) / this.job.total) : 0;
+    if (tenth > this.toldTenth) tell(`${tenth * TENTHS} per cent of the points are done.`);
+    this.toldTenth = tenth;
+  }
+
+  showFacts() {
+    const { job, pace } = this, runs = job.state === "running";
+    const facts = {
+      Points: `${job.done} of ${job.total || "?"}`,
+      "Points a second": runs && pace.rate ? short(Number(pace.rate.toPrecision(3))) : "–",
+      "Time left": runs ? duration(pace.left(job)) : "–",
+      Submitted: moment(job.created), Workers: job.workers ?? "all processors", Id: this.id.slice(0, 8),
+    };
+    this.facts.replaceChildren(...Object.entries(facts).map(([key, value]) =>
+      element("div", {}, element("dt", {}, key), element("dd", {}, String(value)))));
+  }
+
+  showActs() {
+    const { state } = this.job, made = [];
+    if (["queued", "running"].includes(state)) made.push(button("Cancel", () => this.act("POST", "/cancel"), { class: "danger" }));
+    if (["cancelled", "failed"].includes(state)) made.push(button("Resume", () => this.act("POST", "/resume"), { class: "main" }));
+    if (ENDED.includes(state)) made.push(button("Delete", () => this.remove(), { class: "danger" }));
+    made.push(element("a", { class: "button", href: `#/new/${this.id}` }, "Edit a copy"));
+    if (this.job.kind === "campaign") made.push(element("a", { class: "button", href: `#/compare/${this.id}` }, "Compare"));
+    const had = this.acts.contains(document.activeElement);
+    this.acts.replaceChildren(...made);
+    if (had) this.acts.firstChild.focus();
+  }
+
+  async ask(method, rest = "") {
+    try {
+      this.said.textContent = "";
+      return await ask(method, campaignPath(this.id, rest));
+    } catch (error) {
+      this.said.textContent = error.message;
+      return null;
+    }
+  }
+
+  async act(method, rest) {
+    const job = await this.ask(method, rest);
+    if (!job || this.ended) return;
+    this.failures.hidden = this.results.hidden = true;
+    this.seen(job);
+    this.watchEvents();
+  }
+
+  async remove() {
+    if (!confirm("Delete this campaign with all of its results?")) return;
+    const before = this.said.textContent;
+    await this.ask("DELETE");
+    if (this.said.textContent === before || !this.said.textContent) location.hash = "#/campaigns";
+  }
+
+  /** Show what there is once a campaign has ended. */
+  async finish() {
+    this.showResults();
+    if (this.job.kind === "run" && this.job.state === "done") showPoint(this.point, this.id, 0);
+    const found = await this.ask("GET", "/failures?limit=200");
+    if (found?.total) this.showFailures(found);
+  }
+
+  showFailures({ total, items }) {
+    const names = Object.keys(items[0].coordinates);
+    const rows = items.map((one) => [
+      this.diagram ? button(`Point ${one.run}`, () => showPoint(this.point, this.id, one.run, () => { this.point.hidden = true; })) : String(one.run),
+      ...names.map((name) => one.coordinates[name]), one.outcome, one.message,
+    ]);
+    this.failures.hidden = false;
+    this.failures.replaceChildren(element("h2", { id: "failures-title" }, `${total} points did not come to their end`),
+      element("div", { class: "scroll tall", tabindex: "0", role: "region", "aria-label": "Points that failed" },
+        table("Points that failed, and why", ["Point", ...names.map((name) => name.replaceAll("_", " ")), "Outcome", "Why"], rows)));
+  }
+
+  showResults() {
+    const done = this.job.state === "done", href = (rest) => address(campaignPath(this.id, rest));
+    const link = (rest, text, name) => element("a", { class: "button", href: href(rest), download: name }, text);
+    const log = element("pre", { class: "scroll tall", tabindex: "0", "aria-label": "Log" });
+    const made = [link("/scene", "Scene (TOML)", `${this.id}.toml`), link("/log", "Log", `${this.id}.log`)];
+    if (done) {
+      made.unshift(link("/dataset", "Dataset (NetCDF)", `${this.id}.nc`));
+      made.push(link("/figure?format=svg", "Figure (SVG)", `${this.id}.svg`), link("/figure?format=png", "Figure (PNG)", `${this.id}.png`));
+    }
+    this.results.hidden = false;
+    this.results.replaceChildren(element("h2", { id: "results-title" }, "Download"), element("div", { class: "row" }, made),
+      element("details", { ontoggle: async () => { log.textContent = await askText(campaignPath(this.id, "/log")); } },
+        element("summary", {}, "Show the log"), log));
+  }
+}

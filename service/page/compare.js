@@ -1,0 +1,47 @@
+// Two campaigns side by side.
+
+import { ask } from "./api.js";
+import { Diagram } from "./diagram.js";
+import { choice, element, stateBadge } from "./dom.js";
+import { showPoint } from "./point.js";
+
+const EVERY = 1500;
+
+export function showComparison(main, first = "", second = "") {
+  main.append(element("div", { class: "head" }, element("h1", {}, "Two campaigns side by side")));
+  const open = [];
+  let ended = false, timer;
+  ask("GET", "/campaigns?limit=200").then(({ items }) => {
+    if (ended) return;
+    const swept = items.filter((job) => job.kind === "campaign");
+    if (!swept.length) {
+      main.append(element("div", { class: "card empty" }, "There are no campaigns to compare yet."));
+      return;
+    }
+    const ids = swept.map((job) => job.id);
+    const chosen = [ids.includes(first) ? first : ids[0]];
+    chosen.push(ids.includes(second) ? second : ids.find((id) => id !== chosen[0]) ?? chosen[0]);
+    const sides = element("div", { class: "sides" });
+    main.append(sides);
+    chosen.forEach((id, place) => {
+      const job = swept.find((one) => one.id === id), name = place ? "Right" : "Left";
+      const point = element("div", { hidden: true });
+      const diagram = new Diagram(id, `${name} diagram`, (run) => showPoint(point, id, run, () => { point.hidden = true; }), 320);
+      const options = swept.map((one) => [one.id, `${one.title || "untitled"} (${one.id.slice(0, 8)})`]);
+      sides.append(element("section", { class: "card", "aria-label": name },
+        element("div", { class: "row end" }, choice(name, options, id, (other) => go(chosen, place, other)), stateBadge(job.state)),
+        element("h2", {}, element("a", { href: `#/campaign/${id}` }, job.title || id.slice(0, 8))),
+        diagram.node, point));
+      open.push(diagram);
+      diagram.refresh();
+    });
+    timer = setInterval(() => open.filter((one) => one.data?.state !== "done").forEach((one) => one.refresh()), EVERY);
+  }, (error) => main.append(element("p", { class: "problem", role: "alert" }, error.message)));
+  return () => { ended = true; clearInterval(timer); open.forEach((one) => one.close()); };
+}
+
+function go(chosen, place, other) {
+  const next = chosen.slice();
+  next[place] = other;
+  location.hash = `#/compare/${next.join("/")}`;
+}

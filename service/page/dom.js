@@ -1,0 +1,67 @@
+// Elements, numbers and words, as all views make them.
+
+/** Return an element: attributes, on* listeners, and children, of which text is never read as markup. */
+export function element(name, attributes = {}, ...children) {
+  const made = document.createElement(name);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
+    else if (value === true) made.setAttribute(key, "");
+    else if (value !== false && value !== null && value !== undefined) made.setAttribute(key, value);
+  }
+  made.append(...children.flat().filter((child) => child !== null && child !== undefined));
+  return made;
+}
+
+export function button(text, action, attributes = {}) {
+  return element("button", { type: "button", onclick: action, ...attributes }, text);
+}
+
+/** Return a table; cells that are numbers are set as such. */
+export function table(caption, names, rows) {
+  const cell = (one) => typeof one === "number"
+    ? element("td", { class: "number" }, short(one))
+    : element("td", {}, one ?? "–");
+  return element("table", {},
+    element("caption", { class: "unseen" }, caption),
+    element("thead", {}, element("tr", {}, names.map((name) => element("th", { scope: "col" }, name)))),
+    element("tbody", {}, rows.map((row) => element("tr", {}, row.map(cell)))));
+}
+
+export function choice(label, options, chosen, changed) {
+  const select = element("select", { onchange: () => changed(select.value) },
+    options.map(([value, text]) => element("option", { value, selected: value === chosen }, text)));
+  return element("label", {}, label, select);
+}
+
+/** Return a number with five digits. */
+export function short(number) {
+  if (number === null || number === undefined || Number.isNaN(number)) return "–";
+  if (Number.isInteger(number) && Math.abs(number) < 1e7) return String(number);
+  return String(Number(number.toPrecision(5)));
+}
+
+export function duration(seconds) {
+  if (!Number.isFinite(seconds)) return "–";
+  if (seconds < 1) return "less than 1 s";
+  if (seconds < 100) return `${Math.round(seconds)} s`;
+  if (seconds < 6000) return `${Math.round(seconds / 60)} min`;
+  return seconds < 172800 ? `${Math.round(seconds / 3600)} h` : `${Math.round(seconds / 86400)} days`;
+}
+
+export function moment(seconds) {
+  return seconds ? new Date(seconds * 1000).toLocaleString([], { dateStyle: "medium", timeStyle: "short" }) : "–";
+}
+
+export function inWords(one) {
+  return one.units && one.units !== "1" ? `${one.label} (${one.units})` : one.label;
+}
+
+export function stateBadge(state) {
+  return element("span", { class: `state ${state}` }, state);
+}
+
+/** Tell a screen reader what has changed. */
+export function tell(text) {
+  const news = document.getElementById("news");
+  if (news.textContent !== text) news.textContent = text;
+}

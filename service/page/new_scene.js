@@ -1,0 +1,162 @@
+// A new campaign: a scene that is written, pasted or dropped, checked while one types, its problems at their lines.
+
+import { ask, askText, campaignPath } from "./api.js";
+import { button, element, tell } from "./dom.js";
+
+const PAUSE = 300; // milliseconds of silence after which a scene is checked
+const LINE = 20; // pixels, as style.css has it
+const LARGEST = 2 ** 20;
+const DRAFT = "vibroimpact-scene";
+
+export function showNew(main, from = "", given = "") {
+  const view = new NewScene();
+  main.append(...view.nodes);
+  view.begin(from, given);
+  return () => view.close();
+}
+
+class NewScene {
+  constructor() {
+    this.key = crypto.randomUUID();
+    this.text = element("textarea", {
+      id: "scene", spellcheck: "false", autocapitalize: "off", autocomplete: "off", "aria-describedby": "scene-help",
+      oninput: () => this.changed(), onscroll: () => { this.lines.scrollTop = this.text.scrollTop; },
+    });
+    this.lines = element("pre", { "aria-hidden": "true" });
+    this.editor = element("div", {
+      class: "editor", ondragover: (event) => { event.preventDefault(); this.editor.classList.add("over"); },
+      ondragleave: () => this.editor.classList.remove("over"), ondrop: (event) => this.drop(event),
+    }, this.lines, this.text);
+    this.file = element("input", { type: "file", accept: ".toml,text/plain", id: "file", class: "unseen", onchange: () => this.read(this.file.files[0]) });
+    this.workers = element("input", { type: "number", min: "1", max: "256", placeholder: "all", id: "workers" });
+    this.submit = button("Submit", () => this.send(), { class: "main", disabled: true });
+    this.said = element("p", { role: "status" });
+    this.problems = element("ul", { class: "problems" });
+    this.templates = element("ul", { class: "templates" });
+    this.nodes = [
+      element("div", { class: "head" }, element("h1", {}, "New campaign")),
+      element("div", { class: "with-side" },
+        element("section", { class: "card", "aria-label": "Scene" },
+          element("div", { class: "row" }, element("label", { for: "scene" }, "Scene (TOML)"),
+            element("span", { class: "muted small", id: "scene-help" }, "Write, paste or drop a file; it is checked as you type.")),
+          this.editor, this.said, this.problems,
+          element("div", { class: "row end" }, element("label", { for: "workers" }, "Workers", this.workers), this.submit,
+            this.file, button("Open a file", () => this.file.click()))),
+        element("section", { class: "card", "aria-labelledby": "templates-title" },
+          element("h2", { id: "templates-title" }, "Start from an example"), this.templates))];
+    this.file.tabIndex = -1;
+    this.file.setAttribute("aria-label", "Scene file");
+  }
+
+  async begin(from, given) {
+    this.write(sessionStorage.getItem(DRAFT) ?? "");
+    try {
+      if (from === "replay") this.write(replayOf(given));
+      else if (from) this.write(await askText(campaignPath(from, "/scene")));
+      const examples = await ask("GET", "/examples");
+      this.templates.replaceChildren(...examples.map((one) => element("li", {},
+        button(one.title || one.name, () => { this.write(one.scene); this.text.focus(); }))));
+      examples.forEach((one, place) => this.templates.children[place].firstChild.append(element("small", {}, one.kind)));
+    } catch (error) {
+      this.say(error.message, "problem");
+    }
+  }
+
+  close() {
+    clearTimeout(this.timer);
+    this.question?.abort();
+  }
+
+  write(text) {
+    this.text.value = text;
+    this.text.scrollTop = 0;
+    this.changed();
+  }
+
+  changed() {
+    sessionStorage.setItem(DRAFT, this.text.value);
+    this.key = crypto.randomUUID(); // another text is another campaign
+    this.submit.disabled = true;
+    this.number([]);
+    clearTimeout(this.timer);
+    this.question?.abort();
+    this.timer = setTimeout(() => this.check(), PAUSE);
+  }
+
+  async check() {
+    if (!this.text.value.trim()) return this.show([], "");
+    this.question = new AbortController();
+    try {
+      const { problems } = await ask("POST", "/scenes/validate", { body: { scene: this.text.value }, signal: this.question.signal });
+      this.show(problems, problems.length ? `${problems.length} ${problems.length === 1 ? "problem" : "problems"}` : "The scene is sound.");
+    } catch (error) {
+      if (error.name !== "AbortError") this.say(error.message, "problem");
+    }
+  }
+
+  show(problems, words) {
+    this.submit.disabled = !words || problems.length > 0;
+    this.say(words, problems.length ? "problem" : "good");
+    this.number(problems);
+    this.problems.replaceChildren(...problems.map((one) => element("li", {},
+      button(`Line ${one.line}: ${one.message}`, () => this.jump(one)))));
+  }
+
+  say(words, kind) {
+    this.said.className = kind;
+    this.said.textContent = words;
+  }
+
+  /** Number the lines; those with a problem stand out. */
+  number(problems) {
+    const wrong = new Set(problems.map((one) => one.line));
+    const count = this.text.value.split("\n").length;
+    this.lines.replaceChildren(...Array.from({ length: count }, (_, place) =>
+      element("span", { class: wrong.has(place + 1) ? "wrong" : null }, String(place + 1))));
+    this.lines.scrollTop = this.text.scrollTop;
+    this.text.setAttribute("aria-invalid", String(problems.length > 0));
+  }
+
+  jump({ line, column }) {
+    const lines = this.text.value.split("\n");
+    const start = lines.slice(0, line - 1).reduce((sum, one) => sum + one.length + 1, 0);
+    const end = start + (lines[line - 1]?.length ?? 0);
+    this.text.focus();
+    this.text.setSelectionRange(Math.min(start + column - 1, end), end);
+    this.text.scrollTop = Math.max(0, (line - 6) * LINE);
+  }
+
+  drop(event) {
+    event.preventDefault();
+    this.editor.classList.remove("over");
+    const [file] = event.dataTransfer.files;
+    if (file) this.read(file);
+    else this.write(event.dataTransfer.getData("text"));
+  }
+
+  async read(file) {
+    if (!file) return;
+    if (file.size > LARGEST) return this.say(`${file.name}: expected a scene of at most 1 MiB, got ${file.size} byte.`, "problem");
+    this.write(await file.text());
+    tell(`${file.name} was read.`);
+  }
+
+  async send() {
+    const workers = this.workers.value ? Number(this.workers.value) : null;
+    this.submit.disabled = true;
+    try {
+      const job = await ask("POST", "/campaigns", { body: { scene: this.text.value, workers }, headers: { "Idempotency-Key": this.key } });
+      sessionStorage.removeItem(DRAFT);
+      location.hash = `#/campaign/${job.id}`;
+    } catch (error) {
+      if (error.problems.length && error.problems[0].line) this.show(error.problems, "The scene was refused.");
+      else this.say(error.message, "problem");
+      this.submit.disabled = false;
+    }
+  }
+}
+
+/** Return a scene to begin a replay of a recording with. */
+function replayOf(name) {
+  return `[scene]\ntitle = "Replay of ${name}"\nunits = "SI"\n\n[body]\nmass = 1.0\nstiffness = 1000.0\ndamping_ratio = 0.02\n\n[[stop]]\nposition = 0.001\nrestitution = 0.7\n\n[replay]\nrecording = ${JSON.stringify(name)}\n\n[replay.drive]\nchannel = "base"\n`;
+}

@@ -1,0 +1,26 @@
+// How fast a campaign goes, as the looks at it in the last seconds have seen.
+
+const MEMORY = 10; // seconds
+
+export class Pace {
+  seen = [];
+
+  /** Note how far a campaign is now. */
+  note({ done, state }) {
+    const now = Date.now() / 1000;
+    if (state !== "running" || done < (this.seen.at(-1)?.done ?? 0)) this.seen = [];
+    if (state !== "running") return;
+    this.seen.push({ at: now, done });
+    while (this.seen.length > 2 && this.seen[1].at < now - MEMORY) this.seen.shift();
+  }
+
+  get rate() {
+    const first = this.seen[0], last = this.seen.at(-1);
+    return first && last.at > first.at ? (last.done - first.done) / (last.at - first.at) : 0;
+  }
+
+  /** Return the seconds that are left. */
+  left({ done, total }) {
+    return this.rate > 0 ? (total - done) / this.rate : NaN;
+  }
+}

@@ -1,0 +1,113 @@
+// One point of a campaign, simulated again: its motion in time, its phase portrait, its impacts.
+
+import { ask, campaignPath } from "./api.js";
+import { button, element, short, table, tell } from "./dom.js";
+import { Plot } from "./plot.js";
+
+const TABLE_ROWS = 200;
+const AGAIN = 1200; // milliseconds until a service that is busy is asked again
+const IMPACT = { impact_time: "Time", impact_phase: "Phase (rad)", impact_velocity: "Velocity", impact_impulse: "Impulse", impact_contact: "Stop", impact_restitution: "Restitution" };
+
+/** Show a point below `host`; of two that are asked for the later one is shown. */
+export async function showPoint(host, id, run, closed = null) {
+  const mine = Symbol("question");
+  host.asked = mine;
+  host.hidden = false;
+  const name = closed ? `Point ${run}` : "Motion";
+  const head = element("div", { class: "head" }, element("h2", { tabindex: "-1" }, name), closed && button("Close", closed));
+  const said = element("p", { class: "muted", role: "status" }, "Simulating …");
+  host.replaceChildren(head, said);
+  tell(`${name}: simulating`);
+  try {
+    const data = await answered(id, run, () => host.asked === mine);
+    if (host.asked !== mine) return;
+    said.remove();
+    host.append(...views(data));
+    tell(`${name}: ${data.outcome}`);
+    head.querySelector("h2").focus({ preventScroll: !closed });
+  } catch (error) {
+    if (host.asked === mine) said.replaceWith(element("p", { class: "problem", role: "alert" }, error.message));
+  }
+}
+
+async function answered(id, run, wanted) {
+  for (;;) {
+    try {
+      return await ask("GET", campaignPath(id, `/points/${run}`));
+    } catch (error) {
+      if (error.status !== 429 || !wanted()) throw error;
+      await new Promise((resolve) => { setTimeout(resolve, AGAIN); });
+    }
+  }
+}
+
+function views(data) {
+  const { samples, impacts, periods } = data;
+  const facts = { ...data.coordinates, outcome: data.outcome, direction: data.direction };
+  const made = [element("dl", { class: "facts" }, Object.entries(facts).map(([key, value]) =>
+    element("div", {}, element("dt", {}, key.replaceAll("_", " ")), element("dd", {}, typeof value === "number" ? short(value) : value))))];
+  if (data.message) made.push(element("p", { class: "small muted" }, data.message));
+  const grid = element("div", { class: "sides" });
+  grid.append(...seriesPlots(samples));
+  const portrait = portraitPlot(samples, periods);
+  if (portrait) grid.append(portrait);
+  if (impacts.impact_time?.length) grid.append(impactPlot(impacts));
+  made.push(grid);
+  if (impacts.impact_time) made.push(impactTable(impacts));
+  return made;
+}
+
+function panel(title, plot) {
+  return element("section", { "aria-label": title }, element("h3", { class: "small" }, title), plot.node);
+}
+
+function seriesPlots(samples) {
+  const names = Object.keys(samples).filter((name) => name !== "time");
+  if (!names.length) return [element("p", { class: "muted" }, "This scene records no motion in time.")];
+  let chosen = names[0];
+  const plot = new Plot("Motion in time", { height: 280 });
+  const draw = () => plot.show({
+    layers: [{ kind: "line", readable: true, colour: "one", xs: samples.time, ys: samples[chosen] }],
+    x: { label: "time" }, y: { label: chosen },
+  });
+  const made = panel("Motion in time", plot);
+  if (names.length > 1) {
+    const select = element("select", { "aria-label": "Variable over time", onchange: () => { chosen = select.value; plot.view = null; draw(); } },
+      names.map((name) => element("option", { value: name }, name)));
+    made.querySelector("h3").append(" of ", select);
+  }
+  draw();
+  return [made];
+}
+
+function portraitPlot(samples, periods) {
+  const velocity = Object.keys(samples).find((name) => name === "velocity" || name.endsWith(".velocity"));
+  const displacement = velocity?.replace(/velocity$/, "displacement");
+  if (!velocity || !samples[displacement]) return null;
+  const layers = [{ kind: "line", readable: true, colour: "one", name: "orbit", xs: samples[displacement], ys: samples[velocity] }];
+  if (periods.strobe_velocity) {
+    layers.push({ kind: "points", size: 5, colour: "two", name: "once a period", xs: periods.strobe_displacement, ys: periods.strobe_velocity });
+  }
+  const plot = new Plot("Phase portrait", { height: 280 });
+  plot.show({ layers, x: { label: displacement }, y: { label: velocity } });
+  return panel("Phase portrait", plot);
+}
+
+function impactPlot(impacts) {
+  const plot = new Plot("Impacts", { height: 280 });
+  plot.show({
+    layers: [{ kind: "stems", colour: "three", xs: impacts.impact_time, ys: impacts.impact_velocity }],
+    x: { label: "time" }, y: { label: "velocity of approach" },
+  });
+  return panel("Impacts", plot);
+}
+
+function impactTable(impacts) {
+  const count = impacts.impact_time.length;
+  if (!count) return element("p", { class: "muted" }, "No impacts in what is shown.");
+  const names = Object.keys(IMPACT).filter((name) => impacts[name]);
+  const rows = impacts.impact_time.slice(0, TABLE_ROWS).map((_, place) => names.map((name) => impacts[name][place]));
+  return element("details", {}, element("summary", {}, `${count} impacts, as a table`),
+    element("div", { class: "scroll tall", tabindex: "0", role: "region", "aria-label": "Impacts as a table" },
+      table("Impacts", names.map((name) => IMPACT[name]), rows)));
+}

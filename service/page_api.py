@@ -1,0 +1,300 @@
+"""Routes that the page is made of, besides those of every client: its session, slices, points, failures, examples."""
+
+from __future__ import annotations
+
+from functools import cache
+from http import HTTPStatus
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+from fastapi import Path as PathPart
+from pydantic import BaseModel
+
+from vibroimpact.analysis.dataset import Direction, Outcome
+from vibroimpact.fmus.errors import DatasetError, SceneError
+from vibroimpact.service.landed import Failure, Landed, LandedReader, Quantity, failures_in, files_of
+from vibroimpact.service.points import simulated_point
+from vibroimpact.service.problems import ProblemError
+from vibroimpact.service.routes.described import problems
+from vibroimpact.service.scenes import taken_scene
+from vibroimpact.service.sessions import SECONDS, Sessions, is_own_origin
+from vibroimpact.service.slices import Selection, slice_of
+from vibroimpact.service.store import Job, State, Store
+
+DEFAULT_VARIABLES = ("strobe_displacement", "displacement_range", "impact_velocity", "final_displacement")
+"""What is shown of a campaign of which nothing is asked: the first that it has."""
+MOST_ROWS = 50_000
+"""Rows of one slice."""
+MOST_FAILURES = 200
+"""Failures on one page of them."""
+FAILED = (Outcome.error, Outcome.crash, Outcome.timeout, Outcome.impact_limit)
+MOST_RUN = 2**31 - 1
+
+Column = list[float | None]
+
+
+class QuantityAnswer(BaseModel):
+    """A variable, or a swept parameter."""
+
+    name: str
+    label: str
+    units: str
+    along: str
+
+
+class SliceAnswer(BaseModel):
+    """Columns of as many rows: `run`, `direction`, `outcome`, `value`, and one of each axis in `coordinates`."""
+
+    state: State
+    total: int
+    landed: int
+    variable: QuantityAnswer | None
+    variables: list[QuantityAnswer]
+    axes: list[QuantityAnswer]
+    directions: list[str]
+    outcomes: list[str]
+    rows: int
+    shown: int
+    run: list[int]
+    direction: list[int]
+    outcome: list[int]
+    coordinates: list[Column]
+    value: Column
+
+
+class PointAnswer(BaseModel):
+    """One point, simulated again: columns by the name of their variable."""
+
+    run: int
+    direction: str
+    coordinates: dict[str, float]
+    outcome: str
+    message: str
+    samples: dict[str, Column]
+    impacts: dict[str, Column]
+    periods: dict[str, Column]
+
+
+class FailureAnswer(BaseModel):
+    """A point that did not come to its end."""
+
+    run: int
+    outcome: str
+    message: str
+    coordinates: dict[str, float]
+
+
+class FailurePage(BaseModel):
+    """Points that did not come to their end, in the order of their index."""
+
+    total: int
+    items: list[FailureAnswer]
+    next: int | None
+
+
+class ExampleAnswer(BaseModel):
+    """A scene to begin with."""
+
+    name: str
+    title: str
+    kind: Literal["campaign", "run"]
+    scene: str
+
+
+def page_routes(store: Store, sessions: Sessions) -> APIRouter:
+    """Return the routes of the page."""
+    router = APIRouter()
+    router.include_router(_session(sessions), tags=["session"])
+    router.include_router(_slices(store), tags=["results"])
+    router.include_router(_points(store), tags=["results"])
+    return router
+
+
+def _session(sessions: Sessions) -> APIRouter:
+    router = APIRouter()
+
+    @router.post(
+        "/session",
+        status_code=HTTPStatus.NO_CONTENT,
+        responses=problems(HTTPStatus.FORBIDDEN),
+        summary="Begin a session of a browser",
+    )
+    def begin(request: Request, response: Response) -> None:
+        """Turn the token into a cookie, which the scripts of no page can read."""
+        if "origin" in request.headers and not is_own_origin(dict(request.scope["headers"])):
+            raise ProblemError(HTTPStatus.FORBIDDEN, "Origin: expected the page of this service.")
+        response.set_cookie(
+            sessions.cookie,
+            sessions.made(),
+            max_age=SECONDS,
+            path="/api/v1",
+            secure=request.url.scheme == "https",
+            httponly=True,
+            samesite="strict",
+        )
+
+    @router.delete(
+        "/session", status_code=HTTPStatus.NO_CONTENT, responses=problems(), summary="End the session"
+    )
+    def end(response: Response) -> None:
+        response.delete_cookie(sessions.cookie, path="/api/v1", httponly=True, samesite="strict")
+
+    return router
+
+
+def _known(store: Store, name: str) -> Job:
+    try:
+        return store.job(name)
+    except KeyError:
+        raise ProblemError(
+            HTTPStatus.NOT_FOUND, f"{name}: expected the id of a campaign, got an unknown one."
+        ) from None
+
+
+def _files(store: Store, job: Job) -> list[Path]:
+    path = store.dataset_of(job)
+    if job.sweeps:
+        return files_of(path.parent)
+    return [path] if path.is_file() else []
+
+
+def _slices(store: Store) -> APIRouter:
+    router = APIRouter()
+    reader = LandedReader()
+
+    def landed_of(job: Job, variable: str | None) -> tuple[str, Landed | None]:
+        names = DEFAULT_VARIABLES if variable is None else (variable,)
+        for name in names:
+            try:
+                return name, reader.read(_files(store, job), name)
+            except KeyError:
+                continue
+            except DatasetError as error:
+                raise ProblemError(
+                    HTTPStatus.CONFLICT, f"{job.id}: its results are damaged: {error}"
+                ) from None
+        raise ProblemError(
+            HTTPStatus.UNPROCESSABLE_ENTITY, f"variable: expected one of this campaign, got {names[0]!r}."
+        )
+
+    @router.get(
+        "/campaigns/{name}/slice",
+        responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
+        summary="One variable of the points that have landed so far",
+    )
+    def one_slice(
+        name: str,
+        variable: Annotated[str | None, Query(max_length=200)] = None,
+        at: Annotated[list[str], Query(max_length=20, description="NAME:VALUE, the nearest there is")] = [],  # noqa: B006
+        within: Annotated[list[str], Query(max_length=20, description="NAME:LOW:HIGH")] = [],  # noqa: B006
+        most: Annotated[int, Query(ge=1, le=MOST_ROWS, description="Rows, at most")] = 5000,
+    ) -> SliceAnswer:
+        """Return columns of at most so many rows, thinned evenly; what is not finite is null."""
+        job = _known(store, name)
+        found, landed = landed_of(job, variable)
+        try:
+            selection = Selection.from_words(at, within)
+            columns = _empty() if landed is None else slice_of(landed, selection, most)
+        except ValueError as error:
+            raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from None
+        quantities = () if landed is None else landed.quantities
+        shown = next((one for one in quantities if one.name == found), None)
+        return SliceAnswer(
+            state=job.state,
+            total=job.total,
+            landed=0 if landed is None else landed.runs.size,
+            variable=None if shown is None else _quantity(shown),
+            variables=[_quantity(one) for one in quantities],
+            axes=[] if landed is None else [_quantity(axis) for axis in landed.axes],
+            directions=[one.name for one in sorted(Direction)],
+            outcomes=[one.name for one in sorted(Outcome)],
+            **columns,
+        )
+
+    return router
+
+
+def _empty() -> dict[str, Any]:
+    columns: dict[str, list[Any]] = {
+        name: [] for name in ("run", "direction", "outcome", "coordinates", "value")
+    }
+    return {"rows": 0, "shown": 0, **columns}
+
+
+def _quantity(one: Quantity) -> QuantityAnswer:
+    return QuantityAnswer(name=one.name, label=one.label, units=one.units, along=one.along)
+
+
+def _points(store: Store) -> APIRouter:
+    router = APIRouter()
+
+    @router.get(
+        "/campaigns/{name}/points/{run}",
+        responses=problems(
+            HTTPStatus.NOT_FOUND, HTTPStatus.UNPROCESSABLE_ENTITY, HTTPStatus.TOO_MANY_REQUESTS
+        ),
+        summary="One point, simulated again with its motion in time",
+    )
+    def point(name: str, run: Annotated[int, PathPart(ge=0, le=MOST_RUN)]) -> PointAnswer:
+        """Simulate a point of a campaign; on a path it starts where the point before it had ended."""
+        job = _known(store, name)
+        path = store.dataset_of(job)
+        results = path.parent if job.sweeps else path
+        return PointAnswer(**simulated_point(store.scene_of(name), results, run))
+
+    @router.get(
+        "/campaigns/{name}/failures",
+        responses=problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY),
+        summary="Points that did not come to their end, and why",
+    )
+    def failures(
+        name: str,
+        limit: Annotated[int, Query(ge=1, le=MOST_FAILURES)] = 50,
+        cursor: Annotated[int, Query(ge=0, le=MOST_RUN, description="`next` of the page before")] = 0,
+    ) -> FailurePage:
+        found: list[Failure] = []
+        for path in _files(store, _known(store, name)):
+            try:
+                found += failures_in(path, FAILED)
+            except DatasetError as error:
+                if path.exists():
+                    raise ProblemError(HTTPStatus.CONFLICT, f"{name}: {error}") from None
+        left = [one for one in sorted(found, key=lambda one: one.run) if one.run >= cursor]
+        more = left[limit].run if len(left) > limit else None
+        return FailurePage(total=len(found), items=[_failure(one) for one in left[:limit]], next=more)
+
+    @router.get("/examples", responses=problems(), tags=["scenes"], summary="Scenes to begin with")
+    def examples() -> list[ExampleAnswer]:
+        return _examples()
+
+    return router
+
+
+def _failure(one: Failure) -> FailureAnswer:
+    return FailureAnswer(
+        run=one.run, outcome=Outcome(one.outcome).name, message=one.message, coordinates=one.coordinates
+    )
+
+
+@cache
+def _examples() -> list[ExampleAnswer]:
+    """Return the examples of the project that this service takes, campaigns first."""
+    found = []
+    for path in sorted(examples_folder().glob("*.toml")):
+        text = path.read_text(encoding="utf-8")
+        try:
+            scene = taken_scene(text)
+        except SceneError:
+            continue  # of an FMU that the package does not bring along
+        kind: Literal["campaign", "run"] = "campaign" if scene.sweep else "run"
+        found.append(ExampleAnswer(name=path.stem, title=scene.title, kind=kind, scene=text))
+    return sorted(found, key=lambda one: one.kind)
+
+
+def examples_folder() -> Path:
+    """Return the folder of the examples: in the package, or in the checkout that an editable install is of."""
+    package = Path(str(files("vibroimpact.service")))
+    shipped = package / "examples"
+    return shipped if shipped.is_dir() else package.resolve().parent / "examples"

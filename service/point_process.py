@@ -1,0 +1,173 @@
+"""The process that simulates one point again: `python -m vibroimpact.service.point_process SCENE RESULTS RUN`.
+
+It answers with one line of JSON: the motion in time, its impacts and sections. RESULTS is the folder of a campaign, or
+the dataset of a run; in a sweep with a path the point starts where the one before it had ended.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibroimpact.analysis.dataset import (
+    IMPACT_COLUMNS,
+    PERIOD_COLUMNS,
+    Direction,
+    RunRecord,
+    read_flat,
+)
+from vibroimpact.analysis.files.opening import opened_netcdf
+from vibroimpact.fmus.errors import UsageError, VibroimpactError
+from vibroimpact.orchestrator.campaign.chunks import (
+    CARRYING,
+    DEFAULT_RUNNER,
+    BranchPoint,
+    Chunk,
+    State,
+    points_of,
+    run_points,
+)
+from vibroimpact.orchestrator.campaign.manifest import read_manifest
+from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
+from vibroimpact.orchestrator.scene.models import TimeSeries
+from vibroimpact.orchestrator.scene.sweep import Branch, expand
+from vibroimpact.service.landed import files_of
+from vibroimpact.service.slices import finite
+
+MOST_PERIODS = 20
+"""Periods that are shown, of those that are recorded."""
+PER_PERIOD = 200
+"""Samples in a forcing period."""
+MOST_SAMPLES = 4000
+"""Samples that are shown."""
+OBSERVED = ("displacement", "velocity")
+
+
+def main(arguments: list[str]) -> int:
+    """Simulate the point that the arguments name; return the exit code."""
+    scene, results, run = arguments
+    try:
+        answer = simulated(Path(scene), Path(results), int(run))
+    except VibroimpactError as error:
+        answer = {"failed": str(error)}
+    sys.stdout.write(json.dumps(answer, allow_nan=False) + "\n")
+    return 0
+
+
+def simulated(path: Path, results: Path, run: int) -> dict[str, Any]:
+    """Return the motion of one point, ready for JSON."""
+    given = load_scene(path)
+    scene = _as_it_ran(given, results)
+    place, branch = _place_of(scene, run)
+    start = None if place.first else _start_of(results, branch, run)
+    watched = _watched(scene, place)
+    runner = named_runner(watched, DEFAULT_RUNNER)
+    try:
+        (record,), _ = run_points(watched, runner, [place], start)
+    finally:
+        runner.close()
+    series = watched.record.time_series
+    names = series.variables if series is not None else ()
+    if watched.general is not None:
+        names = tuple(watched.general.variables)
+    return {
+        "run": run,
+        "direction": place.direction.name,
+        "coordinates": {scene.sweep_coordinate_name(key): value for key, value in place.point.values.items()},
+        "outcome": record.outcome.name,
+        "message": record.message,
+        "samples": _samples(record, names),
+        "impacts": _columns(record.impacts, IMPACT_COLUMNS),
+        "periods": _columns(record.periods, PERIOD_COLUMNS),
+    }
+
+
+def _as_it_ran(given: Scene, results: Path) -> Scene:
+    """Return the scene with what was found out about it before it ran, without finding it out again."""
+    if given.execution.tolerance is None:
+        return given
+    if not results.is_dir():
+        return parse_scene(str(read_flat(results).attrs["scene"]), given.source)
+    manifest = read_manifest(results / "campaign.json")
+    return given if manifest is None else parse_scene(manifest.scene_text, given.source)
+
+
+def _place_of(scene: Scene, run: int) -> tuple[BranchPoint, Branch]:
+    branches = expand(scene)
+    for number, branch in enumerate(branches):
+        first = branch.points.first_index
+        if first <= run < first + len(branch.points):
+            (place,) = points_of(branches, Chunk(number, run, run + 1))
+            return place, branch
+    raise UsageError(f"run: expected a point of this campaign, got {run}.")
+
+
+def _start_of(results: Path, branch: Branch, run: int) -> State | None:
+    """Return the state that a point of a path starts from: that of the nearest one before it that came to its end.
+
+    Raises
+    ------
+    UsageError
+        The point before it has not landed.
+    """
+    if branch.direction == Direction.independent.name:
+        return None
+    first, known = branch.points.first_index, dict[int, State | None]()
+    for path in files_of(results):
+        with opened_netcdf(path) as file:
+            runs, outcomes = file["run_index"][:], file["outcome"][:]
+            if "final_state" in file.variables:
+                states = file["final_state"][:]
+            else:
+                states = np.column_stack([file["final_displacement"][:], file["final_velocity"][:]])
+        ended = np.isin(outcomes, CARRYING) & np.isfinite(states).all(axis=1)
+        for place in np.flatnonzero((runs >= first) & (runs < run)):
+            known[int(runs[place])] = tuple(states[place].tolist()) if ended[place] else None
+    for before in range(run - 1, first - 1, -1):
+        if before not in known:
+            raise UsageError(f"run: expected a point whose predecessor has been computed, got {run}.")
+        if known[before] is not None:
+            return known[before]
+    return None
+
+
+def _watched(scene: Scene, place: BranchPoint) -> Scene:
+    """Return a scene that records what is shown: its last periods in time, with its impacts."""
+    record = scene.record
+    if scene.general is not None or scene.replay is not None:
+        return scene
+    period = scene.at(place.point.values).period
+    if record.recorded_periods:
+        record = record.model_copy(update={"recorded_periods": min(record.recorded_periods, MOST_PERIODS)})
+    if record.recorded_periods and period:
+        rate = PER_PERIOD / period
+    else:
+        rate = MOST_SAMPLES / record.recorded_time if record.recorded_time else PER_PERIOD
+    others = record.time_series.variables if record.time_series is not None else ()
+    series = TimeSeries(rate=rate, variables=tuple(dict.fromkeys((*OBSERVED, *others))))
+    return scene.model_copy(
+        update={"record": record.model_copy(update={"time_series": series, "impacts": True, "strobe": True})}
+    )
+
+
+def _samples(record: RunRecord, names: tuple[str, ...]) -> dict[str, list[float | None]]:
+    if record.samples is None:
+        return {}
+    step = max(1, -(-len(record.samples) // MOST_SAMPLES))
+    return _columns(record.samples[::step], ("time", *names))
+
+
+def _columns(rows: Any, names: tuple[str, ...]) -> dict[str, list[float | None]]:
+    if rows is None:
+        return {}
+    shown = rows[:MOST_SAMPLES]
+    return {name: finite(shown[:, place]) for place, name in enumerate(names[: shown.shape[1]])}
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

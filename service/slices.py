@@ -1,0 +1,140 @@
+"""What the page draws of a campaign: some thousands of values of one variable, whichever the size of the campaign."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.service.landed import Landed
+
+LEVELS = 2000
+"""Values of a run that differ by less than this share of the range of all are one point of a diagram."""
+
+
+class Selection:
+    """The part of a campaign that is asked for.
+
+    Parameters
+    ----------
+    at : mapping of str to float
+        Swept parameters that are held: the nearest value that there is.
+    within : mapping of str to (float, float)
+        Lowest and highest value of swept parameters.
+    """
+
+    def __init__(self, at: dict[str, float], within: dict[str, tuple[float, float]]) -> None:
+        self.at, self.within = at, within
+
+    @classmethod
+    def from_words(cls, at: Sequence[str], within: Sequence[str]) -> Selection:
+        """Read `NAME:VALUE` and `NAME:LOW:HIGH`.
+
+        Raises
+        ------
+        ValueError
+            With what was expected.
+
+        Examples
+        --------
+        >>> Selection.from_words(["restitution:0.7"], ["angular_frequency:0.8:0.9"]).within
+        {'angular_frequency': (0.8, 0.9)}
+        """
+        held = {name: numbers[0] for name, numbers in (_read("at", word, 1) for word in at)}
+        ranges = {name: (low, high) for name, (low, high) in (_read("within", word, 2) for word in within)}
+        return cls(held, ranges)
+
+    def runs(self, landed: Landed) -> NDArray[np.bool_]:
+        """Return which runs are asked for.
+
+        Raises
+        ------
+        ValueError
+            A name is no swept parameter.
+        """
+        names = [axis.name for axis in landed.axes]
+        for name in (*self.at, *self.within):
+            if name not in names:
+                raise ValueError(f"{name}: expected a swept parameter ({', '.join(names) or 'none'}).")
+        kept = np.ones(landed.runs.size, dtype=bool)
+        for name, (low, high) in self.within.items():
+            values = landed.coordinates[names.index(name)]
+            kept &= (values >= low) & (values <= high)
+        for name, value in self.at.items():
+            values = landed.coordinates[names.index(name)]
+            kept &= values == values[np.argmin(np.abs(values - value))]
+        return kept
+
+
+def _read(option: str, word: str, count: int) -> tuple[str, list[float]]:
+    name, *texts = word.split(":")
+    try:
+        numbers = [float(text) for text in texts]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        form = ":".join(("NAME", *(("VALUE",) if count == 1 else ("LOW", "HIGH"))))
+        raise ValueError(f"{option}: expected {form} with finite numbers, got {word!r}.")
+    return name, numbers
+
+
+def slice_of(landed: Landed, selection: Selection, most: int) -> dict[str, Any]:
+    """Return columns of at most `most` rows (a map: of about as many): run, direction, outcome, coordinates, value."""
+    kept = selection.runs(landed)
+    per_run = landed.owners.size == landed.runs.size
+    if per_run and len(landed.axes) - len(selection.at) > 1:
+        kept = kept & _coarser_grid(landed.coordinates[:, kept], kept, most)
+    rows = np.flatnonzero(kept[landed.owners])
+    total = rows.size
+    if not per_run:
+        rows = rows[_distinct(landed.owners[rows], landed.values[rows])]
+    if rows.size > most:
+        rows = rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
+    owners = landed.owners[rows]
+    return {
+        "rows": int(total),
+        "shown": int(rows.size),
+        "run": landed.runs[owners].tolist(),
+        "direction": landed.directions[owners].tolist(),
+        "outcome": landed.outcomes[owners].tolist(),
+        "coordinates": [finite(column[owners]) for column in landed.coordinates],
+        "value": finite(landed.values[rows]),
+    }
+
+
+def _coarser_grid(coordinates: NDArray[np.float64], kept: NDArray[np.bool_], most: int) -> NDArray[np.bool_]:
+    """Return the runs on every second, third, ... value of each axis, so that a map has no gaps but larger cells."""
+    found = kept.copy()
+    step = math.ceil(math.sqrt(coordinates.shape[1] / most)) if coordinates.shape[1] else 1
+    if step > 1:
+        chosen = np.ones(coordinates.shape[1], dtype=bool)
+        for column in coordinates:
+            _, places = np.unique(column, return_inverse=True)
+            chosen &= places % step == 0
+        found[np.flatnonzero(kept)[~chosen]] = False
+    return found
+
+
+def _distinct(owners: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Return one row for all values of a run that a diagram cannot tell apart."""
+    usable = np.isfinite(values)
+    if not usable.any():
+        return np.flatnonzero(usable)
+    low, high = values[usable].min(), values[usable].max()
+    scale = LEVELS / (high - low) if 0.0 < high - low < math.inf else 0.0
+    levels = np.where(usable, (values - low) * scale, -1.0).astype(np.int64)
+    _, first = np.unique(owners * (LEVELS + 2) + levels, return_index=True)
+    return np.sort(first)
+
+
+def finite(values: NDArray[Any]) -> list[float | None]:
+    """Return numbers as JSON has them: null for what is not finite.
+
+    >>> finite(np.array([1.0, np.nan]))
+    [1.0, None]
+    """
+    found: list[float | None] = np.asarray(values, dtype=np.float64).tolist()
+    return [one if one is not None and math.isfinite(one) else None for one in found]
