@@ -23,6 +23,7 @@ from vibroimpact.analysis.dataset.schema import (
     RAGGED,
     RULES,
     SCHEMA_VERSION,
+    SWEPT_ALONG,
     Direction,
     constant_names,
     swept_names,
@@ -257,8 +258,8 @@ def _on_grid(flat: xr.Dataset) -> xr.Dataset:
         flat = flat.swap_dims(interface="connection")
     if "compared" in flat.variables:
         flat = flat.swap_dims(comparison="compared")
-    axes, scalars, run_id = _grid(flat)
-    dims, swept, constants = tuple(axes), swept_names(flat), constant_names(flat)
+    dims, axes, scalars, run_id = _grid(flat)
+    swept, constants = swept_names(flat), constant_names(flat)
     variables: dict[str, xr.Variable] = {}
     # The order of the schema reads better than the alphabet; sampled variables come last.
     order = [name for name in RULES if name in flat.variables]
@@ -324,9 +325,12 @@ def _row_owners(flat: xr.Dataset) -> dict[str, xr.Variable]:
     }
 
 
-def _grid(flat: xr.Dataset) -> tuple[dict[str, xr.Variable], dict[str, xr.Variable], NDArray[np.int32]]:
-    """Return the axes of the sweep, its scalar coordinates, and the run at each point (-1: none)."""
+def _grid(
+    flat: xr.Dataset,
+) -> tuple[tuple[str, ...], dict[str, xr.Variable], dict[str, xr.Variable], NDArray[np.int32]]:
+    """Return the dimensions of the sweep, coordinates along them, scalar ones, and the run at each point (-1: none)."""
     axes: dict[str, xr.Variable] = {}
+    sizes: dict[str, int] = {}
     scalars: dict[str, xr.Variable] = {}
     places: list[NDArray[np.intp]] = []
     directions = flat.variables["direction"].values
@@ -335,19 +339,44 @@ def _grid(flat: xr.Dataset) -> tuple[dict[str, xr.Variable], dict[str, xr.Variab
         present, place = np.unique(directions, return_inverse=True)
         labels = np.array([Direction(int(value)).name for value in present])
         axes["direction"] = xr.Variable("direction", labels, _plain(flat.variables["direction"]))
+        sizes["direction"] = labels.size
         places.append(place)
     elif directions.size:
         scalars["direction"] = xr.Variable((), names[0], _plain(flat.variables["direction"]))
-    for name in _in_order_of_the_scene(flat):
-        values, place = np.unique(flat.variables[name].values, return_inverse=True)
-        axes[name] = xr.Variable(name, values, flat.variables[name].attrs)
+    for dimension, names_along in _swept_along(flat).items():
+        values, place = _distinct([flat.variables[name] for name in names_along])
+        for name, column in zip(names_along, values.T, strict=True):
+            axes[name] = xr.Variable(dimension, column, flat.variables[name].attrs)
+        sizes[dimension] = len(values)
         places.append(place)
-    shape = tuple(axis.size for axis in axes.values())
-    run_id = _runs_on(shape, places, flat.sizes["run"])
+    run_id = _runs_on(tuple(sizes.values()), places, flat.sizes["run"])
     if run_id is None:
-        count = np.arange(flat.sizes["run"], dtype=np.int32)
-        return {"run": xr.Variable("run", count)}, {}, count
-    return axes, scalars, run_id
+        return ("run",), {}, {}, np.arange(flat.sizes["run"], dtype=np.int32)
+    return tuple(sizes), axes, scalars, run_id
+
+
+def _swept_along(flat: xr.Dataset) -> dict[str, list[str]]:
+    """Return the swept parameters along each dimension: those that move together share one."""
+    found: dict[str, list[str]] = {}
+    for name in _in_order_of_the_scene(flat):
+        found.setdefault(flat.variables[name].attrs.get(SWEPT_ALONG, name), []).append(name)
+    return found
+
+
+def _distinct(columns: list[xr.Variable]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return the points that runs have along a dimension, shape (point, parameter), and at which each run is.
+
+    One parameter ascends; several that move together are in the order of the runs.
+    """
+    if len(columns) == 1 and SWEPT_ALONG not in columns[0].attrs:
+        values, place = np.unique(columns[0].values, return_inverse=True)
+        return values[:, None], place
+    rows = np.stack([column.values for column in columns], axis=1)
+    values, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(order.size)
+    return values[order], rank[place.reshape(-1)]
 
 
 def _in_order_of_the_scene(flat: xr.Dataset) -> list[str]:

@@ -214,6 +214,8 @@ RESERVED_NAMES = frozenset(
     | {"run_id", "displacement_range"}
 )
 """Names that mean something in a stored or opened dataset; nothing else may take them."""
+SWEPT_ALONG = "swept_along"
+"""Attribute of a swept parameter: the dimension that it shares with those that move with it."""
 NOT_SWEPT = {"swept": "no"}
 """Attribute of the numbers of a scene that are the same for all of its runs; scalar coordinates."""
 

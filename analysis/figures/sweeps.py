@@ -13,7 +13,7 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from vibroimpact.analysis.dataset.schema import scene_of, swept_names
+from vibroimpact.analysis.dataset.schema import SWEPT_ALONG, scene_of, swept_names
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, canvas, label, legend_outside
 from vibroimpact.analysis.figures.scene_text import column_of, swept_keys
 from vibroimpact.fmus.errors import DatasetError
@@ -39,6 +39,8 @@ _LOWEST = 0.01
 _WIDE = 8.0
 # Largest ratio of the ends of a logarithmic scale.
 _WIDEST = 1e6
+# Dimension of the runs of two adaptive axes.
+_SCATTERED = "point"
 _NEITHER = (
     "figure: expected extrema or impacts in the dataset, got neither. "
     "Set extrema = true or impacts = true in [record]."
@@ -46,8 +48,14 @@ _NEITHER = (
 
 
 def varied(dataset: xr.Dataset) -> list[str]:
-    """Return the swept parameters that take more than one value."""
-    return [name for name in swept_names(dataset) if dataset[name].size > 1]
+    """Return the swept parameters that take more than one value; of those that move together the first."""
+    names = [name for name in swept_names(dataset) if dataset[name].size > 1]
+    first: dict[str, str] = {}
+    for name in names:
+        along = dataset[name].attrs.get(SWEPT_ALONG, name)
+        # points that are no grid stand for two parameters
+        first.setdefault(name if along == _SCATTERED else along, name)
+    return list(first.values())
 
 
 def _in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
@@ -250,15 +258,24 @@ def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, st
         figure.subplots(len(quantities), len(directions), sharex=True, sharey=True, squeeze=False)
     )
     along, across = _in_order_of_the_scene(dataset, varied(dataset))
+    numbered = {name: dataset[name].dims[0] for name in (along, across) if name not in dataset.dims}
+    along, across = (str(numbered.get(name, name)) for name in (along, across))
+    places = {name: _numbered(dataset, str(name)) for name in numbered.values()}
     for row, (values, text, missing) in zip(axes, quantities, strict=True):
         for axis, direction in zip(row, directions, strict=True):
             branch = values.sel(direction=direction) if "direction" in values.dims else values
             notes = [f"{direction} sweep"] if len(directions) > 1 else []
-            branch = branch.squeeze().transpose(across, along)
+            branch = branch.squeeze().transpose(across, along).assign_coords(places)
             notes += _colours(axis, branch, text, values.values)
             notes += [] if np.isfinite(branch.values).all() else [f"gray: {missing}"]
             axis.set_title("; ".join(notes), fontsize=8 if len(notes) == 1 else 7)
     return figure
+
+
+def _numbered(dataset: xr.Dataset, dimension: str) -> xr.DataArray:
+    """Return the places along a dimension that several parameters share, from 1: none of them may stand for all."""
+    described = {"long_name": f"place along {dimension}", "units": "1"}
+    return xr.DataArray(np.arange(1.0, dataset.sizes[dimension] + 1.0), dims=dimension, attrs=described)
 
 
 def largest_impact_velocity(dataset: xr.Dataset) -> xr.DataArray:

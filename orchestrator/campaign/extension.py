@@ -40,7 +40,7 @@ from vibroimpact.orchestrator.campaign.manifest import (
 from vibroimpact.orchestrator.campaign.parts import NO_RUNS, Note, StoredPart, list_parts, own_files
 from vibroimpact.orchestrator.run.dataset import coordinate_names, stored_samples, with_constants_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, SweepAxis, run_count
+from vibroimpact.orchestrator.scene.sweep import DIRECTIONS, Dimension, SweepAxis, dimensions, run_count
 
 Runs = NDArray[np.int64]
 
@@ -101,21 +101,23 @@ def same_runs(old: Scene, new: Scene) -> Runs:
         -1 where it is none of them.
     """
     was, now = _Layout(old.sweep), _Layout(new.sweep)
-    if was.carried_key != now.carried_key:
+    adaptive = any(axis.adaptive is not None for axis in (*old.sweep, *new.sweep))
+    if was.carried_key != now.carried_key or adaptive:
         return np.full(now.size, -1, dtype=np.int64)
     found = np.zeros(now.shape, dtype=np.int64)
     missing = np.zeros(now.shape, dtype=np.bool_)
-    for axis, stride in was.spanning():
-        place = now.place_of(axis.key)
-        values = (new.value(axis.key),) if place is None else now.axes[place].values
-        index = _places(values, axis.values)
+    for members, stride in was.spanning():
+        place = now.place_of(members)
+        index = _places(
+            _values_in(new, members) if place is None else _values(now, place, members), _rows(members)
+        )
         column = index if place is None else index.reshape(now.along(place))
         found += stride * column
         missing |= column < 0
-    for axis, _ in now.spanning():
-        if was.place_of(axis.key) is None:
-            index = _places(axis.values, (old.value(axis.key),))
-            missing |= index.reshape(now.along(now.place_of(axis.key))) < 0
+    for members, _ in now.spanning():
+        if was.place_of(members) is None:
+            index = _places(_rows(members), _values_in(old, members))
+            missing |= index.reshape(now.along(now.place_of(members))) < 0
     if now.carried is not None and was.carried is not None:
         index = _along_branches(was.carried, now.carried)
         found += index
@@ -123,13 +125,31 @@ def same_runs(old: Scene, new: Scene) -> Runs:
     return np.where(missing, -1, found).reshape(-1)
 
 
+def _rows(members: Dimension) -> list[tuple[float, ...]]:
+    """Return the values that the axes of a dimension have together."""
+    return list(zip(*(axis.values for axis in members), strict=True))
+
+
+def _values(layout: _Layout, place: int, members: Dimension) -> list[tuple[float, ...]]:
+    """Return the values of a dimension of a layout, in the order of the axes of another."""
+    own = {axis.key: axis for axis in layout.dimensions[place]}
+    return _rows(tuple(own[axis.key] for axis in members))
+
+
+def _values_in(scene: Scene, members: Dimension) -> list[tuple[float, ...]]:
+    """Return what a scene has of keys without sweeping them; nothing where it sweeps one of them in other company."""
+    if {axis.key for axis in members} & {axis.key for axis in scene.sweep}:
+        return []
+    return [tuple(scene.value(axis.key) for axis in members)]
+
+
 class _Layout:
     """How the runs of a sweep lie: spanning axes in their order, then direction and place along a branch."""
 
     def __init__(self, sweep: Sequence[SweepAxis]) -> None:
         self.carried = next((axis for axis in sweep if axis.continuation), None)
-        self.axes = tuple(axis for axis in sweep if axis is not self.carried)
-        lengths = [len(axis.values) for axis in self.axes]
+        self.dimensions = dimensions([axis for axis in sweep if axis is not self.carried])
+        lengths = [len(members[0].values) for members in self.dimensions]
         branches = (
             () if self.carried is None else (len(DIRECTIONS[self.carried.path]), len(self.carried.values))
         )
@@ -140,23 +160,28 @@ class _Layout:
     def carried_key(self) -> str | None:
         return None if self.carried is None else self.carried.key
 
-    def spanning(self) -> Iterator[tuple[SweepAxis, int]]:
-        """Yield the spanning axes, each with the distance in runs between two neighbours along it."""
-        for place, axis in enumerate(self.axes):
-            yield axis, math.prod(self.shape[place + 1 :])
+    def spanning(self) -> Iterator[tuple[Dimension, int]]:
+        """Yield the spanning dimensions, each with the distance in runs between two neighbours along it."""
+        for place, members in enumerate(self.dimensions):
+            yield members, math.prod(self.shape[place + 1 :])
 
-    def place_of(self, key: str) -> int | None:
-        return next((place for place, axis in enumerate(self.axes) if axis.key == key), None)
+    def place_of(self, members: Dimension) -> int | None:
+        """Return which dimension has the keys of another one, and no others."""
+        keys = {axis.key for axis in members}
+        own = (place for place, axes in enumerate(self.dimensions) if {axis.key for axis in axes} == keys)
+        return next(own, None)
 
     def along(self, place: int | None) -> tuple[int, ...]:
         """Return the shape of an array along one dimension that is broadcast along the others."""
         return tuple(length if other == place else 1 for other, length in enumerate(self.shape))
 
 
-def _places(values: Sequence[float], among: Sequence[float]) -> Runs:
-    """Return where each value is among others, bit for bit; -1: nowhere."""
-    known = {value.hex(): place for place, value in enumerate(among)}
-    return np.array([known.get(value.hex(), -1) for value in values], dtype=np.int64)
+def _places(values: Sequence[tuple[float, ...]], among: Sequence[tuple[float, ...]]) -> Runs:
+    """Return where each point is among others, bit for bit; -1: nowhere."""
+    if not values:
+        return np.array([-1], dtype=np.int64)
+    known = {tuple(map(float.hex, point)): place for place, point in enumerate(among)}
+    return np.array([known.get(tuple(map(float.hex, point)), -1) for point in values], dtype=np.int64)
 
 
 def _along_branches(was: SweepAxis, now: SweepAxis) -> Runs:
@@ -227,7 +252,8 @@ def _coordinates(scene: Scene, runs: Runs) -> dict[str, NDArray[np.float64]]:
     places = np.unravel_index(runs, layout.shape) if layout.shape else ()
     found = {
         names[axis.key]: np.array(axis.values)[place]
-        for axis, place in zip(layout.axes, places, strict=False)
+        for members, place in zip(layout.dimensions, places, strict=False)
+        for axis in members
     }
     if layout.carried is not None:
         values, ways = np.array(layout.carried.values), DIRECTIONS[layout.carried.path]

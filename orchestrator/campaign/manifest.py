@@ -77,7 +77,14 @@ def flat_scene(scene: Scene) -> dict[str, Any]:
     document = scene.model_dump(mode="json", by_alias=True, exclude={"source", "text"})
     document["stop"] = document.pop("stops")
     document["sweep"] = {
-        axis["key"]: {"values": axis["values"], "path": axis["path"], "place": place}
+        axis["key"]: {
+            "values": axis["values"],
+            "path": axis["path"],
+            "place": place,
+            # absent in campaigns that were begun before there were such axes
+            "together": axis["together"] or None,
+            "adaptive": axis["adaptive"],
+        }
         for place, axis in enumerate(document["sweep"], start=1)
     }
     return dict(sorted(_flat("", document)))

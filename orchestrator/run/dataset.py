@@ -17,6 +17,7 @@ from vibroimpact.analysis.dataset import (
     file_names,
     with_constants,
 )
+from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
 from vibroimpact.orchestrator.run.empty_record import sample_variables
@@ -24,6 +25,7 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
+from vibroimpact.orchestrator.scene.sweep import shared_dimensions
 
 EXTREMA = ("displacement_max", "displacement_min")
 STROBE = ("strobe_displacement", "strobe_velocity")
@@ -76,6 +78,9 @@ def dataset_of_runs(
 def _described(dataset: xr.Dataset, scene: Scene, names: Mapping[str, str]) -> xr.Dataset:
     for file, long_name in _long_names(scene, names).items():
         dataset[file].attrs["long_name"] = long_name
+    for key, dimension in shared_dimensions(scene.sweep).items():
+        if key in names:
+            dataset[names[key]].attrs[SWEPT_ALONG] = dimension
     return dataset
 
 

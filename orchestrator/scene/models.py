@@ -3,7 +3,8 @@
 A field says everything about itself in one place: its constraints, its default, and its `Rule`, from which messages,
 keys of sweeps, units of datasets, parameters of FMUs and the tables of docs/scene.md come (`fields`). Rules between
 fields or tables are in `rules`. Another contact law becomes one more model here and one more entry in `STOP_MODELS`;
-another kind of body likewise in `body_models`, and the tables of a replay are in `replay_models`.
+another kind of body likewise in `body_models`, the tables of a replay are in `replay_models`, those of a sweep in
+`sweep_models`.
 """
 
 from __future__ import annotations
@@ -16,11 +17,9 @@ from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag
 from vibroimpact.orchestrator.importer.specification import Exchange
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.problems import ARRAY_TAG, NUMBER_TAG, WORD_TAG
-from vibroimpact.orchestrator.scene.sweep import SweepPath
 
 MOST_SAMPLES_PER_RUN = 10**8
 MOST_PERIODS = 10**9
-MOST_POINTS_PER_AXIS = 10**6
 MOST_IMPACTS_PER_POINT = 10**12
 DEFAULT_IMPACT_LIMIT = 10_000_000
 MOST_MODES = 64
@@ -397,31 +396,6 @@ class Execution(SceneTable):
             default="nothing is estimated",
         ),
     ] = None
-
-
-class AxisTable(SceneTable):
-    """One entry of `[sweep]` as written: a range or a list, and a path."""
-
-    start: Annotated[Finite | None, Rule(doc="first value of a range")] = None
-    stop: Annotated[Finite | None, Rule(doc="last value of a range, included")] = None
-    points: Annotated[
-        int | None,
-        Field(ge=1, le=MOST_POINTS_PER_AXIS),
-        Rule(doc="number of values of a range; at least 2 unless start = stop"),
-    ] = None
-    spacing: Annotated[
-        Literal["linear", "log"],
-        Rule(
-            hint="log: each value over the one before is the same.",
-            doc='`"linear"`; `"log"`: each value of a range over the one before is the same, with ends of one sign',
-        ),
-    ] = "linear"
-    values: Annotated[
-        tuple[Finite, ...] | None,
-        Field(strict=False, min_length=1),
-        Rule(doc="instead of a range; all different"),
-    ] = None
-    path: Annotated[SweepPath, Rule()] = "independent"
 
 
 Stop = RestitutionStop | KelvinVoigtStop | HertzStop | HuntCrossleyStop

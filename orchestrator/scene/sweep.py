@@ -2,7 +2,8 @@
 
 Run order (the `run` dimension of the dataset) is fixed by the scene alone:
 
-- axes count in the order in which the scene file lists them, the last one fastest;
+- axes count in the order in which the scene file lists them, the last one fastest; axes that move together
+  count once, where the first of them stands;
 - a continuation axis (`up`, `down`, `up-down`) is always the fastest, whatever its place in the file;
 - each combination of the other axes is one branch (two for `up-down`: first up, then down), and a branch
   occupies a contiguous range of runs in the order in which it is travelled: a down branch starts at the top;
@@ -14,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import product
 from math import prod
 from typing import Any, Literal, Protocol, overload
 
@@ -32,6 +32,25 @@ DIRECTIONS: dict[SweepPath, tuple[SweepDirection, ...]] = {
 
 
 @dataclass(frozen=True, slots=True)
+class Adaptive:
+    """How an axis is refined where the motion jumps.
+
+    Attributes
+    ----------
+    tolerance : float
+        Distance, in the unit of the key, down to which jumps are bracketed.
+    at_most : int
+        Points of the whole sweep.
+    jump : float
+        Change of the recorded range between neighbours, over the largest range, that counts as a jump.
+    """
+
+    tolerance: float
+    at_most: int
+    jump: float
+
+
+@dataclass(frozen=True, slots=True)
 class SweepAxis:
     """One swept key of a scene.
 
@@ -45,17 +64,23 @@ class SweepAxis:
         Whether each point starts from the scene's start state, or from its predecessor's final state.
     span : tuple or None
         Start, stop and number of the values of a range: all of it that is sent to workers.
+    together : str
+        Name of the dimension that it shares with the axes that move with it; empty where it moves alone.
+    adaptive : Adaptive or None
+        How points are put between these values.
     """
 
     key: str
     values: tuple[float, ...]
     path: SweepPath = "independent"
     span: tuple[float, float, int] | None = field(default=None, compare=False, repr=False)
+    together: str = ""
+    adaptive: Adaptive | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        if self.span is not None:
+        if self.span is not None and not self.together and self.adaptive is None:
             return axis_of_range, (self.key, *self.span, self.path)
-        return SweepAxis, (self.key, self.values, self.path)
+        return SweepAxis, (self.key, self.values, self.path, None, self.together, self.adaptive)
 
     @property
     def continuation(self) -> bool:
@@ -88,6 +113,42 @@ def log_axis(key: str, start: float, stop: float, points: int, path: SweepPath) 
     return SweepAxis(key, values if path == "independent" else tuple(sorted(values)), path)
 
 
+SCATTERED = "point"
+"""Dimension of a dataset of two adaptive axes, whose points are no grid."""
+
+Dimension = tuple[SweepAxis, ...]
+"""The axes that move together: one alone, or several of as many values."""
+
+
+def dimensions(axes: Sequence[SweepAxis]) -> tuple[Dimension, ...]:
+    """Return the axes of a sweep by the dimensions that they span, in the order of the scene.
+
+    Examples
+    --------
+    >>> gap = [SweepAxis(f"stop[{k}].position", (0.1, 0.2), together="gap") for k in (1, 2)]
+    >>> [len(dimension) for dimension in dimensions([gap[0], SweepAxis("body.mass", (1.0,)), gap[1]])]
+    [2, 1]
+    """
+    found: dict[str, list[SweepAxis]] = {}
+    for axis in axes:
+        # no name of a dimension has the dot that every key has
+        found.setdefault(axis.together or f".{axis.key}", []).append(axis)
+    return tuple(tuple(members) for members in found.values())
+
+
+def shared_dimensions(axes: Sequence[SweepAxis]) -> dict[str, str]:
+    """Return the dimension of a dataset that each key shares with others, by key; a key that has its own is left out.
+
+    Examples
+    --------
+    >>> shared_dimensions([SweepAxis(f"stop[{k}].position", (0.1, 0.2), together="gap") for k in (1, 2)])
+    {'stop[1].position': 'gap', 'stop[2].position': 'gap'}
+    """
+    adaptive = [axis.key for axis in axes if axis.adaptive is not None]
+    scattered = dict.fromkeys(adaptive, SCATTERED) if len(adaptive) > 1 else {}
+    return {axis.key: axis.together for axis in axes if axis.together} | scattered
+
+
 @dataclass(frozen=True, slots=True)
 class Point:
     """One point of a sweep: its place in the `run` dimension and the value of every swept key."""
@@ -102,10 +163,10 @@ class Points(Sequence[Point]):
 
     first_index: int
     fixed: Mapping[str, float]
-    axes: tuple[SweepAxis, ...]
+    dimensions: tuple[Dimension, ...]
 
     def __len__(self) -> int:
-        return prod(len(axis.values) for axis in self.axes)
+        return prod(len(members[0].values) for members in self.dimensions)
 
     @overload
     def __getitem__(self, position: int) -> Point: ...
@@ -122,9 +183,10 @@ class Points(Sequence[Point]):
     def _point(self, position: int) -> Point:
         rest = position
         swept: dict[str, float] = {}
-        for axis in reversed(self.axes):
-            rest, place = divmod(rest, len(axis.values))
-            swept[axis.key] = axis.values[place]
+        for members in reversed(self.dimensions):
+            rest, place = divmod(rest, len(members[0].values))
+            for axis in members:
+                swept[axis.key] = axis.values[place]
         return Point(self.first_index + position, {**self.fixed, **swept})
 
 
@@ -178,21 +240,22 @@ def expand(scene: Swept) -> tuple[Branch, ...]:
     """
     carried = next((axis for axis in scene.sweep if axis.continuation), None)
     if carried is None:
-        return (Branch("independent", {}, Points(0, {}, scene.sweep)),)
-    return tuple(_continuation_branches(carried, [axis for axis in scene.sweep if axis is not carried]))
+        return (Branch("independent", {}, Points(0, {}, dimensions(scene.sweep))),)
+    spanning = dimensions([axis for axis in scene.sweep if axis is not carried])
+    return tuple(_continuation_branches(carried, spanning))
 
 
-def _continuation_branches(carried: SweepAxis, spanning: Sequence[SweepAxis]) -> Iterator[Branch]:
+def _continuation_branches(carried: SweepAxis, spanning: Sequence[Dimension]) -> Iterator[Branch]:
     first_index = 0
     travelled = {"up": carried, "down": SweepAxis(carried.key, carried.values[::-1], carried.path)}
-    keys = [axis.key for axis in spanning]
-    for combination in product(*(axis.values for axis in spanning)):
-        fixed = dict(zip(keys, combination, strict=True))
+    combinations = Points(0, {}, tuple(spanning))
+    for combination in combinations:
         for direction in DIRECTIONS[carried.path]:
-            yield Branch(direction, fixed, Points(first_index, fixed, (travelled[direction],)))
+            points = Points(first_index, combination.values, ((travelled[direction],),))
+            yield Branch(direction, combination.values, points)
             first_index += len(carried.values)
 
 
 def run_count(axes: Sequence[SweepAxis]) -> int:
     """Return the length of the `run` dimension that these axes span (1 without axes)."""
-    return prod(len(axis.values) * len(DIRECTIONS[axis.path]) for axis in axes)
+    return prod(len(members[0].values) * len(DIRECTIONS[members[0].path]) for members in dimensions(axes))

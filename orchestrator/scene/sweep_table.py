@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
@@ -17,22 +16,20 @@ from vibroimpact.orchestrator.scene.fields import (
     is_array_only,
     is_whole,
     known_keys,
-    listed,
     rule_of,
 )
 from vibroimpact.orchestrator.scene.keys import SWEEPABLE, numeric_key, parse_key
-from vibroimpact.orchestrator.scene.models import STOP_MODELS, AxisTable, Execution, Forcing, Sensor
+from vibroimpact.orchestrator.scene.models import STOP_MODELS, Execution, Forcing, Sensor
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     key_path,
     nearest,
-    problems_of,
     quoted,
     value_problem,
 )
-from vibroimpact.orchestrator.scene.sweep import SweepAxis, axis_of_range, log_axis
-
-_FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
+from vibroimpact.orchestrator.scene.sweep import SweepAxis
+from vibroimpact.orchestrator.scene.sweep_axes import FORMS, SAMPLE, axes_of, read_axis_table
+from vibroimpact.orchestrator.scene.sweep_models import AxisTable
 
 
 def read_sweep(
@@ -60,18 +57,25 @@ def read_sweep(
     """
     table = document.get("sweep", {})
     if not isinstance(table, dict):
-        hint = f"Write [sweep] and below it KEY = {_FORMS}."
+        hint = f"Write [sweep] and below it KEY = {FORMS}."
         return (), [Problem("sweep", "a table", quoted(table), hint)]
-    axes: list[SweepAxis] = []
     problems: list[Problem] = []
+    tables: dict[str, AxisTable] = {}
     for key, entry in table.items():
-        found = list(key_problems(key, entry))
-        if not found:
-            axis, found = _read_axis(key, entry)
-            found += axis_problems(axis) if axis else []
-            axes += [axis] if axis and not found else []
-        problems += found
-    return tuple(axes), problems
+        if key != SAMPLE:
+            found = list(key_problems(key, entry))
+            if not found and (read := read_axis_table(key, entry, found)):
+                tables[key] = read
+            problems += found
+    # a design whose keys are wrong is not told that it has none
+    expects_keys = not any(isinstance(entry, dict) and "distribution" in entry for entry in table.values())
+    axes, found = axes_of(tables, table.get(SAMPLE), expects_keys=expects_keys)
+    sound = []
+    for axis in axes:
+        wrong = list(axis_problems(axis))
+        sound += [] if wrong else [axis]
+        found += wrong
+    return tuple(sound), [*problems, *found]
 
 
 def read_short_sweep(document: Mapping[str, Any]) -> tuple[tuple[SweepAxis, ...], list[Problem]]:
@@ -174,73 +178,6 @@ def _element_hint(text: str, document: Mapping[str, Any], known: list[str]) -> s
     return ""
 
 
-def _read_axis(key: str, entry: object) -> tuple[SweepAxis | None, list[Problem]]:
-    """Return the axis of one entry of a sweep, or what is wrong with its values and path."""
-    path = ("sweep", key)
-    if not isinstance(entry, dict):
-        return None, [Problem(key_path(path), "a table", quoted(entry), f"Write {_FORMS}.")]
-    try:
-        table = AxisTable.model_validate(entry)
-    except ValidationError as error:
-        return None, problems_of(error, AxisTable, path)
-    problem = _form_problem(key, table)
-    if problem:
-        return None, [problem]
-    if table.values is not None:
-        ordered = table.values if table.path == "independent" else tuple(sorted(table.values))
-        axis = SweepAxis(key, ordered, table.path)
-    else:
-        assert table.start is not None
-        assert table.stop is not None
-        assert table.points is not None
-        make = log_axis if table.spacing == "log" else axis_of_range
-        axis = make(key, table.start, table.stop, table.points, table.path)
-    problem = _distinct_problem(key, table.values or axis.values)
-    return (None, [problem]) if problem else (axis, [])
-
-
-def _form_problem(key: str, table: AxisTable) -> Problem | None:
-    """Return what is wrong with the combination of start, stop, points and values."""
-    ends = {"start": table.start, "stop": table.stop, "points": table.points}
-    given = [name for name, value in ends.items() if value is not None]
-    where = key_path(("sweep", key))
-    if table.values is not None:
-        if table.spacing != "linear":
-            hint = "A list says its values itself: remove spacing."
-            return Problem(where, "a range beside spacing", "values", hint)
-        if given:
-            return Problem(
-                where,
-                "start, stop and points, or values",
-                "both",
-                f"Remove values or {listed(given, 'and')}.",
-            )
-        return None
-    if len(given) < len(ends):
-        missing = [name for name in ends if name not in given]
-        return Problem(where, _FORMS, listed(given, "and") or "neither", f"Add {listed(missing, 'and')}.")
-    assert table.start is not None
-    assert table.stop is not None
-    if table.spacing == "log" and not table.start * table.stop > 0.0:
-        got = f"start = {quoted(table.start)} and stop = {quoted(table.stop)}"
-        expected = 'ends that are both > 0, or both < 0, of a range with spacing = "log"'
-        return Problem(where, expected, got, 'No ratio leads from one to the other: use spacing = "linear".')
-    if table.points == 1 and table.start != table.stop:
-        hint = "One point cannot be at both ends; make stop equal to start, or give values."
-        return Problem(key_path(("sweep", key, "points")), "a whole number >= 2", "1", hint)
-    return None
-
-
-def _distinct_problem(key: str, values: tuple[float, ...]) -> Problem | None:
-    value, times = Counter(values).most_common(1)[0]
-    if times == 1:
-        return None
-    hint = "Each point is run once: remove the repeated value or lower points."
-    return Problem(
-        key_path(("sweep", key)), "values that differ from each other", f"{quoted(value)} {times} times", hint
-    )
-
-
 def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Problem]:
     """Return the swept value that breaks the rule of its field.
 
@@ -252,6 +189,9 @@ def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Proble
         return []
     field = field_of(model, key.name)
     if is_whole(field):
+        if axis.adaptive is not None:
+            where = key_path(("sweep", axis.key, "adaptive"))
+            return [Problem(where, "a key between whose values there are others", "whole numbers")]
         low, high, _ = bounds_of(field)
         broken = [value for value in axis.values if not (value.is_integer() and low <= value <= high)]
         if broken:

@@ -12,7 +12,14 @@ from support.places import ROOT
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import agree, si_unit
-from vibroimpact.orchestrator.scene import Scene, body_models, models, parse_scene, replay_models
+from vibroimpact.orchestrator.scene import (
+    Scene,
+    body_models,
+    models,
+    parse_scene,
+    replay_models,
+    sweep_models,
+)
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody, Rayleigh
 from vibroimpact.orchestrator.scene.fields import bounds_of, field_of, known_keys, rule_of
 from vibroimpact.orchestrator.scene.general import models as general_models
@@ -21,7 +28,7 @@ from vibroimpact.orchestrator.scene.general.component_facts import component_fac
 REFERENCE = ROOT / "docs" / "scene.md"
 MODELS = {
     found
-    for module in (models, body_models, replay_models, general_models)
+    for module in (models, body_models, replay_models, sweep_models, general_models)
     for found in vars(module).values()
     if isinstance(found, type) and issubclass(found, BaseModel) and found.model_fields
 }
@@ -55,7 +62,12 @@ def test_the_tables_of_the_reference_are_those_of_the_fields() -> None:
 
 def test_the_reference_has_a_table_for_every_model() -> None:
     page = REFERENCE.read_text(encoding="utf-8")
-    within = {"Rayleigh", "TimeSeries", "Compared"}  # told in the rows of the table that holds them
+    within = {
+        "Rayleigh",
+        "TimeSeries",
+        "Compared",
+        "AdaptiveTable",
+    }  # told in the rows of the table that holds them
     assert set(re.findall(r"<!-- keys of (\w+) -->", page)) == {model.__name__ for model in MODELS} - within
 
 

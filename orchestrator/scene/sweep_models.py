@@ -1,0 +1,109 @@
+"""The entries of `[sweep]` as frozen pydantic models; like those of `models`."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from vibroimpact.orchestrator.scene.designs import DesignName
+from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.models import Finite, SceneTable
+from vibroimpact.orchestrator.scene.sweep import SweepPath
+
+MOST_POINTS_PER_AXIS = 10**6
+
+
+class SampleTable(SceneTable):
+    """The entry `sample` of `[sweep]`: how the keys with a distribution are drawn."""
+
+    design: Annotated[
+        DesignName,
+        Rule(
+            doc='`"random"`; `"sobol"`: evenly spread, for a power of 2 of points; `"saltelli"`: that of '
+            "`vibroimpact sensitivity`, keys + 2 runs for each of a power of 2 of points"
+        ),
+    ]
+    points: Annotated[
+        int,
+        Field(ge=1, le=MOST_POINTS_PER_AXIS),
+        Rule(doc="points that are drawn; more keep those there were"),
+    ]
+    seed: Annotated[int, Field(ge=0, le=10**9), Rule(doc="another one draws other points")] = 0
+
+
+class AdaptiveTable(SceneTable):
+    """`adaptive` of an axis as written."""
+
+    tolerance: Annotated[
+        Finite,
+        Field(gt=0),
+        Rule(unit="of the key", doc="intervals where the motion jumps are halved until they are no wider"),
+    ]
+    at_most: Annotated[
+        int | None,
+        Field(ge=2, le=MOST_POINTS_PER_AXIS),
+        Rule(
+            doc="points of the whole sweep; of two adaptive axes one says it, or both the same",
+            default="required",
+        ),
+    ] = None
+    jump: Annotated[
+        Finite,
+        Field(gt=0, le=1),
+        Rule(doc="change of the recorded range, over the largest one, that counts as a jump"),
+    ] = 0.05
+
+
+class AxisTable(SceneTable):
+    """One entry of `[sweep]` as written: a range, a list or a distribution, and a path."""
+
+    start: Annotated[Finite | None, Rule(doc="first value of a range")] = None
+    stop: Annotated[Finite | None, Rule(doc="last value of a range, included")] = None
+    points: Annotated[
+        int | None,
+        Field(ge=1, le=MOST_POINTS_PER_AXIS),
+        Rule(doc="number of values of a range; at least 2 unless start = stop"),
+    ] = None
+    spacing: Annotated[
+        Literal["linear", "log"],
+        Rule(
+            hint="log: each value over the one before is the same.",
+            doc='`"linear"`; `"log"`: each value of a range over the one before is the same, with ends of one sign',
+        ),
+    ] = "linear"
+    values: Annotated[
+        tuple[Finite, ...] | None,
+        Field(strict=False, min_length=1),
+        Rule(doc="instead of a range; all different"),
+    ] = None
+    path: Annotated[SweepPath, Rule()] = "independent"
+    zip: Annotated[
+        str | None,
+        Field(pattern=r"^[a-z][a-z0-9_]*$"),
+        Rule(
+            "a name of small letters, digits and _",
+            hint="Keys with the same name move together.",
+            doc="name of the dimension of keys that move together, of as many values each",
+        ),
+    ] = None
+    distribution: Annotated[
+        Literal["uniform", "log-uniform", "normal"] | None,
+        Rule(
+            hint="Uniform and log-uniform go from low to high; normal has a mean and a deviation.",
+            doc='instead of a range: values are drawn as `sample` says; `"uniform"`, `"log-uniform"`, `"normal"`',
+        ),
+    ] = None
+    low: Annotated[Finite | None, Rule(doc="lowest value of a distribution; normal ones may do without")] = (
+        None
+    )
+    high: Annotated[Finite | None, Rule(doc="highest value of a distribution; likewise")] = None
+    mean: Annotated[Finite | None, Rule(doc="of a normal distribution, before it is cut off")] = None
+    deviation: Annotated[
+        Annotated[Finite, Field(gt=0)] | None,
+        Rule(doc="standard deviation of a normal distribution; likewise"),
+    ] = None
+    adaptive: Annotated[
+        AdaptiveTable | None,
+        Rule("a table with tolerance and at_most", doc="points are put where the motion jumps"),
+    ] = None

@@ -1,0 +1,189 @@
+"""Axes that move together, that are drawn, and that are refined: their values and their problems."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vibroimpact.fmus.errors import SceneError
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.designs import drawn, log_uniform, normal, uniform, unit_design
+from vibroimpact.orchestrator.scene.sweep import expand
+
+TEXT = """
+[body]
+mass = 1
+stiffness = 4
+damping = 0.1
+[[stop]]
+position = 1
+restitution = 0.7
+[record]
+recorded_time = 5
+[sweep]
+"""
+
+
+def swept(*lines: str) -> Scene:
+    return parse_scene(TEXT + "\n".join(lines), "scene.toml")
+
+
+def problems(*lines: str) -> list[str]:
+    with pytest.raises(SceneError) as caught:
+        swept(*lines)
+    return str(caught.value).splitlines()
+
+
+def test_keys_with_one_zip_move_together_and_other_keys_span_them() -> None:
+    scene = swept(
+        '"body.mass" = { values = [1, 2, 3], zip = "size" }',
+        '"body.damping" = { values = [0, 0.5] }',
+        '"body.stiffness" = { values = [4, 5, 6], zip = "size" }',
+    )
+    (branch,) = expand(scene)
+    keys = ("body.mass", "body.stiffness", "body.damping")
+    points = [tuple(point.values[key] for key in keys) for point in branch.points]
+    assert scene.runs == 6
+    assert points == [(1, 4, 0), (1, 4, 0.5), (2, 5, 0), (2, 5, 0.5), (3, 6, 0), (3, 6, 0.5)]
+
+
+def test_a_zipped_value_may_repeat_while_its_points_differ() -> None:
+    zipped = (
+        '"body.mass" = { values = [1, 1], zip = "size" }',
+        '"body.stiffness" = { values = [4, %d], zip = "size" }',
+    )
+    assert swept(zipped[0], zipped[1] % 5).runs == 2
+    assert "got 1.0, 4.0 2 times" in problems(zipped[0], zipped[1] % 4)[0]
+
+
+@given(
+    st.sampled_from(["random", "sobol", "saltelli"]), st.integers(0, 6), st.integers(1, 5), st.integers(0, 99)
+)
+def test_a_larger_design_begins_with_the_smaller_one(design: str, power: int, keys: int, seed: int) -> None:
+    small, large = (unit_design(design, 2**p, keys, seed) for p in (power, power + 1))  # type: ignore[arg-type]
+    assert (large[: len(small)] == small).all()
+    assert ((large >= 0) & (large < 1)).all()
+
+
+@given(st.floats(1e-3, 1e3), st.floats(1.001, 1e3), st.floats(0, 1, exclude_max=True))
+def test_no_drawn_value_lies_outside_its_ends(low: float, ratio: float, share: float) -> None:
+    high = low * ratio
+    spread = normal(0.5 * (low + high), high - low, low, high)
+    for quantile in (uniform(low, high), log_uniform(low, high), spread):
+        (value,) = drawn(np.array([share]), quantile, low, high)
+        assert low <= value <= high
+
+
+def test_drawn_values_have_the_moments_of_their_distribution() -> None:
+    shares = unit_design("sobol", 4096, 1, 2)[:, 0]
+    flat = np.array(drawn(shares, uniform(2.0, 5.0), 2.0, 5.0))
+    bell = np.array(drawn(shares, normal(3.0, 0.5), -math.inf, math.inf))
+    decades = np.log10(drawn(shares, log_uniform(1.0, 1e4), 1.0, 1e4))
+    assert (flat.mean(), flat.std()) == pytest.approx((3.5, 3.0 / math.sqrt(12.0)), rel=1e-3)
+    assert (bell.mean(), bell.std()) == pytest.approx((3.0, 0.5), rel=2e-3)
+    assert (decades.mean(), decades.std()) == pytest.approx((2.0, 4.0 / math.sqrt(12.0)), rel=1e-3)
+
+
+def test_a_saltelli_design_changes_one_column_at_a_time() -> None:
+    a, b, first, second = unit_design("saltelli", 1, 2, 0)
+    assert first.tolist() == [b[0], a[1]]
+    assert second.tolist() == [a[0], b[1]]
+
+
+UNIFORM = '"body.mass" = { distribution = "uniform", low = %s, high = %s }'
+SOBOL = 'sample = { design = "sobol", points = 8 }'
+BAD = {
+    "expected low < high, got low = 2.0 and high = 1.0": [SOBOL, UNIFORM % (2, 1)],
+    "expected a number > 0, got -": [SOBOL, UNIFORM % (-1, 1)],
+    "expected sample beside a distribution, got none": [UNIFORM % (1, 2)],
+    "expected a power of 2 of a sobol design, got 100. Use 64 or 128": [
+        SOBOL.replace("8", "100"),
+        UNIFORM % (1, 2),
+    ],
+    "expected keys that are drawn, got none": [SOBOL, '"body.mass" = { values = [1, 2] }'],
+    "expected mean and deviation of a normal distribution, got mean": [
+        SOBOL,
+        '"body.mass" = { distribution = "normal", mean = 1 }',
+    ],
+    "expected low > 0 of a log-uniform distribution": [
+        SOBOL,
+        (UNIFORM % (-1, 1)).replace("uniform", "log-uniform"),
+    ],
+    "expected low and high around the mean": [
+        SOBOL,
+        '"body.mass" = { distribution = "normal", mean = 1, deviation = 0.1, low = 5 }',
+    ],
+    "expected a distribution beside them, got low": [
+        '"body.mass" = { start = 1, stop = 2, points = 3, low = 0 }'
+    ],
+    "got 2 of body.mass and 3 of body.stiffness": [
+        '"body.mass" = { values = [1, 2], zip = "size" }',
+        '"body.stiffness" = { values = [1, 2, 3], zip = "size" }',
+    ],
+    'expected "independent" beside zip': ['"body.mass" = { values = [1, 2], zip = "size", path = "up" }'],
+    "expected a name that datasets do not use themselves": ['"body.mass" = { values = [1, 2], zip = "run" }'],
+    "expected a zip that is no name of a swept key": ['"body.mass" = { values = [1, 2], zip = "mass" }'],
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_wrong_axis_is_one_line_that_says_what_to_do(text: str) -> None:
+    (problem,) = problems(*BAD[text])
+    assert text in problem
+
+
+RANGE = "start = 1, stop = 2, points = 5"
+BAD_ADAPTIVE = {
+    "expected a tolerance >= 1.78e-15, got 1e-16": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-16, at_most = 90 }} }}'
+    ],
+    "expected a tolerance < 0.25": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 0.3, at_most = 90 }} }}'
+    ],
+    "expected more than 5 points, got 5": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 5 }} }}'
+    ],
+    "expected the most points of the sweep, got nothing": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3 }} }}'
+    ],
+    'got the unknown key "at_mos". Did you mean at_most?': [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_mos = 9 }} }}'
+    ],
+    "expected one or two adaptive axes": [
+        f'"{key}" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 900 }} }}'
+        for key in ("body.mass", "body.stiffness", "body.damping")
+    ],
+    'expected "independent" of two adaptive axes': [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 900 }} }}',
+        f'"body.damping" = {{ {RANGE}, path = "up", adaptive = {{ tolerance = 1e-3 }} }}',
+    ],
+    "expected no axis beside two adaptive ones": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 900 }} }}',
+        f'"body.damping" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3 }} }}',
+        '"body.stiffness" = { values = [1, 2] }',
+    ],
+    "expected one number of points for the whole sweep, got 800 and 900": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 900 }} }}',
+        f'"body.damping" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 800 }} }}',
+    ],
+}
+
+
+@pytest.mark.parametrize("text", BAD_ADAPTIVE)
+def test_a_wrong_adaptive_axis_is_one_line_that_says_what_to_do(text: str) -> None:
+    (problem,) = problems(*BAD_ADAPTIVE[text])
+    assert text in problem
+
+
+def test_a_whole_number_is_not_adaptive() -> None:
+    text = TEXT.replace("mass = 1", 'kind = "chain"\nmasses = [1, 1, 1, 1]').replace(
+        "stiffness = 4", "stiffnesses = [1, 1, 1, 1]"
+    )
+    text = text.replace("damping = 0.1\n", "")
+    line = '"body.modes" = { values = [1, 4], adaptive = { tolerance = 1, at_most = 9 } }'
+    with pytest.raises(SceneError, match="expected a key between whose values there are others"):
+        parse_scene(text + line, "scene.toml")
