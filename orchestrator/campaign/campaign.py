@@ -152,7 +152,15 @@ def run_campaign(
     with locked_folder(home):
         campaign = _Campaign(scene, home, runner, progress or Progress())
         opened = partial(open_workers, workers=workers, scheduler=scheduler, progress=progress)
-        return campaign.finished_before() or campaign.run(opened)
+        try:
+            return campaign.finished_before() or campaign.run(opened)
+        except OSError as error:
+            # Of this process or of a worker: the folder for temporary files may be full too.
+            raise CampaignError(
+                f"{error.filename or home}: expected a file that can be read and written, got "
+                f"{error.strerror or error}. Make room or restore access, there and in the folder for temporary "
+                f"files; then the same {typed_or_called('command', 'call')} resumes."
+            ) from error
 
 
 class _Campaign:

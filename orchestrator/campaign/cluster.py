@@ -83,7 +83,8 @@ def open_workers(
         When the workers cannot be started.
     """
     # Dask warns of workers that end: they are meant to, or an error says it better.
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):  # which have levels of their own
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     with warnings.catch_warnings(), dask.config.set(QUIET), ExitStack() as stack:
         # Ctrl-C may come between the making of a coroutine of Dask and its start.
         warnings.filterwarnings("ignore", "coroutine .* was never awaited", RuntimeWarning)

@@ -11,6 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import psutil
+import xarray as xr
 from support.campaign_scenes import TIMING, frequency_text
 from support.places import TESTS
 
@@ -70,8 +71,12 @@ def _undisturbed(path: str) -> Content:
 
 
 def content(dataset: Path) -> Content:
+    """Return what is in a file, without what tells one computation from another."""
+    return bits_of(read_flat(dataset))
+
+
+def bits_of(flat: xr.Dataset) -> Content:
     """Return the bits of each variable, and the attributes, without what tells one computation from another."""
-    flat = read_flat(dataset)
     bits = {
         str(name): (
             str({key: str(value) for key, value in variable.attrs.items()}),

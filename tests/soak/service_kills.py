@@ -28,9 +28,14 @@ def check(seed: int) -> str | None:
     """Submit, kill, start again, and compare with a campaign that nothing disturbed."""
     chance = random.Random(seed)
     path = chance.choice(sorted(POINTS))
-    expected = _undisturbed(path)
+    return disturbed(chance, path, POINTS[path], TRANSIENT)
+
+
+def disturbed(chance: random.Random, path: str, points: int, transient: int) -> str | None:
+    """Do it with a sweep of so many points, each after so many periods."""
+    expected = _undisturbed(path, points, transient)
     scene, folder = Path("scene.toml"), Path("service").absolute()
-    scene.write_text(sweep_text(POINTS[path], TRANSIENT, path))
+    scene.write_text(sweep_text(points, transient, path))
     served = Served(folder)
     try:
         with served.client() as service:
@@ -67,11 +72,11 @@ def _end_of(served: Served, name: str, folder: Path, expected: Content) -> str |
 
 
 @lru_cache(maxsize=2)
-def _undisturbed(path: str) -> Content:
+def _undisturbed(path: str, points: int, transient: int) -> Content:
     folder = Path(f"undisturbed-{path}")
     folder.mkdir()
     scene = folder / "scene.toml"
-    scene.write_text(sweep_text(POINTS[path], TRANSIENT, path))
+    scene.write_text(sweep_text(points, transient, path))
     vi.campaign(scene, folder / "campaign", workers=2, progress=False).close()
     return content(folder / "campaign" / "dataset.nc")
 

@@ -49,7 +49,8 @@ enum {
     FAULT_STOP_PROCESS,
     FAULT_CLOSE_FILES,
     FAULT_KILL_PARENT,
-    FAULT_ENDLESS_LOG
+    FAULT_ENDLESS_LOG,
+    FAULT_BY_INPUT
 };
 /* s; a lie that lies beyond every run */
 #define BEYOND 360000.0
@@ -222,9 +223,19 @@ static step_answer says(model *m, double time)
     return STEP_SAYS;
 }
 
+/* The fault that is asked for; with `by_input` one input of a hundred brings each of three. */
+static int asked_for(const model *m)
+{
+    if ((int)m->value[FAULT] != FAULT_BY_INPUT) {
+        return (int)m->value[FAULT];
+    }
+    const int fault = (int)m->value[U] % 100;
+    return fault == FAULT_HANG || fault == FAULT_SEGFAULT || fault == FAULT_NOT_A_NUMBER ? fault : FAULT_NONE;
+}
+
 static step_answer misbehave(model *m, double time, void *instance)
 {
-    const int fault = (int)m->value[FAULT];
+    const int fault = asked_for(m);
     if (misbehave_anywhere(fault, time, instance)) {
         return STEP_DONE;
     }

@@ -1,0 +1,22 @@
+"""A small one of the fault campaigns of `make soak`; not every round of it fits into seconds."""
+
+from __future__ import annotations
+
+import random
+import signal
+from pathlib import Path
+
+import pytest
+from soak import faults
+
+POINTS = 150
+ROUNDS = ["workers killed and stopped", "damaged parts"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="processes cannot be stopped here")
+def test_a_disturbed_campaign_of_misbehaving_fmus_loses_and_blames_no_innocent_point(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert faults.disturbed(random.Random(15), POINTS, ROUNDS) is None

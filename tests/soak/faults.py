@@ -1,0 +1,335 @@
+"""Everything at once: a campaign of FMUs that misbehave, disturbed in every way, loses and doubles no innocent point.
+
+One point of a hundred segfaults, one hangs, one gives NaN. Meanwhile workers are killed and stopped, the command is
+killed, its disk is full, parts are damaged and the scheduler is restarted; each time the same command goes on. What
+comes out is compared, bit for bit, with what nobody disturbed. A service that is killed gets as many points: of an
+oscillator, since it loads no FMUs of others.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import psutil
+import xarray as xr
+from support import fmu_factory
+from support.campaign_process import wait_until
+from support.command_line import ENTRY
+
+from soak import service_kills
+from soak.flipped_parts import DAMAGES
+from soak.kills import Content, bits_of, difference
+from vibroimpact.analysis.dataset import Outcome, read_flat
+
+CASES = 2
+SAMPLE = 0
+"""None: `make test` has a campaign of a few hundred points of its own (`tests/end_to_end/test_fault_campaign.py`)."""
+SECONDS = 3600.0
+POINTS = 10_000
+SERVICE_TRANSIENT = 4_000
+"""Periods before the recording: a point of the service's takes some two milliseconds."""
+POINTS_PER_SECOND = 60.0
+"""On an idle machine of two processors, hangs and crashes included: so long is a round before its command is killed."""
+DEADLINE = 0.5
+STOPPED_SECONDS = 3.0 * DEADLINE
+"""How long a process is stopped: longer than a point may take."""
+WAIT_SECONDS = 1800.0
+GUILTY = {4: Outcome.timeout, 7: Outcome.crash, 10: Outcome.error}
+"""What becomes of the inputs that leave these numbers of a hundred (`by_input` of Faulty)."""
+FULL = 1024
+"""Bytes that a file may have once the disk counts as full."""
+SCENE = """
+[scene]
+title = "guilty and innocent"
+units = "SI"
+[component.culprit]
+fmu = "{fmu}"
+parameters = {{ fault = "by_input", fault_time = 0.35 }}
+[record]
+recorded_time = 0.5
+variables = ["culprit.y"]
+rate = 20
+[sweep]
+"culprit.u" = {{ start = 0, stop = {last}, points = {points} }}
+[execution]
+macro_step = 0.1
+deadline = {deadline}
+"""
+
+
+def check(seed: int) -> str | None:
+    """Disturb a campaign of the command line, then one of a service."""
+    chance = random.Random(seed)
+    rounds = list(ROUNDS)
+    chance.shuffle(rounds)
+    return disturbed(chance, POINTS, rounds) or service_kills.disturbed(
+        chance, "independent", POINTS, SERVICE_TRANSIENT
+    )
+
+
+def disturbed(chance: random.Random, points: int, rounds: list[str]) -> str | None:
+    """Disturb a campaign in each of the ways named, in their order, let it end, and compare."""
+    Path("scene.toml").write_text(
+        SCENE.format(
+            fmu=fmu_factory.faulty(Path.cwd(), "3.0").name, last=points - 1, points=points, deadline=DEADLINE
+        )
+    )
+    seconds = points / POINTS_PER_SECOND / (len(rounds) + 1)
+    for name in rounds:
+        problem = ROUNDS[name](chance, seconds)
+        if problem is not None:
+            return f"{name}: {problem}"
+    code, said = Command().end(by_force=False)
+    return _compared(points) if code == 0 else f"the last command ended with {code}: {said}"
+
+
+class Command:
+    """`vibroimpact campaign scene.toml -o campaign` in a session of its own."""
+
+    def __init__(self, *options: str, folder: str = "campaign") -> None:
+        Path("scratch").mkdir(exist_ok=True)
+        self._errors = Path(f"{folder}.err")
+        arguments = ["campaign", "scene.toml", "-o", folder, *(options or ("--workers", "2"))]
+        with self._errors.open("w", encoding="utf-8") as errors:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", ENTRY, *arguments],
+                stdout=subprocess.DEVNULL,
+                stderr=errors,
+                start_new_session=True,
+                # Python itself writes compiled modules cut off where the disk is full
+                env=os.environ | {"TMPDIR": str(Path("scratch").absolute()), "PYTHONDONTWRITEBYTECODE": "1"},
+            )
+
+    def session(self) -> list[psutil.Process]:
+        """Return its living processes."""
+        found = []
+        for process in psutil.process_iter():
+            try:
+                if os.getsid(process.pid) == self.process.pid and process.status() != psutil.STATUS_ZOMBIE:
+                    found.append(process)
+            except (ProcessLookupError, psutil.Error):
+                continue
+        return found
+
+    def workers(self) -> list[psutil.Process]:
+        """Return its worker processes."""
+        return [one for one in self.session() if one.ppid() == self.process.pid and _is_worker(one)]
+
+    def runs_for(self, seconds: float) -> bool:
+        """Wait so long; return whether it still runs."""
+        try:
+            self.process.wait(max(seconds, 0.0))
+        except subprocess.TimeoutExpired:
+            return True
+        return False
+
+    def said(self) -> str:
+        """Return what it wrote to its standard error."""
+        return self._errors.read_text(encoding="utf-8")
+
+    def end(self, *, by_force: bool) -> tuple[int | None, str]:
+        """Kill it, or wait for its end; return its exit code (None: it hung) and what it said."""
+        if by_force:
+            self.process.kill()
+        try:
+            code: int | None = self.process.wait(WAIT_SECONDS)
+        except subprocess.TimeoutExpired:
+            code = None
+        wait_until(lambda: not self.session(), seconds=20.0)
+        outlived = self.session()
+        for left in outlived:
+            left.kill()
+        return (1, f"processes outlived it: {outlived}") if outlived else (code, self.said()[-2000:])
+
+
+def _begun(*options: str) -> Command:
+    """Start the command and wait until it has computed something."""
+    before = _parts_there()
+    command = Command(*options)
+    wait_until(lambda: command.process.poll() is not None or _parts_there() - before != set())
+    return command
+
+
+def _parts_there() -> set[str]:
+    return {part.name for part in Path("campaign", "parts").glob("branch-*.nc")}
+
+
+def _is_worker(process: psutil.Process) -> bool:
+    try:
+        return "spawn_main" in " ".join(process.cmdline())
+    except psutil.Error:
+        return False
+
+
+# ---- rounds: None, or a problem ----
+
+
+def _workers(chance: random.Random, seconds: float) -> str | None:
+    """Kill and stop workers, and now and then stop all processes, as Ctrl-Z and a lid do."""
+    command, end = _begun(), time.monotonic() + seconds
+    while command.runs_for(min(chance.expovariate(0.5), end - time.monotonic())):
+        if time.monotonic() >= end:
+            break
+        workers = command.workers()
+        draw = chance.random()
+        if workers and draw < 0.4:
+            _signal([chance.choice(workers)], signal.SIGKILL)
+        elif workers:
+            stopped = [chance.choice(workers)] if draw < 0.7 else command.session()
+            _signal(stopped, signal.SIGSTOP)
+            time.sleep(STOPPED_SECONDS)
+            _signal(stopped, signal.SIGCONT)
+    return _killed(command)
+
+
+def _client(_chance: random.Random, seconds: float) -> str | None:
+    command = _begun()
+    command.runs_for(seconds)
+    return _killed(command)
+
+
+def _killed(command: Command) -> str | None:
+    """Kill a command that has not ended by itself; one that has must have ended well."""
+    over = command.process.poll()
+    code, said = command.end(by_force=True)
+    return None if over in (None, 0) and code in (0, -signal.SIGKILL) else f"exit code {code}: {said}"
+
+
+def _disk(_chance: random.Random, seconds: float) -> str | None:
+    """Let the disk be full from some moment on: no file may grow."""
+    command = _begun()
+    command.runs_for(seconds)
+    for process in command.session():
+        process.rlimit(psutil.RLIMIT_FSIZE, (FULL, FULL))
+    code, said = command.end(by_force=False)
+    if code == 0:
+        return None
+    good = code == 1 and "Make room" in said and "Traceback" not in said
+    return None if good else f"exit code {code} with a full disk: {said}"
+
+
+def _parts(chance: random.Random, seconds: float) -> str | None:
+    """Damage parts, of which the next command must know."""
+    parts = sorted(Path("campaign", "parts").glob("branch-*.nc"))
+    damaged = []
+    for part in chance.sample(parts, min(3, len(parts))):
+        before = part.read_bytes()
+        part.write_bytes(DAMAGES[chance.choice(sorted(DAMAGES))](chance, before))
+        damaged += [part.name] if part.read_bytes() != before else []
+    command = Command()
+    wait_until(lambda: command.process.poll() is not None or all(name in command.said() for name in damaged))
+    command.runs_for(seconds)
+    said = command.said()
+    unnamed = [name for name in damaged if f"{name} was damaged and is removed" not in said]
+    return _killed(command) or (f"not named: {unnamed}: {said[-2000:]}" if unnamed else None)
+
+
+def _scheduler(chance: random.Random, seconds: float) -> str | None:
+    """Restart the scheduler of others in the middle, and kill one of its workers before."""
+    port = _free_port()
+    address = f"tcp://127.0.0.1:{port}"
+    with _external(port) as first:
+        command = _begun("--scheduler", address)
+        command.runs_for(0.3 * seconds)
+        chance.choice(first[1:]).kill()
+        command.runs_for(0.3 * seconds)
+    before = _parts_there()
+    with _external(port):
+        wait_until(lambda: command.process.poll() is not None or _parts_there() > before, seconds=120.0)
+        over = command.process.poll()
+        code, said = command.end(by_force=True)
+    good = over in (None, 0) or (over == 1 and "resumes" in said and "Traceback" not in said)
+    return None if good and code is not None else f"exit code {code}: {said}"
+
+
+def _free_port() -> int:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return int(listener.getsockname()[1])
+
+
+@contextmanager
+def _external(port: int) -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Start a scheduler and three workers that belong to nobody, and kill them."""
+    Path("external").mkdir(exist_ok=True)
+    commands = [["scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]]
+    worker = ["worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    commands += [worker] * 3
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-m", "dask", *arguments],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=os.environ | {"TMPDIR": str(Path("external").absolute())},
+        )
+        for arguments in commands
+    ]
+    try:
+        yield started
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def _signal(processes: list[psutil.Process], number: signal.Signals) -> None:
+    for process in processes:
+        try:
+            process.send_signal(number)
+        except psutil.Error:
+            continue  # it ended by itself
+
+
+ROUNDS: dict[str, Callable[[random.Random, float], str | None]] = {
+    "workers killed and stopped": _workers,
+    "the command killed": _client,
+    "a full disk": _disk,
+    "damaged parts": _parts,
+    "a scheduler that is restarted": _scheduler,
+}
+
+
+# ---- what comes out ----
+
+
+def _compared(points: int) -> str | None:
+    code, said = Command(folder="undisturbed").end(by_force=False)
+    if code != 0:
+        return f"the undisturbed campaign ended with {code}: {said}"
+    if left := [entry.name for entry in Path("scratch").iterdir()]:
+        return f"left behind in the folder for temporary files: {left}"
+    got = read_flat(Path("campaign", "dataset.nc"))
+    return _misjudged(got, points) or difference(
+        _content(read_flat(Path("undisturbed", "dataset.nc"))), _content(got)
+    )
+
+
+def _misjudged(rows: xr.Dataset, points: int) -> str | None:
+    """Name points that are lost, doubled, or blamed for what they have not done."""
+    inputs = rows["u"].values
+    if not np.array_equal(inputs, np.arange(float(points))):
+        return f"{len(inputs)} rows, which are not the {points} points each once"
+    expected = np.array([GUILTY.get(int(u) % 100, Outcome.ok) for u in inputs])
+    wrong = np.flatnonzero(rows["outcome"].values != expected)
+    if wrong.size:
+        at = wrong[0]
+        outcome = Outcome(rows["outcome"].values[at]).name
+        return f"{wrong.size} points misjudged, the first u = {inputs[at]:g}: {outcome}: {rows['message'].values[at]}"
+    unnamed = [str(text) for text in rows["message"].values[expected != Outcome.ok] if "culprit" not in text]
+    return f"{len(unnamed)} messages do not name the component: {unnamed[0]}" if unnamed else None
+
+
+def _content(rows: xr.Dataset) -> Content:
+    """Return the bits of everything but the messages of those whose process died: what they say depends on where."""
+    innocent = rows["outcome"].values == Outcome.ok
+    return bits_of(rows.assign(message=rows["message"].where(innocent, "")))
