@@ -40,9 +40,9 @@ class Told(Progress):
         super().__init__()
         self._last, self._told = 0.0, 0
 
-    def begin(self, total: int, done: int) -> None:
+    def begin(self, total: int, done: int, said: str = "") -> None:
         """Say it at once."""
-        super().begin(total, done)
+        super().begin(total, done, said)
         self._told = done
         say(total=total, done=done)
 

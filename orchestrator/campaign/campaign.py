@@ -12,10 +12,11 @@ from __future__ import annotations
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -61,11 +62,12 @@ from vibroimpact.orchestrator.campaign.parts import (
 )
 from vibroimpact.orchestrator.campaign.pool import WorkerPool
 from vibroimpact.orchestrator.campaign.progress import Progress
+from vibroimpact.orchestrator.campaign.rounds import Rounds, Stage, adaptive_axes, stages_of
 from vibroimpact.orchestrator.campaign.schedule import ChunkSchedule
 from vibroimpact.orchestrator.campaign.shared_folder import refuse_blind_workers
 from vibroimpact.orchestrator.run import RunnerIdentity
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import expand, run_count
+from vibroimpact.orchestrator.scene.sweep import run_count
 
 MOST_ROUNDS = 3
 """How often parts that turn out unfit are computed again by one command."""
@@ -179,6 +181,7 @@ class _Campaign:
         self._go_on_with_this_sweep()
         hashed = self._manifest.scene_hash if self._manifest is not None else scene_hash(scene)
         self._kept_path = kept_path(self._parts_folder, hashed)
+        self._rounds: Rounds | None = None
         self._work = Work(
             scene.model_copy(update={"source": source}),
             str(self._parts_folder),
@@ -269,17 +272,34 @@ class _Campaign:
         """Compute what no part holds, and return the files that hold all runs."""
         remove_temporary_files(self._parts_folder)
         self._report.chunks.clear()
+        self._rounds = Rounds(self._scene) if adaptive_axes(self._scene) else None
         kept = self._read_kept()
         runs = kept.runs if kept is not None else NO_RUNS
         parts = list_parts(self._parts_folder, self._work.scene_hash, self._progress.note, runs)
         self._report.resumed = runs.size + sum(part.rows for part in parts)
-        held = sorted(
-            [*parts, *(kept.stretches if kept is not None else ())], key=lambda part: part.chunk.first
-        )
         stored = [part.path for part in parts] + ([kept.path] if kept is not None else [])
-        if self._report.resumed < self._report.runs:
-            self._compute_on(held, stored, workers)
-        return stored + [self._parts_folder / chunk.part_name for chunk in self._report.chunks]
+        stages = stages_of(
+            self._scene,
+            self._rounds,
+            lambda: [*parts, *self._computed()],
+            kept.stretches if kept is not None else (),
+        )
+        # of a sweep the number of runs is known, of rounds the first that is not complete
+        stage = next(stages, None) if self._rounds or self._report.resumed < self._report.runs else None
+        if stage is not None:
+            there = [path for path in stored if path.exists()]
+            self._compute_on(chain([stage], stages), there, workers)
+        found = [path for path in stored if path.exists()] + [part.path for part in self._computed()]
+        if self._rounds is not None:
+            self._report.runs = sum(part.rows for part in [*parts, *self._computed()] if part.path.exists())
+        return found
+
+    def _computed(self) -> list[StoredPart]:
+        """Return the parts that were computed by now."""
+        folder = self._parts_folder
+        return [
+            StoredPart(folder / chunk.part_name, chunk, None, chunk.count) for chunk in self._report.chunks
+        ]
 
     def _read_kept(self) -> Kept | None:
         for path in own_files(self._parts_folder):
@@ -303,27 +323,28 @@ class _Campaign:
             f"The same {typed_or_called('command', 'call')} resumes."
         )
 
-    def _compute_on(
-        self, parts: Sequence[StoredPart], stored: Sequence[Path], workers: OpenedWorkers
-    ) -> None:
+    def _compute_on(self, stages: Iterable[Stage], stored: Sequence[Path], workers: OpenedWorkers) -> None:
         try:
             with workers() as pool:
                 if not pool.is_local:
                     refuse_blind_workers(pool, self._home)
                 work = replace(self._work, identity=_common_identity(pool, self._work))
                 self._agree_with_manifest(pool, work, stored)
-                self._compute_with(pool, work, parts)
+                self._compute_with(pool, work, stages)
         finally:
             # A worker that was stopped may have been writing.
             remove_temporary_files(self._parts_folder)
 
-    def _compute_with(self, pool: WorkerPool, work: Work, parts: Sequence[StoredPart]) -> None:
+    def _compute_with(self, pool: WorkerPool, work: Work, stages: Iterable[Stage]) -> None:
         self._report.workers = len(pool.worker_addresses())
-        schedule = ChunkSchedule(expand(self._scene), parts, self._report.workers)
         began = time.perf_counter()
-        self._progress.begin(self._report.runs, self._report.resumed)
         try:
-            Computation(pool, work, schedule, self._take).run()
+            for stage in stages:
+                schedule = ChunkSchedule(stage.branches, stage.held, self._report.workers)
+                self._report.runs = stage.runs
+                self._progress.begin(stage.runs, stage.runs - schedule.left, stage.said)
+                own = replace(work, branches=stage.branches) if self._rounds is not None else work
+                Computation(pool, own, schedule, self._take).run()
         finally:
             self._report.compute_seconds += time.perf_counter() - began
             self._report.lost_workers += pool.lost_workers
@@ -385,7 +406,8 @@ class _Campaign:
             raise CampaignError(
                 f"{self._manifest_path}: expected the manifest of this campaign, got no file. Put it back."
             )
-        return manifest.attributes(self._scene) | {"scene_hash": scene_hash(self._scene)}
+        found = manifest.attributes(self._scene) | {"scene_hash": scene_hash(self._scene)}
+        return found | ({} if self._rounds is None else {"unresolved_jumps": self._rounds.left})
 
 
 def _common_identity(pool: WorkerPool, work: Work) -> RunnerIdentity:

@@ -59,6 +59,8 @@ class Work:
         What the runner must be; None while the campaign still asks.
     kept : str
         File with the runs of an earlier sweep that are left out of all chunks; it may be absent.
+    branches : tuple of Branch
+        The points of a round of an adaptive sweep; empty: those of the scene's sweep.
     """
 
     scene: Scene
@@ -67,6 +69,7 @@ class Work:
     scene_hash: str = ""
     identity: RunnerIdentity | None = None
     kept: str = ""
+    branches: tuple[Branch, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +146,7 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     branches, runner = _opened(work.scene, work.runner)
     _refuse_other_runner(work, runner)
     began = time.perf_counter()
-    points = _points_left(work, branches, chunk)
+    points = _points_left(work, work.branches or branches, chunk)
     if not points:
         return ChunkResult(chunk, chunk.start, {}, 0.0)
     records, carried = run_points(work.scene, runner, points, chunk.start, began + chunk.most_seconds)
@@ -166,7 +169,7 @@ def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
 
 def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     """Write the part of points that kill the process that runs them; nothing of the points is run."""
-    points = _points_left(work, expand(work.scene), chunk)
+    points = _points_left(work, work.branches or expand(work.scene), chunk)
     records = [empty_record(work.scene, Outcome.crash, message, 0.0) for _ in points]
     return ChunkResult(chunk, chunk.start, write_part(work, chunk, points, records, chunk.start), 0.0)
 
@@ -181,11 +184,12 @@ def _refuse_other_runner(work: Work, runner: Runner) -> None:
 
 @dataclass(frozen=True, slots=True)
 class BranchPoint:
-    """A point, the direction it is travelled in, and whether its branch begins with it."""
+    """A point, the direction it is travelled in, whether its branch begins with it, and from which state then."""
 
     point: Point
     direction: Direction
     first: bool
+    start: State | None = None
 
 
 def points_of(branches: Sequence[Branch], chunk: Chunk) -> list[BranchPoint]:
@@ -197,7 +201,7 @@ def points_of(branches: Sequence[Branch], chunk: Chunk) -> list[BranchPoint]:
             break
         direction = Direction[branch.direction]
         inside = branch.points[max(chunk.first - first, 0) : chunk.stop - first]
-        points += [BranchPoint(point, direction, point.index == first) for point in inside]
+        points += [BranchPoint(point, direction, point.index == first, branch.start) for point in inside]
     return points
 
 
@@ -233,7 +237,7 @@ def run_points(
     carried = start
     records = []
     for place in points:
-        given = None if place.first else carried
+        given = place.start if place.first else carried
         record = run_point(scene, runner, place.point, given)
         records.append(record)
         carried = None if place.direction is Direction.independent else _next_start(record, given)

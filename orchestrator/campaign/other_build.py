@@ -21,7 +21,7 @@ from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, Work, comp
 from vibroimpact.orchestrator.campaign.extension import final_states, without_empty_periods
 from vibroimpact.orchestrator.campaign.pool import WorkerPool
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import expand
+from vibroimpact.orchestrator.scene.sweep import expand, run_count
 
 MOST_POINTS = 8
 """Points that are computed again."""
@@ -73,8 +73,10 @@ def _chosen(scene: Scene, stored: Sequence[Path]) -> Iterator[tuple[Chunk, xr.Da
         rows = read_flat(stored[place])
         run, states = rows.run_index.values, final_states(rows, slice(None))
         carries = np.isin(rows.outcome.values, CARRYING) & np.isfinite(states).all(axis=1)
+        # where a refined point of an adaptive path started is not in its row
+        first_round = run < run_count(scene.sweep)
         begins, follows = run % length == 0, np.append(False, (np.diff(run) == 1) & carries[:-1])
-        known = np.flatnonzero(np.isin(rows.outcome.values, COMPARABLE) & (begins | follows))
+        known = np.flatnonzero(np.isin(rows.outcome.values, COMPARABLE) & (begins | follows) & first_round)
         for row in known[_spread(known.size, max(MOST_POINTS // files.size, 1))]:
             taken = float(rows.point_seconds.values[row])
             if seconds and seconds + taken > MOST_SECONDS:

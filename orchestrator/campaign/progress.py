@@ -27,11 +27,12 @@ class Progress:
 
     def __init__(self) -> None:
         self._total = self._done = self._resumed = 0
-        self._lost = ""
+        self._lost, self._stage = "", ""
         self._began = time.monotonic()
 
-    def begin(self, total: int, done: int) -> None:
-        """Take note that `done` of `total` points are there already, and start the clock."""
+    def begin(self, total: int, done: int, said: str = "") -> None:
+        """Take note that `done` of `total` points are there already, and start the clock; `said` names their round."""
+        self._stage = said
         self._total, self._done, self._resumed = total, done, done
         self._began = time.monotonic()
 
@@ -68,7 +69,8 @@ class Lines(Progress):
         if now - max(self._last_line, self._began) >= LINE_SECONDS or self._done == self._total:
             self._last_line = now
             rate, remaining = self._pace()
-            self.note(f"{self._done} of {self._total} points, {rate}, {remaining} remaining{self._lost}")
+            done = f"{self._done} of {self._total} points{self._stage}"
+            self.note(f"{done}, {rate}, {remaining} remaining{self._lost}")
 
     def note(self, text: str) -> None:
         """Write a line."""
@@ -81,12 +83,12 @@ class Bar(Progress):
     def __init__(self, bar: RichBar) -> None:
         super().__init__()
         self._bar = bar
-        self._task = bar.add_task("points", total=None, rate="", remaining="", lost="")
+        self._task = bar.add_task("points", total=None, rate="", remaining="", lost="", round="")
 
-    def begin(self, total: int, done: int) -> None:
+    def begin(self, total: int, done: int, said: str = "") -> None:
         """Show the bar."""
-        super().begin(total, done)
-        self._bar.update(self._task, total=total, completed=done)
+        super().begin(total, done, said)
+        self._bar.update(self._task, total=total, completed=done, round=said)
 
     def advance(self, points: int) -> None:
         """Move the bar; it is drawn by a clock, not here."""
@@ -111,9 +113,9 @@ class NotebookBar(Progress):
         self._show = show
         self._notes, self._drawn = "", 0.0
 
-    def begin(self, total: int, done: int) -> None:
+    def begin(self, total: int, done: int, said: str = "") -> None:
         """Show the bar."""
-        super().begin(total, done)
+        super().begin(total, done, said)
         self._draw()
 
     def advance(self, points: int) -> None:
@@ -132,7 +134,7 @@ class NotebookBar(Progress):
         rate, remaining = self._pace()
         left = f", {rate}, {remaining} remaining" if self._done > self._resumed else ""
         bar = f'<progress max="{self._total}" value="{self._done}"></progress>'
-        self._show(f"{bar} {self._done} of {self._total} points{left}{self._lost}{self._notes}")
+        self._show(f"{bar} {self._done} of {self._total} points{self._stage}{left}{self._lost}{self._notes}")
 
 
 def _notebook() -> Callable[[str], None] | None:
@@ -184,7 +186,7 @@ def shown_progress(stream: TextIO | None = None) -> Iterator[Progress]:
     columns = (
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("points"),
+        TextColumn("points{task.fields[round]}"),
         TextColumn("{task.fields[rate]}"),
         TextColumn("{task.fields[remaining]} remaining{task.fields[lost]}"),
     )

@@ -203,11 +203,14 @@ class Branch:
         Values of the spanning axes, the same for all points; empty for the independent branch.
     points : Points
         The points in the order of travel; `point.index` is their place in the `run` dimension.
+    start : tuple of float or None
+        State that the first point starts from; None: the scene's own.
     """
 
     direction: SweepDirection
     fixed: Mapping[str, float]
     points: Points
+    start: tuple[float, ...] | None = None
 
 
 class Swept(Protocol):

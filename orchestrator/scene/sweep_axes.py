@@ -298,6 +298,11 @@ def _adaptive_problems(adaptive: Sequence[SweepAxis], axes: Sequence[SweepAxis])
             f"{len(axes)} axes",
             "Run a scene for each value of the others.",
         )
+    for axis in axes if adaptive else ():
+        if axis.continuation and axis.adaptive is None:
+            where = key_path(("sweep", axis.key, "path"))
+            hint = "A path is refined along itself only: make its own axis the adaptive one."
+            yield Problem(where, '"independent" beside an adaptive axis', quoted(axis.path), hint)
     for axis in adaptive:
         yield from _refinement_problems(axis, len(adaptive))
     limits = {axis.adaptive.at_most for axis in adaptive if axis.adaptive is not None} - {0}

@@ -161,6 +161,10 @@ BAD_ADAPTIVE = {
         f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 900 }} }}',
         f'"body.damping" = {{ {RANGE}, path = "up", adaptive = {{ tolerance = 1e-3 }} }}',
     ],
+    'expected "independent" beside an adaptive axis': [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 900 }} }}',
+        '"body.stiffness" = { values = [1, 2], path = "up" }',
+    ],
     "expected no axis beside two adaptive ones": [
         f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 900 }} }}',
         f'"body.damping" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3 }} }}',

@@ -1,0 +1,66 @@
+"""The intervals of a swept parameter in which the motion jumps, read off a dataset."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset.schema import swept_names
+from vibroimpact.analysis.jumps.classes import classes_of
+from vibroimpact.fmus.errors import DatasetError
+
+JUMP = 0.05
+"""Change of the recorded range between neighbours, over the largest range, that counts as a jump."""
+
+
+def jumps_of(dataset: xr.Dataset, jump: float = JUMP) -> xr.Dataset:
+    """Return between which neighbouring runs of a sweep of one parameter the motion jumps.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As `open_dataset` gives it, adaptive or not.
+    jump : float
+        Change of the displacement range, over the largest one, that counts as a jump.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along `jump`: `below` and `above`, the values on its two sides; `direction`; `period` and `impacts` of the
+        motion P(p,q) on each of them, along `side` (period 0: aperiodic).
+
+    Raises
+    ------
+    DatasetError
+        The dataset sweeps more than one parameter, or none.
+
+    Examples
+    --------
+    >>> jumps_of(open_dataset("campaign")).above.values  # doctest: +SKIP
+    """
+    names = [name for name in swept_names(dataset) if dataset[name].size > 1]
+    if len(names) != 1:
+        raise DatasetError(
+            f"jumps: expected one swept parameter, got {', '.join(names) or 'none'}. Select values of the others."
+        )
+    runs = dataset.vibroimpact.runs
+    values = runs[names[0]].values
+    directions = np.broadcast_to(runs["direction"].values, values.shape)
+    classes = classes_of(runs)
+    order = np.lexsort((values, directions))
+    low, high = order[:-1], order[1:]
+    step = jump * float(np.nanmax(classes.extent, initial=0.0))
+    there = classes.jump(low, high, step) & (directions[low] == directions[high])
+    low, high = low[there], high[there]
+    unit = dataset[names[0]].attrs.get("units", "1")
+    labels = np.stack([classes.label[low], classes.label[high]], axis=1)
+    return xr.Dataset(
+        {
+            "below": ("jump", values[low], {"units": unit, "long_name": f"{names[0]} below the jump"}),
+            "above": ("jump", values[high], {"units": unit, "long_name": f"{names[0]} above the jump"}),
+            "direction": ("jump", directions[low]),
+            "period": (("jump", "side"), labels[:, :, 1]),
+            "impacts": (("jump", "side"), labels[:, :, 2]),
+        },
+        coords={"side": ["below", "above"]},
+    )

@@ -1,0 +1,207 @@
+"""The stages of a campaign: a sweep is one; where axes are adaptive each round of points is one, and makes the next.
+
+A round is a function of the rows of the rounds before, so that a campaign which goes on has the rounds that it had,
+whatever ended it and however many workers there were. Runs are numbered round after round.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import Direction, merge_datasets, read_flat
+from vibroimpact.analysis.jumps import RunClasses, classes_of
+from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, State, points_of
+from vibroimpact.orchestrator.campaign.extension import final_states
+from vibroimpact.orchestrator.campaign.parts import StoredPart
+from vibroimpact.orchestrator.campaign.refinement import Known, Refined, cut_cells, halved_intervals
+from vibroimpact.orchestrator.run.dataset import coordinate_names
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.sweep import Branch, Points, SweepAxis, SweepDirection, expand, run_count
+
+_WAYS: dict[int, SweepDirection] = {Direction.up: "up", Direction.down: "down"}
+
+Stored = Callable[[], Sequence[StoredPart]]
+"""Returns the sound parts that a campaign has by now, in run order."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """Points that can be computed together.
+
+    Attributes
+    ----------
+    branches : tuple of Branch
+    held : list of StoredPart
+        The runs before `runs` that need not be computed.
+    runs : int
+        Runs of the campaign with this stage.
+    said : str
+        What progress says of it; empty of a plain sweep.
+    """
+
+    branches: tuple[Branch, ...]
+    held: list[StoredPart]
+    runs: int
+    said: str = ""
+
+
+def adaptive_axes(scene: Scene) -> tuple[SweepAxis, ...]:
+    """Return the axes of a scene whose points are put where the motion jumps."""
+    return tuple(axis for axis in scene.sweep if axis.adaptive is not None)
+
+
+class Rounds:
+    """The rounds of an adaptive campaign.
+
+    Attributes
+    ----------
+    left : int
+        Places where the motion jumps that `at_most` left no points for, in the last round.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.left = 0
+        self._scene = scene
+        self._names = coordinate_names(scene)
+        self._axes = adaptive_axes(scene)
+        self._at_most = max(axis.adaptive.at_most for axis in self._axes if axis.adaptive is not None)
+        self._known: Known | None = None
+        self._states: NDArray[np.float64] = np.empty((0, 0))
+        self._usable: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
+
+    def stages(self, stored: Stored) -> Iterator[Stage]:
+        """Yield each round that is not complete; when one is asked for the next, its parts are among those stored."""
+        branches, first, number = expand(self._scene), 0, 0
+        while branches:
+            stop = first + sum(len(branch.points) for branch in branches)
+            parts = self._parts(stored(), branches, first, stop)
+            if sum(part.rows for part in parts) < stop - first:
+                before = [StoredPart(Path(), Chunk(0, 0, first), None, first)] if first else []
+                yield Stage(branches, [*before, *parts], stop, f" of round {number + 1}")
+                parts = self._parts(stored(), branches, first, stop)
+            self._take(merge_datasets([part.path for part in parts]))
+            branches, first, number = self._next(stop), stop, number + 1
+
+    def _parts(
+        self, stored: Sequence[StoredPart], branches: Sequence[Branch], first: int, stop: int
+    ) -> list[StoredPart]:
+        """Return the parts of a round; one of other points, of rows that had to be computed again, is removed."""
+        found = []
+        for part in stored:
+            if first <= part.chunk.first and part.chunk.stop <= stop and part.path.exists():
+                if self._is_of(read_flat(part.path), branches):
+                    found.append(part)
+                else:
+                    part.path.unlink()
+        return sorted(found, key=lambda part: part.chunk.first)
+
+    def _is_of(self, rows: xr.Dataset, branches: Sequence[Branch]) -> bool:
+        runs = rows.run_index.values
+        points = points_of(branches, Chunk(0, int(runs[0]), int(runs[-1]) + 1))
+        wanted = np.array([[place.point.values[key] for key in self._names] for place in points])
+        return bool(np.array_equal(wanted, self._values(rows)))
+
+    def _values(self, rows: xr.Dataset) -> NDArray[np.float64]:
+        return np.stack([rows[name].values for name in self._names.values()], axis=1)
+
+    def _take(self, rows: xr.Dataset) -> None:
+        """Add the rows of a complete round to what is known."""
+        states = final_states(rows, slice(None))
+        usable = np.isin(rows.outcome.values, CARRYING) & np.isfinite(states).all(axis=1)
+        values, classes = self._values(rows), classes_of(rows)
+        direction = rows.direction.values.astype(np.int64)
+        if self._known is None:
+            self._known, self._states, self._usable = Known(values, direction, classes), states, usable
+            return
+        known = self._known
+        joined: RunClasses = known.classes.joined(classes)
+        self._known = Known(
+            np.concatenate([known.values, values]), np.concatenate([known.direction, direction]), joined
+        )
+        self._states = np.concatenate([self._states, states])
+        self._usable = np.concatenate([self._usable, usable])
+
+    def _next(self, first: int) -> tuple[Branch, ...]:
+        """Return the branches of the next round; none where every jump is bracketed, or there is no more room."""
+        assert self._known is not None
+        room = self._at_most - first
+        tolerance = [axis.adaptive.tolerance for axis in self._axes if axis.adaptive is not None]
+        if len(self._axes) == 1:
+            place = self._scene.sweep.index(self._axes[0])
+            refined = halved_intervals(self._known, place, tolerance[0], self._step(), room)
+        else:
+            start = [sorted(axis.values) for axis in self._axes]
+            refined = cut_cells(self._known, start, tolerance, self._step(), room)
+        self.left = refined.left
+        return self._branches(refined, first)
+
+    def _step(self) -> float:
+        """Return the difference of ranges that is a jump (m)."""
+        assert self._known is not None
+        extent = self._known.classes.extent
+        shares = [axis.adaptive.jump for axis in self._axes if axis.adaptive is not None]
+        return min(shares) * float(np.fmax.reduce(extent, initial=0.0))
+
+    def _branches(self, refined: Refined, first: int) -> tuple[Branch, ...]:
+        keys = list(self._names)
+        if not len(refined.values):
+            return ()
+        if not any(axis.continuation for axis in self._scene.sweep):
+            columns = (
+                SweepAxis(key, tuple(column), together="round")
+                for key, column in zip(keys, refined.values.T.tolist(), strict=True)
+            )
+            return (Branch("independent", {}, Points(first, {}, (tuple(columns),))),)
+        return tuple(
+            Branch(_WAYS[way], point, Points(first + number, point, ()), self._start(refined, number))
+            for number, (way, values) in enumerate(
+                zip(refined.direction.tolist(), refined.values.tolist(), strict=True)
+            )
+            for point in [dict(zip(keys, values, strict=True))]
+        )
+
+    def _start(self, refined: Refined, number: int) -> State | None:
+        """Return the state from which a point goes on: that of the nearest computed point before it on its branch.
+
+        A point that did not come to its end hands on that of the one before it, as along any path.
+        """
+        assert self._known is not None
+        up = refined.direction[number] == Direction.up
+        nearest = int((refined.below if up else refined.above)[number])
+        place = self._scene.sweep.index(self._axes[0])
+        along = self._known.values[:, place]
+        others = np.delete(self._known.values, place, axis=1)
+        behind = along <= along[nearest] if up else along >= along[nearest]
+        line = (self._known.direction == refined.direction[number]) & (others == others[nearest]).all(axis=1)
+        rows = np.flatnonzero(line & behind & self._usable)
+        if not rows.size:
+            return None
+        row = rows[np.argmax(along[rows]) if up else np.argmin(along[rows])]
+        return tuple(self._states[row].tolist())
+
+
+def stages_of(
+    scene: Scene, rounds: Rounds | None, stored: Stored, kept: Sequence[StoredPart]
+) -> Iterator[Stage]:
+    """Yield what a campaign has to compute, one after the other: its sweep, or each round of an adaptive one.
+
+    Parameters
+    ----------
+    scene : Scene
+    rounds : Rounds or None
+        None of a plain sweep.
+    stored : callable
+    kept : sequence of StoredPart
+        Stretches of runs that are kept from an earlier sweep.
+    """
+    if rounds is not None:
+        yield from rounds.stages(stored)
+        return
+    held = sorted([*stored(), *kept], key=lambda part: part.chunk.first)
+    yield Stage(expand(scene), held, run_count(scene.sweep))
