@@ -10,16 +10,20 @@ from vibroimpact.service.metrics import CONTENT_TYPE, exposition
 from vibroimpact.service.problems import answer_problems
 from vibroimpact.service.routes.campaigns import campaigns_router
 from vibroimpact.service.routes.described import PREFIX, problems
+from vibroimpact.service.routes.estimates import estimates_router
 from vibroimpact.service.routes.events import events_router
 from vibroimpact.service.routes.fmus import fmus_router
+from vibroimpact.service.routes.recordings import recordings_router
 from vibroimpact.service.routes.results import results_router
 from vibroimpact.service.routes.scenes import scenes_router
+from vibroimpact.service.routes.uploads import Uploads
+from vibroimpact.service.scenes import Shelf
 from vibroimpact.service.store import Store
 from vibroimpact.service.supervisor import Supervisor
 
 
-def application(store: Store, supervisor: Supervisor) -> FastAPI:
-    """Return the application over a store and what runs its jobs."""
+def application(store: Store, supervisor: Supervisor, shelf: Shelf) -> FastAPI:
+    """Return the application over a store, what runs its jobs, and what scenes may name."""
     app = FastAPI(
         title="vibroimpact",
         version=versions()["vibroimpact"],
@@ -38,12 +42,15 @@ def application(store: Store, supervisor: Supervisor) -> FastAPI:
     def metrics() -> Response:
         return Response(exposition(store), media_type=CONTENT_TYPE)
 
+    uploads = Uploads(store.folder)
     routers = (
-        campaigns_router(store, supervisor),
+        campaigns_router(store, supervisor, shelf),
         events_router(store),
         results_router(store),
-        scenes_router(),
-        fmus_router(),
+        recordings_router(shelf.recordings, uploads),
+        estimates_router(store, shelf.recordings),
+        scenes_router(shelf),
+        fmus_router(shelf.fmus, uploads),
     )
     for router in routers:
         app.include_router(router, prefix=PREFIX)
