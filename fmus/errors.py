@@ -86,5 +86,9 @@ class CampaignError(VibroimpactError):
     """A campaign could not finish; what is complete stays and the same command resumes it."""
 
 
+class WorkersGoneError(CampaignError):
+    """The workers of a campaign, or their scheduler, are gone; once they are back the same command resumes."""
+
+
 class EstimationError(VibroimpactError):
     """An estimation has no admissible answer for its data."""

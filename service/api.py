@@ -12,17 +12,21 @@ from vibroimpact.service.page_files import serve_page
 from vibroimpact.service.problems import answer_problems
 from vibroimpact.service.routes.campaigns import campaigns_router
 from vibroimpact.service.routes.described import PREFIX, problems
+from vibroimpact.service.routes.estimates import estimates_router
 from vibroimpact.service.routes.events import events_router
 from vibroimpact.service.routes.fmus import fmus_router
+from vibroimpact.service.routes.recordings import recordings_router
 from vibroimpact.service.routes.results import results_router
 from vibroimpact.service.routes.scenes import scenes_router
+from vibroimpact.service.routes.uploads import Uploads
+from vibroimpact.service.scenes import Shelf
 from vibroimpact.service.sessions import Sessions
 from vibroimpact.service.store import Store
 from vibroimpact.service.supervisor import Supervisor
 
 
-def application(store: Store, supervisor: Supervisor, sessions: Sessions) -> FastAPI:
-    """Return the application over a store, what runs its jobs, and the sessions of its page."""
+def application(store: Store, supervisor: Supervisor, shelf: Shelf, sessions: Sessions) -> FastAPI:
+    """Return the application over a store, what runs its jobs, what scenes may name, and the sessions of its page."""
     app = FastAPI(
         title="vibroimpact",
         version=versions()["vibroimpact"],
@@ -41,13 +45,16 @@ def application(store: Store, supervisor: Supervisor, sessions: Sessions) -> Fas
     def metrics() -> Response:
         return Response(exposition(store), media_type=CONTENT_TYPE)
 
+    uploads = Uploads(store.folder)
     routers = (
-        campaigns_router(store, supervisor),
+        campaigns_router(store, supervisor, shelf),
         events_router(store),
         results_router(store),
-        scenes_router(),
-        fmus_router(),
-        page_routes(store, sessions),
+        recordings_router(shelf.recordings, uploads),
+        estimates_router(store, shelf.recordings),
+        scenes_router(shelf),
+        fmus_router(shelf.fmus, uploads),
+        page_routes(store, shelf, sessions),
     )
     for router in routers:
         app.include_router(router, prefix=PREFIX)

@@ -5,42 +5,25 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
+from urllib.parse import quote
 
-from vibroimpact.fmus.errors import UsageError, VibroimpactError
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.service.remote import RemoteJob, RemoteRecording, ServiceError
 
 if TYPE_CHECKING:
     import httpx
-    import xarray as xr
 
+__all__ = ["RemoteJob", "RemoteRecording", "Service", "ServiceError"]
 URL_VARIABLE, TOKEN_VARIABLE = "VIBROIMPACT_SERVICE", "VIBROIMPACT_TOKEN"
 DEFAULT_URL = "http://127.0.0.1:8737"
 SECONDS = 30.0
 """For one answer."""
-ENDED = ("done", "failed", "cancelled")
-MOST_RECONNECTS = 20
-"""Attempts in a row to follow a service that does not answer."""
-
-
-class ServiceError(VibroimpactError):
-    """The service refused a request, or a campaign on it has failed.
-
-    Attributes
-    ----------
-    status : int
-        Of the answer, as HTTP has them; 0 where there was none.
-    problems : list of dict
-        Of a scene: `message`, `line`, `column`.
-    """
-
-    def __init__(self, message: str, status: int = 0, problems: list[dict[str, Any]] | None = None) -> None:
-        self.status, self.problems = status, problems or []
-        self.exit_code = 2 if 400 <= status < 500 else 1
-        super().__init__(message)
+UPLOAD_SECONDS = 600.0
+"""For the answer to an upload, which comes when the file is imported, after those before it."""
 
 
 class Service:
@@ -103,8 +86,25 @@ class Service:
         """Close the connection."""
         self._http.close()
 
-    def submit(self, scene: str | os.PathLike[str], *, workers: int | None = None) -> RemoteJob:
+    def submit(
+        self,
+        scene: str | os.PathLike[str],
+        *,
+        workers: int | None = None,
+        recordings: Sequence[str | RemoteRecording] = (),
+        fit: str | None = None,
+        score: Sequence[str | RemoteRecording] = (),
+    ) -> RemoteJob:
         """Submit a scene file.
+
+        Parameters
+        ----------
+        scene : path
+        workers : int, optional
+        recordings, score : sequence of str or RemoteRecording
+            Recordings of the service that a scene with `[replay]` replays, and those that are scored alone.
+        fit : str, optional
+            Numbers of the scene to fit, by key, with commas between them.
 
         Raises
         ------
@@ -117,10 +117,80 @@ class Service:
             text = Path(scene).read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise UsageError(f"{scene}: expected a scene file, got {error}.") from None
+        asked: dict[str, Any] = {"scene": text, "workers": workers}
+        if recordings or score or fit is not None:
+            asked |= {"fit": fit, "recordings": _names(recordings), "score": _names(score)}
+        return self._accepted_job("/campaigns", asked)
+
+    def estimate(self, kind: str, data: RemoteRecording | RemoteJob, **options: Any) -> RemoteJob:
+        """Estimate from a recording of the service, or from what a job of it has computed.
+
+        Parameters
+        ----------
+        kind : str
+            `decay`, `impacts`, `response` or `spikes`.
+        data : RemoteRecording or RemoteJob
+        **options
+            Those of the command: `channel`, `start`, `stop`, `law`, `drive`, ...
+
+        Examples
+        --------
+        >>> service.estimate("decay", recording, channel="tip").wait().dataset()      # doctest: +SKIP
+        """
+        source = "recording" if isinstance(data, RemoteRecording) else "campaign"
+        return self._accepted_job("/estimates", {source: data.id, "estimate": {"kind": kind, **options}})
+
+    def _accepted_job(self, path: str, asked: dict[str, Any]) -> RemoteJob:
         # one key for all attempts: an answer that is lost on the way starts nothing twice
         key = {"Idempotency-Key": uuid.uuid4().hex}
-        answer = self.ask("POST", "/campaigns", json={"scene": text, "workers": workers}, headers=key)
-        return RemoteJob(self, answer.json())
+        return RemoteJob(self, self.ask("POST", path, json=asked, headers=key).json())
+
+    def upload_recording(
+        self,
+        path: str | os.PathLike[str],
+        settings: Mapping[str, Any] | None = None,
+        *,
+        name: str | None = None,
+    ) -> RemoteRecording:
+        """Upload a file of a measuring system, which the service imports.
+
+        Parameters
+        ----------
+        path : path
+        settings : mapping, optional
+            Of the import, as `import_recording` takes them: `name`, `unit`, `rate`, ...
+        name : str, optional
+            By which scenes name it, with `.nc` in place of its ending; that of the file by default.
+
+        Raises
+        ------
+        ServiceError
+            It is no recording, or another one has its name.
+        """
+        parameters = {"name": name or Path(path).name, "settings": json.dumps(dict(settings or {}))}
+        return RemoteRecording(self, self._upload("/recordings", path, parameters))
+
+    def upload_fmu(self, path: str | os.PathLike[str]) -> str:
+        """Upload an FMU to a service that takes them; return by which name scenes have it."""
+        return str(self._upload("/fmus", path, {"name": Path(path).name})["name"])
+
+    def _upload(self, path: str, file: str | os.PathLike[str], parameters: dict[str, str]) -> Any:
+        try:
+            with open(file, "rb") as content:
+                size = {"Content-Length": str(os.fstat(content.fileno()).st_size)}
+                return self.ask(
+                    "POST", path, params=parameters, content=content, headers=size, timeout=UPLOAD_SECONDS
+                ).json()
+        except OSError as error:
+            raise UsageError(f"{file}: expected a file to upload, got {error.strerror}.") from None
+
+    def recording(self, name: str) -> RemoteRecording:
+        """Return a recording by its id or its name."""
+        return RemoteRecording(self, self.ask("GET", f"/recordings/{quote(name, safe='')}").json())
+
+    def recordings(self) -> Iterator[RemoteRecording]:
+        """Yield all recordings, the newest first."""
+        return (RemoteRecording(self, one) for one in self._listed("/recordings"))
 
     def job(self, name: str) -> RemoteJob:
         """Return a campaign by its id."""
@@ -128,11 +198,15 @@ class Service:
 
     def jobs(self) -> Iterator[RemoteJob]:
         """Yield all campaigns, the newest first."""
-        cursor: str | None = None
+        return (RemoteJob(self, one) for one in self._listed("/campaigns"))
+
+    def _listed(self, path: str) -> Iterator[dict[str, Any]]:
+        """Yield the items of all pages."""
+        cursor: int | None = None
         while True:
             parameters = {} if cursor is None else {"cursor": cursor}
-            page = self.ask("GET", "/campaigns", params=parameters).json()
-            yield from (RemoteJob(self, one) for one in page["items"])
+            page = self.ask("GET", path, params=parameters).json()
+            yield from page["items"]
             cursor = page["next"]
             if cursor is None:
                 return
@@ -170,107 +244,8 @@ class Service:
         return ServiceError(f"{self._base}: expected a service that answers, got {error}. Is it running?")
 
 
-class RemoteJob:
-    """A campaign on a service.
-
-    Attributes
-    ----------
-    id : str
-    status : dict
-        As the service told it last: `state`, `done`, `total`, `message`, ...
-    """
-
-    def __init__(self, service: Service, status: dict[str, Any]) -> None:
-        self._service, self.status = service, status
-        self.id: str = status["id"]
-
-    def refresh(self) -> RemoteJob:
-        """Ask the service where the campaign is."""
-        self.status = self._service.ask("GET", f"/campaigns/{self.id}").json()
-        return self
-
-    def events(self, after: int = 0) -> Iterator[dict[str, Any]]:
-        """Yield all that happens to it until it has ended, each with its `id`, over lost connections too."""
-        failures = 0
-        while True:
-            try:
-                for event in self._events(after):
-                    after, failures = event["id"], 0
-                    yield event
-                if self.refresh().status["state"] in ENDED:
-                    return
-            except ServiceError as error:
-                failures += 1
-                if error.status or failures > MOST_RECONNECTS:
-                    raise
-                time.sleep(min(0.1 * 2**failures, 5.0))
-
-    def _events(self, after: int) -> Iterator[dict[str, Any]]:
-        header = {"Last-Event-ID": str(after)}
-        with self._service.stream(f"/campaigns/{self.id}/events", headers=header) as answer:
-            event: dict[str, Any] = {}
-            for line in answer.iter_lines():
-                name, _, value = line.partition(": ")
-                if not line and event:
-                    yield event
-                    event = {}
-                elif name == "id":
-                    event["id"] = int(value)
-                elif name == "event":
-                    event["kind"] = value
-                elif name == "data":
-                    event |= json.loads(value)
-
-    def wait(self) -> RemoteJob:
-        """Return when it is done.
-
-        Raises
-        ------
-        ServiceError
-            It has failed, or was cancelled.
-        """
-        for _ in self.events():
-            pass
-        if self.status["state"] != "done":
-            raise ServiceError(f"{self.id}: {self.status['state']}: {self.status['message']}")
-        return self
-
-    def cancel(self) -> RemoteJob:
-        """Cancel it; what it has computed stays."""
-        self.status = self._service.ask("POST", f"/campaigns/{self.id}/cancel").json()
-        return self
-
-    def resume(self) -> RemoteJob:
-        """Let it go on."""
-        self.status = self._service.ask("POST", f"/campaigns/{self.id}/resume").json()
-        return self
-
-    def fetch(self, path: str | os.PathLike[str]) -> Path:
-        """Write its dataset to a file, whole or not at all."""
-        target = Path(path)
-        part = target.with_name(f".{target.name}.{os.getpid()}.part")
-        try:
-            with self._service.stream(f"/campaigns/{self.id}/dataset") as answer, part.open("wb") as file:
-                for block in answer.iter_bytes():
-                    file.write(block)
-            part.replace(target)
-        except OSError as error:
-            raise UsageError(f"{target}: expected a place for a dataset, got {error.strerror}.") from None
-        finally:
-            part.unlink(missing_ok=True)
-        return target
-
-    def dataset(self) -> xr.Dataset:
-        """Return its dataset, in memory."""
-        import tempfile
-
-        from vibroimpact.analysis.dataset import open_dataset
-
-        with (
-            tempfile.TemporaryDirectory() as folder,
-            open_dataset(self.fetch(Path(folder, "dataset.nc"))) as found,
-        ):
-            return found.load()
+def _names(recordings: Sequence[str | RemoteRecording]) -> list[str]:
+    return [one if isinstance(one, str) else one.name for one in recordings]
 
 
 def _token_in(folder: str | os.PathLike[str] | None) -> str:

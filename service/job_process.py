@@ -1,36 +1,64 @@
-"""The process that runs one job: `python -m vibroimpact.service.job_process SCENE FOLDER [WORKERS [SCHEDULER]]`.
+"""The process that runs one job: `python -m vibroimpact.service.job_process FOLDER WORK`, WORK as `Work` writes it.
 
-It says how far it is in lines of JSON on its standard output, and ends when its standard input does: then the service
-that started it is gone, and another one will start it again.
+What it makes is what the command line makes, by the same functions. It says how far it is in lines of JSON on its
+standard output, and ends when its standard input does: then the service is gone, and another will start it again.
 """
 
 from __future__ import annotations
 
 import json
-import os
-import signal
+import socket
 import sys
-import threading
+import tempfile
 import time
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
-from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.analysis.dataset.results import write_results
+from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.fmus.errors import UsageError, VibroimpactError, WorkersGoneError
 from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign, run_scene
 from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.preparation import prepared_scene
+from vibroimpact.service.child import FULL, end_with_service, say
 
 SAID_EVERY, SAID_PART = 0.25, 1.0 / 500.0
 """Seconds between two lines of progress, at least, and part of all points: each becomes an event that is kept."""
-INTERRUPTED = 130
-"""Exit code of a job that was interrupted in good order."""
+INTERRUPTED, LATER = 130, 75
+"""Exit codes of a job that was interrupted in good order, and of one that cannot go on now and may later."""
+TRIAL_BYTES = 2**16
+"""What must fit on a disk that is not full."""
+CONNECT_SECONDS = 2.0
+"""How long a scheduler may take to take a connection."""
 
 
-def say(**what: Any) -> None:
-    """Tell the service something: one line of JSON."""
-    sys.stdout.write(json.dumps(what) + "\n")
-    sys.stdout.flush()
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What a job's process is to do.
+
+    Attributes
+    ----------
+    kind : str
+        `campaign`, `run`, `replay` or `estimate`.
+    workers : int or None
+        Worker processes; None: one for each processor.
+    scheduler : str or None
+        Address of a Dask scheduler to use instead.
+    options : dict
+        Of a replay `fit` and `score`, of an estimate what `estimates.estimate` takes.
+    """
+
+    kind: str
+    workers: int | None = None
+    scheduler: str | None = None
+    options: dict[str, Any] = field(default_factory=dict)
+
+    def written(self) -> str:
+        """Return it as one word of a command line."""
+        return json.dumps(asdict(self))
 
 
 class Told(Progress):
@@ -59,41 +87,106 @@ class Told(Progress):
         say(note=text)
 
 
-def end_with_service() -> None:
-    """End this process and its workers as soon as standard input does."""
-    os.read(0, 1)
-    os.killpg(os.getpid(), signal.SIGKILL)
-
-
-def run(scene: Scene, folder: Path, workers: int | None, scheduler: str | None) -> None:
-    """Run a job into its folder."""
+def run(folder: Path, work: Work) -> None:
+    """Do the work of a job in its folder."""
     progress = Told()
-    prepared = prepared_scene(scene, progress.note)
-    if scene.sweep:
-        run_campaign(prepared, folder / "campaign", workers=workers, scheduler=scheduler, progress=progress)
+    if work.kind == "estimate":
+        from vibroimpact.service.estimates import estimate
+
+        progress.begin(1, 0)
+        estimate(folder, work.options)
+        progress.advance(1)
         return
-    progress.begin(1, 0)
-    run_scene(prepared, folder / "run.nc")
-    progress.advance(1)
+    scene = load_scene(folder / "scene.toml")
+    if work.kind == "replay":
+        progress.begin(1, 0)
+        _replay(scene, folder, **work.options)
+        progress.advance(1)
+        return
+    prepared = prepared_scene(scene, progress.note)
+    if work.kind == "run":
+        progress.begin(1, 0)
+        say(outcomes=dict(run_scene(prepared, folder / "run.nc")))
+        progress.advance(1)
+        return
+    workers = None if work.scheduler else work.workers
+    report = run_campaign(
+        prepared, folder / "campaign", workers=workers, scheduler=work.scheduler, progress=progress
+    )
+    say(outcomes=dict(report.outcomes))
+
+
+def _replay(scene: Scene, folder: Path, fit: str | None = None, score: list[str] | None = None) -> None:
+    """Replay the recordings of a scene, and fit numbers of it, into `replay.nc`; the fitted scene beside it."""
+    from vibroimpact.orchestrator.replay.output import fitted_scene_text
+    from vibroimpact.orchestrator.replay.replaying import replay_scene
+
+    scored = [folder / name for name in score or ()]
+    whole = replay_scene(scene, fit=fit, score=scored)
+    if whole.verdict is not None:
+        say(note=whole.verdict.words)
+    if whole.fit is not None:
+        fitted = [replay.name for replay in whole.replays if replay.use == "fitted"]
+        text = fitted_scene_text(scene, whole.fit, fitted, folder)
+        write_atomically(folder / "fitted.toml", text.encode())
+    write_results(whole.dataset, folder / "replay.nc", kind="replay")
 
 
 def main(arguments: list[str]) -> int:
     """Run the job that the arguments name; return the exit code."""
-    scene, folder, *others = arguments
-    workers = int(others[0]) if others and others[0] else None
-    scheduler = others[1] if len(others) > 1 else None
-    threading.Thread(target=end_with_service, daemon=True).start()
+    folder, work = Path(arguments[0]), Work(**json.loads(arguments[1]))
+    end_with_service()
     try:
-        run(load_scene(Path(scene)), Path(folder), workers, scheduler)
+        run(folder, work)
     except CampaignInterrupted as interrupted:
         say(note=str(interrupted))
         return INTERRUPTED
     except KeyboardInterrupt:
         return INTERRUPTED
-    except VibroimpactError as error:
-        say(failed=str(error))
+    except (VibroimpactError, OSError) as error:
+        if why := _passing(error, folder, work.scheduler):
+            say(later=f"{why}: {error}")
+            return LATER
+        if isinstance(error, OSError):
+            raise
+        say(failed=str(error).replace(f"{folder}/", ""))  # where the service lies is its own matter
         return error.exit_code
     return 0
+
+
+def _passing(error: Exception, folder: Path, scheduler: str | None) -> str:
+    """Return in words what hinders a job that may go on later; empty where the job itself is at fault."""
+    if _is_full(error, folder):
+        return "waits for room on the disk"
+    if scheduler and (
+        isinstance(error, WorkersGoneError) or (isinstance(error, UsageError) and not _answers(scheduler))
+    ):
+        return f"waits for workers behind {scheduler}"
+    return ""
+
+
+def _is_full(error: BaseException | None, folder: Path) -> bool:
+    """Return whether the disk is full, as the error says or as a trial shows: errors of workers come without causes."""
+    while error is not None:
+        if isinstance(error, OSError) and error.errno in FULL:
+            return True
+        error = error.__cause__ or error.__context__
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(TRIAL_BYTES))
+    except OSError as found:
+        return found.errno in FULL
+    return False
+
+
+def _answers(scheduler: str) -> bool:
+    """Return whether something listens at the address of a scheduler."""
+    try:
+        place = urlsplit(scheduler)
+        socket.create_connection((place.hostname or "", place.port or 0), CONNECT_SECONDS).close()
+    except (OSError, ValueError):
+        return False
+    return True
 
 
 if __name__ == "__main__":

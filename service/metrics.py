@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, generate_latest
 from prometheus_client.core import GaugeMetricFamily, Metric
 
-from vibroimpact.service.store import State, Store
+from vibroimpact.orchestrator.campaign.cluster import processor_count
+from vibroimpact.service.store import Job, Kind, State, Store
 
 CONTENT_TYPE = CONTENT_TYPE_LATEST
-MOST_TOLD = 1000
 
 
 class _Jobs:
@@ -26,17 +25,33 @@ class _Jobs:
         for state, count in self._store.counts().items():
             jobs.add_metric([state], count)
         yield jobs
-        total = GaugeMetricFamily("vibroimpact_points", "Points of a job that runs.", labels=["job"])
-        done = GaugeMetricFamily("vibroimpact_points_done", "Those that are done.", labels=["job"])
-        rate = GaugeMetricFamily(
-            "vibroimpact_points_per_second", "Points done a second since it was started.", labels=["job"]
+        running = [job for job in self._store.jobs_in(State.running) if job.started is not None]
+        yield _of_each("points", "Points of a job that runs.", {job.id: job.total for job in running})
+        yield _of_each("points_done", "Those that are done.", {job.id: job.done for job in running})
+        yield _of_each("workers", "Workers that it may use.", {job.id: _workers(job) for job in running})
+        rates = {job.id: self._store.rate(job.id) for job in running}
+        yield _of_each("points_per_second", "Points done a second, of late.", rates)
+        seconds = {job.id: _workers(job) / rates[job.id] for job in running if rates[job.id] > 0}
+        yield _of_each("seconds_per_point", "Seconds of a worker that a point takes, of late.", seconds)
+        outcomes = GaugeMetricFamily(
+            "vibroimpact_outcomes", "Points by how they ended, of jobs that have ended.", labels=["outcome"]
         )
-        for job in self._store.jobs(most=MOST_TOLD):
-            if job.state == State.running and job.started is not None:
-                total.add_metric([job.id], job.total)
-                done.add_metric([job.id], job.done)
-                rate.add_metric([job.id], job.done / max(time.time() - job.started, 1e-3))
-        yield from (total, done, rate)
+        for outcome, count in self._store.outcomes().items():
+            outcomes.add_metric([outcome], count)
+        yield outcomes
+
+
+def _of_each(name: str, meaning: str, values: Mapping[str, float]) -> Metric:
+    """Return a metric that each job has."""
+    metric = GaugeMetricFamily(f"vibroimpact_{name}", meaning, labels=["job"])
+    for job, value in values.items():
+        metric.add_metric([job], value)
+    return metric
+
+
+def _workers(job: Job) -> int:
+    """Return the processes that a job computes with; with a scheduler, it may be others."""
+    return (job.workers or processor_count()) if job.kind == Kind.campaign else 1
 
 
 def exposition(store: Store) -> bytes:

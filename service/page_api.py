@@ -17,11 +17,11 @@ from vibroimpact.fmus.errors import DatasetError, SceneError
 from vibroimpact.service.landed import Failure, Landed, LandedReader, Quantity, failures_in, files_of
 from vibroimpact.service.points import simulated_point
 from vibroimpact.service.problems import ProblemError
-from vibroimpact.service.routes.described import problems
-from vibroimpact.service.scenes import taken_scene
+from vibroimpact.service.routes.described import known_job, problems
+from vibroimpact.service.scenes import Shelf, taken_scene
 from vibroimpact.service.sessions import SECONDS, Sessions, is_own_origin
 from vibroimpact.service.slices import Selection, slice_of
-from vibroimpact.service.store import Job, State, Store
+from vibroimpact.service.store import Job, Kind, State, Store
 
 DEFAULT_VARIABLES = ("strobe_displacement", "displacement_range", "impact_velocity", "final_displacement")
 """What is shown of a campaign of which nothing is asked: the first that it has."""
@@ -103,12 +103,12 @@ class ExampleAnswer(BaseModel):
     scene: str
 
 
-def page_routes(store: Store, sessions: Sessions) -> APIRouter:
+def page_routes(store: Store, shelf: Shelf, sessions: Sessions) -> APIRouter:
     """Return the routes of the page."""
     router = APIRouter()
     router.include_router(_session(sessions), tags=["session"])
     router.include_router(_slices(store), tags=["results"])
-    router.include_router(_points(store), tags=["results"])
+    router.include_router(_points(store, shelf), tags=["results"])
     return router
 
 
@@ -144,18 +144,9 @@ def _session(sessions: Sessions) -> APIRouter:
     return router
 
 
-def _known(store: Store, name: str) -> Job:
-    try:
-        return store.job(name)
-    except KeyError:
-        raise ProblemError(
-            HTTPStatus.NOT_FOUND, f"{name}: expected the id of a campaign, got an unknown one."
-        ) from None
-
-
 def _files(store: Store, job: Job) -> list[Path]:
     path = store.dataset_of(job)
-    if job.sweeps:
+    if job.kind is Kind.campaign:
         return files_of(path.parent)
     return [path] if path.is_file() else []
 
@@ -192,7 +183,7 @@ def _slices(store: Store) -> APIRouter:
         most: Annotated[int, Query(ge=1, le=MOST_ROWS, description="Rows, at most")] = 5000,
     ) -> SliceAnswer:
         """Return columns of at most so many rows, thinned evenly; what is not finite is null."""
-        job = _known(store, name)
+        job = known_job(store, name)
         found, landed = landed_of(job, variable)
         try:
             selection = Selection.from_words(at, within)
@@ -227,7 +218,7 @@ def _quantity(one: Quantity) -> QuantityAnswer:
     return QuantityAnswer(name=one.name, label=one.label, units=one.units, along=one.along)
 
 
-def _points(store: Store) -> APIRouter:
+def _points(store: Store, shelf: Shelf) -> APIRouter:
     router = APIRouter()
 
     @router.get(
@@ -239,9 +230,9 @@ def _points(store: Store) -> APIRouter:
     )
     def point(name: str, run: Annotated[int, PathPart(ge=0, le=MOST_RUN)]) -> PointAnswer:
         """Simulate a point of a campaign; on a path it starts where the point before it had ended."""
-        job = _known(store, name)
+        job = known_job(store, name)
         path = store.dataset_of(job)
-        results = path.parent if job.sweeps else path
+        results = path.parent if job.kind is Kind.campaign else path
         return PointAnswer(**simulated_point(store.scene_of(name), results, run))
 
     @router.get(
@@ -255,7 +246,7 @@ def _points(store: Store) -> APIRouter:
         cursor: Annotated[int, Query(ge=0, le=MOST_RUN, description="`next` of the page before")] = 0,
     ) -> FailurePage:
         found: list[Failure] = []
-        for path in _files(store, _known(store, name)):
+        for path in _files(store, known_job(store, name)):
             try:
                 found += failures_in(path, FAILED)
             except DatasetError as error:
@@ -267,7 +258,7 @@ def _points(store: Store) -> APIRouter:
 
     @router.get("/examples", responses=problems(), tags=["scenes"], summary="Scenes to begin with")
     def examples() -> list[ExampleAnswer]:
-        return _examples()
+        return _examples(shelf)
 
     return router
 
@@ -279,13 +270,13 @@ def _failure(one: Failure) -> FailureAnswer:
 
 
 @cache
-def _examples() -> list[ExampleAnswer]:
+def _examples(shelf: Shelf) -> list[ExampleAnswer]:
     """Return the examples of the project that this service takes, campaigns first."""
     found = []
     for path in sorted(examples_folder().glob("*.toml")):
         text = path.read_text(encoding="utf-8")
         try:
-            scene = taken_scene(text)
+            scene = taken_scene(text, shelf).scene
         except SceneError:
             continue  # of an FMU that the package does not bring along
         kind: Literal["campaign", "run"] = "campaign" if scene.sweep else "run"

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.python_child import ending, python_command
+from vibroimpact.service.child import kill_session
 from vibroimpact.service.problems import ProblemError
-from vibroimpact.service.supervisor import kill_group
 
 DEADLINE = 30.0
 """Seconds that a point may take."""
@@ -74,7 +74,7 @@ def _said_by_process(scene: Path, results: Path, run: int) -> dict[str, Any]:
                 "Simulate it with the command line.",
             ) from None
         finally:
-            kill_group(process)
+            kill_session(process)
     lines = out.splitlines()
     if process.returncode or not lines:
         last = said.strip().splitlines()[-1:] or [""]

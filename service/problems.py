@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
@@ -12,6 +13,9 @@ from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 from starlette.routing import Match
 
+from vibroimpact.service.child import FULL
+
+_FULL_DATABASE = ("SQLITE_FULL", "SQLITE_IOERR_WRITE", "SQLITE_IOERR_FSYNC", "SQLITE_IOERR_SHMSIZE")
 METHODS = ("GET", "POST", "DELETE")
 MEDIA_TYPE = "application/problem+json"
 
@@ -44,6 +48,13 @@ def answer(
     return JSONResponse(content | members, status, dict(headers or {}), MEDIA_TYPE)
 
 
+def is_full(error: Exception) -> bool:
+    """Return whether an error is that of a full disk, under a file or under the database."""
+    if isinstance(error, sqlite3.Error):
+        return getattr(error, "sqlite_errorname", "") in _FULL_DATABASE
+    return isinstance(error, OSError) and error.errno in FULL
+
+
 def allowed_methods(request: Request) -> list[str]:
     """Return the methods that some route of an application takes at the path of a request."""
     scope, found = dict(request.scope), set[str]()
@@ -60,6 +71,17 @@ def answer_problems(app: FastAPI) -> None:
     @app.exception_handler(ProblemError)
     def of_ours(_: Request, problem: ProblemError) -> JSONResponse:
         return answer(problem.status, problem.detail, problem.headers, **problem.members)
+
+    @app.exception_handler(OSError)
+    @app.exception_handler(sqlite3.Error)
+    def of_the_disk(_: Request, error: Exception) -> JSONResponse:
+        if not is_full(error):
+            raise error
+        return answer(
+            HTTPStatus.INSUFFICIENT_STORAGE,
+            "expected room on the disk of the service, got none. Nothing that was accepted is lost; ask again when "
+            "there is room.",
+        )
 
     @app.exception_handler(HTTPException)
     def of_routing(request: Request, error: HTTPException) -> JSONResponse:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from vibroimpact.fmus.errors import SceneError
@@ -11,6 +13,11 @@ from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import components
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.file import parse_scene_toml
+from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
+from vibroimpact.orchestrator.scene.text import text_with_values
+from vibroimpact.service.fmus import FmuStore
+from vibroimpact.service.recordings import RecordingStore
+from vibroimpact.service.store import Kind
 
 SOURCE = "scene"
 """What messages about a submitted scene begin with."""
@@ -20,47 +27,119 @@ _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
 _ENTRY = re.compile(r"^(\s*)([\w\-\".]+)\s*=")
 
 
-def taken_scene(text: str) -> Scene:
+@dataclass(frozen=True, slots=True)
+class Shelf:
+    """What a scene that was submitted may name: recordings and FMUs of the service."""
+
+    recordings: RecordingStore
+    fmus: FmuStore
+
+
+@dataclass(frozen=True, slots=True)
+class Taken:
+    """A scene that was submitted.
+
+    Attributes
+    ----------
+    scene : Scene
+    text : str
+        TOML, with the recordings that were named beside it.
+    files : dict of str to Path
+        The files of the service that it reads, by the names it has for them.
+    """
+
+    scene: Scene
+    text: str
+    files: dict[str, Path]
+
+    @property
+    def kind(self) -> Kind:
+        """What running it makes: recordings alone are no sweep, since one replay compares them all."""
+        if self.scene.replay is not None and all(axis.key == RECORDING_KEY for axis in self.scene.sweep):
+            return Kind.replay
+        return Kind.campaign if self.scene.sweep else Kind.run
+
+
+def taken_scene(text: str, shelf: Shelf, recordings: Sequence[str] = ()) -> Taken:
     """Return a scene that was submitted.
 
     Parameters
     ----------
     text : str
         TOML.
+    shelf : Shelf
+    recordings : sequence of str
+        Names or ids of recordings that the scene replays, where it names none itself.
 
     Raises
     ------
     SceneError
-        With all of its problems; among them components that are files, and recordings: a stranger names no paths here.
+        With all of its problems; among them files that the service does not have: a stranger names no paths here.
     """
     document = parse_scene_toml(text, SOURCE)
-    problems = [*_foreign_components(document), *_recordings(document)]
+    files, problems = _files(document, shelf)
+    for place, name in enumerate(recordings, 1):
+        problems += linked(f"recordings[{place}]", name, shelf, files)
     if problems:
         raise SceneError(problems)
-    return parse_scene(text, SOURCE)
+    # files count from the folder of the scene
+    source = str(shelf.fmus.folder / SOURCE)
+    try:
+        scene = parse_scene(text, source)
+        if recordings and not (scene.replay is not None and not scene.replay.recordings):
+            raise SceneError(
+                [f"{SOURCE}: replay.recordings: expected [replay] without recordings beside others."]
+            )
+        if recordings:
+            text = text_with_values(text, {}, recordings)
+            scene = parse_scene(text, source)
+    except SceneError as error:
+        raise SceneError([problem.replace(source, SOURCE) for problem in error.problems]) from None
+    if scene.replay is not None and not scene.replay.recordings:
+        raise SceneError(
+            [f"{SOURCE}: replay.recordings: expected a recording to replay, got none. Name one."]
+        )
+    return Taken(scene, text, files)
 
 
-def _foreign_components(document: Mapping[str, Any]) -> list[str]:
+def _files(document: Mapping[str, Any], shelf: Shelf) -> tuple[dict[str, Path], list[str]]:
+    """Return the files that a scene names, each found in the service, and what is wrong with the names."""
+    files, problems = dict[str, Path](), list[str]()
     tables = document.get("component", {})
-    if not isinstance(tables, Mapping):
-        return []
-    named = {name: table.get("fmu") for name, table in tables.items() if isinstance(table, Mapping)}
-    shipped = components()
-    known = ", ".join(sorted(shipped))
-    return [
-        f"{SOURCE}: component.{name}.fmu: expected one of {known}, got {fmu!r}. "
-        "This service loads no FMU but those of the package."
-        for name, fmu in named.items()
-        if fmu is not None and fmu not in shipped
-    ]
+    for name, table in tables.items() if isinstance(tables, Mapping) else ():
+        fmu = table.get("fmu") if isinstance(table, Mapping) else None
+        if fmu is None or fmu in components():
+            continue
+        file = shelf.fmus.find(fmu) if isinstance(fmu, str) else None
+        if file is not None:
+            files[fmu] = file
+        else:
+            problems.append(
+                f"{SOURCE}: component.{name}.fmu: expected one of {', '.join(known_fmus(shelf))}, got {fmu!r}. "
+                "This service loads no FMU but those of the package and its own."
+            )
+    replay = document.get("replay")
+    named = replay.get("recordings") if isinstance(replay, Mapping) else None
+    for place, name in enumerate(named if isinstance(named, list) else (), 1):
+        problems += linked(f"replay.recordings[{place}]", name, shelf, files)
+    return files, problems
 
 
-def _recordings(document: Mapping[str, Any]) -> list[str]:
-    if "replay" not in document:
-        return []
-    return [
-        f"{SOURCE}: replay: expected a scene without recordings, got [replay]. Use the command line for it."
-    ]
+def known_fmus(shelf: Shelf) -> list[str]:
+    """Return all FMUs that a scene may name."""
+    return [*sorted(components()), *shelf.fmus.names()]
+
+
+def linked(key: str, name: Any, shelf: Shelf, files: dict[str, Path]) -> list[str]:
+    """Note the file of a recording; return what is wrong with its name."""
+    try:
+        files[name] = shelf.recordings.path(shelf.recordings.find(str(name)).id)
+    except KeyError:
+        return [
+            f"{SOURCE}: {key}: expected the name of a recording of this service, got {str(name)[:200]!r}. "
+            "Upload it first."
+        ]
+    return []
 
 
 def located(problem: str, text: str) -> dict[str, Any]:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import hmac
+import logging
 import os
+import re
 import secrets
+import time
 from collections.abc import Awaitable, Callable, MutableMapping
 from http import HTTPStatus
 from pathlib import Path
@@ -19,6 +22,9 @@ OPEN_PATHS = ("/healthz", *page_files())
 """What is answered without a token."""
 MOST_BYTES = 4 * 2**20
 """Size of a request, byte."""
+MOST_UPLOADED = {"/api/v1/recordings": 256 * 2**20, "/api/v1/fmus": 64 * 2**20}
+"""Likewise where files are uploaded."""
+LOG = logging.getLogger("vibroimpact.service")
 HEADERS = (
     (b"x-content-type-options", b"nosniff"),
     (b"x-frame-options", b"DENY"),
@@ -26,6 +32,9 @@ HEADERS = (
     (b"referrer-policy", b"no-referrer"),
     (b"cache-control", b"no-store"),
 )
+
+_LENGTH = re.compile(rb"[0-9]{1,15}")
+_JOB = re.compile(r"/campaigns/([0-9a-f]{32})")
 
 Scope = MutableMapping[str, Any]
 Message = MutableMapping[str, Any]
@@ -81,8 +90,11 @@ class Guarded:
             await self._app(scope, receive, send)
             return
 
+        began = time.monotonic()
+
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
+                _note(scope, message["status"], time.monotonic() - began)
                 known = {name for name, _ in message["headers"]}
                 extra = [(name, value) for name, value in HEADERS if name not in known]
                 message["headers"] = [*message["headers"], *extra]
@@ -99,11 +111,14 @@ class Guarded:
             await refused(scope, receive, with_headers)
             return
         length = headers.get(b"content-length", b"0")
-        if not length.isdigit() or int(length) > MOST_BYTES or b"transfer-encoding" in headers:
+        most = MOST_UPLOADED.get(scope["path"], MOST_BYTES) if scope["method"] == "POST" else MOST_BYTES
+        if not _LENGTH.fullmatch(length) or int(length) > most or b"transfer-encoding" in headers:
+            got = (
+                "a body in chunks" if b"transfer-encoding" in headers else repr(length[:40].decode("latin-1"))
+            )
             refused = answer(
                 HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
-                f"expected a request of at most {MOST_BYTES} byte with its Content-Length, got "
-                f"{length.decode('latin-1')!r}.",
+                f"expected a request of at most {most} byte with its Content-Length, got {got}.",
             )
             await refused(scope, receive, with_headers)
             return
@@ -112,3 +127,14 @@ class Guarded:
     def _is_known(self, headers: dict[bytes, bytes], method: str) -> bool:
         given = headers.get(b"authorization", b"")
         return hmac.compare_digest(given, self._expected) or self._sessions.are_in(headers, method)
+
+
+def _note(scope: Scope, status: int, seconds: float) -> None:
+    """Log a request that changes something or is refused; those that look alone are too many."""
+    if scope["method"] in ("GET", "HEAD") and status < HTTPStatus.BAD_REQUEST:
+        return
+    job = _JOB.search(scope["path"])
+    client = (scope.get("client") or ("",))[0]
+    facts = {"method": scope["method"], "path": scope["path"][:200], "status": status, "client": client}
+    level = logging.ERROR if status >= HTTPStatus.INTERNAL_SERVER_ERROR else logging.INFO
+    LOG.log(level, "request", extra=facts | {"job": job[1] if job else "", "seconds": round(seconds, 4)})

@@ -14,6 +14,10 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import say
 from vibroimpact.fmus.wording import option
 from vibroimpact.service.api import application
+from vibroimpact.service.fmus import FmuStore
+from vibroimpact.service.logs import write_lines
+from vibroimpact.service.recordings import RecordingStore
+from vibroimpact.service.scenes import Shelf
 from vibroimpact.service.security import Guarded, token_of
 from vibroimpact.service.sessions import Sessions
 from vibroimpact.service.store import DATABASE, Store
@@ -25,7 +29,15 @@ LAST_SECONDS = 2
 """For answers that are under way when the service is told to end."""
 
 
-def serve(folder: Path, *, host: str, port: int, scheduler: str | None, allow_remote: bool) -> None:
+def serve(
+    folder: Path,
+    *,
+    host: str,
+    port: int,
+    scheduler: str | None,
+    allow_remote: bool,
+    allow_fmu_upload: bool = False,
+) -> None:
     """Serve until a signal ends it.
 
     Raises
@@ -39,7 +51,9 @@ def serve(folder: Path, *, host: str, port: int, scheduler: str | None, allow_re
         token = token_of(folder)
         sessions = Sessions(token)
         with _bound(host, port) as listening:
+            write_lines()
             store = Store(folder)
+            shelf = Shelf(RecordingStore(store), FmuStore(folder / "fmus", allow_fmu_upload))
             supervisor = Supervisor(store, scheduler)
             supervisor.start()
             try:
@@ -47,8 +61,8 @@ def serve(folder: Path, *, host: str, port: int, scheduler: str | None, allow_re
                 say(f"Serving {folder} on {address}; the token is in {folder / 'token'}.")
                 logging.getLogger("uvicorn.access").disabled = True
                 config = uvicorn.Config(
-                    Guarded(application(store, supervisor, sessions), token, sessions),
-                    log_level="warning",
+                    Guarded(application(store, supervisor, shelf, sessions), token, sessions),
+                    log_config=None,
                     timeout_graceful_shutdown=LAST_SECONDS,
                     server_header=False,
                 )

@@ -1,36 +1,52 @@
 """What the service knows of its jobs: SQLite beside their folders, the truth that outlives every process.
 
-A job is a scene with its state; its folder `jobs/ID` has `scene.toml`, `log.txt`, and what the command line would
-write: `campaign/` of a sweep, `run.nc` else. Events are numbered once and for all, so that a reader who comes back asks
-for those after the last one that it has.
+A job is a scene with its state; its folder `jobs/ID` has `scene.toml`, `log.txt`, the files that it reads, and
+what the command line would write: `campaign/` of a sweep, else `run.nc`, `replay.nc` or `estimates.nc`. Events are
+numbered once and for all, so that a reader who comes back asks for those after the last one that it has.
 """
 
 from __future__ import annotations
 
 import json
+import logging
+import os
+import shutil
 import sqlite3
 import threading
 import time
 import uuid
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
+from vibroimpact.analysis.files.atomic import write_atomically
+from vibroimpact.fmus.errors import UsageError
+
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, title TEXT NOT NULL, state TEXT NOT NULL,
-    workers INTEGER, sweeps INTEGER NOT NULL, created REAL NOT NULL, started REAL, ended REAL,
-    total INTEGER NOT NULL, done INTEGER NOT NULL, attempts INTEGER NOT NULL, message TEXT NOT NULL);
+    workers INTEGER, kind TEXT NOT NULL, created REAL NOT NULL, started REAL, ended REAL,
+    total INTEGER NOT NULL, done INTEGER NOT NULL, attempts INTEGER NOT NULL, message TEXT NOT NULL,
+    options TEXT NOT NULL DEFAULT '{}', outcomes TEXT NOT NULL DEFAULT '{}');
 CREATE INDEX IF NOT EXISTS jobs_by_state ON jobs (state, number);
 CREATE TABLE IF NOT EXISTS events (
     id INTEGER PRIMARY KEY AUTOINCREMENT, job TEXT NOT NULL, at REAL NOT NULL, kind TEXT NOT NULL, data TEXT NOT NULL);
 CREATE INDEX IF NOT EXISTS events_of_job ON events (job, id);
 CREATE TABLE IF NOT EXISTS requests (key TEXT PRIMARY KEY, digest TEXT NOT NULL, job TEXT NOT NULL);
+CREATE TABLE IF NOT EXISTS recordings (
+    number INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, name TEXT NOT NULL UNIQUE,
+    source TEXT NOT NULL, bytes INTEGER NOT NULL, channels TEXT NOT NULL, created REAL NOT NULL);
 """
+LAYOUT = 2
+"""Of the database; a service of another version refuses it."""
+LOG = logging.getLogger("vibroimpact.service")
 DATABASE = "service.sqlite"
+PROGRESS_READ = 20
+"""Events of progress, the last ones, over which the rate of a job is taken."""
 MOST_EVENTS_READ = 500
 """Events that one question is answered with."""
 
@@ -46,6 +62,22 @@ class State(StrEnum):
     done = "done"
 
 
+class Kind(StrEnum):
+    """What a job makes."""
+
+    campaign = "campaign"
+    run = "run"
+    replay = "replay"
+    estimate = "estimate"
+
+
+OUTPUTS = {
+    Kind.campaign: "campaign/dataset.nc",
+    Kind.run: "run.nc",
+    Kind.replay: "replay.nc",
+    Kind.estimate: "estimates.nc",
+}
+"""Where the dataset of a job of each kind is, in its folder."""
 ENDED = (State.cancelled, State.failed, State.done)
 """States from which nothing goes on by itself."""
 
@@ -65,8 +97,7 @@ class Job:
     state : State
     workers : int or None
         Worker processes; None: one for each processor.
-    sweeps : bool
-        Whether it is a campaign, and not one run.
+    kind : Kind
     created, started, ended : float or None
         Seconds since 1970.
     total, done : int
@@ -75,6 +106,10 @@ class Job:
         How often it was started.
     message : str
         Why it is where it is, in words; empty where nothing is to be said.
+    options : dict
+        What its process is told beside its kind; see `job_process.Work`.
+    outcomes : dict of str to int
+        How many points ended in each way.
     """
 
     number: int
@@ -82,7 +117,7 @@ class Job:
     title: str
     state: State
     workers: int | None
-    sweeps: bool
+    kind: Kind
     created: float
     started: float | None
     ended: float | None
@@ -90,6 +125,8 @@ class Job:
     done: int
     attempts: int
     message: str
+    options: dict[str, Any]
+    outcomes: dict[str, int]
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +138,30 @@ class Event:
     at: float
     kind: str
     data: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a job is made of.
+
+    Attributes
+    ----------
+    kind : Kind
+    title : str
+    text : str
+        The scene; empty where there is none.
+    workers : int or None
+    files : dict of str to Path
+        What it reads, by the names it has in the folder of the job: linked, so that what is deleted later stays there.
+    options : dict
+    """
+
+    kind: Kind
+    title: str
+    text: str = ""
+    workers: int | None = None
+    files: dict[str, Path] = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict)
 
 
 class KeyReusedError(Exception):
@@ -122,23 +183,41 @@ class Store:
         self._connection = sqlite3.connect(folder / DATABASE, check_same_thread=False, isolation_level=None)
         self._connection.execute("PRAGMA journal_mode = WAL")
         self._connection.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
-        self._connection.executescript(SCHEMA)
+        self._refuse_other_layout()
+        self._connection.executescript(f"{SCHEMA}PRAGMA user_version = {LAYOUT};")
+
+    def _refuse_other_layout(self) -> None:
+        is_there = self._connection.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]
+        (layout,) = self._connection.execute("PRAGMA user_version").fetchone()
+        if is_there and layout != LAYOUT:
+            self._connection.close()
+            raise UsageError(
+                f"{self.folder / DATABASE}: expected the layout {LAYOUT}, got {layout}, of another version. "
+                "Its campaigns in `jobs` open with the commands; serve another folder."
+            )
 
     def close(self) -> None:
         """Close the database."""
         with self._lock:
             self._connection.close()
 
+    def rows(self, question: str, *values: Any) -> list[Any]:
+        """Return the rows that answer a question in SQL."""
+        with self._lock:
+            return self._connection.execute(question, values).fetchall()
+
     @contextmanager
-    def _transaction(self) -> Iterator[sqlite3.Connection]:
+    def transaction(self) -> Iterator[sqlite3.Connection]:
+        """Open a transaction, which is taken back where what is done in it fails."""
         with self._lock:
             self._connection.execute("BEGIN IMMEDIATE")
             try:
                 yield self._connection
+                self._connection.execute("COMMIT")
             except BaseException:
-                self._connection.execute("ROLLBACK")
+                if self._connection.in_transaction:  # a full disk has taken it back already
+                    self._connection.execute("ROLLBACK")
                 raise
-            self._connection.execute("COMMIT")
 
     def folder_of(self, job: str) -> Path:
         """Return the folder of a job."""
@@ -150,23 +229,16 @@ class Store:
 
     def dataset_of(self, job: Job) -> Path:
         """Return where the dataset of a job is, once it is done."""
-        folder = self.folder_of(job.id)
-        return folder / "campaign" / "dataset.nc" if job.sweeps else folder / "run.nc"
+        return self.folder_of(job.id) / OUTPUTS[job.kind]
 
     # ---- jobs ----
 
-    def submit(
-        self, text: str, *, title: str, sweeps: bool, workers: int | None, key: str = "", digest: str = ""
-    ) -> tuple[Job, bool]:
-        """Accept a scene; return its job, and whether it is new.
+    def submit(self, asked: Asked, *, key: str = "", digest: str = "") -> tuple[Job, bool]:
+        """Accept what was asked for; return its job, and whether it is new.
 
         Parameters
         ----------
-        text : str
-            The scene.
-        title : str
-        sweeps : bool
-        workers : int or None
+        asked : Asked
         key, digest : str
             Idempotency key and hash of the request; the same pair again is the same job.
 
@@ -175,7 +247,7 @@ class Store:
         KeyReusedError
             The key came with another digest before.
         """
-        with self._transaction() as database:
+        with self.transaction() as database:
             if key:
                 known = database.execute("SELECT digest, job FROM requests WHERE key = ?", (key,)).fetchone()
                 if known is not None:
@@ -183,18 +255,39 @@ class Store:
                         raise KeyReusedError
                     return self.job(known[1]), False
             name = uuid.uuid4().hex
-            folder = self.folder_of(name)
-            folder.mkdir(parents=True)
-            self.scene_of(name).write_text(text, encoding="utf-8")
+            self._fill(name, asked)
             database.execute(
-                "INSERT INTO jobs (id, title, state, workers, sweeps, created, total, done, attempts, message) "
-                "VALUES (?, ?, ?, ?, ?, ?, 0, 0, 0, '')",
-                (name, title, State.queued, workers, sweeps, time.time()),
+                "INSERT INTO jobs (id, title, state, workers, kind, created, total, done, attempts, message, options) "
+                "VALUES (?, ?, ?, ?, ?, ?, 0, 0, 0, '', ?)",
+                (
+                    *(name, asked.title, State.queued, asked.workers, asked.kind, time.time()),
+                    json.dumps(asked.options),
+                ),
             )
             if key:
                 database.execute("INSERT INTO requests VALUES (?, ?, ?)", (key, digest, name))
             self._tell(database, name, "state")
             return self.job(name), True
+
+    def _fill(self, name: str, asked: Asked) -> None:
+        """Make the folder of a job, with its scene and the files that it reads."""
+        folder = self.folder_of(name)
+        folder.mkdir(parents=True)
+        try:
+            if asked.text:
+                write_atomically(self.scene_of(name), asked.text.encode())
+            for link, file in asked.files.items():
+                _link(file, folder / link)
+        except OSError:
+            shutil.rmtree(folder)
+            raise
+
+    def remove_strays(self) -> None:
+        """Remove the folders of jobs that were not accepted, or forgotten, when the service was killed."""
+        known = {name for (name,) in self.rows("SELECT id FROM jobs")}
+        for folder in (self.folder / "jobs").glob("*"):
+            if folder.name not in known:
+                shutil.rmtree(folder)
 
     def job(self, name: str) -> Job:
         """Return a job.
@@ -204,11 +297,10 @@ class Store:
         KeyError
             There is none of this name.
         """
-        with self._lock:
-            row = self._connection.execute(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", (name,)).fetchone()
-        if row is None:
+        rows = self.rows(f"SELECT {_COLUMNS} FROM jobs WHERE id = ?", name)
+        if not rows:
             raise KeyError(name)
-        return _job(row)
+        return _job(rows[0])
 
     def jobs(self, *, before: int | None = None, most: int = 100) -> list[Job]:
         """Return jobs, the newest first.
@@ -219,30 +311,50 @@ class Store:
             Only those of lower number.
         most : int
         """
-        with self._lock:
-            rows = self._connection.execute(
-                f"SELECT {_COLUMNS} FROM jobs WHERE number < ? ORDER BY number DESC LIMIT ?",
-                (2**62 if before is None else before, most),
-            ).fetchall()
+        rows = self.rows(
+            f"SELECT {_COLUMNS} FROM jobs WHERE number < ? ORDER BY number DESC LIMIT ?",
+            *(2**62 if before is None else before, most),
+        )
         return [_job(row) for row in rows]
+
+    def jobs_in(self, state: State) -> list[Job]:
+        """Return the jobs in a state, the oldest first."""
+        return [
+            _job(row)
+            for row in self.rows(f"SELECT {_COLUMNS} FROM jobs WHERE state = ? ORDER BY number", state)
+        ]
+
+    def rate(self, name: str) -> float:
+        """Return how many points of a job were done a second over its last progress; 0 before there is any."""
+        rows = self.rows(
+            "SELECT at, data FROM events WHERE job = ? AND kind = 'progress' ORDER BY id DESC LIMIT ?",
+            *(name, PROGRESS_READ),
+        )
+        if len(rows) < 2:
+            return 0.0
+        (last, now), (first, before) = rows[0], rows[-1]
+        done = json.loads(now)["done"] - json.loads(before)["done"]
+        return float(done / (last - first)) if last > first else 0.0
+
+    def outcomes(self) -> dict[str, int]:
+        """Return how many points of all jobs ended in each way."""
+        found: Counter[str] = Counter()
+        for (text,) in self.rows("SELECT outcomes FROM jobs WHERE outcomes != '{}'"):
+            found.update(json.loads(text))
+        return dict(found)
 
     def next_queued(self) -> Job | None:
         """Return the job that has waited longest."""
-        with self._lock:
-            row = self._connection.execute(
-                f"SELECT {_COLUMNS} FROM jobs WHERE state = ? ORDER BY number LIMIT 1", (State.queued,)
-            ).fetchone()
-        return None if row is None else _job(row)
+        return next(iter(self.jobs_in(State.queued)), None)
 
     def counts(self) -> dict[State, int]:
         """Return how many jobs are in each state."""
-        with self._lock:
-            rows = self._connection.execute("SELECT state, COUNT(*) FROM jobs GROUP BY state").fetchall()
+        rows = self.rows("SELECT state, COUNT(*) FROM jobs GROUP BY state")
         return dict.fromkeys(State, 0) | {State(state): count for state, count in rows}
 
     def change(self, name: str, *, only_from: Sequence[State] = tuple(State), **values: Any) -> bool:
         """Change columns of a job, and tell it as an event; return whether it was in one of the states named."""
-        with self._transaction() as database:
+        with self.transaction() as database:
             assignments = ", ".join(f"{column} = ?" for column in values)
             places = ", ".join("?" for _ in only_from)
             changed = database.execute(
@@ -251,20 +363,20 @@ class Store:
             ).rowcount
             if changed:
                 self._tell(database, name, "state" if "state" in values else "progress")
-            return bool(changed)
+        if changed and "state" in values:
+            LOG.info("job", extra={"job": name, "state": values["state"], "why": values.get("message", "")})
+        return bool(changed)
 
     def requeue_running(self) -> None:
         """Put the jobs that a dead service was running back into the queue, and end those it was to cancel."""
-        with self._lock:
-            for job in self.jobs(most=2**31):
-                if job.state == State.running:
-                    self.change(job.id, state=State.queued, message="the service was restarted")
-                elif job.state == State.cancelling:
-                    self.change(job.id, state=State.cancelled, ended=time.time())
+        for job in self.jobs_in(State.running):
+            self.change(job.id, state=State.queued, message="the service was restarted")
+        for job in self.jobs_in(State.cancelling):
+            self.change(job.id, state=State.cancelled, ended=time.time())
 
     def delete(self, name: str) -> None:
         """Forget a job and its events; its folder is the caller's."""
-        with self._transaction() as database:
+        with self.transaction() as database:
             for table, column in (("events", "job"), ("requests", "job"), ("jobs", "id")):
                 database.execute(f"DELETE FROM {table} WHERE {column} = ?", (name,))
 
@@ -280,17 +392,26 @@ class Store:
 
     def events(self, name: str, *, after: int = 0) -> list[Event]:
         """Return the events of a job after one of them, in their order."""
-        with self._lock:
-            rows = self._connection.execute(
-                "SELECT id, job, at, kind, data FROM events WHERE job = ? AND id > ? ORDER BY id LIMIT ?",
-                (name, after, MOST_EVENTS_READ),
-            ).fetchall()
+        rows = self.rows(
+            "SELECT id, job, at, kind, data FROM events WHERE job = ? AND id > ? ORDER BY id LIMIT ?",
+            *(name, after, MOST_EVENTS_READ),
+        )
         return [Event(number, job, at, kind, json.loads(data)) for number, job, at, kind, data in rows]
 
 
-_COLUMNS = ", ".join(field.name for field in fields(Job))
+def _link(file: Path, name: Path) -> None:
+    try:
+        os.link(file, name)
+    except FileNotFoundError:
+        raise
+    except OSError:  # a file system without links
+        shutil.copyfile(file, name)
+
+
+_COLUMNS = ", ".join(one.name for one in fields(Job))
 
 
 def _job(row: Sequence[Any]) -> Job:
-    values = dict(zip((field.name for field in fields(Job)), row, strict=True))
-    return Job(**values | {"state": State(values["state"]), "sweeps": bool(values["sweeps"])})
+    values = dict(zip((one.name for one in fields(Job)), row, strict=True))
+    read = {name: json.loads(values[name]) for name in ("options", "outcomes")}
+    return Job(**values | read | {"state": State(values["state"]), "kind": Kind(values["kind"])})

@@ -10,17 +10,21 @@ import contextlib
 import json
 import os
 import signal
+import sqlite3
 import subprocess
-import sys
 import threading
 import time
-from collections import deque
+from collections import Counter, deque
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from vibroimpact.fmus.python_child import ending, python_command
-from vibroimpact.service.job_process import INTERRUPTED
-from vibroimpact.service.store import Job, State, Store
+from vibroimpact.service.child import kill_session
+from vibroimpact.service.job_process import INTERRUPTED, LATER, Work
+from vibroimpact.service.problems import is_full
+from vibroimpact.service.store import LOG, Job, State, Store
 
 GRACE = 0.5
 """Seconds that a cancelled job has to end in good order, before it and its workers are killed."""
@@ -28,6 +32,8 @@ MOST_ATTEMPTS = 3
 """How often a job whose process was killed by something else is started."""
 IDLE = 0.2
 """Seconds between two looks into an empty queue."""
+PAUSE = 2.0
+"""Seconds before something is tried again that a full disk or an absent scheduler hinders."""
 LAST_LINES = 5
 """Of what a process wrote to its standard error, that a failure is told with."""
 
@@ -51,6 +57,7 @@ class Supervisor:
 
     def start(self) -> None:
         """Take up what a dead service has left, and begin."""
+        self._store.remove_strays()
         self._store.requeue_running()
         self._thread.start()
 
@@ -82,9 +89,13 @@ class Supervisor:
                 continue
             try:
                 self._run(job)
-            except OSError as error:  # of its folder; the queue goes on with the next
-                message = f"its folder cannot be used: {error}"
-                self._store.change(job.id, state=State.failed, ended=time.time(), message=message)
+            except (OSError, sqlite3.Error) as error:
+                if is_full(error):
+                    LOG.warning("no room on the disk", extra={"job": job.id})
+                    self._closing.wait(PAUSE)
+                    continue
+                # of its folder; the queue goes on with the next
+                self._end(job, State.failed, f"its folder cannot be used: {error}")
 
     def _run(self, job: Job) -> None:
         started = self._store.change(
@@ -99,24 +110,25 @@ class Supervisor:
         if not started:
             return  # cancelled in the same instant
         folder = self._store.folder_of(job.id)
-        with (folder / "log.txt").open("a", encoding="utf-8") as log:
-            log.write(f"--- {time.strftime('%Y-%m-%d %H:%M:%S')} attempt {job.attempts + 1}\n")
-            log.flush()
-            process = self._open(job, folder)
-            with process:  # closes its pipes
-                failed, last = self._listen(job, process, log)
-                code = process.wait()
+        try:
+            with JobLog(folder / "log.txt", job.id) as log:
+                log.write(f"--- {time.strftime('%Y-%m-%d %H:%M:%S')} attempt {job.attempts + 1}")
+                process = self._open(job, folder)
+                with process:  # closes its pipes
+                    told = self._listen(job, process, log)
+                    code = process.wait()
+        except OSError as error:
+            if is_full(error):
+                self._change(job, state=State.queued, message=f"waits for room on the disk: {error}")
+            raise
         with self._lock:
             self._running = None
-        kill_group(process)  # workers that outlived it
-        self._note_end(job, code, failed, last)
+        kill_session(process)  # workers that outlived it
+        self._note_end(job, code, told)
 
     def _open(self, job: Job, folder: Path) -> subprocess.Popen[str]:
-        arguments = [
-            *("-m", "vibroimpact.service.job_process", str(self._store.scene_of(job.id)), str(folder)),
-            "" if job.workers is None else str(job.workers),
-            *([self._scheduler] if self._scheduler else []),
-        ]
+        work = Work(job.kind, job.workers, self._scheduler, job.options)
+        arguments = ("-m", "vibroimpact.service.job_process", str(folder.absolute()), work.written())
         process = subprocess.Popen(
             python_command(*arguments),
             stdin=subprocess.PIPE,
@@ -133,52 +145,84 @@ class Supervisor:
             self._stop(job.id)
         return process
 
-    def _listen(self, job: Job, process: subprocess.Popen[str], log: Any) -> tuple[str, list[str]]:
-        """Follow what a process says until it ends; return why it failed, and the end of its standard error."""
+    def _listen(self, job: Job, process: subprocess.Popen[str], log: JobLog) -> Told:
+        """Follow what a process says until it ends."""
         assert process.stdout is not None
         assert process.stderr is not None
-        last: deque[str] = deque(maxlen=LAST_LINES)
+        told = Told()
 
         def copy_errors(stream: Any) -> None:
             for line in stream:
-                last.append(line.rstrip("\n"))
-                log.write(line)
-                log.flush()
+                told.last.append(line.rstrip("\n"))
+                log.write(told.last[-1])
 
         errors = threading.Thread(target=copy_errors, args=(process.stderr,), daemon=True)
         errors.start()
-        failed = ""
         for line in process.stdout:
-            try:
-                said = json.loads(line)
-            except ValueError:
-                said = {"note": line.rstrip("\n")}  # an FMU that prints
+            said = _said(line)
             if "total" in said:
-                self._store.change(job.id, total=said["total"], done=said["done"])
-            if "failed" in said:
-                failed = said["failed"]
-            text = said.get("note") or said.get("failed")
+                told.total, told.done = said["total"], said["done"]
+                self._note_progress(job, told)
+            told.failed = said.get("failed", told.failed)
+            told.later = said.get("later", told.later)
+            told.outcomes = said.get("outcomes", told.outcomes)
+            text = said.get("note") or said.get("failed") or said.get("later")
             if text:
-                log.write(f"{text}\n")
-                log.flush()
+                log.write(text)
         errors.join(timeout=GRACE)
-        return failed, [line for line in last if line.strip()]
+        return told
 
-    def _note_end(self, job: Job, code: int, failed: str, last: list[str]) -> None:
-        now, state = time.time(), self._store.job(job.id).state
-        if state == State.cancelling:
-            self._store.change(job.id, state=State.cancelled, ended=now, message="cancelled")
+    def _note_progress(self, job: Job, told: Told) -> None:
+        """Note how far a job is; where the disk is full, the next look or its end does."""
+        try:
+            self._store.change(job.id, total=told.total, done=told.done)
+        except sqlite3.Error as error:
+            if not is_full(error):
+                raise
+            LOG.warning("no room on the disk", extra={"job": job.id})
+
+    def _note_end(self, job: Job, code: int, told: Told) -> None:
+        if self._store.job(job.id).state == State.cancelling:
+            self._end(job, State.cancelled, "cancelled", told)
         elif code == 0:
-            self._store.change(job.id, state=State.done, ended=now, message="")
+            self._end(job, State.done, "", told)
         elif self._closing.is_set():
-            self._store.change(job.id, state=State.queued, message="the service was stopped")
-        elif failed:
-            self._store.change(job.id, state=State.failed, ended=now, message=failed)
+            self._change(job, state=State.queued, message="the service was stopped")
+        elif code == LATER:
+            # what hinders it is no fault of the job, and does not count as an attempt
+            self._change(job, state=State.queued, message=told.later, attempts=job.attempts)
+            self._closing.wait(PAUSE)
+        elif told.failed:
+            self._end(job, State.failed, told.failed, told)
         elif code in (INTERRUPTED, -signal.SIGINT) or (code < 0 and job.attempts + 1 < MOST_ATTEMPTS):
-            self._store.change(job.id, state=State.queued, message=f"its process {ending(code)}")
+            self._change(job, state=State.queued, message=f"its process {ending(code)}")
         else:
-            why = f"its process {ending(code)}" + (f": {last[-1]}" if last else "")
-            self._store.change(job.id, state=State.failed, ended=now, message=why)
+            last = [line for line in told.last if line.strip()]
+            self._end(
+                job, State.failed, f"its process {ending(code)}" + (f": {last[-1]}" if last else ""), told
+            )
+
+    def _end(self, job: Job, state: State, message: str, told: Told | None = None) -> None:
+        known: dict[str, Any] = (
+            {} if told is None else {"outcomes": json.dumps(_sum(job.outcomes, told.outcomes))}
+        )
+        if told is not None and told.total:
+            known |= {"total": told.total, "done": told.done}
+        self._change(job, state=state, ended=time.time(), message=message, **known)
+
+    def _change(self, job: Job, **values: Any) -> None:
+        """Note what became of a job, as soon as the disk has room for it; else the next start of the service does."""
+        while True:
+            try:
+                self._store.change(job.id, **values)
+            except sqlite3.Error as error:
+                if not is_full(error):
+                    raise
+                LOG.warning("no room on the disk", extra={"job": job.id})
+                if self._closing.wait(PAUSE):
+                    return
+            else:
+                return
 
     def _stop(self, name: str | None) -> None:
         """End the process that runs, if it is that of the job named: first in good order, then at once."""
@@ -191,13 +235,58 @@ class Supervisor:
         try:
             process.wait(timeout=GRACE)
         except subprocess.TimeoutExpired:
-            kill_group(process)
+            kill_session(process)
 
 
-def kill_group(process: subprocess.Popen[str]) -> None:
-    """Kill a process with all that it has started in its session."""
-    if sys.platform == "win32":
-        process.kill()
-        return
-    with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
+@dataclass(slots=True)
+class Told:
+    """What a process has said of its job: how far it is, why it failed or waits, how points ended, its last lines."""
+
+    total: int = 0
+    done: int = 0
+    failed: str = ""
+    later: str = ""
+    outcomes: dict[str, int] = field(default_factory=dict)
+    last: deque[str] = field(default_factory=lambda: deque(maxlen=LAST_LINES))
+
+
+class JobLog:
+    """The log of a job: whole lines; those that a full disk has no room for are lost, and that is logged.
+
+    Parameters
+    ----------
+    path : Path
+    job : str
+    """
+
+    def __init__(self, path: Path, job: str) -> None:
+        self._file = path.open("ab", buffering=0)
+        self._job = job
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def write(self, line: str) -> None:
+        """Write a line."""
+        try:
+            self._file.write(f"{line}\n".encode())
+        except OSError as error:
+            LOG.warning("a line of its log is lost", extra={"job": self._job, "why": str(error)})
+
+
+def _said(line: str) -> dict[str, Any]:
+    """Return what a line of a process says; one that is no JSON object is a remark, of an FMU that prints."""
+    try:
+        said = json.loads(line)
+    except ValueError:
+        said = None
+    return said if isinstance(said, dict) else {"note": line.rstrip("\n")}
+
+
+def _sum(first: Mapping[str, int], second: Mapping[str, int]) -> dict[str, int]:
+    return dict(Counter(first) + Counter(second))

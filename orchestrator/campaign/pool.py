@@ -16,7 +16,7 @@ from distributed import CancelledError, Client, Future
 from distributed.comm.core import CommClosedError
 from distributed.scheduler import KilledWorker
 
-from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.fmus.errors import CampaignError, WorkersGoneError
 from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.progress import Progress
 
@@ -114,7 +114,7 @@ class WorkerPool:
 
         Raises
         ------
-        CampaignError
+        WorkersGoneError
             When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
         """
         self._leave_out_suspension()
@@ -129,7 +129,7 @@ class WorkerPool:
         if there:
             self._last_present = self._looked
         elif self._looked - self._last_present > WORKERLESS_SECONDS:
-            raise CampaignError(
+            raise WorkersGoneError(
                 f"{self._where}: expected at least one worker, got none for {WORKERLESS_SECONDS:.0f} s. "
                 f"Start workers; then the same {typed_or_called('command', 'call')} resumes."
             )
@@ -250,7 +250,7 @@ class WorkerPool:
 
         Raises
         ------
-        CampaignError
+        WorkersGoneError
             When no worker, or no scheduler, has been there for `WORKERLESS_SECONDS`.
         """
         while True:
@@ -282,7 +282,7 @@ class WorkerPool:
         except KilledWorker as error:
             return Finished(ticket, error=error, worker_lost=True)
         except (CancelledError, CommClosedError) as error:
-            raise CampaignError(
+            raise WorkersGoneError(
                 f"{self._where}: expected a scheduler that stays up, got none any more. "
                 f"The same {typed_or_called('command', 'call')} resumes."
             ) from error

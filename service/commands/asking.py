@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from vibroimpact.fmus.errors import SceneError
@@ -10,11 +12,34 @@ from vibroimpact.fmus.terminal import say
 from vibroimpact.service.client import RemoteJob, Service, ServiceError
 
 
-def submit_scene(scene: Path, url: str | None, folder: Path | None, workers: int | None, wait: bool) -> None:
-    """Submit a scene; the id is the one line of standard output."""
+@dataclass(frozen=True, slots=True)
+class Replayed:
+    """What `submit` is told of a scene that replays: recordings, a fit, recordings that are scored alone."""
+
+    recordings: Sequence[Path] = ()
+    fit: str | None = None
+    score: Sequence[Path] = ()
+
+    @property
+    def files(self) -> tuple[Sequence[Path], Sequence[Path]]:
+        """What is uploaded."""
+        return self.recordings, self.score
+
+
+def submit_scene(
+    scene: Path,
+    url: str | None,
+    folder: Path | None,
+    workers: int | None,
+    wait: bool,
+    replay: Replayed | None = None,
+) -> None:
+    """Submit a scene, with recordings that are uploaded before it; the id is the one line of standard output."""
+    asked = replay or Replayed()
     with Service(url, folder=folder) as service:
+        fitted, scored = ([service.upload_recording(path) for path in paths] for paths in asked.files)
         try:
-            job = service.submit(scene, workers=workers)
+            job = service.submit(scene, workers=workers, recordings=fitted, fit=asked.fit, score=scored)
         except ServiceError as error:
             if error.problems:
                 raise SceneError([_placed(scene, one) for one in error.problems]) from None

@@ -43,6 +43,9 @@ def serve(
     allow_remote: Annotated[
         bool, typer.Option("--allow-remote", help="Listen on an address that others reach.")
     ] = False,
+    allow_fmu_upload: Annotated[
+        bool, typer.Option("--allow-fmu-upload", help="Take FMUs, native code that runs with your rights.")
+    ] = False,
 ) -> None:
     """Run the service: campaigns over HTTP, one after the other, resumed after anything.
 
@@ -51,7 +54,14 @@ def serve(
     _need("fastapi", "uvicorn", "prometheus_client")
     from vibroimpact.service.serving import serve as run
 
-    run(data, host=host, port=port, scheduler=scheduler, allow_remote=allow_remote)
+    run(
+        data,
+        host=host,
+        port=port,
+        scheduler=scheduler,
+        allow_remote=allow_remote,
+        allow_fmu_upload=allow_fmu_upload,
+    )
 
 
 def submit(
@@ -60,15 +70,23 @@ def submit(
     data: Folder = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Worker processes.")] = None,
     wait: Annotated[bool, typer.Option("--wait", help="Follow it to its end.")] = False,
+    recording: Annotated[
+        list[Path] | None,
+        typer.Option(help="Recording, or file to import, to upload and replay; repeat it."),
+    ] = None,
+    fit: Annotated[str | None, typer.Option(help="Numbers of a replay to fit, with commas.")] = None,
+    score: Annotated[
+        list[Path] | None, typer.Option(help="Recording to upload and score that is not fitted; repeat it.")
+    ] = None,
 ) -> None:
     """Submit a scene to a service and print the id of its campaign.
 
     Example: vibroimpact submit examples/bifurcation.toml --data service --wait
     """
     _need("httpx")
-    from vibroimpact.service.commands.asking import submit_scene
+    from vibroimpact.service.commands.asking import Replayed, submit_scene
 
-    submit_scene(scene, service, data, workers, wait)
+    submit_scene(scene, service, data, workers, wait, Replayed(recording or (), fit, score or ()))
 
 
 def status(

@@ -2,36 +2,31 @@
 
 from __future__ import annotations
 
-import hashlib
 import shutil
 from http import HTTPStatus
-from typing import Annotated
+from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Query, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.service.problems import ProblemError
+from vibroimpact.service.routes.accepting import IdempotencyKey, accepted
 from vibroimpact.service.routes.described import (
     MOST_PAGE,
-    PREFIX,
     JobAnswer,
     job_answer,
     known_job,
     problems,
 )
 from vibroimpact.service.routes.scenes import refused_scene
-from vibroimpact.service.scenes import taken_scene, title_of
-from vibroimpact.service.store import ENDED, KeyReusedError, State, Store
+from vibroimpact.service.scenes import SOURCE, Shelf, Taken, linked, taken_scene, title_of
+from vibroimpact.service.store import ENDED, Asked, Kind, State, Store
 from vibroimpact.service.supervisor import Supervisor
 
-MOST_QUEUED = 100
-"""Jobs that wait, above which no more are accepted."""
-RETRY_AFTER = 30
-"""Seconds after which a client that was refused may ask again."""
 MOST_WORKERS = 256
 """Processes that one campaign may ask for."""
-Key = Annotated[str | None, Header(alias="Idempotency-Key", min_length=1, max_length=200)]
+Reference = Annotated[str, Field(min_length=1, max_length=200)]
 
 
 class Submission(BaseModel):
@@ -41,6 +36,17 @@ class Submission(BaseModel):
 
     scene: Annotated[str, Field(min_length=1, max_length=2**20, description="The scene file, TOML.")]
     workers: Annotated[int | None, Field(ge=1, le=MOST_WORKERS, description="Worker processes.")] = None
+    recordings: Annotated[
+        list[Reference],
+        Field(max_length=100, description="Replayed by a scene with [replay] that names none: names or ids."),
+    ] = []
+    fit: Annotated[
+        str | None,
+        Field(min_length=1, max_length=2000, description="Numbers of a replay to fit, by key, with commas."),
+    ] = None
+    score: Annotated[
+        list[Reference], Field(max_length=100, description="Recordings to score that are not fitted.")
+    ] = []
 
 
 class JobPage(BaseModel):
@@ -50,7 +56,7 @@ class JobPage(BaseModel):
     next: int | None
 
 
-def campaigns_router(store: Store, supervisor: Supervisor) -> APIRouter:
+def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIRouter:
     """Return the routes of jobs: submitted, listed, cancelled, resumed, deleted."""
     router = APIRouter(tags=["campaigns"])
 
@@ -60,35 +66,14 @@ def campaigns_router(store: Store, supervisor: Supervisor) -> APIRouter:
         responses=problems(HTTPStatus.UNPROCESSABLE_ENTITY, HTTPStatus.TOO_MANY_REQUESTS),
         summary="Submit a scene",
     )
-    def submit(given: Submission, response: Response, idempotency_key: Key = None) -> JobAnswer:
+    def submit(given: Submission, response: Response, idempotency_key: IdempotencyKey = None) -> JobAnswer:
         """Accept a scene, which is run after those before it. The same `Idempotency-Key` again is the same job."""
         try:
-            scene = taken_scene(given.scene)
+            taken = taken_scene(given.scene, shelf, given.recordings)
+            asked = _asked(given, taken, shelf)
         except SceneError as error:
             raise refused_scene(error, given.scene) from None
-        if store.counts()[State.queued] >= MOST_QUEUED:
-            raise ProblemError(
-                HTTPStatus.TOO_MANY_REQUESTS,
-                f"expected fewer than {MOST_QUEUED} campaigns that wait, got a full queue. Come back later.",
-                {"Retry-After": str(RETRY_AFTER)},
-            )
-        digest = hashlib.sha256(given.model_dump_json().encode()).hexdigest()
-        try:
-            job, _ = store.submit(
-                given.scene,
-                title=title_of(given.scene),
-                sweeps=bool(scene.sweep),
-                workers=given.workers,
-                key=idempotency_key or "",
-                digest=digest,
-            )
-        except KeyReusedError:
-            raise ProblemError(
-                HTTPStatus.UNPROCESSABLE_ENTITY,
-                "Idempotency-Key: expected a new key, got that of another request.",
-            ) from None
-        response.headers["Location"] = f"{PREFIX}/campaigns/{job.id}"
-        return job_answer(job)
+        return accepted(store, asked, given, response, idempotency_key)
 
     @router.get(
         "/campaigns", responses=problems(HTTPStatus.UNPROCESSABLE_ENTITY), summary="List, the newest first"
@@ -156,3 +141,24 @@ def campaigns_router(store: Store, supervisor: Supervisor) -> APIRouter:
         shutil.rmtree(store.folder_of(name))
 
     return router
+
+
+def _asked(given: Submission, taken: Taken, shelf: Shelf) -> Asked:
+    """Return the job that a submission makes."""
+    files, options = dict(taken.files), dict[str, Any]()
+    if taken.kind == Kind.replay:
+        options = {"fit": given.fit, "score": given.score}
+        problems = [line for name in given.score for line in linked("score", name, shelf, files)]
+    else:
+        beside = {"fit": given.fit, "score": given.score}
+        problems = [
+            f"{SOURCE}: {name}: expected a scene with [replay] that sweeps nothing but recordings, got another."
+            for name, value in beside.items()
+            if value
+        ]
+    if given.score and given.fit is None:
+        problems.append(f"{SOURCE}: score: expected fit beside it: a recording is scored that is not fitted.")
+    if problems:
+        raise SceneError(problems)
+    title = title_of(given.scene)
+    return Asked(taken.kind, title, taken.text, given.workers, files=files, options=options)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from http import HTTPStatus
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel
 
 from vibroimpact.service.problems import MEDIA_TYPE, ProblemError
-from vibroimpact.service.store import Job, State, Store
+from vibroimpact.service.store import Job, Kind, State, Store
 
 PREFIX = "/api/v1"
 """Of the paths of all routes but those that are no part of the API."""
@@ -17,12 +17,12 @@ MOST_PAGE = 200
 
 
 class JobAnswer(BaseModel):
-    """A job: a campaign, or one run."""
+    """A job: a campaign, one run, replays of recordings, or an estimate."""
 
     id: str
     title: str
     state: State
-    kind: Literal["campaign", "run"]
+    kind: Kind
     workers: int | None
     created: float
     started: float | None
@@ -31,6 +31,7 @@ class JobAnswer(BaseModel):
     done: int
     attempts: int
     message: str
+    outcomes: dict[str, int]
 
 
 class ProblemAnswer(BaseModel):
@@ -51,10 +52,7 @@ def problems(*statuses: HTTPStatus) -> dict[int | str, dict[str, Any]]:
 
 def job_answer(job: Job) -> JobAnswer:
     """Return a job as it is told."""
-    return JobAnswer(
-        kind="campaign" if job.sweeps else "run",
-        **{name: getattr(job, name) for name in JobAnswer.model_fields if name != "kind"},
-    )
+    return JobAnswer(**{name: getattr(job, name) for name in JobAnswer.model_fields})
 
 
 def known_job(store: Store, name: str) -> Job:

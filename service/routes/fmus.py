@@ -1,33 +1,40 @@
-"""The components that a scene may name."""
+"""The FMUs that a scene may name: listed, exported, uploaded where that is allowed."""
 
 from __future__ import annotations
 
+import asyncio
 from http import HTTPStatus
+from pathlib import Path
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import FileResponse
 from pydantic import BaseModel
 
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.shipped import components, fmu_path
+from vibroimpact.service.fmus import NAME, FmuStore
 from vibroimpact.service.problems import ProblemError
-from vibroimpact.service.routes.described import problems
+from vibroimpact.service.routes.described import PREFIX, problems
+from vibroimpact.service.routes.uploads import Uploads
 
 
 class Component(BaseModel):
-    """A component that the package brings."""
+    """A component that a scene may name, and whether the package brings it or somebody has uploaded it."""
 
     name: str
+    origin: Literal["package", "uploaded"]
 
 
-def fmus_router() -> APIRouter:
+def fmus_router(fmus: FmuStore, uploads: Uploads) -> APIRouter:
     """Return the routes of components."""
     router = APIRouter(tags=["fmus"])
 
     @router.get("/fmus", responses=problems())
-    def fmus() -> list[Component]:
-        """List the components of the package."""
-        return [Component(name=name) for name in sorted(components())]
+    def listed() -> list[Component]:
+        """List the components of the package and those that were uploaded."""
+        own = [Component(name=name, origin="uploaded") for name in fmus.names()]
+        return [Component(name=name, origin="package") for name in sorted(components())] + own
 
     @router.get(
         "/fmus/{name}",
@@ -40,11 +47,49 @@ def fmus_router() -> APIRouter:
         },
     )
     def fmu(name: str, fmi: Annotated[Literal["2.0", "3.0"], Query()] = "3.0") -> FileResponse:
-        """Return a component of the package as it is loaded here."""
-        if name not in components():
+        """Return a component as it is loaded here; `fmi` is for those of the package."""
+        path = Path(fmu_path(name, fmi)) if name in components() else fmus.find(name)
+        if path is None:
+            known = ", ".join([*sorted(components()), *fmus.names()])
+            raise ProblemError(HTTPStatus.NOT_FOUND, f"{name}: expected one of {known}.")
+        return FileResponse(path, media_type="application/zip", filename=f"{name.removesuffix('.fmu')}.fmu")
+
+    @router.post(
+        "/fmus",
+        status_code=HTTPStatus.CREATED,
+        responses=problems(
+            *(HTTPStatus.FORBIDDEN, HTTPStatus.REQUEST_TIMEOUT),
+            *(HTTPStatus.UNPROCESSABLE_ENTITY, HTTPStatus.INSUFFICIENT_STORAGE),
+        ),
+        openapi_extra={
+            "requestBody": {
+                "required": True,
+                "content": {"application/octet-stream": {"schema": {"type": "string"}}},
+            }
+        },
+        summary="Upload an FMU",
+    )
+    async def upload(
+        request: Request,
+        response: Response,
+        name: Annotated[str, Query(pattern=NAME, description="By which scenes name it.")],
+    ) -> Component:
+        """Take an FMU, of a law of one's own too, where the service was started with `--allow-fmu-upload`.
+
+        Its archive and its description are checked; nothing of it is loaded before a scene names it.
+        """
+        if not fmus.takes_uploads:
             raise ProblemError(
-                HTTPStatus.NOT_FOUND, f"{name}: expected one of {', '.join(sorted(components()))}."
+                HTTPStatus.FORBIDDEN,
+                "expected a service that takes FMUs, got one that does not: they are native code. "
+                "Start it with --allow-fmu-upload.",
             )
-        return FileResponse(fmu_path(name, fmi), media_type="application/zip", filename=f"{name}.fmu")
+        try:
+            async with uploads.received(request, name) as given:
+                await asyncio.to_thread(fmus.add, given.file, name)
+        except UsageError as error:
+            raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from None
+        response.headers["Location"] = f"{PREFIX}/fmus/{name}"
+        return Component(name=name, origin="uploaded")
 
     return router

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated, Literal
@@ -10,11 +9,8 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse, PlainTextResponse
 
-from vibroimpact.analysis import figures
-from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.figures import KINDS
-from vibroimpact.fmus.errors import VibroimpactError
-from vibroimpact.service.landed import READING
+from vibroimpact.service.drawing import DRAWN, MEDIA, drawn
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import known_job, problems
 from vibroimpact.service.store import Job, State, Store
@@ -23,25 +19,36 @@ MOST_LOG = 2**20
 """Of a log, the end that is shown, byte."""
 
 
+def dataset_of(store: Store, name: str) -> tuple[Job, Path]:
+    """Return a job that is done, and its dataset; 409 where it is not."""
+    job = known_job(store, name)
+    path = store.dataset_of(job)
+    if job.state != State.done or not path.is_file():
+        raise ProblemError(
+            HTTPStatus.CONFLICT, f"{name}: expected a campaign that is done, got one that is {job.state}."
+        )
+    return job, path
+
+
 def results_router(store: Store) -> APIRouter:
     """Return the routes of what a job has left."""
     router = APIRouter(tags=["results"])
     absent = problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY)
 
-    def dataset_of(name: str) -> tuple[Job, Path]:
-        job = known_job(store, name)
-        path = store.dataset_of(job)
-        if job.state != State.done or not path.is_file():
-            raise ProblemError(
-                HTTPStatus.CONFLICT, f"{name}: expected a campaign that is done, got one that is {job.state}."
-            )
-        return job, path
-
     @router.get("/campaigns/{name}/scene", response_class=PlainTextResponse, responses=absent)
-    def scene(name: str) -> Response:
-        """Return the scene as it was submitted."""
+    def scene(
+        name: str,
+        fitted: Annotated[bool, Query(description="With the numbers that a fit has found.")] = False,
+    ) -> Response:
+        """Return the scene that was submitted, or that which was fitted."""
         known_job(store, name)
-        return Response(store.scene_of(name).read_bytes(), media_type="text/plain; charset=utf-8")
+        path = store.folder_of(name) / "fitted.toml" if fitted else store.scene_of(name)
+        if not path.is_file():
+            raise ProblemError(
+                HTTPStatus.CONFLICT,
+                f"{name}: expected a job with a {'fitted ' * fitted}scene, got one without.",
+            )
+        return Response(path.read_bytes(), media_type="text/plain; charset=utf-8")
 
     @router.get("/campaigns/{name}/log", response_class=PlainTextResponse, responses=absent)
     def log(name: str) -> Response:
@@ -63,13 +70,13 @@ def results_router(store: Store) -> APIRouter:
     )
     def dataset(name: str) -> FileResponse:
         """Return the dataset, whole or a range of it."""
-        job, path = dataset_of(name)
+        job, path = dataset_of(store, name)
         return FileResponse(path, media_type="application/x-netcdf", filename=f"{job.id}.nc")
 
     @router.get(
         "/campaigns/{name}/figure",
         response_class=Response,
-        responses={200: {"content": {"image/png": {}, "image/svg+xml": {}}}, **absent},
+        responses={200: DRAWN, **absent},
     )
     def figure(
         name: str,
@@ -78,14 +85,7 @@ def results_router(store: Store) -> APIRouter:
         run: Annotated[int | None, Query(ge=0, le=2**31)] = None,
     ) -> Response:
         """Draw the dataset."""
-        _, path = dataset_of(name)
-        try:
-            buffer = io.BytesIO()
-            with READING, open_dataset(path) as found:
-                figures.draw(found, kind, run).savefig(buffer, format=file_format)
-        except VibroimpactError as error:
-            raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, str(error)) from None
-        media = {"png": "image/png", "svg": "image/svg+xml"}[file_format]
-        return Response(buffer.getvalue(), media_type=media)
+        _, path = dataset_of(store, name)
+        return Response(drawn(path, file_format, kind, run), media_type=MEDIA[file_format])
 
     return router

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import problems
-from vibroimpact.service.scenes import located, taken_scene
+from vibroimpact.service.scenes import Shelf, located, taken_scene
 
 
 class SceneText(BaseModel):
@@ -36,7 +36,7 @@ class Validation(BaseModel):
     problems: list[SceneProblem]
 
 
-def scenes_router() -> APIRouter:
+def scenes_router(shelf: Shelf) -> APIRouter:
     """Return the route that checks a scene."""
     router = APIRouter(tags=["scenes"])
 
@@ -44,7 +44,7 @@ def scenes_router() -> APIRouter:
     def validate(given: SceneText) -> Validation:
         """Return all problems of a scene, with their lines and columns."""
         try:
-            taken_scene(given.scene)
+            taken_scene(given.scene, shelf)
         except SceneError as error:
             found = [SceneProblem(**located(problem, given.scene)) for problem in error.problems]
             return Validation(problems=found)

@@ -7,10 +7,11 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 from support.command_line import ENTRY, ENVIRONMENT
-from vibroimpact.service.client import Service
+from vibroimpact.service.client import RemoteJob, Service
 
 SWEEP = """
 [scene]
@@ -44,17 +45,19 @@ class Served:
 
     def __init__(self, folder: Path, *options: str) -> None:
         self.folder = folder
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", ENTRY, "serve", "--data", str(folder), "--port", "0", *options],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=os.environ | ENVIRONMENT,
-        )
+        self.log = folder.with_name(f"{folder.name}.log")
+        with self.log.open("ab") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", ENTRY, "serve", "--data", str(folder), "--port", "0", *options],
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+                env=os.environ | ENVIRONMENT,
+            )
         assert self.process.stdout is not None
         said = self.process.stdout.readline()
         found = re.search(r"http://\S+:\d+", said)
-        assert found, said + self.process.stdout.read()
+        assert found, said + self.log.read_text()
         self.url = found[0]
 
     def client(self) -> Service:
@@ -67,3 +70,16 @@ class Served:
     def stop(self) -> None:
         self.process.send_signal(signal.SIGTERM)
         self.process.communicate(timeout=20)
+
+
+def scene_file(folder: Path, text: str) -> Path:
+    path = folder / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def until(job: RemoteJob, *states: str, seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while job.refresh().status["state"] not in states:
+        assert time.monotonic() < end, job.status
+        time.sleep(0.05)

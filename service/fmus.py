@@ -1,0 +1,66 @@
+"""The FMUs that scenes may name: those of the package, and those that were uploaded into the folder of the service."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+from vibroimpact.fmus.errors import ComponentFileError, UsageError
+from vibroimpact.fmus.packaging.archive import unpack
+from vibroimpact.fmus.packaging.fmpy_door import read_description
+
+MOST_FMUS = 100
+"""FMUs that a service keeps."""
+NAME = r"^[A-Za-z0-9_][A-Za-z0-9_.+\-]{0,99}\.fmu$"
+"""What an uploaded FMU may be called: the same on every system, never a path, nor the name of a shipped component."""
+
+
+class FmuStore:
+    """The FMUs of the folder of a service.
+
+    Parameters
+    ----------
+    folder : Path
+        `fmus` in the folder of the service; made when absent.
+    takes_uploads : bool
+        Whether others may add to it: an FMU is native code, which runs with the rights of the service.
+    """
+
+    def __init__(self, folder: Path, takes_uploads: bool) -> None:
+        self.folder, self.takes_uploads = folder, takes_uploads
+        self._lock = threading.Lock()
+        folder.mkdir(exist_ok=True, mode=0o700)
+        for part in folder.glob(".*"):  # of uploads that a kill has cut off
+            part.unlink()
+
+    def names(self) -> list[str]:
+        """Return the names of the FMUs that are there."""
+        return sorted(path.name for path in self.folder.glob("*.fmu"))
+
+    def find(self, name: str) -> Path | None:
+        """Return the file of an FMU; None where there is none of this name."""
+        return self.folder / name if name in self.names() else None
+
+    def add(self, file: Path, name: str) -> Path:
+        """Take an FMU that was uploaded: moved to its place once its archive and its description are in order.
+
+        Nothing of it is loaded.
+
+        Raises
+        ------
+        UsageError
+            It is no FMU, there are too many, or another one has its name.
+        """
+        try:
+            unpack(file)
+            read_description(file)
+        except ComponentFileError as error:
+            raise UsageError(str(error).replace(str(file), name)) from None
+        target = self.folder / name
+        with self._lock:
+            if target.exists() and target.read_bytes() != file.read_bytes():
+                raise UsageError(f"name: expected a new name, got {name}, which another FMU has.")
+            if len(self.names()) >= MOST_FMUS:
+                raise UsageError(f"expected fewer than {MOST_FMUS} FMUs, got no room.")
+            file.replace(target)
+        return target

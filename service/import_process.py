@@ -1,0 +1,64 @@
+"""The process that imports one file: `python -m vibroimpact.service.import_process FILE RECORDING SETTINGS`.
+
+What a stranger has uploaded is read here, where a library that crashes, hangs or fills the memory takes nothing else
+with it.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.analysis.recording import Recording, write_recording
+from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.hardware.recordings import import_recording
+from vibroimpact.service.child import FULL, end_with_service, say
+
+MOST_MEMORY = 8 * 2**30
+"""Address space of the process, byte."""
+
+
+def limit_memory() -> None:
+    """Let allocations beyond `MOST_MEMORY` fail."""
+    if sys.platform == "linux":
+        import resource
+
+        _, most = resource.getrlimit(resource.RLIMIT_AS)
+        wanted = MOST_MEMORY if most == resource.RLIM_INFINITY else min(MOST_MEMORY, most)
+        resource.setrlimit(resource.RLIMIT_AS, (wanted, most))
+
+
+def contents(recording: Recording) -> list[dict[str, Any]]:
+    """Return what is in a recording, for its list."""
+    channels = [
+        {"name": one.name, "units": one.unit, "samples": len(one.values)}
+        for one in recording.channels.values()
+    ]
+    events = [{"name": one.name, "units": "s", "events": len(one.times)} for one in recording.events.values()]
+    return channels + events
+
+
+def main(arguments: list[str]) -> int:
+    """Import the file that the arguments name; return the exit code."""
+    file, target, settings = Path(arguments[0]), Path(arguments[1]), json.loads(arguments[2])
+    end_with_service()
+    limit_memory()
+    try:
+        recording = import_recording(file, settings)
+        write_recording(recording, target)
+        say(channels=contents(recording))
+    except VibroimpactError as error:
+        say(failed=str(error).replace(f"{file.parent}/", ""))  # its folder is the service's own matter
+    except MemoryError:
+        say(failed=f"{file.name}: expected a recording, got more than fits into {MOST_MEMORY >> 30} GiB.")
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        say(full=[error.errno, error.strerror])
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

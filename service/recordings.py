@@ -1,0 +1,216 @@
+"""The recordings of a service: uploaded files, imported once, each a file `recordings/ID.nc` and a row of the store."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import threading
+import time
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.python_child import ending, python_command
+from vibroimpact.service.child import kill_session
+from vibroimpact.service.store import OUTPUTS, Store
+
+MOST_RECORDINGS = 1000
+"""Recordings that a service keeps."""
+IMPORT_SECONDS = 120.0
+"""For the import of one file, which a damaged one may hold up."""
+NAME = r"^[A-Za-z0-9_][A-Za-z0-9_ .+\-]{0,99}$"
+"""What a file may be called: the same on every system, and never a path."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoredRecording:
+    """A recording of the service.
+
+    Attributes
+    ----------
+    number : int
+        In the order of upload, from 1.
+    id : str
+        32 hexadecimal digits.
+    name : str
+        By which scenes name it: that of the file uploaded, with the ending `.nc`.
+    source : str
+        SHA-256 of the file uploaded, and its import settings.
+    bytes : int
+    channels : list of dict
+        `name`, `units`, `samples` of each channel; of a train of events `events` in place of `samples`.
+    created : float
+        Seconds since 1970.
+    """
+
+    number: int
+    id: str
+    name: str
+    source: str
+    bytes: int
+    channels: list[dict[str, Any]]
+    created: float
+
+
+class RecordingStore:
+    """The recordings of the folder of a store.
+
+    Parameters
+    ----------
+    store : Store
+    """
+
+    def __init__(self, store: Store) -> None:
+        self._store = store
+        self.folder = store.folder / "recordings"
+        self.folder.mkdir(exist_ok=True, mode=0o700)
+        known = {self.path(name).name for (name,) in store.rows("SELECT id FROM recordings")}
+        for path in self.folder.iterdir():  # of uploads that a kill has cut off
+            if path.name not in known:
+                path.unlink()
+
+    def path(self, name: str) -> Path:
+        """Return the file of a recording by its id."""
+        return self.folder / f"{name}.nc"
+
+    def find(self, name: str) -> StoredRecording:
+        """Return a recording by its id or its name.
+
+        Raises
+        ------
+        KeyError
+            There is none.
+        """
+        rows = self._store.rows(f"SELECT {_COLUMNS} FROM recordings WHERE id = ? OR name = ?", name, name)
+        if not rows:
+            raise KeyError(name)
+        return _recording(rows[0])
+
+    def page(self, *, before: int | None = None, most: int = 100) -> list[StoredRecording]:
+        """Return recordings of lower number, the newest first."""
+        rows = self._store.rows(
+            f"SELECT {_COLUMNS} FROM recordings WHERE number < ? ORDER BY number DESC LIMIT ?",
+            *(2**62 if before is None else before, most),
+        )
+        return [_recording(row) for row in rows]
+
+    def add(self, file: Path, source: str, settings: str) -> StoredRecording:
+        """Import a file that was uploaded; the same file with the same name and settings again is the same recording.
+
+        Parameters
+        ----------
+        file : Path
+            Under the name that it was given, in a folder of its own.
+        source : str
+            SHA-256 of file and settings.
+        settings : str
+            Of the import, JSON.
+
+        Raises
+        ------
+        UsageError
+            It is no recording, or another one has its name.
+        """
+        name, known = stored_name(file.name), self._known(stored_name(file.name), source)
+        if known is not None:
+            return known
+        identifier = uuid.uuid4().hex
+        target = self.path(identifier)
+        channels = imported(file, target, settings)
+        try:
+            with self._store.transaction() as database:
+                there = self._known(name, source)
+                if there is None:
+                    database.execute(
+                        "INSERT INTO recordings (id, name, source, bytes, channels, created) VALUES (?, ?, ?, ?, ?, ?)",
+                        (identifier, name, source, target.stat().st_size, json.dumps(channels), time.time()),
+                    )
+        except BaseException:
+            target.unlink(missing_ok=True)
+            raise
+        if there is not None:  # another upload of the same was faster
+            target.unlink()
+            return there
+        return self.find(identifier)
+
+    def refuse_more(self) -> None:
+        """Refuse a recording more than there may be."""
+        if self._store.rows("SELECT COUNT(*) FROM recordings")[0][0] >= MOST_RECORDINGS:
+            raise UsageError(f"expected fewer than {MOST_RECORDINGS} recordings, got no room. Delete some.")
+
+    def delete(self, recording: StoredRecording) -> None:
+        """Forget a recording; jobs that have begun with it keep what they read."""
+        with self._store.transaction() as database:
+            database.execute("DELETE FROM recordings WHERE id = ?", (recording.id,))
+        self.path(recording.id).unlink(missing_ok=True)
+
+    def _known(self, name: str, source: str) -> StoredRecording | None:
+        try:
+            found = self.find(name)
+        except KeyError:
+            return None
+        if found.source != source:
+            raise UsageError(
+                f"name: expected a new name, got {name}, which another recording has ({found.id}). "
+                "Choose another, or delete that one."
+            )
+        return found
+
+
+def stored_name(name: str) -> str:
+    """Return what a recording is called that was uploaded under a name.
+
+    >>> stored_name("a0.tdms")
+    'a0.nc'
+    """
+    stored = f"{Path(name).stem}.nc"
+    if stored in OUTPUTS.values():
+        raise UsageError(f"name: expected another name, got {name!r}: {stored} is what jobs write.")
+    return stored
+
+
+def imported(file: Path, target: Path, settings: str) -> list[dict[str, Any]]:
+    """Import a file in a process that may die or hang; return what its channels are.
+
+    Raises
+    ------
+    UsageError
+        It is no recording, or its import did not end.
+    """
+    process = subprocess.Popen(
+        python_command("-m", "vibroimpact.service.import_process", str(file), str(target), settings),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    hung = threading.Timer(IMPORT_SECONDS, kill_session, [process])
+    with process:
+        assert process.stdout is not None
+        hung.start()
+        said = process.stdout.read().splitlines()
+        process.wait()
+    hung.cancel()
+    told = json.loads(said[-1]) if said else {}
+    if "full" in told:
+        raise OSError(*told["full"])
+    if "channels" not in told:
+        late = f", after {IMPORT_SECONDS:.0f} s" if hung.finished.is_set() and process.returncode < 0 else ""
+        end = (
+            f"{file.name}: expected a recording, got a file whose import {ending(process.returncode)}{late}."
+        )
+        why = told.get("failed") or end
+        raise UsageError(str(why))
+    channels: list[dict[str, Any]] = told["channels"]
+    return channels
+
+
+_COLUMNS = ", ".join(one.name for one in fields(StoredRecording))
+
+
+def _recording(row: Sequence[Any]) -> StoredRecording:
+    values = dict(zip((one.name for one in fields(StoredRecording)), row, strict=True))
+    return StoredRecording(**values | {"channels": json.loads(values["channels"])})

@@ -1,0 +1,40 @@
+"""How any job is accepted: 202 with its place, the same answer to the same key, 429 where too many wait."""
+
+from __future__ import annotations
+
+import hashlib
+from http import HTTPStatus
+from typing import Annotated
+
+from fastapi import Header, Response
+from pydantic import BaseModel
+
+from vibroimpact.service.problems import ProblemError
+from vibroimpact.service.routes.described import PREFIX, JobAnswer, job_answer
+from vibroimpact.service.store import Asked, KeyReusedError, State, Store
+
+MOST_QUEUED = 100
+"""Jobs that wait, above which no more are accepted."""
+RETRY_AFTER = 30
+"""Seconds after which a client that was refused may ask again."""
+IdempotencyKey = Annotated[str | None, Header(alias="Idempotency-Key", min_length=1, max_length=200)]
+
+
+def accepted(store: Store, asked: Asked, given: BaseModel, response: Response, key: str | None) -> JobAnswer:
+    """Accept a job that a request asks for, and say in the response where it is."""
+    if store.counts()[State.queued] >= MOST_QUEUED:
+        raise ProblemError(
+            HTTPStatus.TOO_MANY_REQUESTS,
+            f"expected fewer than {MOST_QUEUED} campaigns that wait, got a full queue. Come back later.",
+            {"Retry-After": str(RETRY_AFTER)},
+        )
+    digest = hashlib.sha256(f"{type(given).__name__}{given.model_dump_json()}".encode()).hexdigest()
+    try:
+        job, _ = store.submit(asked, key=key or "", digest=digest)
+    except KeyReusedError:
+        raise ProblemError(
+            HTTPStatus.UNPROCESSABLE_ENTITY,
+            "Idempotency-Key: expected a new key, got that of another request.",
+        ) from None
+    response.headers["Location"] = f"{PREFIX}/campaigns/{job.id}"
+    return job_answer(job)

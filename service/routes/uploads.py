@@ -1,0 +1,77 @@
+"""The body of a request as a file: streamed to the disk, whole or not there at all."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import tempfile
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from http import HTTPStatus
+from pathlib import Path
+
+from fastapi import Request
+from starlette.requests import ClientDisconnect
+
+from vibroimpact.service.problems import ProblemError
+
+MOST_AT_ONCE = 4
+"""Uploads that are read and imported at a time; others wait for their turn before their bodies are read."""
+STALLED_SECONDS = 30.0
+"""Silence after which an upload is given up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Upload:
+    """A file that was uploaded, in a folder of its own, which ends with the request."""
+
+    file: Path
+    sha256: str
+
+
+class Uploads:
+    """Takes uploads, some at a time.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they lie meanwhile; emptied.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._turns = asyncio.Semaphore(MOST_AT_ONCE)
+
+    @asynccontextmanager
+    async def received(self, request: Request, name: str) -> AsyncIterator[Upload]:
+        """Receive the body of a request under a name.
+
+        Raises
+        ------
+        ProblemError
+            It has stalled, or was cut off.
+        """
+        async with self._turns:
+            with tempfile.TemporaryDirectory(prefix=".upload-", dir=self._folder) as folder:
+                file = Path(folder, name)
+                yield Upload(file, await _written(request, file))
+
+
+async def _written(request: Request, file: Path) -> str:
+    """Write the body of a request to a file; return its SHA-256."""
+    digest = hashlib.sha256()
+    blocks = aiter(request.stream())
+    try:
+        with file.open("wb") as target:
+            while (block := await asyncio.wait_for(anext(blocks, None), STALLED_SECONDS)) is not None:
+                digest.update(block)
+                target.write(block)
+    except TimeoutError:
+        raise ProblemError(
+            HTTPStatus.REQUEST_TIMEOUT,
+            f"expected the rest of {file.name}, got nothing for {STALLED_SECONDS:.0f} s.",
+        ) from None
+    except ClientDisconnect:
+        raise ProblemError(HTTPStatus.BAD_REQUEST, f"{file.name}: the connection was cut off.") from None
+    return digest.hexdigest()
