@@ -88,9 +88,9 @@ def slice_of(landed: Landed, selection: Selection, most: int) -> dict[str, Any]:
     if per_run and len(landed.axes) - len(selection.at) > 1:
         kept = kept & _coarser_grid(landed.coordinates[:, kept], kept, most)
     rows = np.flatnonzero(kept[landed.owners])
-    total = rows.size
     if not per_run:
         rows = rows[_distinct(landed.owners[rows], landed.values[rows])]
+    total = rows.size
     if rows.size > most:
         rows = rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
     owners = landed.owners[rows]

@@ -72,15 +72,14 @@ class CampaignView {
     this.progress.max = job.total || 1;
     this.progress.value = job.done;
     this.state.replaceChildren(stateBadge(job.state));
-    this.message.textContent = job.message;
+    this.message.textContent = job.message || (job.state === "running" && !job.total ? "Its workers are starting." : "");
     this.message.className = job.state === "failed" ? "problem" : "small muted";
     this.showFacts();
     this.diagram?.refresh();
     if (before === job.state) return this.tellTenth();
     if (before) tell(`The campaign is ${job.state}.`);
     this.showActs();
-    if (before && !job.started) this.ask("GET").then((fresh) => fresh && this.seen(fresh));
-    if (ENDED.includes(job.state)) this.finish();
+    if (ENDED.includes(job.state)) this.finish(Boolean(before));
   }
 
   tellTenth() {
@@ -91,12 +90,13 @@ class CampaignView {
 
   showFacts() {
     const { job, pace } = this, runs = job.state === "running";
-    const facts = {
-      Points: `${job.done} of ${job.total || "?"}`,
-      "Points a second": runs && pace.rate ? short(Number(pace.rate.toPrecision(3))) : "–",
-      "Time left": runs ? duration(pace.left(job)) : "–",
-      Submitted: moment(job.created), Workers: job.workers ?? "all processors", Id: this.id.slice(0, 8),
-    };
+    const facts = { Points: job.total ? `${job.done} of ${job.total}` : "–" };
+    if (runs) {
+      facts["Points a second"] = pace.rate ? short(Number(pace.rate.toPrecision(3))) : "–";
+      facts["Time left"] = duration(pace.left(job));
+    }
+    if (job.ended && job.started) facts.Took = duration(job.ended - job.started);
+    Object.assign(facts, { Submitted: moment(job.created), Workers: job.workers ?? "all processors", Id: this.id.slice(0, 8) });
     this.facts.replaceChildren(...Object.entries(facts).map(([key, value]) =>
       element("div", {}, element("dt", {}, key), element("dd", {}, String(value)))));
   }
@@ -139,8 +139,12 @@ class CampaignView {
   }
 
   /** Show what there is once a campaign has ended. */
-  async finish() {
+  async finish(changed) {
     this.showResults();
+    if (changed) { // events do not tell when it began and ended
+      const fresh = await this.ask("GET");
+      if (fresh?.state === this.job.state) { this.job = fresh; this.showFacts(); }
+    }
     if (this.job.kind === "run" && this.job.state === "done") showPoint(this.point, this.id, 0);
     const found = await this.ask("GET", "/failures?limit=200");
     if (found?.total) this.showFailures(found);

@@ -1,6 +1,6 @@
 // All campaigns, the newest first: how far each is, how fast, how long it will take.
 
-import { ask, campaignPath } from "./api.js";
+import { ask } from "./api.js";
 import { button, duration, element, moment, short, stateBadge } from "./dom.js";
 import { Pace } from "./pace.js";
 
@@ -57,7 +57,12 @@ function row(job, paces) {
       ? [element("progress", { max: job.total, value: job.done, "aria-label": `Points of ${job.title || job.id}` }),
          element("span", { class: "small muted" }, `${job.done} of ${job.total} ${job.total === 1 ? "run" : "points"}`)]
       : element("span", { class: "small muted" }, job.message || "–")),
-    element("td", { class: "number" }, runs && pace.rate ? short(Number(pace.rate.toPrecision(3))) : "–"),
-    element("td", { class: "number" }, runs ? duration(pace.left(job)) : "–"),
+    numbered(runs && pace.rate ? short(Number(pace.rate.toPrecision(3))) : "–", "points a second"),
+    numbered(runs ? duration(pace.left(job)) : "–", "left"),
     element("td", { class: "small muted" }, moment(job.created)));
+}
+
+/** Return a cell of a number; where there is no room for a head its unit is told beside it. */
+function numbered(text, unit) {
+  return element("td", { class: text === "–" ? "number nothing" : "number", "data-unit": unit }, text);
 }

@@ -132,7 +132,7 @@ export class Diagram {
     const content = this.along === MAP ? this.map() : this.branches();
     this.plot.canvas.dataset.points = content.layers.reduce((sum, layer) => sum + layer.xs.length, 0);
     this.plot.show(content);
-    const thinned = shown < rows ? `; ${shown} of ${rows} values are drawn, more where you zoom in` : "";
+    const thinned = shown < rows ? `; ${shown} of ${rows} different values are drawn, more where you zoom in` : "";
     this.said.textContent = `${inWords(variable)}: ${landed} of ${Math.max(total, landed)} points${thinned}.`;
     this.fillTable();
   }
@@ -144,7 +144,7 @@ export class Diagram {
     const layers = ways.map((way) => {
       const places = run.map((_, place) => place).filter((place) => direction[place] === way);
       return {
-        kind: "points", size: value.length > 3000 ? 2 : 3, colour: COLOURS[directions[way]], name: ways.length > 1 ? directions[way] : null,
+        kind: "points", size: value.length > 3000 ? 2 : value.length > 400 ? 3 : 4, colour: COLOURS[directions[way]], name: ways.length > 1 ? directions[way] : null,
         xs: places.map((place) => coordinates[number][place]), ys: places.map((place) => value[place]), runs: places.map((place) => run[place]),
       };
     });

@@ -78,7 +78,7 @@ export function drawBar(pen, range, label, left, top, height, text, words) {
     pen.fillText(words(range[0] + share * (range[1] - range[0])), left + 17, top + height * (1 - share));
   }
   pen.save();
-  pen.translate(left + 66, top + height / 2);
+  pen.translate(left + 74, top + height / 2);
   pen.rotate(-Math.PI / 2);
   pen.textAlign = "center";
   pen.fillText(label, 0, 0);

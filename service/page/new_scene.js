@@ -158,5 +158,26 @@ class NewScene {
 
 /** Return a scene to begin a replay of a recording with. */
 function replayOf(name) {
-  return `[scene]\ntitle = "Replay of ${name}"\nunits = "SI"\n\n[body]\nmass = 1.0\nstiffness = 1000.0\ndamping_ratio = 0.02\n\n[[stop]]\nposition = 0.001\nrestitution = 0.7\n\n[replay]\nrecording = ${JSON.stringify(name)}\n\n[replay.drive]\nchannel = "base"\n`;
+  return `[scene]
+title = ${JSON.stringify(`Replay of ${name}`)}
+
+[body]
+kind = "beam"
+boundary = "clamped-clamped"
+length = 0.1
+mass_per_length = 0.3
+frequency = 100.0
+modes = 1
+damping_ratio = 0.015
+
+[sensor]
+location = 0.5
+gain = 1.0
+
+[replay]
+recording = ${JSON.stringify(name)}
+drive = "base_acceleration"
+from = "base"
+compare = [{ simulated = "beam.sensor.acceleration", measured = "board" }]
+`;
 }

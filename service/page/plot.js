@@ -65,7 +65,7 @@ export class Plot {
     pen.font = '12px system-ui, "DejaVu Sans", sans-serif';
     const map = this.content.layers.find((layer) => layer.kind === "cells");
     const { x, y } = this.ranges;
-    const box = this.box = { left: 62, right: width - (map ? 84 : 12), top: 10, bottom: height - 42 };
+    const box = this.box = { left: 62, right: width - (map ? 96 : 12), top: 10, bottom: height - 42 };
     this.x = scaleOf(x[0], x[1], box.left, box.right, this.content.x.log);
     this.y = scaleOf(y[0], y[1], box.bottom, box.top, this.content.y.log);
     this.frame(pen, colour);
@@ -76,7 +76,7 @@ export class Plot {
     for (const layer of this.content.layers) drawLayer(pen, layer, this.x, this.y, colour(NAMES[layer.colour] ?? NAMES.one));
     this.marks(pen, colour);
     pen.restore();
-    if (map) drawBar(pen, map.range, map.bar, box.right + 10, box.top, box.bottom - box.top, colour("--muted"), short);
+    if (map) drawBar(pen, map.range, map.bar, box.right + 10, box.top, box.bottom - box.top, colour("--muted"), (value) => short(Number(value.toPrecision(3))));
   }
 
   frame(pen, colour) {
@@ -87,7 +87,7 @@ export class Plot {
     pen.fillStyle = colour("--muted");
     pen.textAlign = "center";
     pen.textBaseline = "top";
-    for (const value of this.x.ticks(Math.max(3, (right - left) / 95))) {
+    for (const value of this.x.ticks(Math.max(3, (right - left) / 75))) {
       const place = this.x.place(value);
       line(pen, place, top, place, bottom);
       pen.fillText(short(value), place, bottom + 6);

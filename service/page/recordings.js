@@ -13,6 +13,7 @@ export function showRecordings(main) {
       name ? element("th", { scope: "col" }, name) : element("td", {})))), body));
   const nothing = element("p", { class: "empty", hidden: true }, "No recordings yet.");
   const more = button("More", () => look(more.dataset.next), { hidden: true });
+  const cards = element("section", { class: "card", "aria-label": "Recordings" }, listing, nothing, more);
   const enter = element("button", { class: "main", type: "submit" }, "Send");
   const form = element("form", { class: "row end", onsubmit: send }, element("label", { for: "recording" }, "A file of a measurement", file), enter);
 
@@ -49,13 +50,13 @@ export function showRecordings(main) {
     } catch (error) {
       said.className = "problem";
       said.textContent = error.status === 404 ? "This service takes no recordings." : error.message;
-      form.hidden = listing.hidden = error.status === 404;
+      form.hidden = cards.hidden = error.status === 404;
     }
   }
 
   main.append(element("div", { class: "head" }, element("h1", {}, "Recordings")),
     element("section", { class: "card", "aria-label": "Send a recording" }, form, said),
-    element("section", { class: "card", "aria-label": "Recordings" }, listing, nothing, more));
+    cards);
   look();
 }
 
