@@ -1,6 +1,6 @@
 """Where the workers of a campaign live: processes of this machine, or behind the address of a Dask scheduler.
 
-Only this module and `pool` import dask or distributed. docs/clusters.md says what the settings `QUIET` are worth.
+Only this module and `pool` import dask or distributed. docs/scaling.md says what the settings `QUIET` are worth.
 """
 
 from __future__ import annotations
@@ -148,10 +148,10 @@ def _remote_cluster(address: str, security: Security | None) -> Iterator[Cluster
         certified = security.get_connection_args("client")["ssl_context"] is not None
     except OSError as error:
         raise UsageError(
-            f"{expected}, and certificates that can be read, got {error}. See docs/clusters.md."
+            f"{expected}, and certificates that can be read, got {error}. See docs/scaling.md."
         ) from error
     if address.startswith("tls:") and not certified:
-        raise UsageError(f"{expected}, and certificates for TLS, got none. See docs/clusters.md.")
+        raise UsageError(f"{expected}, and certificates for TLS, got none. See docs/scaling.md.")
     try:
         client = Client(address, timeout=CONNECT_SECONDS, set_as_default=False, security=security)
     except (OSError, ValueError) as error:

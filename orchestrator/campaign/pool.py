@@ -16,7 +16,7 @@ from distributed import CancelledError, Client, Future
 from distributed.comm.core import CommClosedError
 from distributed.scheduler import KilledWorker
 
-from vibroimpact.fmus.errors import CampaignError, WorkersGoneError
+from vibroimpact.fmus.errors import CampaignError, UsageError, WorkersGoneError
 from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.orchestrator.campaign.progress import Progress
 
@@ -52,6 +52,10 @@ MOST_REPLACEMENTS = 50
 
 MOST_DEATHS = 5
 """Deaths per worker, while all get ready, above which the scene counts as what kills them."""
+
+
+UNREADABLE = "Error during deserialization"
+"""How Dask's own error begins where a scheduler or a worker lacks a package."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +188,8 @@ class WorkerPool:
         ------
         CampaignError
             When workers die again and again.
+        UsageError
+            When scheduler or workers lack this package.
         """
         calls: dict[str, Future[Any]] = {}
         answers: dict[str, Any] = {}
@@ -216,7 +222,19 @@ class WorkerPool:
                 self._moved()
             except (TimeoutError, CancelledError, KilledWorker):
                 del calls[address]
+            except (ImportError, RuntimeError) as error:
+                self._refuse_strangers(error)
+                raise
         return answers
+
+    def _refuse_strangers(self, error: Exception) -> None:
+        """Refuse a scheduler or a worker that cannot read what it is sent."""
+        if isinstance(error, ImportError) or str(error).startswith(UNREADABLE):
+            raise UsageError(
+                f"{self._where}: expected a scheduler and workers with the packages of this process, got some that "
+                "cannot read the work. Install vibroimpact where they run, and the same versions of dask and "
+                "distributed. See docs/scaling.md."
+            ) from error
 
     def _is_complete(self, began: float) -> bool:
         """Return whether all workers are there, or those that are missing have been waited for."""

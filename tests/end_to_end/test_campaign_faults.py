@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import signal
@@ -19,7 +20,10 @@ from support.campaign_process import CampaignProcess, run_campaign_process, wait
 from support.campaign_scenes import amplitude_text, assert_same_rows, frequency_text, scene_of
 from support.places import TESTS
 
+import vibroimpact.orchestrator.campaign.campaign as engine
 from vibroimpact.analysis.dataset import Outcome, read_flat
+from vibroimpact.fmus.errors import CampaignError
+from vibroimpact.orchestrator.campaign import run_campaign
 from vibroimpact.orchestrator.campaign.single_run import run_scene
 
 POINTS, MILLISECONDS = 600, 3.0
@@ -408,6 +412,29 @@ def test_a_scheduler_with_tls_is_reached_with_certificates_and_not_without(tmp_p
             assert_one_clear_message(err)
             assert f"--scheduler {given}: expected a Dask scheduler that listens there" in err
     assert read_flat(tmp_path / "with" / "dataset.nc").sizes["run"] == 20
+
+
+def test_a_scheduler_without_this_package_is_refused_in_one_line(tmp_path: Path) -> None:
+    scene, preload = tmp_path / "scene.toml", tmp_path / "lacks.py"
+    scene.write_text(frequency_text(10))
+    preload.write_text("import sys\nsys.modules['vibroimpact'] = None\n")
+    address = f"tcp://127.0.0.1:{free_port()}"
+    with started_cluster(address, "--preload", str(preload)):
+        code, _, err = run_campaign_process(scene, tmp_path / "campaign", "--scheduler", address)
+    assert code == 2
+    assert_one_clear_message(err)
+    assert "Install vibroimpact where they run" in err
+
+
+def test_a_full_folder_for_temporary_files_is_named_and_no_defect(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/tmp/notes")
+
+    monkeypatch.setattr(engine, "open_workers", full)
+    with pytest.raises(CampaignError, match=r"/tmp/notes: .*No space left.*folder for temporary files"):
+        run_campaign(scene_of(frequency_text(10)), tmp_path / "campaign")
 
 
 @pytest.fixture
