@@ -39,6 +39,8 @@ _LOWEST = 0.01
 _WIDE = 8.0
 # Largest ratio of the ends of a logarithmic scale.
 _WIDEST = 1e6
+# Cells of a map of scattered points along each axis.
+_CELLS = 500
 # Dimension of the runs of two adaptive axes.
 _SCATTERED = "point"
 _NEITHER = (
@@ -247,7 +249,10 @@ def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, st
     """Draw values over two swept parameters: a row for each quantity, a column for each direction."""
     if len(varied(dataset)) != 2:
         raise DatasetError(wrong_sweep("two swept parameters", dataset))
-    if "run" in dataset["run_id"].dims:
+    along, across = _in_order_of_the_scene(dataset, varied(dataset))
+    if dataset["run_id"].dims == (_SCATTERED,):
+        quantities = [(_nearest(values, along, across), text, none) for values, text, none in quantities]
+    elif "run" in dataset["run_id"].dims:
         raise DatasetError(
             "figure: expected a grid of two parameters, got scattered runs. "
             "Sweep each parameter over its own values."
@@ -257,10 +262,10 @@ def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, st
     axes = np.asarray(
         figure.subplots(len(quantities), len(directions), sharex=True, sharey=True, squeeze=False)
     )
-    along, across = _in_order_of_the_scene(dataset, varied(dataset))
-    numbered = {name: dataset[name].dims[0] for name in (along, across) if name not in dataset.dims}
-    along, across = (str(numbered.get(name, name)) for name in (along, across))
-    places = {name: _numbered(dataset, str(name)) for name in numbered.values()}
+    shared = {name: str(dataset[name].dims[0]) for name in (along, across) if name not in dataset.dims}
+    numbered = {name: along for name, along in shared.items() if along != _SCATTERED}
+    along, across = (numbered.get(name, name) for name in (along, across))
+    places = {name: _numbered(dataset, name) for name in numbered.values()}
     for row, (values, text, missing) in zip(axes, quantities, strict=True):
         for axis, direction in zip(row, directions, strict=True):
             branch = values.sel(direction=direction) if "direction" in values.dims else values
@@ -270,6 +275,22 @@ def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, st
             notes += [] if np.isfinite(branch.values).all() else [f"gray: {missing}"]
             axis.set_title("; ".join(notes), fontsize=8 if len(notes) == 1 else 7)
     return figure
+
+
+def _nearest(values: xr.DataArray, along: str, across: str) -> xr.DataArray:
+    """Return values of scattered points on a fine grid, each cell with that of the nearest point."""
+    from scipy.spatial import cKDTree
+
+    columns = [values[along].values, values[across].values]
+    spans = [np.ptp(column) or 1.0 for column in columns]
+    grid = [np.linspace(column.min(), column.max(), _CELLS) for column in columns]
+    tree = cKDTree(np.stack([c / span for c, span in zip(columns, spans, strict=True)], axis=1))
+    x, y = np.meshgrid(grid[0] / spans[0], grid[1] / spans[1], indexing="ij")
+    _, place = tree.query(np.stack([x.ravel(), y.ravel()], axis=1))
+    coordinates = {
+        name: (name, axis, values[name].attrs) for name, axis in zip((along, across), grid, strict=True)
+    }
+    return xr.DataArray(values.values[place].reshape(_CELLS, _CELLS), coordinates, dims=(along, across))
 
 
 def _numbered(dataset: xr.Dataset, dimension: str) -> xr.DataArray:

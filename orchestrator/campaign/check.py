@@ -11,7 +11,7 @@ from vibroimpact.orchestrator.campaign.chunks import DEFAULT_RUNNER, BranchPoint
 from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.run.result_size import MOST_BYTES, bytes_of_a_run, size
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import Point, run_count
+from vibroimpact.orchestrator.scene.sweep import Point, most_points, run_count
 
 MOST_TRIAL_SECONDS = 20.0
 """Wall time after which the trial point is given up, s."""
@@ -70,12 +70,15 @@ class SceneCost:
         None where no point could be tried.
     untried : str
         Why none was tried.
+    first : int
+        Points of the first round of an adaptive sweep, whose `points` are the most that there may be; else 0.
     """
 
     points: int
     branches: int
     trial: Trial | None
     untried: str = ""
+    first: int = 0
 
     @property
     def result_bytes(self) -> int | None:
@@ -116,8 +119,11 @@ def cost_of(scene: Scene) -> SceneCost:
     points = run_count(scene.sweep)
     carried = next((axis for axis in scene.sweep if axis.continuation), None)
     branches = points if carried is None else points // len(carried.values)
-    untried = _why_untried(scene)
-    return SceneCost(points, branches, None if untried else _tried(scene), untried)
+    untried, most = _why_untried(scene), most_points(scene.sweep)
+    trial = None if untried else _tried(scene)
+    if most is not None:
+        return SceneCost(most, branches, trial, untried, first=points)
+    return SceneCost(points, branches, trial, untried)
 
 
 def _why_untried(scene: Scene) -> str:

@@ -25,7 +25,7 @@ from vibroimpact.orchestrator.run import Runner, identity_of, named_runner
 from vibroimpact.orchestrator.run.dataset import with_constants_of
 from vibroimpact.orchestrator.run.result_size import refuse_large_results
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.sweep import expand, run_count
+from vibroimpact.orchestrator.scene.sweep import expand, most_points, run_count
 
 
 def run_scene(
@@ -55,9 +55,10 @@ def run_scene(
     Raises
     ------
     UsageError
-        When the dataset cannot be written, or would be larger than memory.
+        When the dataset cannot be written, or would be larger than memory, or the sweep is adaptive.
     """
     target = Path(path)
+    refuse_adaptive(scene)
     refuse_large_results(scene)
     _refuse_unwritable(target)
     opened = named_runner(scene, runner)
@@ -75,6 +76,21 @@ def run_scene(
     except OSError as error:
         raise _unwritable(target, error) from error
     return tally(dataset)
+
+
+def refuse_adaptive(scene: Scene) -> None:
+    """Refuse a scene whose points are found round by round.
+
+    Raises
+    ------
+    UsageError
+        With what to do.
+    """
+    if most_points(scene.sweep) is not None:
+        raise UsageError(
+            f"{scene.source}: sweep: expected points that are known before the first is computed, got adaptive axes. "
+            "Use `vibroimpact campaign`, which computes them round by round."
+        )
 
 
 def _run_all(scene: Scene, runner: Runner, points: list[BranchPoint], progress: Progress) -> list[RunRecord]:

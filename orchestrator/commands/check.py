@@ -75,19 +75,30 @@ def _what_it_costs(scene: Scene, cost: SceneCost) -> Iterator[tuple[str, str]]:
     yield "points", _points(cost)
     yield "trial", f"none: {cost.untried}" if cost.trial is None else _trial(cost.trial)
     refused = _refused(scene)
-    if refused or cost.trial is not None:
+    if cost.first:
+        yield "run", "refused: the points of adaptive axes are found by `vibroimpact campaign`"
+    elif refused or cost.trial is not None:
         yield "run", refused or _time(cost) + _memory(cost, COPIES_IN_RUN)
     if cost.trial is None:
         return
     if cost.points > 1:
         workers = min(processor_count(), cost.branches)
         on = f" on {counted(workers, 'worker')} and some seconds to start"
-        yield "campaign", _time(cost, workers) + on + _memory(cost, COPIES_IN_CAMPAIGN)
+        yield (
+            "campaign",
+            ("at most " if cost.first else "")
+            + _time(cost, workers)
+            + on
+            + _memory(cost, COPIES_IN_CAMPAIGN),
+        )
     if not cost.trial.given_up:
-        yield "dataset", f"about {size(cost.trial.size * cost.points + BYTES_BESIDE)}"
+        most = "at most " if cost.first else ""
+        yield "dataset", f"{most}about {size(cost.trial.size * cost.points + BYTES_BESIDE)}"
 
 
 def _points(cost: SceneCost) -> str:
+    if cost.first:
+        return f"{cost.first} in the first round, {cost.points} at most: more go where the motion jumps"
     if cost.branches == cost.points:
         return f"{cost.points}"
     each = cost.points // cost.branches

@@ -136,6 +136,11 @@ def dimensions(axes: Sequence[SweepAxis]) -> tuple[Dimension, ...]:
     return tuple(tuple(members) for members in found.values())
 
 
+def most_points(axes: Sequence[SweepAxis]) -> int | None:
+    """Return how many points adaptive axes may come to; None where every point is known before."""
+    return max((axis.adaptive.at_most for axis in axes if axis.adaptive is not None), default=None)
+
+
 def shared_dimensions(axes: Sequence[SweepAxis]) -> dict[str, str]:
     """Return the dimension of a dataset that each key shares with others, by key; a key that has its own is left out.
 
