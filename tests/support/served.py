@@ -40,6 +40,9 @@ def sweep_text(points: int, transient: int, path: str = "independent") -> str:
     return SWEEP.format(points=points, transient=transient, path=path)
 
 
+SHORT = sweep_text(40, 50)
+
+
 class Served:
     """A service in a process of its own."""
 
