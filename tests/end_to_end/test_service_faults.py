@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import random
 import socket
-import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -15,7 +13,7 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
-from support.served import SHORT, Served, scene_file, sweep_text, until
+from support.served import SHORT, Cluster, Served, scene_file, sweep_text, until
 
 import vibroimpact as vi
 from vibroimpact.service.client import Service, ServiceError
@@ -128,45 +126,17 @@ def test_a_full_disk_is_one_answer_and_what_was_accepted_goes_on_when_there_is_r
         service.stop()
 
 
-@contextmanager
-def cluster(port: int) -> Iterator[None]:
-    """Run a Dask scheduler with one worker, which are killed at the end."""
-    address = f"tcp://127.0.0.1:{port}"
-    commands = (
-        ("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"),
-        ("worker", address, "--nworkers", "1", "--nthreads", "1", "--no-dashboard", "--no-nanny"),
-    )
-    processes = [
-        subprocess.Popen(
-            [sys.executable, "-P", "-m", "dask", *command],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        for command in commands
-    ]
-    try:
-        yield
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
-
-
 def test_a_campaign_waits_for_a_scheduler_that_is_not_there_and_goes_on_when_it_is(tmp_path: Path) -> None:
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
-    service, scene = (
-        Served(tmp_path / "service", "--scheduler", f"tcp://127.0.0.1:{port}"),
-        scene_file(tmp_path, LONG),
-    )
+    cluster = Cluster()
+    service, scene = Served(tmp_path / "service", "--scheduler", cluster.address), scene_file(tmp_path, LONG)
     try:
         with service.client() as client:
             job = client.submit(scene)
             waits = next(one for one in job.events() if "waits for workers behind tcp://" in one["message"])
             assert waits["state"] == "queued"
-            with cluster(port):
+            with cluster:
                 next(one for one in job.events(after=waits["id"]) if one["done"] > 0)
-            with cluster(port):
+            with cluster:
                 found = job.wait().dataset()
         assert found.displacement_range.equals(vi.run(scene).displacement_range)
     finally:

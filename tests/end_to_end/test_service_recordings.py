@@ -200,8 +200,8 @@ def test_fmus_are_taken_by_a_service_that_allows_it_alone(
             assert service.upload_fmu(own) == "own.fmu"
             assert {"name": "own.fmu", "origin": "uploaded"} in service.ask("GET", "/fmus").json()
             assert service.ask("GET", "/fmus/own.fmu").content == own.read_bytes()
-            job = service.submit(scene_file(tmp_path, scene)).wait()
+            found = service.submit(scene_file(tmp_path, scene)).wait().dataset()
         scene_file(tmp_path, COUPLED)
-        assert job.dataset().sizes["sample"] == vi.run(tmp_path / "scene.toml").sizes["sample"]
+        assert found.sizes["sample"] == vi.run(tmp_path / "scene.toml").sizes["sample"]
     finally:
         allowing.stop()
