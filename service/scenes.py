@@ -24,6 +24,11 @@ SOURCE = "scene"
 _SYNTAX = re.compile(r"line (\d+), column (\d+)")
 _KEY = re.compile(rf"^{SOURCE}: ([A-Za-z_][\w\-]*(?:\[\d+\])?(?:\.[\w\-\"]+(?:\[\d+\])?)*): ")
 _HEADER = re.compile(r"^\s*(\[\[?)\s*([^\[\]]+?)\s*\]\]?\s*(?:#.*)?$")
+_TEXT = re.compile(
+    r'''"""(?:\\.|[^\\])*?"""|\'{3}.*?\'{3}|"(?:\\.|[^"\\\n])*"|\'[^\'\n]*\'|#[^\n]*''', re.DOTALL
+)
+"""Texts and comments of TOML, of which those of several lines are looked for."""
+BOM = "\ufeff"
 _ENTRY = re.compile(r"^(\s*)([\w\-\".]+)\s*=")
 
 
@@ -163,7 +168,8 @@ def _place(key: str, text: str) -> tuple[int, int]:
     """Return where a key such as `stop[2].position` is written; else its nearest table; else the beginning."""
     wanted = re.sub(r"\[(\d+)\]$", "", key)
     table, best, counts = "", (1, 1, 0), dict[str, int]()
-    for number, line in enumerate(text.splitlines(), 1):
+    # TOML ends lines at these alone; and what a text of several lines holds is no key
+    for number, line in enumerate(_TEXT.sub(_blank, text.removeprefix(BOM)).split("\n"), 1):
         header, entry = _HEADER.match(line), _ENTRY.match(line)
         column = 1
         if header:
@@ -179,8 +185,21 @@ def _place(key: str, text: str) -> tuple[int, int]:
             continue
         shared = len(full) if wanted == full or wanted.startswith((f"{full}.", f"{full}[")) else 0
         if shared > best[2]:
-            best = (number, column, shared)
+            best = (number, _within(line, column, wanted[len(full) :]) if entry else column, shared)
     return best[:2]
+
+
+def _within(line: str, column: int, rest: str) -> int:
+    """Return the column of what is left of a key in the inline tables of a line; else that of the line's own key."""
+    index = re.match(r"\[(\d+)\]", rest)
+    name = re.escape(rest.rpartition(".")[2])
+    found = [one.start(1) + 1 for one in re.finditer(rf"[{{,\s](\"?{name}\"?)\s*=", line)] if name else []
+    place = int(index[1]) - 1 if index else 0
+    return found[place] if place < len(found) else column
+
+
+def _blank(text: re.Match[str]) -> str:
+    return "\n" * text[0].count("\n") or text[0]
 
 
 def title_of(text: str) -> str:

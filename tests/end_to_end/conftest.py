@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import httpx
 import pytest
-from support.served import Served
+from support.served import SHORT, Served, scene_file
+
+from vibroimpact.service.client import RemoteJob
 
 
 @pytest.fixture(scope="session")
@@ -14,6 +16,13 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     service = Served(tmp_path_factory.mktemp("served") / "service")
     yield service
     service.stop()
+
+
+@pytest.fixture(scope="session")
+def finished(served: Served, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RemoteJob]:
+    """Yield a short campaign that is done."""
+    with served.client() as service:
+        yield service.submit(scene_file(tmp_path_factory.mktemp("finished"), SHORT), workers=1).wait()
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""A service, or processes of its jobs, killed at random moments: what it accepted ends bit for bit as undisturbed."""
+"""A service, its jobs, a scheduler, killed at random moments: what was accepted ends bit for bit as undisturbed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import psutil
-from support.served import Served, sweep_text
+from support.served import Cluster, Served, sweep_text
 
 import vibroimpact as vi
 from soak.kills import Content, content, difference
@@ -22,6 +22,8 @@ POINTS = {"independent": 240, "up-down": 120}
 TRANSIENT = 20_000
 """Periods before the recording: a point takes some ten milliseconds."""
 MOST_KILLS = 4
+SCHEDULED = 0.3
+"""Part of the cases in which the workers are those of a scheduler, which is killed too."""
 
 
 def check(seed: int) -> str | None:
@@ -36,15 +38,29 @@ def disturbed(chance: random.Random, path: str, points: int, transient: int) -> 
     expected = _undisturbed(path, points, transient)
     scene, folder = Path("scene.toml"), Path("service").absolute()
     scene.write_text(sweep_text(points, transient, path))
-    served = Served(folder)
+    if chance.random() < SCHEDULED:
+        with Cluster() as cluster:
+            return _disturbed(chance, scene, folder, expected, cluster)
+    return _disturbed(chance, scene, folder, expected, None)
+
+
+def _disturbed(
+    chance: random.Random, scene: Path, folder: Path, expected: Content, cluster: Cluster | None
+) -> str | None:
+    options = () if cluster is None else ("--scheduler", cluster.address)
+    served = Served(folder, *options)
     try:
         with served.client() as service:
-            name = service.submit(scene, workers=2).id
+            name = service.submit(scene, workers=None if cluster else 2).id
         for _ in range(chance.randint(1, MOST_KILLS)):
             time.sleep(chance.expovariate(0.5))
             if chance.random() < 0.5:
                 served.kill()
-                served = Served(folder)
+                served = Served(folder, *options)
+            elif cluster is not None and chance.random() < 0.5:
+                cluster.__exit__()
+                time.sleep(chance.expovariate(0.5))
+                cluster.__enter__()
             elif victims := _descendants(served.process.pid):
                 _kill(chance.choice(victims))
         return _end_of(served, name, folder, expected)

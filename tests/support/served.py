@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Self
 
 from support.command_line import ENTRY, ENVIRONMENT
 from vibroimpact.service.client import RemoteJob, Service
@@ -38,6 +40,9 @@ recorded_periods = 5
 def sweep_text(points: int, transient: int, path: str = "independent") -> str:
     """Return a scene of so many points, each after so many periods."""
     return SWEEP.format(points=points, transient=transient, path=path)
+
+
+SHORT = sweep_text(40, 50)
 
 
 class Served:
@@ -70,6 +75,35 @@ class Served:
     def stop(self) -> None:
         self.process.send_signal(signal.SIGTERM)
         self.process.communicate(timeout=20)
+
+
+class Cluster:
+    """A Dask scheduler with one worker: they run while it is entered, and are killed at the end of that."""
+
+    def __init__(self) -> None:
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            self._port = free.getsockname()[1]
+        self.address = f"tcp://127.0.0.1:{self._port}"
+        self._processes: list[subprocess.Popen[bytes]] = []
+
+    def __enter__(self) -> Self:
+        where = ("--host", "127.0.0.1", "--port", str(self._port))
+        how = ("--nworkers", "1", "--nthreads", "1", "--no-nanny")
+        for command in (("scheduler", *where), ("worker", self.address, *how)):
+            self._processes.append(
+                subprocess.Popen(
+                    [sys.executable, "-P", "-m", "dask", *command, "--no-dashboard"],
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                )
+            )
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for process in self._processes:
+            process.kill()
+            process.wait()
+        self._processes.clear()
 
 
 def scene_file(folder: Path, text: str) -> Path:
