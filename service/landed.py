@@ -131,7 +131,10 @@ class LandedReader:
                 self._known.move_to_end(key)
             else:
                 with opened_netcdf(path) as file:
-                    self._known[key] = _read(file, variable)
+                    found = _read(file, variable)
+                if found is None:
+                    raise KeyError(variable)
+                self._known[key] = found
                 while (
                     sum(piece.size for piece in self._known.values()) > MOST_CACHED and len(self._known) > 1
                 ):
@@ -169,12 +172,12 @@ def failures_in(path: Path, outcomes: Sequence[int]) -> list[Failure]:
         ]
 
 
-def _read(file: netCDF4.Dataset, variable: str) -> Landed:
+def _read(file: netCDF4.Dataset, variable: str) -> Landed | None:
     axes = axes_of(file)
     quantities = tuple(_quantities(file, axes))
     found = next((one for one in quantities if one.name == variable), None)
     if found is None:
-        raise KeyError(variable)
+        return None
     runs = file["run_index"][:].astype(np.int64)
     owners, values = _rows(file, found, runs.size)
     return Landed(

@@ -63,17 +63,10 @@ export async function endSession() {
   await send("DELETE", "/session", {});
 }
 
-/** Follow the events of a campaign; the browser reconnects with Last-Event-ID. Returns how to stop. */
-export function follow(id, seen) {
+/** Be told whenever something happens to a campaign, over lost connections too. Returns how to stop. */
+export function follow(id, happened) {
   const source = new EventSource(PREFIX + campaignPath(id, "/events"));
-  const take = (event) => {
-    listeners.lost(false);
-    const told = JSON.parse(event.data);
-    seen(told);
-    if (["done", "failed", "cancelled"].includes(told.state)) source.close();
-  };
-  source.addEventListener("state", take);
-  source.addEventListener("progress", take);
-  source.addEventListener("error", () => listeners.lost(true));
+  // a stream begins with all that happened before, so its events say that one has to look, not what is now
+  for (const kind of ["open", "state", "progress", "error"]) source.addEventListener(kind, happened);
   return () => source.close();
 }

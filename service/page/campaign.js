@@ -7,6 +7,7 @@ import { Pace } from "./pace.js";
 import { showPoint } from "./point.js";
 
 const ENDED = ["done", "failed", "cancelled"];
+const PAUSE = 250; // milliseconds
 const TENTHS = 10; // a screen reader hears of every tenth of a campaign
 
 export function showCampaign(main, id) {
@@ -56,12 +57,22 @@ class CampaignView {
 
   watchEvents() {
     this.stop();
-    this.stop = ENDED.includes(this.job.state) ? () => {} : follow(this.id, (told) => this.seen({ ...this.job, ...told }));
+    this.stop = ENDED.includes(this.job.state) ? () => {} : follow(this.id, () => this.look());
+  }
+
+  /** Ask how far it is, once for all that happens within a pause. */
+  look() {
+    this.timer ??= setTimeout(async () => {
+      const job = await this.ask("GET");
+      this.timer = null;
+      if (job && !this.ended) this.seen(job);
+    }, PAUSE);
   }
 
   close() {
     this.ended = true;
     this.stop();
+    clearTimeout(this.timer);
     this.diagram?.close();
   }
 
@@ -79,7 +90,7 @@ class CampaignView {
     if (before === job.state) return this.tellTenth();
     if (before) tell(`The campaign is ${job.state}.`);
     this.showActs();
-    if (ENDED.includes(job.state)) this.finish(Boolean(before));
+    if (ENDED.includes(job.state)) this.finish();
   }
 
   tellTenth() {
@@ -118,7 +129,7 @@ class CampaignView {
       this.said.textContent = "";
       return await ask(method, campaignPath(this.id, rest));
     } catch (error) {
-      this.said.textContent = error.message;
+      if (error.status !== 0) this.said.textContent = error.message; // else the banner says it
       return null;
     }
   }
@@ -133,18 +144,18 @@ class CampaignView {
 
   async remove() {
     if (!confirm("Delete this campaign with all of its results?")) return;
-    const before = this.said.textContent;
-    await this.ask("DELETE");
-    if (this.said.textContent === before || !this.said.textContent) location.hash = "#/campaigns";
+    try {
+      await ask("DELETE", campaignPath(this.id));
+      location.hash = "#/campaigns";
+    } catch (error) {
+      this.said.textContent = error.message;
+    }
   }
 
   /** Show what there is once a campaign has ended. */
-  async finish(changed) {
+  async finish() {
+    this.stop();
     this.showResults();
-    if (changed) { // events do not tell when it began and ended
-      const fresh = await this.ask("GET");
-      if (fresh?.state === this.job.state) { this.job = fresh; this.showFacts(); }
-    }
     if (this.job.kind === "run" && this.job.state === "done") showPoint(this.point, this.id, 0);
     const found = await this.ask("GET", "/failures?limit=200");
     if (found?.total) this.showFailures(found);
