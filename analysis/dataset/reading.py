@@ -12,6 +12,7 @@ from typing import Any
 
 import netCDF4
 import numpy as np
+import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 from xarray.backends import BackendArray
@@ -336,7 +337,7 @@ def _grid(
     directions = flat.variables["direction"].values
     names = _direction_names(flat)
     if directions.size and (directions != Direction.independent).any():
-        present, place = np.unique(directions, return_inverse=True)
+        present, place = _distinct(directions)
         labels = np.array([Direction(int(value)).name for value in present])
         axes["direction"] = xr.Variable("direction", labels, _plain(flat.variables["direction"]))
         sizes["direction"] = labels.size
@@ -344,7 +345,7 @@ def _grid(
     elif directions.size:
         scalars["direction"] = xr.Variable((), names[0], _plain(flat.variables["direction"]))
     for dimension, names_along in _swept_along(flat).items():
-        values, place = _distinct([flat.variables[name] for name in names_along])
+        values, place = _distinct_points([flat.variables[name] for name in names_along])
         for name, column in zip(names_along, values.T, strict=True):
             axes[name] = xr.Variable(dimension, column, flat.variables[name].attrs)
         sizes[dimension] = len(values)
@@ -363,13 +364,13 @@ def _swept_along(flat: xr.Dataset) -> dict[str, list[str]]:
     return found
 
 
-def _distinct(columns: list[xr.Variable]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+def _distinct_points(columns: list[xr.Variable]) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return the points that runs have along a dimension, shape (point, parameter), and at which each run is.
 
     One parameter ascends; several that move together are in the order of the runs.
     """
     if len(columns) == 1 and SWEPT_ALONG not in columns[0].attrs:
-        values, place = np.unique(columns[0].values, return_inverse=True)
+        values, place = _distinct(columns[0].values)
         return values[:, None], place
     rows = np.stack([column.values for column in columns], axis=1)
     values, first, place = np.unique(rows, axis=0, return_index=True, return_inverse=True)
@@ -377,6 +378,15 @@ def _distinct(columns: list[xr.Variable]) -> tuple[NDArray[np.float64], NDArray[
     rank = np.empty_like(order)
     rank[order] = np.arange(order.size)
     return values[order], rank[place.reshape(-1)]
+
+
+def _distinct(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.intp]]:
+    """Return the values that occur, ascending, and the place of each element among them.
+
+    By a table of hashes: sorting 10^6 values, as `np.unique` does, takes ten times as long.
+    """
+    place, present = pd.factorize(values, sort=True, use_na_sentinel=False)
+    return np.asarray(present), place
 
 
 def _in_order_of_the_scene(flat: xr.Dataset) -> list[str]:
@@ -391,7 +401,7 @@ def _runs_on(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) 
     if runs == 0 or size > _LARGEST_GRID_PER_RUN * runs:
         return None
     where = np.ravel_multi_index(tuple(places), shape) if shape else np.zeros(runs, dtype=np.intp)
-    if np.unique(where).size != runs:
+    if np.bincount(where, minlength=1).max() > 1:
         return None
     run_id = np.full(size, -1, dtype=np.int32)
     run_id[where] = np.arange(runs, dtype=np.int32)
@@ -400,7 +410,9 @@ def _runs_on(shape: tuple[int, ...], places: list[NDArray[np.intp]], runs: int) 
 
 def _direction_names(flat: xr.Dataset) -> NDArray[np.str_]:
     """Return the direction of each run as a word."""
-    return np.array([Direction(int(value)).name for value in flat.variables["direction"].values])
+    names = np.array([member.name for member in Direction])
+    words: NDArray[np.str_] = names[flat.variables["direction"].values]
+    return words
 
 
 def _plain(variable: xr.Variable) -> dict[str, Any]:

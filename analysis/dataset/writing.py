@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.checking import marked
+from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, ragged
 from vibroimpact.analysis.dataset.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,
@@ -47,10 +48,10 @@ _Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]
 
 
 def build_dataset(
-    runs: Sequence[RunRecord],
+    runs: Sequence[RunRecord] | RunColumns,
     *,
     coordinates: Mapping[str, NDArray[np.float64]],
-    direction: Sequence[Direction],
+    direction: Sequence[Direction] | NDArray[np.int8],
     run_index: Sequence[int] | NDArray[np.integer[Any]],
     sample_variables: Sequence[str] = (),
     units: UnitSystem = "SI",
@@ -65,7 +66,7 @@ def build_dataset(
 
     Parameters
     ----------
-    runs : sequence of RunRecord
+    runs : sequence of RunRecord, or RunColumns
         All with the same groups recorded; a failed run may have None where the others have arrays.
     coordinates : mapping of str to ndarray, shape (run,)
         Values of each swept parameter, under its name in the file.
@@ -112,16 +113,16 @@ def build_dataset(
     {'run': 1, 'impact': 0}
     """
     _check_lengths(len(runs), coordinates, direction, run_index)
-    variables = _run_variables(runs, direction, run_index, units)
-    variables |= _state_variables(runs, units)
-    variables |= _period_variables(runs, units, omit)
-    variables |= _ragged_variables("impact", [run.impacts for run in runs], IMPACT_COLUMNS, units)
-    variables |= _ragged_variables("stick", [run.sticks for run in runs], STICK_COLUMNS, units)
+    columns, records = (runs, ()) if isinstance(runs, RunColumns) else (columns_of(runs), runs)
+    variables = _run_variables(columns, direction, run_index, units)
+    variables |= _period_variables(columns.periods, units, omit)
+    variables |= _ragged_variables("impact", columns.impacts, IMPACT_COLUMNS, units)
+    variables |= _ragged_variables("stick", columns.sticks, STICK_COLUMNS, units)
     samples = _Samples(sample_variables, event_components, frozenset(coordinates), unit_of or {}, units)
-    variables |= _sample_variables(runs, samples)
-    variables |= _event_variables(runs, event_components, units)
-    variables |= _coupling_variables(runs, connections, units)
-    variables |= _score_variables(runs, compared, units)
+    variables |= _sample_variables(records, samples)
+    variables |= _event_variables(records, event_components, units)
+    variables |= _coupling_variables(records, connections, units)
+    variables |= _score_variables(records, compared, units)
     swept: _Variables = {
         name: (
             ("run",),
@@ -175,7 +176,7 @@ def with_constants(
 def _check_lengths(
     runs: int,
     coordinates: Mapping[str, NDArray[np.float64]],
-    direction: Sequence[Direction],
+    direction: Sequence[Direction] | NDArray[np.int8],
     run_index: Sequence[int] | NDArray[np.integer[Any]],
 ) -> None:
     """Refuse per-run arrays of different lengths, and swept parameters that would hide a variable."""
@@ -196,22 +197,24 @@ def _check_lengths(
 
 
 def _run_variables(
-    runs: Sequence[RunRecord],
-    direction: Sequence[Direction],
+    columns: RunColumns,
+    direction: Sequence[Direction] | NDArray[np.int8],
     run_index: Sequence[int] | NDArray[np.integer[Any]],
     units: UnitSystem,
 ) -> _Variables:
-    """Return the variables that every run has."""
+    """Return the variables that every run has, and its whole state where it has one."""
     values = {
         "run_index": run_index,
         "direction": direction,
-        "outcome": [run.outcome for run in runs],
-        "message": [run.message for run in runs],
-        "point_seconds": [run.seconds for run in runs],
-        "final_displacement": [run.final_displacement for run in runs],
-        "final_velocity": [run.final_velocity for run in runs],
-        "final_phase": [run.final_phase for run in runs],
+        "outcome": columns.outcome,
+        "message": columns.message,
+        "point_seconds": columns.seconds,
+        "final_displacement": columns.final_displacement,
+        "final_velocity": columns.final_velocity,
+        "final_phase": columns.final_phase,
     }
+    if columns.final_state is not None:
+        values["final_state"] = columns.final_state
     return _described(values, units)
 
 
@@ -227,43 +230,24 @@ def _described(values: Mapping[str, Any], units: UnitSystem) -> _Variables:
     }
 
 
-def _state_variables(runs: Sequence[RunRecord], units: UnitSystem) -> _Variables:
-    """Return the whole state at the end of each run, where it is more than that of the observed point."""
-    states = [run.final_state for run in runs]
-    sizes = {state.size for state in states if state is not None}
-    if not sizes:
+def _period_variables(
+    periods: NDArray[np.float64] | None, units: UnitSystem, omit: Collection[str]
+) -> _Variables:
+    """Return the per-period variables."""
+    if periods is None:
         return {}
-    if len(sizes) > 1:
-        raise DatasetError(
-            f"dataset: final_state: expected states of one size, got {', '.join(map(str, sorted(sizes)))}."
-        )
-    missing = np.full(sizes.pop(), np.nan)
-    return _described({"final_state": [missing if state is None else state for state in states]}, units)
-
-
-def _period_variables(runs: Sequence[RunRecord], units: UnitSystem, omit: Collection[str]) -> _Variables:
-    """Return the per-period variables; a run that recorded fewer periods than the others ends in NaN."""
-    tables = [run.periods for run in runs]
-    if all(table is None for table in tables):
-        return {}
-    length = max(len(table) for table in tables if table is not None)
-    values = np.full((len(runs), length, len(PERIOD_COLUMNS)), np.nan)
-    for row, table in enumerate(tables):
-        if table is not None:
-            values[row, : len(table)] = table
-    columns = dict(zip(PERIOD_COLUMNS, np.moveaxis(values, -1, 0), strict=True))
+    columns = dict(zip(PERIOD_COLUMNS, np.moveaxis(periods, -1, 0), strict=True))
     return _described({name: columns[name] for name in PERIOD_COLUMNS if name not in omit}, units)
 
 
 def _ragged_variables(
-    dimension: str, tables: Sequence[NDArray[np.float64] | None], columns: Sequence[str], units: UnitSystem
+    dimension: str, rows: Ragged | None, columns: Sequence[str], units: UnitSystem
 ) -> _Variables:
     """Return a contiguous ragged array (CF-1.11 section 9.3.3): the count of each run, then all rows."""
-    if all(table is None for table in tables):
+    if rows is None:
         return {}
-    count = [0 if table is None else len(table) for table in tables]
-    rows = np.concatenate([_with_columns(table, len(columns)) for table in tables if table is not None])
-    return _described({RAGGED[dimension]: count} | dict(zip(columns, rows.T, strict=True)), units)
+    values = {RAGGED[dimension]: rows.count} | dict(zip(columns, rows.rows.T, strict=True))
+    return _described(values, units)
 
 
 @dataclass(frozen=True, slots=True)
@@ -293,7 +277,7 @@ class _Samples:
 def _sample_variables(runs: Sequence[RunRecord], known: _Samples) -> _Variables:
     """Return the time series: `time` and the sampled variables."""
     tables = [run.samples for run in runs]
-    variables = _ragged_variables("sample", tables, ("time",), known.units)
+    variables = _ragged_variables("sample", ragged(tables, 1), ("time",), known.units)
     if not variables:
         return {}
     rows = np.concatenate([table for table in tables if table is not None])
@@ -309,15 +293,10 @@ def _sample_variables(runs: Sequence[RunRecord], known: _Samples) -> _Variables:
     return variables
 
 
-def _with_columns(table: NDArray[np.float64], number: int) -> NDArray[np.float64]:
-    """Return a table with so many columns; those that its run does not know are NaN."""
-    known = table[:, :number]
-    return np.hstack([known, np.full((len(known), number - known.shape[1]), np.nan)])
-
-
 def _event_variables(runs: Sequence[RunRecord], components: Sequence[str], units: UnitSystem) -> _Variables:
     """Return the located events; the components are named by flags."""
-    variables = _ragged_variables("event", [run.events for run in runs], EVENT_COLUMNS, units)
+    tables = ragged([run.events for run in runs], len(EVENT_COLUMNS))
+    variables = _ragged_variables("event", tables, EVENT_COLUMNS, units)
     if not variables:
         return {}
     if not components:

@@ -17,13 +17,17 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, marked, read_part, write_dataset
+from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.files.scratch import ScratchFolder
 from vibroimpact.fmus.errors import CampaignError, VibroimpactError
 from vibroimpact.orchestrator.run import Runner, RunnerIdentity, identity_of, named_runner
 from vibroimpact.orchestrator.run.dataset import dataset_of_runs
 from vibroimpact.orchestrator.run.empty_record import empty_record
+from vibroimpact.orchestrator.run.many import PointLoop, PointValues, loop_of
+from vibroimpact.orchestrator.run.many_rows import run_loop
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.sweep import Branch, Point, expand
 
@@ -121,14 +125,15 @@ class ChunkResult:
 
 
 @lru_cache(maxsize=1)
-def _opened(scene: Scene, runner: str) -> tuple[tuple[Branch, ...], Runner]:
-    """Return the branches of a scene, and what runs their points in this process."""
-    return expand(scene), named_runner(scene, runner)
+def _opened(scene: Scene, runner: str) -> tuple[tuple[Branch, ...], Runner, PointLoop | None]:
+    """Return the branches of a scene, what runs their points in this process, and the loop in C over them."""
+    opened = named_runner(scene, runner)
+    return expand(scene), opened, loop_of(scene, opened)
 
 
 def get_ready(work: Work) -> RunnerIdentity:
     """Load all that a worker needs before its first chunk, and return which runner it has."""
-    _, runner = _opened(work.scene, work.runner)
+    _, runner, _ = _opened(work.scene, work.runner)
     # The first dataset of a process takes long, because libraries load what they need when they need it.
     with ScratchFolder("rehearsal") as folder:
         write_dataset(empty_part(work.scene), Path(folder.name, "rehearsal.nc"))
@@ -143,24 +148,49 @@ def run_chunk(work: Work, chunk: Chunk) -> ChunkResult:
     CampaignError
         When this worker's runner is not the one the campaign began with, or the part cannot be written.
     """
-    branches, runner = _opened(work.scene, work.runner)
+    branches, runner, loop = _opened(work.scene, work.runner)
     _refuse_other_runner(work, runner)
     began = time.perf_counter()
     points = _points_left(work, work.branches or branches, chunk)
-    if not points:
+    if not len(points):
         return ChunkResult(chunk, chunk.start, {}, 0.0)
-    records, carried = run_points(work.scene, runner, points, chunk.start, began + chunk.most_seconds)
+    deadline = began + chunk.most_seconds
+    ran: tuple[Sequence[RunRecord] | RunColumns, State | None] | None = None
+    if loop is not None:
+        ran = run_in_loop(work.scene, runner, loop, points, chunk.start, deadline)
+    if ran is None:
+        ran = run_points(work.scene, runner, points.places(), chunk.start, deadline)
+    records, carried = ran
     seconds = time.perf_counter() - began
-    left = points[len(records) :]
-    done = replace(chunk, stop=left[0].point.index if left else chunk.stop)
-    return ChunkResult(
-        done, carried, write_part(work, done, points[: len(records)], records, carried), seconds
-    )
+    stop = int(points.index[len(records)]) if len(records) < len(points) else chunk.stop
+    done = replace(chunk, stop=stop)
+    outcomes = write_part(work, done, points.taken(len(records)), records, carried)
+    return ChunkResult(done, carried, outcomes, seconds)
+
+
+def run_in_loop(
+    scene: Scene,
+    runner: Runner,
+    loop: PointLoop,
+    points: PointColumns,
+    start: State | None,
+    deadline: float = math.inf,
+) -> tuple[RunColumns, State | None] | None:
+    """Run points by the loop in C, with the results of `run_points`; None where they need Python in between."""
+    prepared = None if points.starts else loop.prepared(PointValues(points.values, points.first))
+    if prepared is None:
+        return None
+
+    def alone(place: int, given: State | None) -> tuple[RunRecord, State | None]:
+        record = run_point(scene, runner, points.place(place).point, given)
+        return record, _next_start(record, given)
+
+    return run_loop(loop, prepared, start, deadline, alone)
 
 
 def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
     """Run the points of a chunk, kept ones too, and return their rows; nothing is written."""
-    branches, runner = _opened(work.scene, work.runner)
+    branches, runner, _ = _opened(work.scene, work.runner)
     _refuse_other_runner(work, runner)
     points = points_of(branches, chunk)
     records, _ = run_points(work.scene, runner, points, chunk.start)
@@ -170,7 +200,7 @@ def compute_again(work: Work, chunk: Chunk) -> xr.Dataset:
 def write_crashed(work: Work, chunk: Chunk, message: str) -> ChunkResult:
     """Write the part of points that kill the process that runs them; nothing of the points is run."""
     points = _points_left(work, work.branches or expand(work.scene), chunk)
-    records = [empty_record(work.scene, Outcome.crash, message, 0.0) for _ in points]
+    records = [empty_record(work.scene, Outcome.crash, message, 0.0) for _ in range(len(points))]
     return ChunkResult(chunk, chunk.start, write_part(work, chunk, points, records, chunk.start), 0.0)
 
 
@@ -205,15 +235,85 @@ def points_of(branches: Sequence[Branch], chunk: Chunk) -> list[BranchPoint]:
     return points
 
 
-def _points_left(work: Work, branches: Sequence[Branch], chunk: Chunk) -> list[BranchPoint]:
+@dataclass(frozen=True, slots=True)
+class PointColumns:
+    """Points as arrays, shape (point,): swept values, direction, place in the campaign, where a branch begins.
+
+    `starts` has the states of those branches that do not begin where the scene does, by the index of their first point.
+    """
+
+    values: Mapping[str, NDArray[np.float64]]
+    direction: NDArray[np.int8]
+    index: NDArray[np.int64]
+    first: NDArray[np.bool_]
+    starts: Mapping[int, State]
+
+    def __len__(self) -> int:
+        return len(self.index)
+
+    def chosen(self, which: slice | NDArray[np.bool_]) -> PointColumns:
+        """Return some of the points."""
+        values = {key: column[which] for key, column in self.values.items()}
+        return PointColumns(values, self.direction[which], self.index[which], self.first[which], self.starts)
+
+    def taken(self, count: int) -> PointColumns:
+        """Return the first points."""
+        return self.chosen(slice(count))
+
+    def place(self, number: int) -> BranchPoint:
+        """Return one point."""
+        values = {key: float(column[number]) for key, column in self.values.items()}
+        index, direction = int(self.index[number]), Direction(int(self.direction[number]))
+        first = bool(self.first[number])
+        return BranchPoint(Point(index, values), direction, first, self.starts.get(index) if first else None)
+
+    def places(self) -> list[BranchPoint]:
+        """Return the points one by one."""
+        return [self.place(number) for number in range(len(self))]
+
+
+def columns_of_points(branches: Sequence[Branch], chunk: Chunk) -> PointColumns:
+    """Return the points of a chunk, as `points_of` does, as arrays."""
+    pieces: list[PointColumns] = []
+    for branch in branches[chunk.branch :]:
+        begin = branch.points.first_index
+        if begin >= chunk.stop:
+            break
+        first, stop = max(chunk.first - begin, 0), min(chunk.stop - begin, len(branch.points))
+        index = np.arange(begin + first, begin + stop)
+        direction = np.full(len(index), Direction[branch.direction], dtype=np.int8)
+        starts = {} if branch.start is None else {begin: branch.start}
+        columns = branch.points.columns(first, stop)
+        pieces.append(PointColumns(columns, direction, index, index == begin, starts))
+    return PointColumns(
+        {key: np.concatenate([piece.values[key] for piece in pieces]) for key in pieces[0].values},
+        np.concatenate([piece.direction for piece in pieces]),
+        np.concatenate([piece.index for piece in pieces]),
+        np.concatenate([piece.first for piece in pieces]),
+        {begin: start for piece in pieces for begin, start in piece.starts.items()},
+    )
+
+
+def _of_places(points: Sequence[BranchPoint]) -> PointColumns:
+    keys = points[0].point.values if points else {}
+    return PointColumns(
+        {key: np.array([place.point.values[key] for place in points], dtype=np.float64) for key in keys},
+        np.array([place.direction for place in points], dtype=np.int8),
+        np.array([place.point.index for place in points], dtype=np.int64),
+        np.array([place.first for place in points], dtype=np.bool_),
+        {place.point.index: place.start for place in points if place.start is not None},
+    )
+
+
+def _points_left(work: Work, branches: Sequence[Branch], chunk: Chunk) -> PointColumns:
     """Return the points of a chunk that are not kept from an earlier sweep."""
-    kept = _kept_runs(work.kept)
-    return [place for place in points_of(branches, chunk) if place.point.index not in kept]
+    points, kept = columns_of_points(branches, chunk), _kept_runs(work.kept)
+    return points.chosen(~np.isin(points.index, kept)) if kept.size else points
 
 
 @lru_cache(maxsize=1)
-def _kept_runs(path: str) -> frozenset[int]:
-    return frozenset(read_part(path).run_index.tolist()) if path and Path(path).exists() else frozenset()
+def _kept_runs(path: str) -> NDArray[np.int32]:
+    return read_part(path).run_index if path and Path(path).exists() else np.empty(0, dtype=np.int32)
 
 
 def run_points(
@@ -271,17 +371,14 @@ def tally(dataset: xr.Dataset) -> dict[str, int]:
 
 
 def dataset_of(
-    scene: Scene, points: Sequence[BranchPoint], records: Sequence[RunRecord], attrs: Mapping[str, Any]
+    scene: Scene,
+    points: Sequence[BranchPoint] | PointColumns,
+    records: Sequence[RunRecord] | RunColumns,
+    attrs: Mapping[str, Any],
 ) -> xr.Dataset:
     """Return the dataset of points and what became of them; points with impossible values are marked."""
-    dataset = dataset_of_runs(
-        scene,
-        [place.point.values for place in points],
-        [place.direction for place in points],
-        [place.point.index for place in points],
-        records,
-        attrs,
-    )
+    columns = points if isinstance(points, PointColumns) else _of_places(points)
+    dataset = dataset_of_runs(scene, columns.values, columns.direction, columns.index, records, attrs)
     return marked(dataset)
 
 
@@ -310,8 +407,8 @@ def carried_state(attrs: Mapping[str, Any]) -> State | None:
 def write_part(
     work: Work,
     chunk: Chunk,
-    points: Sequence[BranchPoint],
-    records: Sequence[RunRecord],
+    points: PointColumns,
+    records: Sequence[RunRecord] | RunColumns,
     carried: State | None,
 ) -> dict[str, int]:
     """Write the part of a chunk, as a whole or not at all; returns how many runs ended in each way."""

@@ -93,6 +93,16 @@ class Instance(ABC):
     def _bound(self, name: str, *arguments: Any) -> Callable[[], int]:
         return partial(self._function(name), self._pointer, *arguments)
 
+    @property
+    def pointer(self) -> c_void_p:
+        """The instance, for C code that calls the functions of its FMU itself."""
+        return self._pointer
+
+    def address_of(self, name: str) -> c_void_p:
+        """Return the address of a function of the FMU, for C code that calls it."""
+        function: Any = self._library.function(self.prefix + name)
+        return ctypes.cast(function, c_void_p)
+
     def check(self, status: int, function: str) -> None:
         """Raise ComponentError when `status` is worse than a warning."""
         if status > WARNING or status < OK:

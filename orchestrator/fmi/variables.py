@@ -29,13 +29,15 @@ class VariableGroup:
         The instance that they belong to.
     name : str
         FMI's name of their type, in the version of the instance.
+    references : tuple of int
+        Their value references.
     values : ndarray
         The buffer: `get` fills it, `set` sends it. Its type is that of the variables in C.
     get_call, set_call : callable
         The bare calls, which return FMI's status: for paths that check it themselves.
     """
 
-    __slots__ = ("_references", "get_call", "instance", "name", "set_call", "values")
+    __slots__ = ("_array", "get_call", "instance", "name", "references", "set_call", "values")
 
     def __init__(
         self,
@@ -53,11 +55,12 @@ class VariableGroup:
         self.values = values
         self.name = name
         self.instance = owner
-        self._references = (ctypes.c_uint32 * max(1, len(references)))(*references)
+        self.references = tuple(references)
+        self._array = (ctypes.c_uint32 * max(1, len(references)))(*references)
         tail = (ctypes.c_size_t(values.size),) if with_value_count else ()
         arguments = (
             pointer,
-            ctypes.byref(self._references),
+            ctypes.byref(self._array),
             ctypes.c_size_t(len(references)),
             ctypes.c_void_p(values.ctypes.data),
             *tail,

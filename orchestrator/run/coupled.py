@@ -144,8 +144,10 @@ class CoupledDriver(RecordedBody):
         self.rows.blocks = []
         values: dict[tuple[str, str], Value] = {(BODY, name): value for name, value in floats.items()}
         values |= {target: floats[source] for target, source in self._stop_floats.items()}
+        log = self.importer.components[BODY].instance.log
+        log.take()  # what the run before has left is not said of this one
         self.importer.begin(0.0, values)
-        self.warnings = self.importer.components[BODY].instance.log.take()
+        self.warnings = log.take()
 
     def advance(self, end: float) -> None:
         """Advance to time `end`, s."""

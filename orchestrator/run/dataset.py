@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import (
     RESERVED_NAMES,
@@ -17,6 +18,7 @@ from vibroimpact.analysis.dataset import (
     file_names,
     with_constants,
 )
+from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
@@ -34,10 +36,10 @@ FORCING_UNITS = {"force": "N", "base_acceleration": "m s-2", "uniform": "N m-1",
 
 def dataset_of_runs(
     scene: Scene,
-    values: Sequence[Mapping[str, float]],
-    directions: Sequence[Direction],
-    indices: Sequence[int],
-    records: Sequence[RunRecord],
+    values: Mapping[str, NDArray[np.float64]],
+    directions: Sequence[Direction] | NDArray[np.int8],
+    indices: Sequence[int] | NDArray[np.int64],
+    records: Sequence[RunRecord] | RunColumns,
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
     """Return the one-dimensional dataset of runs.
@@ -46,11 +48,11 @@ def dataset_of_runs(
     ----------
     scene : Scene
         The scene they belong to.
-    values : sequence of mapping
-        Swept values of each run, by key.
+    values : mapping of str to ndarray, shape (run,)
+        Swept values by key.
     directions, indices : sequence
         Direction of the sweep and place in the campaign of each run.
-    records : sequence of RunRecord
+    records : sequence of RunRecord, or RunColumns
         What became of each.
     attrs : mapping
         Attributes of the file.
@@ -58,9 +60,7 @@ def dataset_of_runs(
     names = coordinate_names(scene)
     dataset = build_dataset(
         records,
-        coordinates={
-            name: np.array([point[key] for point in values], dtype=np.float64) for key, name in names.items()
-        },
+        coordinates={name: values[key] for key, name in names.items()},
         direction=directions,
         run_index=np.array(indices),
         sample_variables=sample_variables(scene),

@@ -26,6 +26,15 @@ class BodyDriver(RecordedBody):
         Name of the FMU: `Oscillator`, `Chain` or `Beam`.
     wrap : callable or None
         Given a component's name: what wraps the functions of its FMU.
+
+    Attributes
+    ----------
+    references : dict of str to int
+        Value reference of each variable of the body.
+    float_names : tuple of str
+        Real parameters in the order in which they are set.
+    integers : list of VariableGroup
+        Integer and Boolean parameters, with their values.
     """
 
     def __init__(
@@ -38,21 +47,21 @@ class BodyDriver(RecordedBody):
     ) -> None:
         path = fmu_path(body, "3.0")
         self.fmu = unpack(path)
-        self._references = {v.name: v.valueReference for v in description_of(path).modelVariables}
+        self.references = {v.name: v.valueReference for v in description_of(path).modelVariables}
         self.instance = Instance3(self.fmu, "body", early_return=True, wrap=wrap and wrap("body"))
         super().__init__(self._group)
         self._floats = self._group("Float64", tuple(floats))
-        self._float_names = tuple(floats)
-        self._integers = []
+        self.float_names = tuple(floats)
+        self.integers = []
         for kind, is_boolean in (("Int64", False), ("Boolean", True)):
             values = {name: v for name, v in integers.items() if isinstance(v, bool) is is_boolean}
             if values:
                 group = self._group(kind, tuple(values))
                 group.values[:] = list(values.values())
-                self._integers.append(group)
+                self.integers.append(group)
 
     def _group(self, kind: str, names: Sequence[str], size: int | None = None) -> VariableGroup:
-        return self.instance.group(kind, [self._references[name] for name in names], size=size)
+        return self.instance.group(kind, [self.references[name] for name in names], size=size)
 
     @property
     def time(self) -> float:
@@ -69,10 +78,11 @@ class BodyDriver(RecordedBody):
         self._deadline.begin(deadline)
         self.rows.blocks = []
         instance = self.instance
+        instance.log.take()  # what the run before has left is not said of this one
         instance.reset()
-        self._floats.values[:] = [floats[name] for name in self._float_names]
+        self._floats.values[:] = [floats[name] for name in self.float_names]
         self._floats.set()
-        for integers in self._integers:
+        for integers in self.integers:
             integers.set()
         instance.enter_initialization(0.0)
         instance.exit_initialization()

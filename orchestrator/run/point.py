@@ -12,6 +12,7 @@ import time
 from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +41,10 @@ from vibroimpact.orchestrator.run.record import (
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+from vibroimpact.orchestrator.scene.models import Record
 
 TWO_PI = 2.0 * math.pi
+Numbers = TypeVar("Numbers", float, NDArray[np.float64])
 
 
 class PointRunner:
@@ -64,6 +67,8 @@ class PointRunner:
         Machine architecture the components are compiled for.
     fmu_hashes : dict of str to str
         SHA-256 of each component's FMU, by instance.
+    driver : RecordedBody
+        What drives the body.
     """
 
     def __init__(self, scene: Scene, *, execution: str = "auto", wrap: WrapOf | None = None) -> None:
@@ -72,11 +77,11 @@ class PointRunner:
         self._scene, self._wrap = scene, wrap
         self._plan = TimeSeriesPlan(scene)
         self._open(scene)
-        self.fmu_hashes = self._driver.hashes
+        self.fmu_hashes = self.driver.hashes
 
     def _open(self, scene: Scene) -> None:
-        self._driver = driver_of(scene, self.execution, wrap=self._wrap)
-        self._driver.watch(
+        self.driver = driver_of(scene, self.execution, wrap=self._wrap)
+        self.driver.watch(
             contacts=len(scene.stops),
             sampled=self._plan.variables,
             state=state_variables(scene),
@@ -88,7 +93,7 @@ class PointRunner:
     def _reopen_if_other(self, scene: Scene) -> None:
         """Make the components anew where they were made for another number of modes, or another step."""
         if self._built_for != built_for(scene):
-            self._driver.close()
+            self.driver.close()
             self._open(scene)
 
     def run(self, values: Mapping[str, float], start: tuple[float, ...] | None = None) -> RunRecord:
@@ -110,15 +115,15 @@ class PointRunner:
         began = time.perf_counter()
         scene = self._scene.at(values) if values else self._scene
         self._reopen_if_other(scene)
-        run = _Run(scene, self._driver, self._plan, without_padding(start, len(state_variables(scene)) // 2))
+        run = _Run(scene, self.driver, self._plan, without_padding(start, len(state_variables(scene)) // 2))
         outcome, message = run.run()
-        message = message or "; ".join(self._driver.warnings)
+        message = message or "; ".join(self.driver.warnings)
         record = run.record(outcome, message, time.perf_counter() - began)
         return replace(record, final_state=padded_state(record.final_state, most_elements(self._scene)))
 
     def close(self) -> None:
         """Free the components."""
-        self._driver.close()
+        self.driver.close()
 
 
 def built_for(scene: Scene) -> tuple[object, ...]:
@@ -165,13 +170,37 @@ def recorded_window(scene: Scene, parameters: Mapping[str, float]) -> tuple[floa
     parameters : mapping of str to float
         Of its body, as `float_parameters` gives them.
     """
-    record, period = scene.record, scene.period
-    if period is None:
+    if scene.period is None:
+        record = scene.record
         return record.transient_time, record.transient_time + record.recorded_time
-    phase = parameters["forcing.phase"] % TWO_PI
-    lag = phase / parameters["forcing.angular_frequency"]
-    first = record.transient_periods + (1 if phase > 0.0 else 0)
+    phase, angular_frequency = parameters["forcing.phase"], parameters["forcing.angular_frequency"]
+    return forced_window(scene.record, phase, angular_frequency)
+
+
+def forced_window(record: Record, phase: Numbers, angular_frequency: Numbers) -> tuple[Numbers, Numbers]:
+    """Return start and end of the recording of a forced scene, s; of one point, or of many as arrays.
+
+    Parameters
+    ----------
+    record : Record
+        Its `[record]`.
+    phase, angular_frequency : float or ndarray
+        Of the force at time 0, rad, and rad/s.
+    """
+    period, lead = TWO_PI / angular_frequency, phase % TWO_PI
+    lag = lead / angular_frequency
+    first = record.transient_periods + (lead > 0.0)
     return first * period - lag, (first + record.recorded_periods) * period - lag
+
+
+def limit_message(limit: int, time: float) -> str:
+    """Return what a run that came to its impact limit says, `time` s after its start."""
+    return f"impact_limit: {limit} impacts, touch-downs and rests at time {time:.17g}"
+
+
+def late_message(deadline: float | None, time: float) -> str:
+    """Return what a run that took longer than its deadline says, `time` s after its start."""
+    return f"deadline: {deadline} s passed at time {time:.17g}"
 
 
 class _Run:
@@ -197,10 +226,9 @@ class _Run:
             self._advance_sampling()
             driver.advance(self.end_time)
         except ImpactLimitReached:
-            limit = f"{execution.impact_limit} impacts, touch-downs and rests"
-            return Outcome.impact_limit, f"impact_limit: {limit} at time {driver.time:.17g}"
+            return Outcome.impact_limit, limit_message(execution.impact_limit, driver.time)
         except DeadlineReached:
-            return Outcome.timeout, f"deadline: {execution.deadline} s passed at time {driver.time:.17g}"
+            return Outcome.timeout, late_message(execution.deadline, driver.time)
         return (Outcome.stuck, "") if self._rests_for_ever() else (Outcome.ok, "")
 
     def _begin_recording(self) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from vibroimpact.orchestrator.scene.fields import Rule
@@ -82,7 +82,9 @@ class OscillatorBody(SceneTable):
         """Damping coefficient, N s/m: as given, or 2 damping_ratio sqrt(stiffness mass)."""
         if self.damping_ratio is None:
             return self.damping_given
-        return 2.0 * self.damping_ratio * math.sqrt(self.stiffness * self.mass)
+        # of numpy: the points of a sweep come as arrays too
+        coefficient: float = 2.0 * self.damping_ratio * np.sqrt(self.stiffness * self.mass)
+        return coefficient
 
     def mass_at(self, number: int | None) -> float:
         """Return the mass that a stop limits, kg."""

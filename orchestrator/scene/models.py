@@ -189,7 +189,8 @@ class Forcing(SceneTable):
         """Angular frequency, rad/s: as given, or 2 pi frequency; 0 means a constant force."""
         if self.frequency is not None:
             return 2.0 * math.pi * self.frequency
-        return self.angular_frequency_given or 0.0
+        given = self.angular_frequency_given
+        return 0.0 if given is None else given + 0.0  # of -0 too: 0
 
 
 _LAWS = Rule('"restitution", "kelvin_voigt", "hertz" or "hunt_crossley"')

@@ -19,6 +19,7 @@ from math import prod
 from typing import Any, Literal, Protocol, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 SweepPath = Literal["independent", "up", "down", "up-down"]
 SweepDirection = Literal["independent", "up", "down"]
@@ -184,6 +185,18 @@ class Points(Sequence[Point]):
 
     def __iter__(self) -> Iterator[Point]:
         return (self._point(place) for place in range(len(self)))
+
+    def columns(self, first: int, stop: int) -> dict[str, NDArray[np.float64]]:
+        """Return the values of every swept key at the positions `first` to `stop - 1`, shape (point,) each."""
+        rest = np.arange(first, stop)
+        swept: dict[str, NDArray[np.float64]] = {}
+        for members in reversed(self.dimensions):
+            rest, place = np.divmod(rest, len(members[0].values))
+            # an axis may have 10^6 values: those in between alone become an array
+            low, high = (int(place.min()), int(place.max())) if place.size else (0, 0)
+            swept |= {axis.key: np.array(axis.values[low : high + 1])[place - low] for axis in members}
+        fixed = {key: np.full(stop - first, value) for key, value in self.fixed.items()}
+        return fixed | swept
 
     def _point(self, position: int) -> Point:
         rest = position

@@ -284,7 +284,9 @@ def test_swept_parameters_of_stops_and_loads_have_the_units_of_their_law() -> No
     keys = ("forcing.amplitude", "stop[1].stiffness", "stop[1].damping", "body.density", "stop[1].exponent")
     scene = scene_of(swept(nonlinear, *(f'"{key}" = {{ values = [1.0] }}' for key in keys)))
     record = empty_record(scene, Outcome.error, "", 0.0)
-    dataset = dataset_of_runs(scene, [dict.fromkeys(keys, 1.0)], [Direction.independent], [0], [record], {})
+    dataset = dataset_of_runs(
+        scene, dict.fromkeys(keys, np.ones(1)), [Direction.independent], [0], [record], {}
+    )
     check(dataset)
     units = {
         name: dataset[name].attrs["units"]

@@ -1,0 +1,152 @@
+"""What many runs recorded, as arrays: the columns that a dataset is built of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset.schema import (
+    IMPACT_COLUMNS,
+    PERIOD_COLUMNS,
+    STICK_COLUMNS,
+    RunRecord,
+    names_list,
+)
+from vibroimpact.fmus.errors import DatasetError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Ragged:
+    """Rows of runs, those of the first run first: `count`, shape (run,), and `rows`, shape (row, column)."""
+
+    count: NDArray[np.int64]
+    rows: Floats
+
+    def taken(self, first: int, stop: int) -> Ragged:
+        """Return the rows of the runs `first` to `stop - 1`."""
+        begin, end = int(self.count[:first].sum()), int(self.count[:stop].sum())
+        return Ragged(self.count[first:stop], self.rows[begin:end])
+
+
+@dataclass(frozen=True, slots=True)
+class RunColumns:
+    """What runs recorded, one element or row for each; a group that their scene does not ask for is None.
+
+    Attributes are those of `RunRecord`, of all runs at once. `periods` has the shape (run, period, 5): a run that
+    recorded fewer periods than the others ends in NaN.
+    """
+
+    outcome: NDArray[np.int8]
+    message: NDArray[np.object_]
+    seconds: Floats
+    final_displacement: Floats
+    final_velocity: Floats
+    final_phase: Floats
+    final_state: Floats | None = None
+    periods: Floats | None = None
+    impacts: Ragged | None = None
+    sticks: Ragged | None = None
+
+    def __len__(self) -> int:
+        return len(self.outcome)
+
+    def taken(self, first: int, stop: int) -> RunColumns:
+        """Return the runs `first` to `stop - 1`."""
+
+        def some(values: Any) -> Any:
+            if isinstance(values, Ragged):
+                return values.taken(first, stop)
+            return None if values is None else values[first:stop]
+
+        return RunColumns(*(some(getattr(self, name)) for name in self.__slots__))
+
+
+def columns_of(records: Sequence[RunRecord]) -> RunColumns:
+    """Return the columns of single runs.
+
+    Raises
+    ------
+    DatasetError
+        Their whole states are of different sizes.
+    """
+    numbers = np.array(
+        [(r.seconds, r.final_displacement, r.final_velocity, r.final_phase) for r in records],
+        dtype=np.float64,
+    ).reshape(-1, 4)
+    message = np.empty(len(records), dtype=object)
+    message[:] = [record.message for record in records]
+    seconds, displacement, velocity, phase = np.ascontiguousarray(numbers.T)
+    return RunColumns(
+        outcome=np.array([record.outcome for record in records], dtype=np.int8),
+        message=message,
+        seconds=seconds,
+        final_displacement=displacement,
+        final_velocity=velocity,
+        final_phase=phase,
+        final_state=_states([record.final_state for record in records]),
+        periods=_periods([record.periods for record in records]),
+        impacts=ragged([record.impacts for record in records], len(IMPACT_COLUMNS)),
+        sticks=ragged([record.sticks for record in records], len(STICK_COLUMNS)),
+    )
+
+
+def _states(states: Sequence[Floats | None]) -> Floats | None:
+    sizes = {state.size for state in states if state is not None}
+    if not sizes:
+        return None
+    if len(sizes) > 1:
+        raise DatasetError(
+            f"dataset: final_state: expected states of one size, got {names_list(list(map(str, sorted(sizes))))}."
+        )
+    missing = np.full(sizes.pop(), np.nan)
+    return np.array([missing if state is None else state for state in states])
+
+
+def _periods(tables: Sequence[Floats | None]) -> Floats | None:
+    if all(table is None for table in tables):
+        return None
+    length = max(len(table) for table in tables if table is not None)
+    values = np.full((len(tables), length, len(PERIOD_COLUMNS)), np.nan)
+    for row, table in enumerate(tables):
+        if table is not None:
+            values[row, : len(table)] = table
+    return values
+
+
+def ragged(tables: Sequence[Floats | None], columns: int) -> Ragged | None:
+    """Return the tables of runs as one, with so many columns; None where no run has one."""
+    known = [_with_columns(table, columns) for table in tables if table is not None]
+    if not known:
+        return None
+    count = np.array([0 if table is None else len(table) for table in tables], dtype=np.int64)
+    return Ragged(count, np.concatenate(known))
+
+
+def _with_columns(table: Floats, number: int) -> Floats:
+    """Return a table with so many columns; those that its run does not know are NaN."""
+    known = table[:, :number]
+    return np.hstack([known, np.full((len(known), number - known.shape[1]), np.nan)])
+
+
+def joined(pieces: Sequence[RunColumns]) -> RunColumns:
+    """Return the runs of several columns of one scene, one after the other."""
+    return RunColumns(*(_joined([getattr(piece, name) for piece in pieces]) for name in RunColumns.__slots__))
+
+
+def _joined(values: Sequence[Any]) -> Any:
+    first = values[0]
+    if isinstance(first, Ragged):
+        return Ragged(np.concatenate([v.count for v in values]), np.concatenate([v.rows for v in values]))
+    if first is None:
+        return None
+    if first.ndim == 3:
+        periods = max(value.shape[1] for value in values)
+        padding = [((0, 0), (0, periods - value.shape[1]), (0, 0)) for value in values]
+        values = [np.pad(v, p, constant_values=np.nan) for v, p in zip(values, padding, strict=True)]
+    return np.concatenate(values)

@@ -1,0 +1,219 @@
+#include "door/runs.h"
+
+#include <math.h>
+#include <time.h>
+
+#include "body/record.h"
+
+enum { STATUS_WARNING = 1, STATUS_DISCARD = 2 };
+enum { NOT_BEGUN = 0, BEFORE_RECORDING = 1, RECORDING = 2, AT_END = 3 };
+/* What a piece of a run comes to, beside VI_RUNS_*. */
+enum { GO_ON = 0, RUN_ENDS = -1 };
+
+static double seconds_now(void)
+{
+    struct timespec now;
+    return timespec_get(&now, TIME_UTC) != 0 ? (double)now.tv_sec + 1e-9 * (double)now.tv_nsec : 0.0;
+}
+
+/* The clock of the day may be set back. */
+static double seconds_since(double then)
+{
+    const double passed = seconds_now() - then;
+    return passed > 0.0 ? passed : 0.0;
+}
+
+static bool went_well(int status)
+{
+    return status >= 0 && status <= STATUS_WARNING;
+}
+
+/* Start where the run before ended, on the stop that has moved beyond it. */
+static void carry(const vi_runs_plan *plan, const double carried[2], double values[])
+{
+    double displacement = carried[0], velocity = carried[1];
+    for (int k = 0; k < plan->stops; ++k) {
+        const double position = values[plan->stop_position[k]];
+        if (plan->stop_direction[k] * (displacement - position) > 0.0) {
+            displacement = position;
+            velocity = 0.0;
+        }
+    }
+    values[plan->displacement] = displacement;
+    values[plan->velocity] = velocity;
+    if (plan->phase >= 0) {
+        values[plan->phase] = 0.0;
+    }
+}
+
+static int begin(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p)
+{
+    double *values = p->values + (size_t)p->at * plan->parameters.count;
+    if (plan->chained && !p->first[p->at]) {
+        if (!p->has_carried) {
+            return VI_RUNS_REFUSED;
+        }
+        carry(plan, p->carried, values);
+    } else {
+        p->has_carried = 0;
+    }
+    const uint64_t logged = f->log->count;
+    const bool good =
+        went_well(f->reset(f->instance))
+        && went_well(f->set_float64(f->instance, plan->parameters.references, plan->parameters.count, values,
+                                    plan->parameters.count))
+        && (plan->integers.count == 0
+            || went_well(f->set_int64(f->instance, plan->integers.references, plan->integers.count,
+                                      plan->integer_values, plan->integers.count)))
+        && (plan->booleans.count == 0
+            || went_well(f->set_boolean(f->instance, plan->booleans.references, plan->booleans.count,
+                                        plan->boolean_values, plan->booleans.count)))
+        && went_well(f->enter_initialization(f->instance, false, 0.0, 0.0, false, 0.0))
+        && went_well(f->exit_initialization(f->instance)) && f->log->count == logged;
+    p->time = p->spent = 0.0;
+    p->rows_of[p->at] = 0;
+    p->stage = BEFORE_RECORDING;
+    return good ? GO_ON : VI_RUNS_REFUSED;
+}
+
+/* Take the rows that the body has recorded. */
+static int take_rows(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p)
+{
+    if (p->rows_room - p->rows_used < plan->row_capacity) {
+        return VI_RUNS_FULL;
+    }
+    int64_t count = 0;
+    if (!went_well(f->get_int64(f->instance, &plan->record_count, 1, &count, 1))) {
+        return VI_RUNS_REFUSED;
+    }
+    if (count == 0) {
+        return GO_ON;
+    }
+    double *rows = p->rows + p->rows_used * VI_RECORD_WIDTH;
+    const size_t size = (size_t)plan->row_capacity * VI_RECORD_WIDTH;
+    if (!went_well(f->get_float64(f->instance, &plan->record_rows, 1, rows, size))
+        || !went_well(f->set_int64(f->instance, &plan->record_taken, 1, &count, 1))) {
+        return VI_RUNS_REFUSED;
+    }
+    p->rows_used += count;
+    p->rows_of[p->at] += count;
+    return GO_ON;
+}
+
+/* One step towards `end`; RUN_ENDS where the run has come to its limit. */
+static int step(const vi_runs_fmu *f, vi_runs_points *p, double end)
+{
+    bool needs_event = false, ends = false, early = false;
+    double reached = p->time;
+    const int status =
+        f->step(f->instance, p->time, end - p->time, false, &needs_event, &ends, &early, &reached);
+    if (status != STATUS_DISCARD && (!went_well(status) || needs_event || ends)) {
+        return VI_RUNS_REFUSED;
+    }
+    if (status == STATUS_DISCARD) {
+        p->time = reached;
+        p->outcome[p->at] = VI_RUN_IMPACT_LIMIT;
+        return RUN_ENDS;
+    }
+    p->time = early ? reached : end;
+    return GO_ON;
+}
+
+/* Advance to `end`. The rows are taken where a step has ended early, and there is time to listen. */
+static int advance(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p, double end, double call)
+{
+    while (p->time < end) {
+        if (p->give_up) {
+            p->outcome[p->at] = VI_RUN_TIMEOUT;
+            return RUN_ENDS;
+        }
+        if (p->rows_room - p->rows_used < plan->row_capacity) {
+            return VI_RUNS_FULL;
+        }
+        int came_to = step(f, p, end);
+        if (came_to == GO_ON && p->time < end) {
+            came_to = take_rows(f, plan, p);
+            if (came_to == GO_ON && seconds_since(call) >= p->most_seconds) {
+                came_to = VI_RUNS_LISTEN;
+            }
+        }
+        if (came_to != GO_ON) {
+            return came_to;
+        }
+    }
+    return GO_ON;
+}
+
+static int finish(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p)
+{
+    const int came_to = take_rows(f, plan, p);
+    if (came_to != GO_ON) {
+        return came_to;
+    }
+    double *finals = p->finals + (size_t)p->at * plan->finals.count;
+    bool *stuck = p->stuck + (size_t)p->at * plan->stuck.count;
+    if (!went_well(f->get_float64(f->instance, plan->finals.references, plan->finals.count, finals, plan->finals.count))
+        || (plan->stuck.count > 0
+            && !went_well(f->get_boolean(f->instance, plan->stuck.references, plan->stuck.count, stuck,
+                                         plan->stuck.count)))
+        || !isfinite(finals[0])) {
+        return VI_RUNS_REFUSED;
+    }
+    p->reached[p->at] = p->time;
+    if (p->outcome[p->at] == VI_RUN_ENDED && isfinite(finals[1])) {
+        p->carried[0] = finals[0];
+        p->carried[1] = finals[1];
+        p->has_carried = 1;
+    }
+    return GO_ON;
+}
+
+/* Run the point under way to its end. */
+static int go_on(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points *p, double call)
+{
+    int came_to = GO_ON;
+    if (p->stage == NOT_BEGUN) {
+        p->outcome[p->at] = VI_RUN_ENDED;
+        p->give_up = 0;
+        came_to = begin(f, plan, p);
+    }
+    if (came_to == GO_ON && p->stage == BEFORE_RECORDING) {
+        came_to = advance(f, plan, p, p->begin[p->at], call);
+        if (came_to == GO_ON) {
+            const bool good = went_well(f->set_boolean(f->instance, plan->switches.references, plan->switches.count,
+                                                       plan->switch_values, plan->switches.count));
+            came_to = good ? GO_ON : VI_RUNS_REFUSED;
+            p->stage = RECORDING;
+        }
+    }
+    if (came_to == GO_ON && p->stage == RECORDING) {
+        came_to = advance(f, plan, p, p->end[p->at], call);
+    }
+    if (came_to == GO_ON || came_to == RUN_ENDS) {
+        p->stage = AT_END;
+        came_to = finish(f, plan, p);
+    }
+    return came_to;
+}
+
+VI_DOOR int vi_door_runs(const vi_runs_fmu *fmu, const vi_runs_plan *plan, vi_runs_points *points)
+{
+    const double call = seconds_now();
+    double since = call;
+    while (points->at < points->count) {
+        const int came_to = go_on(fmu, plan, points, call);
+        const double now = seconds_now();
+        points->spent += now > since ? now - since : 0.0;
+        since = now;
+        if (came_to != GO_ON) {
+            return came_to;
+        }
+        points->seconds[points->at] = points->spent;
+        points->at += 1;
+        points->stage = NOT_BEGUN;
+        if (now - call >= points->most_seconds || now < call) {
+            return points->at < points->count ? VI_RUNS_LISTEN : VI_RUNS_DONE;
+        }
+    }
+    return VI_RUNS_DONE;
+}

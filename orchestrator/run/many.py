@@ -1,0 +1,218 @@
+"""Many points of a scene by one call: the loop over them runs in C (`fmus.core.run_points`), with no Python for each.
+
+The calls that each point's FMU gets, and so its row, are those of `point`. What a point says beside its numbers (an
+error, a warning of its body) comes from there too: such a point is run again alone. Scenes whose points need Python
+in between, for a time series or an importer, have no such loop: `loop_of` returns None.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.core import runs as core
+from vibroimpact.orchestrator.run.fused import BodyDriver
+from vibroimpact.orchestrator.run.opening import Runner
+from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
+from vibroimpact.orchestrator.run.point import PointRunner, forced_window
+from vibroimpact.orchestrator.run.record import OBSERVED, ROW_CAPACITY
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
+from vibroimpact.orchestrator.scene.keys import MODES
+from vibroimpact.orchestrator.scene.models import RestitutionStop
+
+SHORTEST_DEADLINE = 0.5
+"""Deadline of a point below which the loop, which looks every few hundredths of a second, would be too coarse, s."""
+
+NOT_IN_THE_LOOP = (MODES, "execution.macro_step")
+"""Keys for whose values the components are made anew."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class PointValues:
+    """Points as arrays: the values of each swept key, shape (point,), and where a branch begins."""
+
+    values: Mapping[str, Floats]
+    first: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+@dataclass(frozen=True, slots=True)
+class PreparedPoints:
+    """Points as C takes them: parameters and window of recording of each, which begin at phase 0 within a branch.
+
+    Attributes
+    ----------
+    first : ndarray of bool, shape (point,)
+        Where a branch begins.
+    table : ndarray, shape (point, parameter)
+    begin, end : ndarray, shape (point,)
+        Of the recording, s.
+    columns : dict of str to ndarray, shape (point,)
+        The parameters by name.
+    forced : bool
+        Whether a force has periods.
+    periods : bool
+        Whether each period is recorded.
+    """
+
+    first: NDArray[np.bool_]
+    table: Floats
+    begin: Floats
+    end: Floats
+    columns: Mapping[str, Floats]
+    forced: bool
+    periods: bool
+
+
+def loop_of(scene: Scene, runner: Runner) -> PointLoop | None:
+    """Return the loop in C over points of a scene; None where they need Python in between."""
+    if not isinstance(runner, PointRunner) or runner.execution != "fused":
+        return None
+    driver = runner.driver
+    deadline, chained = scene.execution.deadline, any(axis.continuation for axis in scene.sweep)
+    if (
+        not isinstance(driver, BodyDriver)
+        or scene.record.time_series is not None
+        or any(axis.key in NOT_IN_THE_LOOP for axis in scene.sweep)
+        or (deadline is not None and deadline < SHORTEST_DEADLINE)
+        or (chained and not isinstance(scene.body, OscillatorBody))
+    ):
+        return None
+    return PointLoop(scene, driver)
+
+
+class PointLoop:
+    """Runs points of a scene on the instance of a runner, see `loop_of`."""
+
+    def __init__(self, scene: Scene, driver: BodyDriver) -> None:
+        self.scene, self.driver = scene, driver
+        ports = [f"contact[{k}]" for k in range(1, len(scene.stops) + 1)]
+        self._stuck = tuple(f"{port}.stuck" for port in ports)
+        finals = (*OBSERVED, *state_variables(scene), *(f"{port}.stick_start" for port in ports))
+        is_oscillator = isinstance(scene.body, OscillatorBody)
+        self.finals = finals if is_oscillator else (*finals, "natural_angular_frequency[1]")
+        self._kept: list[NDArray[Any]] = []  # what C reads while it runs
+        instance = driver.instance
+        functions = [instance.address_of(name) for name in core.RunsFmu.FUNCTIONS]
+        self.fmu = core.RunsFmu(instance.pointer, *functions, instance.log.environment)
+        self._plans = {forced: self._planned(ports, forced=forced) for forced in (False, True)}
+
+    # ---- what C is told ----
+
+    def _address(self, values: Any, dtype: Any) -> int:
+        self._kept.append(np.ascontiguousarray(values, dtype=dtype))
+        return core.address(self._kept[-1])
+
+    def _variables(self, names: Sequence[str]) -> core.RunsVariables:
+        references = [self.driver.references[name] for name in names]
+        return core.RunsVariables(self._address(references, np.uint32), len(names))
+
+    def _integers(self, kind: str, dtype: Any) -> tuple[core.RunsVariables, int]:
+        """Return the integer parameters of a type with their values, as the driver sets them."""
+        groups = [group for group in self.driver.integers if group.name == kind]
+        references = [reference for group in groups for reference in group.references]
+        values = np.concatenate([group.values for group in groups]) if groups else ()
+        variables = core.RunsVariables(self._address(references, np.uint32), len(references))
+        return variables, self._address(values, dtype)
+
+    def _planned(self, ports: Sequence[str], *, forced: bool) -> core.RunsPlan:
+        record, references, names = self.scene.record, self.driver.references, self.driver.float_names
+        integers, integer_values = self._integers("Int64", np.int64)
+        booleans, boolean_values = self._integers("Boolean", np.bool_)
+        stops = self.scene.stops
+        return core.RunsPlan(
+            parameters=self._variables(names),
+            integers=integers,
+            booleans=booleans,
+            integer_values=integer_values,
+            boolean_values=boolean_values,
+            switches=self._variables(["record.impacts", "record.extrema", "record.periods"]),
+            switch_values=self._address([record.impacts, record.extrema, self._periods(forced)], np.bool_),
+            finals=self._variables(self.finals),
+            stuck=self._variables(self._stuck),
+            record_count=references["record.count"],
+            record_taken=references["record.taken"],
+            record_rows=references["record.rows"],
+            row_capacity=ROW_CAPACITY,
+            chained=self.chained,
+            displacement=_place("displacement_start", names),
+            velocity=_place("velocity_start", names),
+            phase=_place("forcing.phase", names) if forced else -1,
+            stops=len(stops),
+            stop_position=self._address([names.index(f"{port}.position") for port in ports], np.int32),
+            stop_direction=self._address([_direction(stop) for stop in stops], np.float64),
+        )
+
+    def plan(self, *, forced: bool) -> core.RunsPlan:
+        """Return what all points have in common."""
+        return self._plans[forced]
+
+    @property
+    def chained(self) -> bool:
+        """Whether a point starts from the state where the one before ended."""
+        return any(axis.continuation for axis in self.scene.sweep)
+
+    def _periods(self, forced: bool) -> bool:
+        return forced and (self.scene.record.extrema or self.scene.record.strobe)
+
+    # ---- the points ----
+
+    def prepared(self, points: PointValues) -> PreparedPoints | None:
+        """Return points with their parameters; None where one of them has none, or is of another kind than others."""
+        names = self.driver.float_names
+        try:
+            table = self._parameters(points)
+        except (ArithmeticError, ValueError):
+            return None  # alone each point says what is wrong with it
+        columns = {name: table[:, place].copy() for place, name in enumerate(names)}
+        angular_frequency = columns.get("forcing.angular_frequency", np.zeros(len(points)))
+        forced = bool(angular_frequency.all())
+        if not forced and angular_frequency.any():
+            return None
+        if not forced:
+            record = self.scene.record
+            begin = np.full(len(points), record.transient_time)
+            end = np.full(len(points), record.transient_time + record.recorded_time)
+            return PreparedPoints(points.first, table, begin, end, columns, forced, periods=False)
+        if self.chained:
+            columns["forcing.phase"][~points.first] = 0.0
+        with np.errstate(over="ignore"):  # a period beyond all numbers is one for the body to refuse
+            begin, end = forced_window(self.scene.record, columns["forcing.phase"], angular_frequency)
+        return PreparedPoints(points.first, table, begin, end, columns, forced, self._periods(forced))
+
+    def _parameters(self, points: PointValues) -> Floats:
+        """Return the parameters of each point, shape (point, parameter), in the order of the driver."""
+        names = self.driver.float_names
+        table = np.empty((len(points), len(names)))
+        if isinstance(self.scene.body, BeamBody):
+            # powers of numbers and of arrays may differ in their last bit
+            for place in range(len(points)):
+                at = {key: float(values[place]) for key, values in points.values.items()}
+                found = float_parameters(self.scene.at(at), None)
+                table[place] = [found[name] for name in names]
+            return table
+        columns: Mapping[str, Any] = points.values
+        found = float_parameters(self.scene.at(columns), None)
+        for column, name in enumerate(names):
+            table[:, column] = found[name]
+        return table
+
+
+def _place(name: str, names: Sequence[str]) -> int:
+    return names.index(name) if name in names else -1
+
+
+def _direction(stop: object) -> float:
+    """Return where a rigid stop pushes a body back from; 0 for one that yields."""
+    if not isinstance(stop, RestitutionStop):
+        return 0.0
+    return 1.0 if stop.side == "upper" else -1.0

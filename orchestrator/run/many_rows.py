@@ -1,0 +1,268 @@
+"""Runs the points of a `PointLoop` and makes columns of what they recorded."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import IMPACT_COLUMNS, STICK_COLUMNS, Outcome, RunRecord
+from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, joined
+from vibroimpact.fmus.core import runs as core
+from vibroimpact.orchestrator.run.many import PointLoop, PreparedPoints
+from vibroimpact.orchestrator.run.parameters import state_variables
+from vibroimpact.orchestrator.run.point import TWO_PI, late_message, limit_message
+from vibroimpact.orchestrator.run.record import (
+    OBSERVED,
+    ROW_CAPACITY,
+    ROW_IMPACT,
+    ROW_PERIOD,
+    ROW_STICK,
+    ROW_WIDTH,
+    in_time_order,
+)
+from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+
+LISTEN_SECONDS = 0.05
+"""Time after which the loop lets Python hear signals, s; one step in it may take some hundredths of a second more."""
+
+ROWS_ROOM = 64 * ROW_CAPACITY
+"""Rows of impacts, sticks and periods that the loop writes before Python takes them."""
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+State = tuple[float, ...]
+Alone = Callable[[int, State | None], tuple[RunRecord, State | None]]
+"""Runs one point, by its place, from the state it is given; returns its record and the state that it hands on."""
+
+
+def run_loop(
+    loop: PointLoop, points: PreparedPoints, start: State | None, deadline: float, alone: Alone
+) -> tuple[RunColumns, State | None]:
+    """Run points in their order; along a branch each starts where the one before ended.
+
+    Parameters
+    ----------
+    loop : PointLoop
+    points : PreparedPoints
+    start : tuple of float or None
+        State that the first one goes on from, where it does not begin a branch.
+    deadline : float
+        No point begins after it, except the first; s of `time.perf_counter`.
+    alone : callable
+        Runs those that the loop leaves out.
+
+    Returns
+    -------
+    columns : RunColumns
+        Of the points that were run: the first of them.
+    carried : tuple of float or None
+        Where the next point of the branch starts.
+    """
+    work = _Loop(loop, points, start)
+    records: dict[int, RunRecord] = {}
+    while (end := work.call()) is not core.RunsEnd.done:
+        if end is core.RunsEnd.refused:
+            place = work.state.at
+            records[place], carried = alone(place, work.carried)
+            work.leave_out(carried)
+        if work.state.stage == 0 and work.state.at > 0 and time.perf_counter() > deadline:
+            break
+    columns, done = work.columns(), work.state.at
+    if not records:
+        return columns, work.carried
+    edges = sorted(records)
+    pieces = []
+    for before, place in zip([-1, *edges], [*edges, done], strict=True):
+        pieces.append(columns.taken(before + 1, place))
+        if place < done:
+            pieces.append(columns_of([records[place]]))
+    return joined([piece for piece in pieces if len(piece)]), work.carried
+
+
+class _Loop:
+    """The arrays that C fills, and how far it is."""
+
+    def __init__(self, loop: PointLoop, points: PreparedPoints, start: State | None) -> None:
+        count, contacts = len(points.begin), len(loop.scene.stops)
+        self._loop, self._points = loop, points
+        self._plan = loop.plan(forced=points.forced)
+        self._own_deadline = loop.scene.execution.deadline
+        self._arrays: dict[str, NDArray[Any]] = {
+            "values": points.table,
+            "begin": points.begin,
+            "end": points.end,
+            "first": points.first.astype(np.uint8),
+            "outcome": np.zeros(count, dtype=np.int8),
+            "reached": np.zeros(count),
+            "seconds": np.zeros(count),
+            "finals": np.zeros((count, len(loop.finals))),
+            "stuck": np.zeros((count, contacts), dtype=np.bool_),
+            "rows_of": np.zeros(count, dtype=np.int64),
+            "rows": np.zeros((ROWS_ROOM, ROW_WIDTH)),
+        }
+        self.state = core.RunsPoints(count=count, rows_room=ROWS_ROOM, most_seconds=LISTEN_SECONDS)
+        for name, array in self._arrays.items():
+            setattr(self.state, name, core.address(array))
+        self._blocks: list[Floats] = []
+        self._give_up_at = (0, math.inf)  # a point under way, and when its time is over
+        self._carry(start)
+
+    def _carry(self, state: State | None) -> None:
+        self.state.has_carried = state is not None
+        if state is not None:
+            self.state.carried[:] = state
+
+    @property
+    def carried(self) -> State | None:
+        """State that the next point of the branch starts from."""
+        if not (self._loop.chained and self.state.has_carried):
+            return None
+        return (self.state.carried[0], self.state.carried[1])
+
+    def call(self) -> core.RunsEnd:
+        """Let C go on; signals are heard between two calls."""
+        self._watch_deadline()
+        end = core.run_points(self._loop.fmu, self._plan, self.state)
+        if end is core.RunsEnd.full:
+            self._take_rows()
+        return end
+
+    def _watch_deadline(self) -> None:
+        if self._own_deadline is None:
+            return
+        now, (place, over) = time.perf_counter(), self._give_up_at
+        if self.state.stage == 0 or place != self.state.at:
+            self._give_up_at = (self.state.at, now + self._own_deadline)
+        elif now > over:
+            self.state.give_up = 1
+
+    def _take_rows(self) -> None:
+        self._blocks.append(self._arrays["rows"][: self.state.rows_used].copy())
+        self.state.rows_used = 0
+
+    def leave_out(self, carried: State | None) -> None:
+        """Go on after a point that was run alone, which handed on a state."""
+        self._take_rows()
+        written = int(self._arrays["rows_of"][self.state.at])
+        self._blocks = [np.concatenate(self._blocks)]
+        self._blocks[0] = self._blocks[0][: len(self._blocks[0]) - written]
+        self._arrays["rows_of"][self.state.at] = 0
+        self._carry(carried)
+        self.state.at += 1
+        self.state.stage = 0
+
+    # ---- what they recorded ----
+
+    def columns(self) -> RunColumns:
+        """Return what the points that were run recorded."""
+        self._take_rows()
+        done, record, scene = self.state.at, self._loop.scene.record, self._loop.scene
+        arrays = {name: array[:done] for name, array in self._arrays.items() if name != "rows"}
+        rows = np.concatenate(self._blocks)
+        owner = np.repeat(np.arange(done), arrays["rows_of"])
+        finals, elements = arrays["finals"], len(state_variables(scene))
+        outcome, message = self._ended(arrays)
+        return RunColumns(
+            outcome=outcome,
+            message=message,
+            seconds=arrays["seconds"],
+            final_displacement=finals[:, 0],
+            final_velocity=finals[:, 1],
+            final_phase=self._final_phase(outcome, arrays["reached"]),
+            final_state=finals[:, len(OBSERVED) : len(OBSERVED) + elements] if elements else None,
+            periods=_periods(rows, owner, done) if self._points.periods else None,
+            impacts=_ragged(rows, owner, done, ROW_IMPACT, len(IMPACT_COLUMNS)) if record.impacts else None,
+            sticks=self._sticks(rows, owner, arrays) if record.impacts else None,
+        )
+
+    def _stick_starts(self, arrays: dict[str, NDArray[Any]]) -> Floats:
+        """Return when the rest on each contact began, s; NaN where the body does not rest on it."""
+        begin = len(OBSERVED) + len(state_variables(self._loop.scene))
+        starts = arrays["finals"][:, begin : begin + arrays["stuck"].shape[1]]
+        return np.where(arrays["stuck"], starts, np.nan)
+
+    def _ended(self, arrays: dict[str, NDArray[Any]]) -> tuple[NDArray[np.int8], NDArray[np.object_]]:
+        """Return how each point ended, and its message."""
+        outcome: NDArray[np.int8] = arrays["outcome"].copy()
+        message = np.full(len(outcome), "", dtype=object)
+        execution = self._loop.scene.execution
+        for place in np.flatnonzero(outcome == Outcome.impact_limit):
+            message[place] = limit_message(execution.impact_limit, float(arrays["reached"][place]))
+        for place in np.flatnonzero(outcome == Outcome.timeout):
+            message[place] = late_message(execution.deadline, float(arrays["reached"][place]))
+        if arrays["stuck"].any():
+            outcome[(outcome == Outcome.ok) & self._rests_for_ever(arrays)] = Outcome.stuck
+        return outcome, message
+
+    def _rests_for_ever(self, arrays: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+        """As `point` says it: pressed for good (an oscillator), or at rest for long enough."""
+        scene, columns, points = self._loop.scene, self._points.columns, self._points
+        resting, count = arrays["stuck"].any(axis=1), len(arrays["stuck"])
+        if not isinstance(scene.body, OscillatorBody):
+            starts = self._stick_starts(arrays)
+            began = np.fmin.reduce(starts, axis=1)
+            long_enough = points.end[:count] - points.begin[:count]
+            slowest = arrays["finals"][:, -1]
+            if not points.forced:
+                long_enough = np.where(
+                    slowest > 0.0, TWO_PI / np.where(slowest > 0.0, slowest, 1.0), long_enough
+                )
+            is_settled: NDArray[np.bool_] = arrays["reached"] - began >= long_enough
+            return resting & is_settled
+        pressed = np.zeros(count, dtype=np.bool_)
+        lifting = np.abs(columns.get("forcing.amplitude", np.zeros(count))[:count])
+        contact = arrays["stuck"].argmax(axis=1)
+        for k, stop in enumerate(scene.stops):
+            sign = 1.0 if stop.side == "upper" else -1.0
+            spring = -sign * columns["stiffness"][:count] * columns[f"contact[{k + 1}].position"][:count]
+            pressed |= (contact == k) & (spring > lifting if points.forced else True)
+        return resting & pressed
+
+    def _final_phase(self, outcome: NDArray[np.int8], reached: Floats) -> Floats:
+        if not self._points.forced:
+            return np.full(len(outcome), np.nan)
+        names, table = self._loop.driver.float_names, self._points.table[: len(outcome)]
+        phase = table[:, names.index("forcing.phase")]
+        angle = table[:, names.index("forcing.angular_frequency")] * reached
+        came_to_end = (outcome == Outcome.ok) | (outcome == Outcome.stuck)
+        return np.where(came_to_end, 0.0, (angle + phase) % TWO_PI)
+
+    def _sticks(self, rows: Floats, owner: Ints, arrays: dict[str, NDArray[Any]]) -> Ragged:
+        """Return the sticks of each point, those that have not ended among them."""
+        done = len(arrays["stuck"])
+        run, contact = np.nonzero(arrays["stuck"])
+        still = np.full((len(run), ROW_WIDTH), np.nan)
+        still[:, 0], still[:, 3] = ROW_STICK, contact + 1.0
+        still[:, 1] = self._stick_starts(arrays)[run, contact]
+        ended = rows[:, 0] == ROW_STICK
+        owners = np.concatenate([owner[ended], run])
+        order = np.argsort(owners, kind="stable")
+        together = np.concatenate([rows[ended], still])[order]
+        return _ragged(together, owners[order], done, ROW_STICK, len(STICK_COLUMNS))
+
+
+def _periods(rows: Floats, owner: Ints, done: int) -> Floats:
+    """Return the table of periods, shape (run, period, 5); runs with fewer than others end in NaN."""
+    chosen = rows[:, 0] == ROW_PERIOD
+    owner = owner[chosen]
+    count = np.bincount(owner, minlength=done)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    table = np.full((done, int(count.max(initial=0)), 5), np.nan)
+    table[owner, place] = rows[chosen, 2:7]
+    return table
+
+
+def _ragged(rows: Floats, owner: Ints, done: int, kind: float, columns: int) -> Ragged:
+    """Return the rows of a kind, those of each run in the order of their time."""
+    chosen = rows[:, 0] == kind
+    found, owner = rows[chosen, 1 : 1 + columns], owner[chosen]
+    back = (np.diff(found[:, 0]) < 0.0) & (np.diff(owner) == 0)
+    for run in np.unique(owner[1:][back]):
+        own = slice(*np.searchsorted(owner, (run, run + 1)))
+        found[own] = in_time_order(found[own])
+    return Ragged(np.bincount(owner, minlength=done), found)

@@ -1,0 +1,131 @@
+"""What a map of many points costs: overhead of a point, memory of the client and the workers, bytes, opening.
+
+A map over frequency and amplitude of a forced oscillator with a rigid stop, 100 periods before 20 recorded ones, with
+two workers. For each number of points it prints
+
+- `overhead`: processor time of the workers' chunks per point less that of the body's own work, which is measured on the
+  same points by a process that calls the loop alone and keeps nothing, us;
+- the peak memory of the client (with Dask's scheduler, which lives in it) and of the largest worker, MB;
+- the size of the dataset per point, and how long it takes to open, in a process that has read it before.
+
+Run with `python tests/benchmarks/bench_campaign.py [--points 10000 100000 1000000] [--impacts]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from vibroimpact.analysis import open_dataset
+from vibroimpact.orchestrator.campaign import run_campaign
+from vibroimpact.orchestrator.campaign.chunks import (
+    DEFAULT_RUNNER,
+    Chunk,
+    columns_of_points,
+    run_in_loop,
+)
+from vibroimpact.orchestrator.run import named_runner
+from vibroimpact.orchestrator.run.many import loop_of
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.scene.sweep import expand
+
+WORKERS = 2
+SAMPLE = 2000
+"""Points over which the body's own work is measured, spread over the map."""
+OPENINGS = 5
+
+SCENE = """
+[body]
+mass = 1.0
+stiffness = 1.0
+damping_ratio = 0.05
+[forcing]
+amplitude = 0.5
+angular_frequency = 0.8
+[[stop]]
+position = 1.0
+restitution = 0.7
+[record]
+transient_periods = 100
+recorded_periods = 20
+strobe = false
+impacts = {impacts}
+[sweep]
+"forcing.amplitude" = {{ start = 0.2, stop = 1.0, points = {amplitudes} }}
+"forcing.angular_frequency" = {{ start = 0.6, stop = 1.6, points = {frequencies} }}
+"""
+
+
+def map_of(points: int, impacts: bool) -> Scene:
+    """Return a map of about so many points."""
+    side = math.isqrt(points)
+    text = SCENE.format(impacts=str(impacts).lower(), amplitudes=side, frequencies=points // side)
+    return parse_scene(text, "map.toml")
+
+
+def own_seconds(impacts: bool) -> float:
+    """Return what a point costs the loop in C and the columns of its results, s of wall time of one process."""
+    scene = map_of(SAMPLE, impacts)
+    runner = named_runner(scene, DEFAULT_RUNNER)
+    loop = loop_of(scene, runner)
+    assert loop is not None
+    points = columns_of_points(expand(scene), Chunk(0, 0, SAMPLE))
+    found = run_in_loop(scene, runner, loop, points, None)
+    assert found is not None
+    runner.close()
+    return float(found[0].seconds.sum()) / len(found[0])
+
+
+def measured(points: int, impacts: bool) -> None:
+    """Run one campaign and print what it cost."""
+    scene = map_of(points, impacts)
+    with tempfile.TemporaryDirectory() as folder:
+        began = time.perf_counter()
+        report = run_campaign(scene, Path(folder, "map"), workers=WORKERS)
+        wall = time.perf_counter() - began
+        openings = []
+        for _ in range(OPENINGS):
+            began = time.perf_counter()
+            open_dataset(report.dataset).close()
+            openings.append(time.perf_counter() - began)
+        with open_dataset(report.dataset) as opened:
+            own = float(opened.point_seconds.sum())
+        size = report.dataset.stat().st_size
+    client, workers = (
+        resource.getrusage(who).ru_maxrss / 1024 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
+    overhead = (WORKERS * report.compute_seconds - own) / report.runs
+    print(
+        f"{report.runs:>8} points: {wall:.1f} s, computing {report.compute_seconds:.1f} s, joining "
+        f"{report.compaction_seconds:.1f} s; {own / report.runs * 1e6:.0f} us a point in the body, overhead "
+        f"{overhead * 1e6:.1f} us; client {client:.0f} MB, largest worker {workers:.0f} MB; "
+        f"{size / report.runs:.0f} bytes a point; opened in {statistics.median(openings) * 1e3:.0f} ms",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Measure each number of points in a process of its own, since memory is counted by its peak."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--points", type=int, nargs="+", default=[10_000, 100_000, 1_000_000])
+    parser.add_argument("--impacts", action="store_true", help="keep the rows of impacts too")
+    chosen = parser.parse_args()
+    if len(chosen.points) == 1:
+        measured(chosen.points[0], chosen.impacts)
+        return
+    for points in chosen.points:
+        more = ["--impacts"] if chosen.impacts else []
+        subprocess.run([sys.executable, __file__, "--points", str(points), *more], check=True)
+
+
+if __name__ == "__main__":
+    main()
