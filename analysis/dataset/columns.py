@@ -119,6 +119,46 @@ def _periods(tables: Sequence[Floats | None]) -> Floats | None:
     return values
 
 
+OF_ALL_PERIODS = {
+    "displacement_max": "largest displacement in all recorded periods",
+    "displacement_min": "smallest displacement in all recorded periods",
+    "strobe_displacement": "displacement at forcing phase zero of the last recorded period",
+    "strobe_velocity": "velocity at forcing phase zero of the last recorded period",
+    "impacts_per_period": "mean number of impacts in a recorded period",
+}
+"""What the variables of each period mean where one value stands for all, see `of_all_periods`."""
+
+
+def of_all_periods(periods: Floats) -> Floats:
+    """Return what each run recorded in all its periods together.
+
+    Parameters
+    ----------
+    periods : ndarray of float, shape (run, period, 5)
+        Columns `PERIOD_COLUMNS`; a run that recorded fewer periods than the others ends in NaN.
+
+    Returns
+    -------
+    ndarray of float, shape (run, 1, 5)
+        The same columns: largest, smallest, those of the last period (2), mean; NaN of a run without any period.
+
+    >>> one = [[[2.0, -1.0, 0.1, 0.0, 1.0], [3.0, 0.0, 0.2, 0.5, 2.0], [np.nan] * 5]]
+    >>> of_all_periods(np.array(one)).tolist()
+    [[[3.0, -1.0, 0.2, 0.5, 1.5]]]
+    """
+    result = np.full((len(periods), 1, len(PERIOD_COLUMNS)), np.nan)
+    # each recorded period counts its impacts, whatever else is recorded
+    count = np.count_nonzero(~np.isnan(periods[:, :, 4]), axis=1)
+    some = count > 0
+    if some.any():
+        known, last = periods[some], count[some] - 1
+        result[some, 0, 0] = np.fmax.reduce(known[:, :, 0], axis=1)
+        result[some, 0, 1] = np.fmin.reduce(known[:, :, 1], axis=1)
+        result[some, 0, 2:4] = known[np.arange(len(known)), last, 2:4]
+        result[some, 0, 4] = np.nansum(known[:, :, 4], axis=1) / count[some]
+    return result
+
+
 def ragged(tables: Sequence[Floats | None], columns: int) -> Ragged | None:
     """Return the tables of runs as one, with so many columns; None where no run has one."""
     known = [_with_columns(table, columns) for table in tables if table is not None]

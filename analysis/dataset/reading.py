@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
-from xarray.backends import BackendArray
+from xarray.backends import BackendArray, NetCDF4DataStore
 from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
@@ -56,12 +56,18 @@ class Part:
 def _opened(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
     """Open a file that vibroimpact wrote; whatever is wrong with it is one DatasetError."""
     with opened_netcdf(path) as file:
-        if "dataset_schema" not in file.ncattrs() or not {"run_index", "outcome"} <= file.variables.keys():
-            raise DatasetError(
-                f"{os.fspath(path)}: expected a dataset written by vibroimpact, got other NetCDF contents. "
-                "Use the dataset.nc of a campaign or the file of a run."
-            )
+        _refuse_foreign(path, file.ncattrs(), file.variables)
         yield file
+
+
+def _refuse_foreign(
+    path: str | os.PathLike[str], attributes: Collection[object], variables: Collection[object]
+) -> None:
+    if "dataset_schema" not in attributes or not all(name in variables for name in ("run_index", "outcome")):
+        raise DatasetError(
+            f"{os.fspath(path)}: expected a dataset written by vibroimpact, got other NetCDF contents. "
+            "Use the dataset.nc of a campaign or the file of a run."
+        )
 
 
 def read_part(path: str | os.PathLike[str]) -> Part:
@@ -184,30 +190,49 @@ def open_measured(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def _open_flat(file: Path) -> xr.Dataset:
     """Open a file lazily in its one-dimensional form."""
-    with _opened(file) as stored:
-        schema = str(stored.getncattr("dataset_schema"))[:60]
-    if schema != SCHEMA_VERSION:
-        raise DatasetError(
-            f"{file}: expected dataset schema {SCHEMA_VERSION}, got {schema}. "
-            "Open it with the version of vibroimpact that wrote it."
-        )
     with one_error(file):
-        return _open_checked(file)
+        flat = _open_checked(file)
+    try:
+        _refuse_foreign(file, flat.attrs, flat.variables)
+        schema = str(flat.attrs["dataset_schema"])[:60]
+        if schema != SCHEMA_VERSION:
+            raise DatasetError(
+                f"{file}: expected dataset schema {SCHEMA_VERSION}, got {schema}. "
+                "Open it with the version of vibroimpact that wrote it."
+            )
+    except DatasetError:
+        flat.close()
+        raise
+    return flat
 
 
 def _open_checked(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a file lazily, once it is known to be sound: seconds are not dates, and numbers are as they are stored."""
     state = check_sound(path)
-    # Flags are not floats, and what is missing is NaN already.
-    dataset = xr.open_dataset(
-        os.path.abspath(path), engine="netcdf4", decode_times=False, mask_and_scale=False
-    )
+    store = NetCDF4DataStore.open(os.path.abspath(path))
     try:
         refuse_changed(path, state)
+        stored, _ = store.load()
+        # xarray would read all texts at once: those that are no labels can wait.
+        texts = {name: stored[name] for name in _texts(stored)}
+        # Flags are not floats, and what is missing is NaN already.
+        dataset = xr.open_dataset(store, decode_times=False, mask_and_scale=False, drop_variables=texts)
     except BaseException:
-        dataset.close()
+        store.close()
         raise
-    return dataset
+    opened = dataset.assign(texts)
+    opened.set_close(store.close)
+    return opened
+
+
+def _texts(stored: Mapping[str, xr.Variable]) -> list[str]:
+    """Return the variables of texts that are no labels."""
+    linked = {name for v in stored.values() for name in str(v.attrs.get("coordinates", "")).split()}
+    return [
+        name
+        for name, variable in stored.items()
+        if variable.dtype.kind == "O" and name not in linked and name not in variable.dims
+    ]
 
 
 def _saved_again(opened: xr.Dataset) -> xr.Dataset:

@@ -14,7 +14,14 @@ from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
 from vibroimpact.analysis.dataset.checking import marked
-from vibroimpact.analysis.dataset.columns import Ragged, RunColumns, columns_of, ragged
+from vibroimpact.analysis.dataset.columns import (
+    OF_ALL_PERIODS,
+    Ragged,
+    RunColumns,
+    columns_of,
+    of_all_periods,
+    ragged,
+)
 from vibroimpact.analysis.dataset.schema import (
     CONVENTIONS,
     EVENT_COLUMNS,
@@ -44,6 +51,9 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
 from vibroimpact.fmus.errors import DatasetError
 
+_TEXT_CHUNK = 4096
+"""Texts that are stored together; a chunk without any is not there."""
+
 _Variables = dict[str, tuple[tuple[str, ...], NDArray[Any], dict[str, Any]]]
 
 
@@ -58,6 +68,7 @@ def build_dataset(
     attrs: Mapping[str, Any] | None = None,
     unit_of: Mapping[str, str] | None = None,
     omit: Collection[str] = (),
+    each_period: bool = True,
     event_components: Sequence[str] = (),
     connections: Sequence[str] = (),
     compared: Sequence[str] = (),
@@ -85,6 +96,9 @@ def build_dataset(
         the `event_components` that is not here has the unit 1.
     omit : collection of str
         Per-period variables that the scene does not record; they are not stored.
+    each_period : bool, optional
+        False: `period` has one element, which stands for all recorded periods of its run, see
+        `columns.of_all_periods`.
     event_components : sequence of str, optional
         Names of all components of a general scene, in the order that `RunRecord.events` counts them.
     connections : sequence of str, optional
@@ -115,7 +129,7 @@ def build_dataset(
     _check_lengths(len(runs), coordinates, direction, run_index)
     columns, records = (runs, ()) if isinstance(runs, RunColumns) else (columns_of(runs), runs)
     variables = _run_variables(columns, direction, run_index, units)
-    variables |= _period_variables(columns.periods, units, omit)
+    variables |= _period_variables(columns.periods, units, omit, each_period)
     variables |= _ragged_variables("impact", columns.impacts, IMPACT_COLUMNS, units)
     variables |= _ragged_variables("stick", columns.sticks, STICK_COLUMNS, units)
     samples = _Samples(sample_variables, event_components, frozenset(coordinates), unit_of or {}, units)
@@ -231,13 +245,18 @@ def _described(values: Mapping[str, Any], units: UnitSystem) -> _Variables:
 
 
 def _period_variables(
-    periods: NDArray[np.float64] | None, units: UnitSystem, omit: Collection[str]
+    periods: NDArray[np.float64] | None, units: UnitSystem, omit: Collection[str], each_period: bool
 ) -> _Variables:
     """Return the per-period variables."""
     if periods is None:
         return {}
-    columns = dict(zip(PERIOD_COLUMNS, np.moveaxis(periods, -1, 0), strict=True))
-    return _described({name: columns[name] for name in PERIOD_COLUMNS if name not in omit}, units)
+    values = np.moveaxis(periods if each_period else of_all_periods(periods), -1, 0)
+    columns = dict(zip(PERIOD_COLUMNS, values, strict=True))
+    variables = _described({name: columns[name] for name in PERIOD_COLUMNS if name not in omit}, units)
+    if not each_period:
+        for name, (_, _, attributes) in variables.items():
+            attributes["long_name"] = OF_ALL_PERIODS[name]
+    return variables
 
 
 def _ragged_variables(
@@ -411,7 +430,17 @@ def _store(
         compression="zlib" if compression and not is_text else None,
         complevel=level,
         shuffle=True,
+        chunksizes=[min(_TEXT_CHUNK, variable.size)] if is_text and variable.size else None,
     )
     stored.setncatts(dict(variable.attrs) if linked is None else {**variable.attrs, "coordinates": linked})
-    if variable.size:
+    if is_text:
+        _store_texts(stored, variable.values)
+    elif variable.size:
         stored[...] = variable.values
+
+
+def _store_texts(stored: netCDF4.Variable[Any], texts: NDArray[Any]) -> None:
+    """Store what is not empty: what was never stored reads as empty, and takes no space."""
+    places = np.flatnonzero(texts.astype(bool))
+    for block in np.split(places, np.flatnonzero(np.diff(places) > 1) + 1) if places.size else ():
+        stored[block[0] : block[-1] + 1] = texts[block]

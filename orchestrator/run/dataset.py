@@ -68,6 +68,7 @@ def dataset_of_runs(
         attrs=attrs,
         unit_of=_units(scene, names),
         omit=_omitted(scene),
+        each_period=scene.record.each_period,
         event_components=[c.name for c in scene.general.components] if scene.general is not None else (),
         connections=_energy_connections(scene),
         compared=compared_names(scene),

@@ -22,6 +22,7 @@ def bytes_of_a_run(scene: Scene) -> int:
     record, general = scene.record, scene.general
     periods = record.recorded_periods if (record.extrema or record.strobe) and general is None else 0
     samples = round(_sampling_rate(scene) * _recorded_seconds(scene))
+    periods = periods if record.each_period else min(periods, 1)
     numbers = periods * len(PERIOD_COLUMNS) + samples * (1 + len(sample_variables(scene)))
     return _RUN_BYTES + _NUMBER_BYTES * (numbers + 2 * most_elements(scene))
 

@@ -319,6 +319,13 @@ class Record(SceneTable):
             doc="displacement and velocity once per period, where the forcing phase is 0; none in an unforced scene"
         ),
     ] = True
+    each_period: Annotated[
+        bool,
+        Rule(
+            doc="`false`: one value for all recorded periods together, which is what a map of many points needs: the "
+            "largest and smallest displacement, the mean number of impacts, the strobe of the last"
+        ),
+    ] = True
     time_series: Annotated[
         TimeSeries | None,
         Rule(

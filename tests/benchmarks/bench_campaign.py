@@ -3,8 +3,8 @@
 A map over frequency and amplitude of a forced oscillator with a rigid stop, 100 periods before 20 recorded ones, with
 two workers. For each number of points it prints
 
-- `overhead`: processor time of the workers' chunks per point less that of the body's own work, which is measured on the
-  same points by a process that calls the loop alone and keeps nothing, us;
+- `overhead`: wall time of the workers per point, from the first chunk's begin to the last one's end, less what the
+  points took in the body (`point_seconds`), us;
 - the peak memory of the client (with Dask's scheduler, which lives in it) and of the largest worker, MB;
 - the size of the dataset per point, and how long it takes to open, in a process that has read it before.
 
@@ -25,20 +25,9 @@ from pathlib import Path
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.orchestrator.campaign import run_campaign
-from vibroimpact.orchestrator.campaign.chunks import (
-    DEFAULT_RUNNER,
-    Chunk,
-    columns_of_points,
-    run_in_loop,
-)
-from vibroimpact.orchestrator.run import named_runner
-from vibroimpact.orchestrator.run.many import loop_of
 from vibroimpact.orchestrator.scene import Scene, parse_scene
-from vibroimpact.orchestrator.scene.sweep import expand
 
 WORKERS = 2
-SAMPLE = 2000
-"""Points over which the body's own work is measured, spread over the map."""
 OPENINGS = 5
 
 SCENE = """
@@ -56,6 +45,7 @@ restitution = 0.7
 transient_periods = 100
 recorded_periods = 20
 strobe = false
+each_period = false
 impacts = {impacts}
 [sweep]
 "forcing.amplitude" = {{ start = 0.2, stop = 1.0, points = {amplitudes} }}
@@ -68,19 +58,6 @@ def map_of(points: int, impacts: bool) -> Scene:
     side = math.isqrt(points)
     text = SCENE.format(impacts=str(impacts).lower(), amplitudes=side, frequencies=points // side)
     return parse_scene(text, "map.toml")
-
-
-def own_seconds(impacts: bool) -> float:
-    """Return what a point costs the loop in C and the columns of its results, s of wall time of one process."""
-    scene = map_of(SAMPLE, impacts)
-    runner = named_runner(scene, DEFAULT_RUNNER)
-    loop = loop_of(scene, runner)
-    assert loop is not None
-    points = columns_of_points(expand(scene), Chunk(0, 0, SAMPLE))
-    found = run_in_loop(scene, runner, loop, points, None)
-    assert found is not None
-    runner.close()
-    return float(found[0].seconds.sum()) / len(found[0])
 
 
 def measured(points: int, impacts: bool) -> None:

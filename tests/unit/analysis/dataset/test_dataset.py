@@ -179,6 +179,42 @@ def test_strobe_points_can_be_left_out_alone() -> None:
     assert "displacement_max" in dataset
 
 
+def test_one_value_can_stand_for_all_periods(tmp_path: Path) -> None:
+    runs = [record(float(value)) for value in range(3)]
+    for run in runs:
+        assert run.periods is not None
+        run.periods += np.arange(run.periods.size).reshape(run.periods.shape) % 7
+    cut_short, fell_over = record(4.0), failed("fell over")
+    assert cut_short.periods is not None
+    cut_short.periods = cut_short.periods[:1]
+    each, all_together = (
+        dataset_of([*runs, cut_short, fell_over], each_period=each_period) for each_period in (True, False)
+    )
+    assert all_together.sizes["period"] == 1
+    for name, expected in {
+        "displacement_max": each.displacement_max.max("period"),
+        "displacement_min": each.displacement_min.min("period"),
+        "strobe_velocity": [*each.strobe_velocity[:3, -1], each.strobe_velocity[3, 0], np.nan],
+        "impacts_per_period": each.impacts_per_period.mean("period"),
+    }.items():
+        np.testing.assert_allclose(all_together[name][:, 0], expected, rtol=1e-15)
+    assert "all recorded periods" in all_together.displacement_max.long_name
+    write_dataset(all_together, tmp_path / "all.nc")
+    write_dataset(each, tmp_path / "each.nc")
+    with open_dataset(tmp_path / "all.nc") as one, open_dataset(tmp_path / "each.nc") as many:
+        np.testing.assert_array_equal(one.displacement_range, many.displacement_range)
+
+
+def test_texts_come_back_wherever_they_are_among_empty_ones(tmp_path: Path) -> None:
+    dataset = dataset_of([record(1.0)] * 9000)
+    texts = np.full(9000, "", dtype=object)
+    texts[[0, 1, 4095, 4096, 8999]] = ["first", "two\nlines", "\u00e4", "x" * 3000, "last"]
+    dataset["message"] = ("run", texts, dataset.message.attrs)
+    write_dataset(dataset, tmp_path / "texts.nc")
+    with open_dataset(tmp_path / "texts.nc") as opened:
+        assert opened.vibroimpact.runs.message.values.tolist() == texts.tolist()
+
+
 def test_a_run_without_any_impact_opens_with_empty_ragged_dimensions(tmp_path: Path) -> None:
     path = written(dataset_of([record(1.0)], coordinates={}), tmp_path)
     with open_dataset(path) as opened:
