@@ -105,10 +105,17 @@ def matches_recorded_hash(path: str | os.PathLike[str]) -> bool:
 
 def _recorded(file: BinaryIO) -> tuple[int, bytes] | None:
     """Return the length of the content and the line after it; None where no hash is recorded."""
-    length = os.fstat(file.fileno()).st_size - LINE_LENGTH
+    size = os.fstat(file.fileno()).st_size
+    expected = content_length(file.read(_HEAD))
+    if expected is not None and expected < size:
+        file.seek(expected)
+        line = file.read(LINE_LENGTH + 1)
+        if line[: len(_BEGIN)] == _BEGIN[: len(line)]:
+            # also one that is cut short, or that something follows
+            return expected, line
+    length = size - LINE_LENGTH
     if length < 0:
         return None
-    expected = content_length(file.read(_HEAD))
     file.seek(length)
     line = file.read()
     # Two signs of a hash, the length of the file and the line: damage at one place leaves the other.

@@ -30,6 +30,7 @@ from soak import service_kills
 from soak.flipped_parts import DAMAGES
 from soak.kills import Content, bits_of, difference
 from vibroimpact.analysis.dataset import Outcome, read_flat
+from vibroimpact.analysis.files.fingerprints import LINE_LENGTH
 
 CASES = 2
 SAMPLE = 0
@@ -219,16 +220,19 @@ def _disk(_chance: random.Random, seconds: float) -> str | None:
 
 
 def _parts(chance: random.Random, seconds: float) -> str | None:
-    """Damage parts; one that is cut is named. Where the end of a part has lost its hash only, its rows may be read."""
+    """Damage parts: each is named. One that has lost its hash and nothing else is whole, as those of version 0.1 are."""
     parts = sorted(Path("campaign", "parts").glob("branch-*.nc"))
     damaged = chance.sample(parts, min(3, len(parts)))
+    hurt = []
     for part in damaged:
-        how = "truncation" if part is damaged[0] else chance.choice(sorted(DAMAGES))
-        part.write_bytes(DAMAGES[how](chance, part.read_bytes()))
+        sound = part.read_bytes()
+        part.write_bytes(DAMAGES[chance.choice(sorted(DAMAGES))](chance, sound))
+        if part.read_bytes() not in (sound, sound[:-LINE_LENGTH]):
+            hurt.append(part)
     command = _begun()
     command.runs_for(seconds)
     said = command.said()
-    unnamed = [part.name for part in damaged[:1] if f"{part.name} was damaged and is removed" not in said]
+    unnamed = [part.name for part in hurt if f"{part.name} was damaged and is removed" not in said]
     return _killed(command) or (f"not named: {unnamed}: {said[-2000:]}" if unnamed else None)
 
 

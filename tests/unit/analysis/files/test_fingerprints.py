@@ -70,6 +70,20 @@ def test_zeros_over_the_end_do_not_hide_the_hash(written: Path) -> None:
         matches_recorded_hash(written)
 
 
+@pytest.mark.parametrize("end", [-1, -LINE_LENGTH + 1, -50])
+def test_a_line_that_is_cut_short_is_noticed(written: Path, end: int) -> None:
+    written.write_bytes(written.read_bytes()[:end])
+    with pytest.raises(DatasetError, match="the file is damaged"):
+        matches_recorded_hash(written)
+
+
+@pytest.mark.parametrize("more", [b"\0", bytes(LINE_LENGTH), b"x" * 500])
+def test_what_follows_the_line_is_noticed(written: Path, more: bytes) -> None:
+    written.write_bytes(written.read_bytes() + more)
+    with pytest.raises(DatasetError, match="the file is damaged"):
+        matches_recorded_hash(written)
+
+
 def test_a_file_of_version_0_1_has_no_hash_and_opens(written: Path) -> None:
     written.write_bytes(written.read_bytes()[:-LINE_LENGTH])
     assert not matches_recorded_hash(written)
