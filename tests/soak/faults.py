@@ -220,7 +220,7 @@ def _disk(_chance: random.Random, seconds: float) -> str | None:
 
 
 def _parts(chance: random.Random, seconds: float) -> str | None:
-    """Damage parts: each is named. One that has lost its hash and nothing else is whole, as those of version 0.1 are."""
+    """Damage parts: each is named. One that lost its hash and nothing else is whole, as those of version 0.1 are."""
     parts = sorted(Path("campaign", "parts").glob("branch-*.nc"))
     damaged = chance.sample(parts, min(3, len(parts)))
     hurt = []
