@@ -28,8 +28,8 @@ from vibroimpact.service.store import LOG, Job, State, Store
 
 GRACE = 0.5
 """Seconds that a cancelled job has to end in good order, before it and its workers are killed."""
-MOST_ATTEMPTS = 3
-"""How often a job whose process was killed by something else is started."""
+MOST_ATTEMPTS = 5
+"""How often a job whose process was killed by something else is started without a new point between."""
 IDLE = 0.2
 """Seconds between two looks into an empty queue."""
 PAUSE = 2.0
@@ -194,6 +194,8 @@ class Supervisor:
             self._closing.wait(PAUSE)
         elif told.failed:
             self._end(job, State.failed, told.failed, told)
+        elif code < 0 and told.done > job.done:
+            self._change(job, state=State.queued, message=f"its process {ending(code)}", attempts=0)
         elif code in (INTERRUPTED, -signal.SIGINT) or (code < 0 and job.attempts + 1 < MOST_ATTEMPTS):
             self._change(job, state=State.queued, message=f"its process {ending(code)}")
         else:
