@@ -14,6 +14,8 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 PACKAGES = ("fmus", "orchestrator", "analysis", "hardware", "service")
 DOOR = "door"
+EXAMPLES = "service/examples"
+"""Where the page of the service has the scenes that one may begin with."""
 PACKAGE = "vibroimpact"
 ZIG = "ziglang>=0.13"
 RELEASE = "VIBROIMPACT_RELEASE"
@@ -46,6 +48,8 @@ class FmuBuildHook(BuildHookInterface):  # type: ignore[type-arg]
                 build_platforms(self._built)
             build_data["force_include"][str(self._built)] = f"{PACKAGE}/fmus/built"
             build_data["force_include"][str(Path(self.root, "LICENSE"))] = f"{PACKAGE}/fmus/LICENSE"
+            for path in Path(self.root, "examples").glob("*.toml"):
+                build_data["force_include"][str(path)] = f"{PACKAGE}/{EXAMPLES}/{path.name}"
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{_platform()}"
 

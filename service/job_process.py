@@ -118,13 +118,14 @@ def run(folder: Path, work: Work) -> None:
 
 def _replay(scene: Scene, folder: Path, fit: str | None = None, score: list[str] | None = None) -> None:
     """Replay the recordings of a scene, and fit numbers of it, into `replay.nc`; the fitted scene beside it."""
+    from vibroimpact.fmus.terminal import Terminal
+    from vibroimpact.orchestrator.commands.replay import print_replays
     from vibroimpact.orchestrator.replay.output import fitted_scene_text
     from vibroimpact.orchestrator.replay.replaying import replay_scene
 
     scored = [folder / name for name in score or ()]
     whole = replay_scene(scene, fit=fit, score=scored)
-    if whole.verdict is not None:
-        say(note=whole.verdict.words)
+    print_replays(Terminal(), whole)
     if whole.fit is not None:
         fitted = [replay.name for replay in whole.replays if replay.use == "fitted"]
         text = fitted_scene_text(scene, whole.fit, fitted, folder)

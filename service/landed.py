@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import threading
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import netCDF4
 import numpy as np
@@ -28,6 +28,9 @@ ALONG = ("period", "impact", "stick", "comparison", "interface")
 _NO_VALUES = ("run_index", "direction", "message", "final_state", "connection", "compared")
 MOST_CACHED = 2**27
 """Of what was read, kept in memory, byte."""
+FAILURE_BYTES = 512
+"""Memory that a failure takes, about."""
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +96,7 @@ class Failure:
 
 
 class LandedReader:
-    """Reads what has landed, and remembers the files that it read last.
+    """Reads what has landed, and remembers what it found last in each file.
 
     Examples
     --------
@@ -101,7 +104,7 @@ class LandedReader:
     """
 
     def __init__(self) -> None:
-        self._known: OrderedDict[tuple[Any, ...], Landed] = OrderedDict()
+        self._known: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
 
     def read(self, files: Sequence[Path], variable: str) -> Landed | None:
         """Return a variable from files of the same campaign; None where there are no files yet.
@@ -113,33 +116,65 @@ class LandedReader:
         DatasetError
             A file is damaged.
         """
-        pieces = []
+
+        def piece(file: netCDF4.Dataset) -> tuple[Landed | None, int]:
+            found = _read(file, variable)
+            return found, 0 if found is None else found.size
+
+        found = self._from_each(files, variable, piece)
+        pieces = [one for one in found if one is not None]
+        if len(pieces) < len(found):
+            raise KeyError(variable)
+        return _joined(pieces) if pieces else None
+
+    def failures(self, files: Sequence[Path], outcomes: Sequence[int]) -> list[Failure]:
+        """Return the runs of a campaign with one of these outcomes, in the order of their index.
+
+        Raises
+        ------
+        DatasetError
+            A file is damaged.
+        """
+
+        def failed(file: netCDF4.Dataset) -> tuple[list[Failure], int]:
+            found = _failures(file, outcomes)
+            return found, FAILURE_BYTES * (1 + len(found))
+
+        each = self._from_each(files, tuple(outcomes), failed)
+        return sorted((one for found in each for one in found), key=lambda one: one.run)
+
+    def _from_each(
+        self,
+        files: Sequence[Path],
+        question: Hashable,
+        read: Callable[[netCDF4.Dataset], tuple[Found, int]],
+    ) -> list[Found]:
+        """Return what `read` finds in each file that is still there; it says how many bytes that takes."""
+        answers = []
         for path in files:
             try:
-                pieces.append(self._piece(path, variable))
+                answers.append(self._remembered(path, question, read))
             except (FileNotFoundError, DatasetError):
                 if path.exists():
                     raise
                 # the campaign has made one dataset of its parts in the meantime; the next look finds that
-        return _joined(pieces) if pieces else None
+        return answers
 
-    def _piece(self, path: Path, variable: str) -> Landed:
+    def _remembered(
+        self, path: Path, question: Hashable, read: Callable[[netCDF4.Dataset], tuple[Found, int]]
+    ) -> Found:
         state = path.stat()
-        key = (path, state.st_mtime_ns, state.st_size, variable)
+        key = (path, state.st_mtime_ns, state.st_size, question)
         with READING:
             if key in self._known:
                 self._known.move_to_end(key)
             else:
                 with opened_netcdf(path) as file:
-                    found = _read(file, variable)
-                if found is None:
-                    raise KeyError(variable)
-                self._known[key] = found
-                while (
-                    sum(piece.size for piece in self._known.values()) > MOST_CACHED and len(self._known) > 1
-                ):
+                    self._known[key] = read(file)
+                while sum(size for _, size in self._known.values()) > MOST_CACHED and len(self._known) > 1:
                     self._known.popitem(last=False)
-            return self._known[key]
+            found: Found = self._known[key][0]
+            return found
 
 
 def files_of(campaign: Path) -> list[Path]:
@@ -156,20 +191,20 @@ def axes_of(file: netCDF4.Dataset) -> list[str]:
     return [name for name in linked if name not in RULES and file[name].dimensions == ("run",)]
 
 
-def failures_in(path: Path, outcomes: Sequence[int]) -> list[Failure]:
-    """Return the runs of a file with one of these outcomes, in the order of their index."""
-    with READING, opened_netcdf(path) as file:
-        names = axes_of(file)
-        places = np.flatnonzero(np.isin(file["outcome"][:], outcomes))
-        return [
-            Failure(
-                int(file["run_index"][place]),
-                int(file["outcome"][place]),
-                str(file["message"][place]),
-                {name: float(file[name][place]) for name in names},
-            )
-            for place in places[np.argsort(file["run_index"][:][places])]
-        ]
+def _failures(file: netCDF4.Dataset, outcomes: Sequence[int]) -> list[Failure]:
+    """Return the runs of an open file with one of these outcomes."""
+    names = axes_of(file)
+    all_outcomes, runs = file["outcome"][:], file["run_index"][:]
+    columns = {name: file[name][:] for name in names}
+    return [
+        Failure(
+            int(runs[place]),
+            int(all_outcomes[place]),
+            str(file["message"][place]),
+            {name: float(column[place]) for name, column in columns.items()},
+        )
+        for place in np.flatnonzero(np.isin(all_outcomes, outcomes))
+    ]
 
 
 def _read(file: netCDF4.Dataset, variable: str) -> Landed | None:

@@ -8,13 +8,14 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from fastapi import Path as PathPart
 from pydantic import BaseModel
 
 from vibroimpact.analysis.dataset import Direction, Outcome
 from vibroimpact.fmus.errors import DatasetError, SceneError
-from vibroimpact.service.landed import Failure, Landed, LandedReader, Quantity, failures_in, files_of
+from vibroimpact.service.landed import Failure, Landed, LandedReader, Quantity, files_of
 from vibroimpact.service.points import simulated_point
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import known_job, problems
@@ -23,8 +24,14 @@ from vibroimpact.service.sessions import SECONDS, Sessions, is_own_origin
 from vibroimpact.service.slices import Selection, slice_of
 from vibroimpact.service.store import Job, Kind, State, Store
 
-DEFAULT_VARIABLES = ("strobe_displacement", "displacement_range", "impact_velocity", "final_displacement")
-"""What is shown of a campaign of which nothing is asked: the first that it has."""
+DEFAULT_VARIABLES = (
+    "strobe_displacement",
+    "displacement_range",
+    "impact_velocity",
+    "variance_accounted_for",
+    "final_displacement",
+)
+"""What is shown of a campaign of which nothing is asked: the first that it has values of."""
 MOST_ROWS = 50_000
 """Rows of one slice."""
 MOST_FAILURES = 200
@@ -107,8 +114,10 @@ def page_routes(store: Store, shelf: Shelf, sessions: Sessions) -> APIRouter:
     """Return the routes of the page."""
     router = APIRouter()
     router.include_router(_session(sessions), tags=["session"])
-    router.include_router(_slices(store), tags=["results"])
-    router.include_router(_points(store, shelf), tags=["results"])
+    reader = LandedReader()
+    router.include_router(_slices(store, reader), tags=["results"])
+    router.include_router(_points(store, reader), tags=["results"])
+    router.include_router(_scenes(shelf), tags=["scenes"])
     return router
 
 
@@ -144,30 +153,48 @@ def _session(sessions: Sessions) -> APIRouter:
     return router
 
 
-def _files(store: Store, job: Job) -> list[Path]:
+def _results(store: Store, job: Job) -> Path:
+    """Return where the points of a job land: the folder of a campaign, or the dataset of a run."""
+    if job.kind not in (Kind.campaign, Kind.run):
+        raise ProblemError(
+            HTTPStatus.CONFLICT,
+            f"{job.id}: expected a campaign or a run, which have points, got: {job.kind}.",
+        )
     path = store.dataset_of(job)
+    return path.parent if job.kind is Kind.campaign else path
+
+
+def _files(store: Store, job: Job) -> list[Path]:
+    results = _results(store, job)
     if job.kind is Kind.campaign:
-        return files_of(path.parent)
-    return [path] if path.is_file() else []
+        return files_of(results)
+    return [results] if results.is_file() else []
 
 
-def _slices(store: Store) -> APIRouter:
+def _damaged(store: Store, job: Job, error: DatasetError) -> ProblemError:
+    why = str(error).replace(f"{store.folder_of(job.id)}/", "")  # where the service lies is its own matter
+    return ProblemError(HTTPStatus.CONFLICT, f"{job.id}: expected results that can be read, got: {why}")
+
+
+def _slices(store: Store, reader: LandedReader) -> APIRouter:
     router = APIRouter()
-    reader = LandedReader()
 
     def landed_of(job: Job, variable: str | None) -> tuple[str, Landed | None]:
-        names = DEFAULT_VARIABLES if variable is None else (variable,)
-        for name in names:
+        found: list[tuple[str, Landed | None]] = []
+        for name in DEFAULT_VARIABLES if variable is None else (variable,):
             try:
-                return name, reader.read(_files(store, job), name)
+                landed = reader.read(_files(store, job), name)
             except KeyError:
                 continue
             except DatasetError as error:
-                raise ProblemError(
-                    HTTPStatus.CONFLICT, f"{job.id}: its results are damaged: {error}"
-                ) from None
+                raise _damaged(store, job, error) from None
+            found.append((name, landed))
+            if landed is None or np.isfinite(landed.values).any():
+                return found[-1]
+        if found:
+            return found[0]
         raise ProblemError(
-            HTTPStatus.UNPROCESSABLE_ENTITY, f"variable: expected one of this campaign, got {names[0]!r}."
+            HTTPStatus.UNPROCESSABLE_ENTITY, f"variable: expected one of this campaign, got {variable!r}."
         )
 
     @router.get(
@@ -218,21 +245,22 @@ def _quantity(one: Quantity) -> QuantityAnswer:
     return QuantityAnswer(name=one.name, label=one.label, units=one.units, along=one.along)
 
 
-def _points(store: Store, shelf: Shelf) -> APIRouter:
+def _points(store: Store, reader: LandedReader) -> APIRouter:
     router = APIRouter()
 
     @router.get(
         "/campaigns/{name}/points/{run}",
         responses=problems(
-            HTTPStatus.NOT_FOUND, HTTPStatus.UNPROCESSABLE_ENTITY, HTTPStatus.TOO_MANY_REQUESTS
+            HTTPStatus.NOT_FOUND,
+            HTTPStatus.CONFLICT,
+            HTTPStatus.UNPROCESSABLE_ENTITY,
+            HTTPStatus.TOO_MANY_REQUESTS,
         ),
         summary="One point, simulated again with its motion in time",
     )
     def point(name: str, run: Annotated[int, PathPart(ge=0, le=MOST_RUN)]) -> PointAnswer:
         """Simulate a point of a campaign; on a path it starts where the point before it had ended."""
-        job = known_job(store, name)
-        path = store.dataset_of(job)
-        results = path.parent if job.kind is Kind.campaign else path
+        results = _results(store, known_job(store, name))
         return PointAnswer(**simulated_point(store.scene_of(name), results, run))
 
     @router.get(
@@ -245,18 +273,22 @@ def _points(store: Store, shelf: Shelf) -> APIRouter:
         limit: Annotated[int, Query(ge=1, le=MOST_FAILURES)] = 50,
         cursor: Annotated[int, Query(ge=0, le=MOST_RUN, description="`next` of the page before")] = 0,
     ) -> FailurePage:
-        found: list[Failure] = []
-        for path in _files(store, known_job(store, name)):
-            try:
-                found += failures_in(path, FAILED)
-            except DatasetError as error:
-                if path.exists():
-                    raise ProblemError(HTTPStatus.CONFLICT, f"{name}: {error}") from None
-        left = [one for one in sorted(found, key=lambda one: one.run) if one.run >= cursor]
+        job = known_job(store, name)
+        try:
+            found = reader.failures(_files(store, job), FAILED)
+        except DatasetError as error:
+            raise _damaged(store, job, error) from None
+        left = [one for one in found if one.run >= cursor]
         more = left[limit].run if len(left) > limit else None
         return FailurePage(total=len(found), items=[_failure(one) for one in left[:limit]], next=more)
 
-    @router.get("/examples", responses=problems(), tags=["scenes"], summary="Scenes to begin with")
+    return router
+
+
+def _scenes(shelf: Shelf) -> APIRouter:
+    router = APIRouter()
+
+    @router.get("/examples", responses=problems(), summary="Scenes to begin with")
     def examples() -> list[ExampleAnswer]:
         return _examples(shelf)
 

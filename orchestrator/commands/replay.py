@@ -13,14 +13,13 @@ from vibroimpact.analysis.dataset.outputs import refuse_folder, refuse_outputs, 
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.replay.table import print_comparison
-from vibroimpact.analysis.replay.trust import Verdict
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table, value_and_error
 from vibroimpact.fmus.terminal import Terminal
 from vibroimpact.orchestrator.campaign.manifest import holds_scene
 from vibroimpact.orchestrator.replay import ReplayFit
-from vibroimpact.orchestrator.replay.output import Replayed, fitted_scene_text
-from vibroimpact.orchestrator.replay.replaying import replay_scene, with_recordings
+from vibroimpact.orchestrator.replay.output import fitted_scene_text
+from vibroimpact.orchestrator.replay.replaying import WholeReplay, replay_scene, with_recordings
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 
 
@@ -109,7 +108,7 @@ def _to_dataset(
     with _fitting(fit) as told:
         whole = replay_scene(scene, recordings, fit=fit, score=scored, execution=execution, told=told)
     console = Terminal()
-    _print(console, whole.replays, whole.fit, whole.verdict)
+    print_replays(console, whole)
     _write(whole.dataset, output, figure)
     if save_scene is not None and whole.fit is not None:
         _save_scene(
@@ -129,21 +128,20 @@ def _fitting(fit: str | None) -> Iterator[Callable[[int, float], None]]:
         yield lambda count, error: status.update(f"fitting: {count} simulations, error {100 * error:.3g} %")
 
 
-def _print(
-    console: Terminal, replays: Sequence[Replayed], fit: ReplayFit | None, verdict: Verdict | None
-) -> None:
-    if verdict is not None:
-        console.print(verdict.words, soft_wrap=True, style="bold")
-        for reason in verdict.beside:
+def print_replays(console: Terminal, whole: WholeReplay) -> None:
+    """Print what replays have shown: the verdict, the numbers fitted, the scores of each recording."""
+    if whole.verdict is not None:
+        console.print(whole.verdict.words, soft_wrap=True, style="bold")
+        for reason in whole.verdict.beside:
             console.print(f"  also: {reason}", soft_wrap=True)
-    if fit is not None:
+    if (fit := whole.fit) is not None:
         rows = table("Fit", "<number", ">found", ">standard error", ">began with")
         for key, value, error, start in zip(fit.keys, fit.values, fit.standard_error, fit.start, strict=True):
             rows.add_row(key, *value_and_error(value, error), f"{start:.6g}")
         console.print(rows)
         for line in fit.remarks:
             console.print(f"  {line}", soft_wrap=True)
-    for replay in replays:
+    for replay in whole.replays:
         console.print(f"{replay.name} ({replay.use})", style="bold")
         for line in (*replay.replayer.remarks, *replay.motion.warnings):
             console.print(f"  {line}", soft_wrap=True)

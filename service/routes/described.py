@@ -31,6 +31,7 @@ class JobAnswer(BaseModel):
     done: int
     attempts: int
     message: str
+    options: dict[str, Any]
     outcomes: dict[str, int]
 
 

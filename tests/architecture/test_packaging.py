@@ -14,7 +14,7 @@ from support.places import ROOT
 from vibroimpact.fmus import components
 from vibroimpact.fmus.packaging.build import BUILT
 
-PACKAGES = ("fmus", "orchestrator", "analysis", "hardware")
+PACKAGES = ("fmus", "orchestrator", "analysis", "hardware", "service")
 
 
 def run(*command: str, cwd: Path, **environment: str) -> str:
@@ -64,6 +64,10 @@ def test_the_wheel_has_all_packages_and_the_fmus_and_is_for_one_platform(wheel: 
         assert f"vibroimpact/fmus/built/fmi3/{component}.fmu" in names
         assert f"vibroimpact/fmus/built/fmi2/{component}.fmu" in names
     assert "vibroimpact/fmus/LICENSE" in names
+    for path in (ROOT / "service" / "page").iterdir():
+        assert f"vibroimpact/service/page/{path.name}" in names
+    for path in (ROOT / "examples").glob("*.toml"):
+        assert f"vibroimpact/service/examples/{path.name}" in names
     assert {"vibroimpact/__init__.py", "vibroimpact/simulation.py", "vibroimpact/py.typed"} <= names
     # the binaries bind it to a platform, but to no version of Python
     assert "-py3-none-" in wheel.name

@@ -8,7 +8,7 @@ import pytest
 
 import vibroimpact as vi
 from vibroimpact.orchestrator.campaign import run_scene
-from vibroimpact.service.landed import LandedReader, failures_in, files_of
+from vibroimpact.service.landed import LandedReader, files_of
 from vibroimpact.service.page_api import examples_folder
 from vibroimpact.service.point_process import simulated
 from vibroimpact.service.slices import Selection, slice_of
@@ -109,8 +109,8 @@ def test_a_point_of_a_path_is_simulated_from_where_the_one_before_ended(file: Pa
 
 
 def test_failures_are_the_runs_with_their_outcome_and_reason(file: Path) -> None:
-    assert failures_in(file, [3, 4, 5]) == []
-    assert [one.run for one in failures_in(file, [0, 1])] == list(range(80))
+    assert LandedReader().failures([file], [3, 4, 5]) == []
+    assert [one.run for one in LandedReader().failures([file], [0, 1])] == list(range(80))
 
 
 def test_examples_are_there() -> None:
