@@ -79,6 +79,7 @@ class PointAnswer(BaseModel):
     coordinates: dict[str, float]
     outcome: str
     message: str
+    units: dict[str, str]
     samples: dict[str, Column]
     impacts: dict[str, Column]
     periods: dict[str, Column]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,10 +17,12 @@ import numpy as np
 from vibroimpact.analysis.dataset import (
     IMPACT_COLUMNS,
     PERIOD_COLUMNS,
+    RULES,
     Direction,
     RunRecord,
     read_flat,
 )
+from vibroimpact.analysis.dataset.schema import attributes_of, known_unit, unit_in
 from vibroimpact.analysis.files.opening import opened_netcdf
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.orchestrator.campaign.chunks import (
@@ -75,15 +78,19 @@ def simulated(path: Path, results: Path, run: int) -> dict[str, Any]:
     names = series.variables if series is not None else ()
     if watched.general is not None:
         names = tuple(watched.general.variables)
+    motion = {
+        "samples": _samples(record, names),
+        "impacts": _columns(record.impacts, IMPACT_COLUMNS),
+        "periods": _columns(record.periods, PERIOD_COLUMNS),
+    }
     return {
         "run": run,
         "direction": place.direction.name,
         "coordinates": {scene.sweep_coordinate_name(key): value for key, value in place.point.values.items()},
         "outcome": record.outcome.name,
         "message": record.message,
-        "samples": _samples(record, names),
-        "impacts": _columns(record.impacts, IMPACT_COLUMNS),
-        "periods": _columns(record.periods, PERIOD_COLUMNS),
+        "units": _units(scene, [name for columns in motion.values() for name in columns]),
+        **motion,
     }
 
 
@@ -153,6 +160,17 @@ def _watched(scene: Scene, place: BranchPoint) -> Scene:
     return scene.model_copy(
         update={"record": record.model_copy(update={"time_series": series, "impacts": True, "strobe": True})}
     )
+
+
+def _units(scene: Scene, names: Sequence[str]) -> dict[str, str]:
+    """Return the units of what is shown; those of what components report are theirs alone to know."""
+    found = {}
+    for name in names:
+        if name in RULES:
+            found[name] = str(attributes_of(name, scene.units)["units"])
+        elif scene.general is None and (unit := known_unit(name.replace(".", "_"))) is not None:
+            found[name] = unit_in(scene.units, unit)
+    return found
 
 
 def _samples(record: RunRecord, names: tuple[str, ...]) -> dict[str, list[float | None]]:

@@ -26,6 +26,16 @@ export function campaignPath(id, rest = "") {
   return `/campaigns/${encodeURIComponent(id)}${rest}`;
 }
 
+export function recordingPath(name, rest = "") {
+  return `/recordings/${encodeURIComponent(name)}${rest}`;
+}
+
+/** Return a key under which a submission is accepted once. */
+export function newKey() {
+  const bytes = crypto.getRandomValues(new Uint8Array(16)); // randomUUID is there over TLS alone
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
 async function send(method, path, headers, body, signal) {
   let answer;
   try {

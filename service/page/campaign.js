@@ -1,10 +1,11 @@
 // One campaign: how far it is, its diagram, a point of it, what failed, and what can be done with it.
 
-import { address, ask, askText, campaignPath, follow } from "./api.js";
+import { ask, campaignPath, follow } from "./api.js";
 import { Diagram } from "./diagram.js";
-import { button, duration, element, moment, short, stateBadge, table, tell } from "./dom.js";
+import { button, duration, element, inTitle, kindOf, moment, namesIn, short, stateBadge, table, tell, titleOf } from "./dom.js";
 import { Pace } from "./pace.js";
 import { showPoint } from "./point.js";
+import { Results } from "./results.js";
 
 const ENDED = ["done", "failed", "cancelled"];
 const PAUSE = 250; // milliseconds
@@ -27,7 +28,6 @@ class CampaignView {
     this.said = element("p", { class: "problem", role: "alert" });
     this.point = element("section", { class: "card", "aria-label": "The chosen point", hidden: true });
     this.failures = element("section", { class: "card", hidden: true, "aria-labelledby": "failures-title" });
-    this.results = element("section", { class: "card", hidden: true, "aria-labelledby": "results-title" });
   }
 
   async begin() {
@@ -39,8 +39,9 @@ class CampaignView {
       return;
     }
     if (this.ended) return;
-    const title = this.job.title || this.id.slice(0, 8);
+    const title = titleOf(this.job);
     document.title = `${title} · vibroimpact`;
+    this.results = new Results(this.job);
     this.main.append(
       element("div", { class: "head" }, element("h1", {}, title), this.state, this.acts),
       element("section", { class: "card", "aria-label": "Progress" }, this.progress, this.facts, this.message, this.said));
@@ -50,7 +51,7 @@ class CampaignView {
         element("p", { class: "small muted" }, "Choose a point to see its motion. Drag to zoom."), this.diagram.node));
       this.diagram.refresh();
     }
-    this.main.append(this.point, this.failures, this.results);
+    this.main.append(this.point, this.failures, this.results.node);
     this.seen(this.job);
     this.watchEvents();
   }
@@ -86,9 +87,10 @@ class CampaignView {
     this.message.textContent = job.message || (job.state === "running" && !job.total ? "Its workers are starting." : "");
     this.message.className = job.state === "failed" ? "problem" : "small muted";
     this.showFacts();
+    this.results.show(job);
     this.diagram?.refresh();
     if (before === job.state) return this.tellTenth();
-    if (before) tell(`The campaign is ${job.state}.`);
+    if (before) tell(`The ${kindOf(job)} is ${job.state}.`);
     this.showActs();
     if (ENDED.includes(job.state)) this.finish();
   }
@@ -101,13 +103,16 @@ class CampaignView {
 
   showFacts() {
     const { job, pace } = this, runs = job.state === "running";
-    const facts = { Points: job.total ? `${job.done} of ${job.total}` : "–" };
-    if (runs) {
+    const facts = job.kind === "campaign" ? { Points: job.total ? `${job.done} of ${job.total}` : "–" } : { Kind: kindOf(job) };
+    Object.assign(facts, askedFor(job.options));
+    if (runs && job.kind === "campaign") {
       facts["Points a second"] = pace.rate ? short(Number(pace.rate.toPrecision(3))) : "–";
       facts["Time left"] = duration(pace.left(job));
     }
     if (job.ended && job.started) facts.Took = duration(job.ended - job.started);
-    Object.assign(facts, { Submitted: moment(job.created), Workers: job.workers ?? "all processors", Id: this.id.slice(0, 8) });
+    facts.Submitted = moment(job.created);
+    if (job.kind === "campaign") facts.Workers = job.workers ?? "all processors";
+    facts.Id = this.id.slice(0, 8);
     this.facts.replaceChildren(...Object.entries(facts).map(([key, value]) =>
       element("div", {}, element("dt", {}, key), element("dd", {}, String(value)))));
   }
@@ -117,7 +122,8 @@ class CampaignView {
     if (["queued", "running"].includes(state)) made.push(button("Cancel", () => this.act("POST", "/cancel"), { class: "danger" }));
     if (["cancelled", "failed"].includes(state)) made.push(button("Resume", () => this.act("POST", "/resume"), { class: "main" }));
     if (ENDED.includes(state)) made.push(button("Delete", () => this.remove(), { class: "danger" }));
-    made.push(element("a", { class: "button", href: `#/new/${this.id}` }, "Edit a copy"));
+    if (this.job.kind !== "estimate") made.push(element("a", { class: "button", href: `#/new/${this.id}` }, "Edit a copy"));
+    if (this.job.kind === "run" && state === "done") made.push(element("a", { class: "button", href: `#/estimate/campaign/${this.id}` }, "Estimate"));
     if (this.job.kind === "campaign") made.push(element("a", { class: "button", href: `#/compare/${this.id}` }, "Compare"));
     const had = this.acts.contains(document.activeElement);
     this.acts.replaceChildren(...made);
@@ -137,13 +143,13 @@ class CampaignView {
   async act(method, rest) {
     const job = await this.ask(method, rest);
     if (!job || this.ended) return;
-    this.failures.hidden = this.results.hidden = true;
+    this.failures.hidden = true;
     this.seen(job);
     this.watchEvents();
   }
 
   async remove() {
-    if (!confirm("Delete this campaign with all of its results?")) return;
+    if (!confirm(`Delete this ${kindOf(this.job)} with all of its results?`)) return;
     try {
       await ask("DELETE", campaignPath(this.id));
       location.hash = "#/campaigns";
@@ -155,7 +161,7 @@ class CampaignView {
   /** Show what there is once a campaign has ended. */
   async finish() {
     this.stop();
-    this.showResults();
+    if (!["campaign", "run"].includes(this.job.kind)) return;
     if (this.job.kind === "run" && this.job.state === "done") showPoint(this.point, this.id, 0);
     const found = await this.ask("GET", "/failures?limit=200");
     if (found?.total) this.showFailures(found);
@@ -165,26 +171,23 @@ class CampaignView {
     const names = Object.keys(items[0].coordinates);
     const rows = items.map((one) => [
       this.diagram ? button(`Point ${one.run}`, () => showPoint(this.point, this.id, one.run, () => { this.point.hidden = true; })) : String(one.run),
-      ...names.map((name) => one.coordinates[name]), one.outcome, one.message,
+      one.message, one.outcome, ...names.map((name) => one.coordinates[name]),
     ]);
     this.failures.hidden = false;
-    this.failures.replaceChildren(element("h2", { id: "failures-title" }, `${total} points did not come to their end`),
+    this.failures.replaceChildren(element("h2", { id: "failures-title" }, `${total} ${total === 1 ? "point" : "points"} did not come to ${total === 1 ? "its" : "their"} end`),
       element("div", { class: "scroll tall", tabindex: "0", role: "region", "aria-label": "Points that failed" },
-        table("Points that failed, and why", ["Point", ...names.map((name) => name.replaceAll("_", " ")), "Outcome", "Why"], rows)));
+        table("Points that failed, and why", ["Point", "Why", "Outcome", ...names.map((name) => name.replaceAll("_", " "))], rows)));
   }
+}
 
-  showResults() {
-    const done = this.job.state === "done", href = (rest) => address(campaignPath(this.id, rest));
-    const link = (rest, text, name) => element("a", { class: "button", href: href(rest), download: name }, text);
-    const log = element("pre", { class: "scroll tall", tabindex: "0", "aria-label": "Log" });
-    const made = [link("/scene", "Scene (TOML)", `${this.id}.toml`), link("/log", "Log", `${this.id}.log`)];
-    if (done) {
-      made.unshift(link("/dataset", "Dataset (NetCDF)", `${this.id}.nc`));
-      made.push(link("/figure?format=svg", "Figure (SVG)", `${this.id}.svg`), link("/figure?format=png", "Figure (PNG)", `${this.id}.png`));
-    }
-    this.results.hidden = false;
-    this.results.replaceChildren(element("h2", { id: "results-title" }, "Download"), element("div", { class: "row" }, made),
-      element("details", { ontoggle: async () => { log.textContent = await askText(campaignPath(this.id, "/log")); } },
-        element("summary", {}, "Show the log"), log));
+/** Return what a job was asked beside its scene, as facts. */
+function askedFor({ fit, score, data, asked }) {
+  const facts = {};
+  if (fit) facts.Fitted = namesIn(fit).join(", ");
+  if (score?.length) facts.Scored = score.join(", ");
+  if (data) facts.Of = data;
+  for (const [key, value] of Object.entries(asked ?? {})) {
+    if (value !== null && value !== false && key !== "kind") facts[inTitle(key)] = String(value);
   }
+  return facts;
 }

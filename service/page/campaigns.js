@@ -1,7 +1,7 @@
 // All campaigns, the newest first: how far each is, how fast, how long it will take.
 
 import { ask } from "./api.js";
-import { button, duration, element, moment, short, stateBadge } from "./dom.js";
+import { button, duration, element, kindOf, moment, short, stateBadge, titleOf } from "./dom.js";
 import { Pace } from "./pace.js";
 
 const EVERY = 1000; // milliseconds between two looks while one runs
@@ -51,11 +51,12 @@ function row(job, paces) {
   pace.note(job);
   const runs = job.state === "running";
   return element("tr", {},
-    element("td", { class: "name" }, element("a", { href: `#/campaign/${job.id}` }, job.title || job.id.slice(0, 8))),
+    element("td", { class: "name" }, element("a", { href: `#/campaign/${job.id}` }, titleOf(job)),
+      element("span", { class: "kind small muted" }, kindOf(job))),
     element("td", {}, stateBadge(job.state)),
     element("td", {}, job.total
-      ? [element("progress", { max: job.total, value: job.done, "aria-label": `Points of ${job.title || job.id}` }),
-         element("span", { class: "small muted" }, `${job.done} of ${job.total} ${job.total === 1 ? "run" : "points"}`)]
+      ? [element("progress", { max: job.total, value: job.done, "aria-label": `Points of ${titleOf(job)}` }),
+         element("span", { class: "small muted" }, `${job.done} of ${job.total} ${job.kind === "campaign" ? "points" : kindOf(job)}`)]
       : element("span", { class: "small muted" }, job.message || "–")),
     numbered(runs && pace.rate ? short(Number(pace.rate.toPrecision(3))) : "–", "points a second"),
     numbered(runs ? duration(pace.left(job)) : "–", "left"),

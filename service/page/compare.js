@@ -2,7 +2,7 @@
 
 import { ask } from "./api.js";
 import { Diagram } from "./diagram.js";
-import { choice, element, stateBadge } from "./dom.js";
+import { choice, element, stateBadge, titleOf } from "./dom.js";
 import { showPoint } from "./point.js";
 
 const EVERY = 1500;
@@ -27,10 +27,10 @@ export function showComparison(main, first = "", second = "") {
       const job = swept.find((one) => one.id === id), name = place ? "Right" : "Left";
       const point = element("div", { hidden: true });
       const diagram = new Diagram(id, `${name} diagram`, (run) => showPoint(point, id, run, () => { point.hidden = true; }), 320);
-      const options = swept.map((one) => [one.id, `${one.title || "untitled"} (${one.id.slice(0, 8)})`]);
+      const options = swept.map((one) => [one.id, one.title ? `${one.title} (${one.id.slice(0, 8)})` : titleOf(one)]);
       sides.append(element("section", { class: "card", "aria-label": name },
         element("div", { class: "row end" }, choice(name, options, id, (other) => go(chosen, place, other)), stateBadge(job.state)),
-        element("h2", {}, element("a", { href: `#/campaign/${id}` }, job.title || id.slice(0, 8))),
+        element("h2", {}, element("a", { href: `#/campaign/${id}` }, titleOf(job))),
         diagram.node, point));
       open.push(diagram);
       diagram.refresh();

@@ -8,6 +8,8 @@ import { extent } from "./scale.js";
 const PAUSE = 700; // milliseconds between two looks at what has landed
 const TABLE_ROWS = 200;
 const MAP = "map";
+const MAP_ROOM = 0.25; // part of what is shown of a map that is asked for beside it
+const FAILED = ["impact_limit", "error", "crash", "timeout"];
 const COLOURS = { up: "one", down: "two", independent: "one" };
 
 export class Diagram {
@@ -79,10 +81,11 @@ export class Diagram {
   begin(data) {
     const several = data.axes.length > 1;
     const range = data.variables.find((one) => one.name === "displacement_range");
-    this.along = several && (range || !data.variable.along) ? MAP : data.axes[0]?.name;
-    this.variable = several && range ? range.name : data.variable.name;
+    const hasMap = several && !movesTogether(data) && (range || !data.variable.along);
+    this.along = hasMap ? MAP : data.axes[0]?.name;
+    this.variable = hasMap && range ? range.name : data.variable.name;
     this.hold();
-    if (!several) return false;
+    if (!hasMap && !Object.keys(this.held).length) return false;
     this.refresh();
     return true;
   }
@@ -90,7 +93,7 @@ export class Diagram {
   /** Hold the axes that are not shown at values in their middle. */
   hold() {
     const shown = this.along === MAP ? this.data.axes.slice(0, 2).map((axis) => axis.name) : [this.along];
-    const others = this.data.axes.filter((axis) => !shown.includes(axis.name));
+    const others = movesTogether(this.data) ? [] : this.data.axes.filter((axis) => !shown.includes(axis.name));
     this.held = Object.fromEntries(others.map(({ name }) => [name, this.held[name] ?? middle(this.levels[name])]));
     this.within = {};
     this.plot.view = null;
@@ -133,21 +136,23 @@ export class Diagram {
     this.plot.canvas.dataset.points = content.layers.reduce((sum, layer) => sum + layer.xs.length, 0);
     this.plot.show(content);
     const thinned = shown < rows ? `; ${shown} of ${rows} different values are drawn, more where you zoom in` : "";
-    this.said.textContent = `${inWords(variable)}: ${landed} of ${Math.max(total, landed)} points${thinned}.`;
+    const nothing = landed && !this.data.value.some((one) => one !== null) ? "; none of them has a value of this variable" : "";
+    this.said.textContent = `${inWords(variable)}: ${landed} of ${Math.max(total, landed)} points${nothing}${thinned}.`;
     this.fillTable();
   }
 
   branches() {
-    const { axes, coordinates, value, run, direction, directions, variable } = this.data;
+    const { axes, coordinates, value, run, direction, directions, outcome, outcomes, variable } = this.data;
     const number = Math.max(axes.findIndex((axis) => axis.name === this.along), 0);
-    const ways = [...new Set(direction)].sort();
-    const layers = ways.map((way) => {
-      const places = run.map((_, place) => place).filter((place) => direction[place] === way);
-      return {
-        kind: "points", size: value.length > 3000 ? 2 : value.length > 400 ? 3 : 4, colour: COLOURS[directions[way]], name: ways.length > 1 ? directions[way] : null,
-        xs: places.map((place) => coordinates[number][place]), ys: places.map((place) => value[place]), runs: places.map((place) => run[place]),
-      };
+    const ways = [...new Set(direction)].sort(), size = value.length > 3000 ? 2 : value.length > 400 ? 3 : 4;
+    const all = run.map((_, place) => place), failed = all.filter((place) => FAILED.includes(outcomes[outcome[place]]));
+    const layer = (colour, name, places) => ({
+      kind: "points", size, colour, name,
+      xs: places.map((place) => coordinates[number][place]), ys: places.map((place) => value[place]), runs: places.map((place) => run[place]),
     });
+    const layers = ways.map((way) => layer(COLOURS[directions[way]], ways.length > 1 ? directions[way] : null,
+      all.filter((place) => direction[place] === way && !FAILED.includes(outcomes[outcome[place]]))));
+    if (failed.length) layers.push(layer("wrong", "did not come to its end", failed));
     return { layers, x: { label: inWords(axes[number]), log: isLog(coordinates[number]) }, y: { label: inWords(variable) } };
   }
 
@@ -156,7 +161,7 @@ export class Diagram {
     const places = run.map((_, place) => place).filter((place) => this.direction === null || direction[place] === this.direction);
     const of = (column) => places.map((place) => column[place]);
     const values = of(value);
-    const layer = { kind: "cells", xs: of(coordinates[0]), ys: of(coordinates[1]), values, runs: of(run), range: extent([values], 0), bar: inWords(variable) };
+    const layer = { kind: isGrid(this.data) ? "cells" : "nearest", xs: of(coordinates[0]), ys: of(coordinates[1]), values, runs: of(run), range: extent([values], 0), bar: inWords(variable) };
     return { layers: [layer], x: { label: inWords(axes[0]), log: isLog(coordinates[0]) }, y: { label: inWords(axes[1]), log: isLog(coordinates[1]) } };
   }
 
@@ -170,7 +175,9 @@ export class Diagram {
 
   zoomed(view) {
     const shown = this.along === MAP ? this.data.axes.slice(0, 2).map((axis) => axis.name) : [this.along];
-    this.within = view ? Object.fromEntries(shown.map((name, place) => [name, [view.x, view.y][place]])) : {};
+    const room = this.along === MAP ? MAP_ROOM : 0; // what lies beside a map colours its edge
+    const wider = ([low, high]) => [low - room * (high - low), high + room * (high - low)];
+    this.within = view ? Object.fromEntries(shown.map((name, place) => [name, wider([view.x, view.y][place])])) : {};
     this.refresh();
   }
 
@@ -186,6 +193,18 @@ export class Diagram {
 
 function middle(values) {
   return values[Math.floor(values.length / 2)];
+}
+
+/** Whether swept parameters move together or are drawn, so that none of them can be held. */
+function movesTogether({ axes, coordinates }) {
+  if (axes.length < 2) return false;
+  const distinct = coordinates.map((column) => new Set(column).size), points = new Set(coordinates[0].map((_, place) => coordinates.map((column) => column[place]).join())).size;
+  return points > 1 && distinct.every((count) => count === points);
+}
+
+/** Whether the first two coordinates are those of a grid, of which not all points have to be there yet. */
+function isGrid({ coordinates: [across, up], total }) {
+  return new Set(across).size * new Set(up).size <= total;
 }
 
 /** Whether values are spaced by equal ratios. */

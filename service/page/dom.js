@@ -27,10 +27,21 @@ export function table(caption, names, rows) {
     element("tbody", {}, rows.map((row) => element("tr", {}, row.map(cell)))));
 }
 
-export function choice(label, options, chosen, changed) {
+let fields = 0;
+
+/** Return a control below its label. */
+export function field(label, control, help = null) {
+  control.id ||= `field-${++fields}`;
+  if (help) control.setAttribute("aria-describedby", `${control.id}-help`);
+  return element("div", { class: "field" }, element("label", { for: control.id }, label), control,
+    help && element("small", { class: "muted", id: `${control.id}-help` }, help));
+}
+
+/** Return a list to choose from, of pairs of a value and its text. */
+export function choice(label, options, chosen, changed, help = null) {
   const select = element("select", { onchange: () => changed(select.value) },
     options.map(([value, text]) => element("option", { value, selected: value === chosen }, text)));
-  return element("label", {}, label, select);
+  return field(label, select, help);
 }
 
 /** Return a number with five digits. */
@@ -52,8 +63,36 @@ export function moment(seconds) {
   return seconds ? new Date(seconds * 1000).toLocaleString([], { dateStyle: "medium", timeStyle: "short" }) : "–";
 }
 
-export function inWords(one) {
-  return one.units && one.units !== "1" ? `${one.label} (${one.units})` : one.label;
+/** Return the label of a quantity with its unit. */
+export function inWords({ label, units }) {
+  return units && units !== "1" ? `${label} (${unitInWords(units)})` : label;
+}
+
+/** Return a unit as it is read: `m s-2` is m/s². */
+function unitInWords(units) {
+  const parts = units.split(" ").map((part) => /^(\D+?)(-?\d*)$/.exec(part) ?? [part, part, ""]);
+  const written = ([, name, power]) => name + ({ 2: "²", 3: "³", 4: "⁴" }[power.replace("-", "")] ?? "");
+  const [above, below] = [parts.filter((one) => !one[2].startsWith("-")), parts.filter((one) => one[2].startsWith("-"))];
+  return [above.map(written).join(" ") || "1", ...below.map(written)].join("/");
+}
+
+/** Return what a job makes, in a word. */
+export function kindOf({ kind, options }) {
+  return options.fit ? "fit" : kind;
+}
+
+export function titleOf(job) {
+  return job.title || `Untitled ${kindOf(job)} ${job.id.slice(0, 8)}`;
+}
+
+/** Return a name of the API as a heading: `stop_position` is Stop position. */
+export function inTitle(name) {
+  return name[0].toUpperCase() + name.slice(1).replaceAll("_", " ");
+}
+
+/** Return the names in a text, with commas between them. */
+export function namesIn(text) {
+  return text.split(",").map((name) => name.trim()).filter(Boolean);
 }
 
 export function stateBadge(state) {

@@ -2,9 +2,17 @@
 
 import { colourOf } from "./scale.js";
 
-export function drawLayer(pen, layer, x, y, colour) {
+const GRAIN = 2; // pixels of a map of points that lie on no grid
+
+/** Draw one layer between the scales `x` and `y`, in the box of the plot. */
+export function drawLayer(pen, layer, x, y, colour, box) {
   pen.fillStyle = pen.strokeStyle = colour;
-  DRAWN[layer.kind](pen, layer, x, y);
+  DRAWN[layer.kind](pen, layer, x, y, box);
+}
+
+/** Whether a layer is a map, which has a value everywhere. */
+export function isMap({ kind }) {
+  return kind === "cells" || kind === "nearest";
 }
 
 const DRAWN = {
@@ -38,6 +46,35 @@ const DRAWN = {
       pen.beginPath();
       pen.arc(across, up, 2.6, 0, 7);
       pen.fill();
+    }
+  },
+  /** Each place has the colour of the nearest point: the first of two passes looks up and left, the second down and right. */
+  nearest(pen, { xs, ys, values, range }, x, y, box) {
+    const wide = Math.ceil((box.right - box.left) / GRAIN), tall = Math.ceil((box.bottom - box.top) / GRAIN);
+    const across = xs.map((value) => (x.place(value) - box.left) / GRAIN), up = ys.map((value) => (y.place(value) - box.top) / GRAIN);
+    const owner = new Int32Array(wide * tall).fill(-1);
+    const clip = (place, count) => Math.min(Math.max(Math.floor(place), 0), count - 1);
+    const consider = (column, row, one) => {
+      if (one < 0) return;
+      const cell = row * wide + column, other = owner[cell];
+      const far = (which) => (across[which] - column - 0.5) ** 2 + (up[which] - row - 0.5) ** 2;
+      if (other < 0 || far(one) < far(other)) owner[cell] = one;
+    };
+    values.forEach((value, one) => { if (value !== null) consider(clip(across[one], wide), clip(up[one], tall), one); });
+    for (const [first, last, step] of [[0, wide * tall, 1], [wide * tall - 1, -1, -1]]) {
+      for (let cell = first; cell !== last; cell += step) {
+        const column = cell % wide, row = (cell - column) / wide;
+        for (const [aside, above] of [[step, 0], [-step, step], [0, step], [step, step]]) {
+          if (column - aside < 0 || column - aside >= wide || row - above < 0 || row - above >= tall) continue;
+          consider(column, row, owner[cell - above * wide - aside]);
+        }
+      }
+    }
+    for (let cell = 0; cell < owner.length; cell++) {
+      if (owner[cell] < 0) continue;
+      const column = cell % wide;
+      pen.fillStyle = colourOf((values[owner[cell]] - range[0]) / (range[1] - range[0]));
+      pen.fillRect(box.left + column * GRAIN, box.top + ((cell - column) / wide) * GRAIN, GRAIN, GRAIN);
     }
   },
   cells(pen, { xs, ys, values, range }, x, y) {

@@ -5,6 +5,7 @@ import { showCampaign } from "./campaign.js";
 import { showCampaigns } from "./campaigns.js";
 import { showComparison } from "./compare.js";
 import { button, element, tell } from "./dom.js";
+import { showEstimate } from "./estimate.js";
 import { showNew } from "./new_scene.js";
 import { showRecordings } from "./recordings.js";
 
@@ -15,6 +16,7 @@ const leave = document.getElementById("leave");
 const VIEWS = {
   campaigns: ["Campaigns", showCampaigns], campaign: ["Campaign", showCampaign], new: ["New", showNew],
   compare: ["Compare", showComparison], recordings: ["Recordings", showRecordings],
+  estimate: ["Estimate", showEstimate],
 };
 let close = () => {};
 let known = false;
@@ -71,9 +73,6 @@ function showSignIn() {
 async function begin() {
   await ask("GET", "/campaigns?limit=1");
   signedIn(true);
-  ask("GET", "/recordings?limit=1").then(
-    () => { navigation.querySelector('[href="#/recordings"]').hidden = false; },
-    (error) => { if (!(error instanceof Refusal)) throw error; }); // a service without recordings
   route();
 }
 

@@ -1,12 +1,13 @@
 // A new campaign: a scene that is written, pasted or dropped, checked while one types, its problems at their lines.
 
-import { ask, askText, campaignPath } from "./api.js";
-import { button, element, tell } from "./dom.js";
+import { ask, askText, campaignPath, newKey, recordingPath } from "./api.js";
+import { button, element, field, namesIn, tell } from "./dom.js";
 
 const PAUSE = 300; // milliseconds of silence after which a scene is checked
 const LINE = 20; // pixels, as style.css has it
 const LARGEST = 2 ** 20;
 const DRAFT = "vibroimpact-scene";
+const REPLAY = /^\s*\[replay\]/m;
 
 export function showNew(main, from = "", given = "") {
   const view = new NewScene();
@@ -17,7 +18,6 @@ export function showNew(main, from = "", given = "") {
 
 class NewScene {
   constructor() {
-    this.key = crypto.randomUUID();
     this.text = element("textarea", {
       id: "scene", spellcheck: "false", autocapitalize: "off", autocomplete: "off", "aria-describedby": "scene-help",
       oninput: () => this.changed(), onscroll: () => { this.lines.scrollTop = this.text.scrollTop; },
@@ -28,7 +28,12 @@ class NewScene {
       ondragleave: () => this.editor.classList.remove("over"), ondrop: (event) => this.drop(event),
     }, this.lines, this.text);
     this.file = element("input", { type: "file", accept: ".toml,text/plain", id: "file", class: "unseen", onchange: () => this.read(this.file.files[0]) });
-    this.workers = element("input", { type: "number", min: "1", max: "256", placeholder: "all", id: "workers" });
+    this.workers = element("input", { type: "number", min: "1", max: "256", placeholder: "all", oninput: () => this.renewed() });
+    this.fit = element("input", { type: "text", autocomplete: "off", oninput: () => this.renewed() });
+    this.score = element("input", { type: "text", autocomplete: "off", oninput: () => this.renewed() });
+    this.replaying = element("div", { class: "fields", hidden: true },
+      field("Fit", this.fit, "Keys of numbers, with commas, for instance body.frequency."),
+      field("Score", this.score, "Recordings that are not fitted, with commas."));
     this.submit = button("Submit", () => this.send(), { class: "main", disabled: true });
     this.said = element("p", { role: "status" });
     this.problems = element("ul", { class: "problems" });
@@ -39,8 +44,8 @@ class NewScene {
         element("section", { class: "card", "aria-label": "Scene" },
           element("div", { class: "row" }, element("label", { for: "scene" }, "Scene (TOML)"),
             element("span", { class: "muted small", id: "scene-help" }, "Write, paste or drop a file; it is checked as you type.")),
-          this.editor, this.said, this.problems,
-          element("div", { class: "row end" }, element("label", { for: "workers" }, "Workers", this.workers), this.submit,
+          this.editor, this.said, this.problems, this.replaying,
+          element("div", { class: "row end" }, field("Workers", this.workers), this.submit,
             this.file, button("Open a file", () => this.file.click()))),
         element("section", { class: "card", "aria-labelledby": "templates-title" },
           element("h2", { id: "templates-title" }, "Start from an example"), this.templates))];
@@ -51,8 +56,8 @@ class NewScene {
   async begin(from, given) {
     this.write(sessionStorage.getItem(DRAFT) ?? "");
     try {
-      if (from === "replay") this.write(replayOf(given));
-      else if (from) this.write(await askText(campaignPath(from, "/scene")));
+      if (from === "replay") this.write(replayOf(await ask("GET", recordingPath(given))));
+      else if (from) await this.copy(from);
       const examples = await ask("GET", "/examples");
       this.templates.replaceChildren(...examples.map((one) => element("li", {},
         button(one.title || one.name, () => { this.write(one.scene); this.text.focus(); }))));
@@ -60,6 +65,20 @@ class NewScene {
     } catch (error) {
       this.say(error.message, "problem");
     }
+  }
+
+  /** Begin with what another campaign was submitted as. */
+  async copy(from) {
+    const { options, workers } = await ask("GET", campaignPath(from));
+    this.write(await askText(campaignPath(from, "/scene")));
+    this.fit.value = options.fit ?? "";
+    this.score.value = (options.score ?? []).join(", ");
+    this.workers.value = workers ?? "";
+  }
+
+  /** What is submitted is another campaign from here on. */
+  renewed() {
+    this.key = newKey();
   }
 
   close() {
@@ -75,8 +94,9 @@ class NewScene {
 
   changed() {
     sessionStorage.setItem(DRAFT, this.text.value);
-    this.key = crypto.randomUUID(); // another text is another campaign
+    this.renewed();
     this.submit.disabled = true;
+    this.replaying.hidden = !REPLAY.test(this.text.value);
     this.number([]);
     clearTimeout(this.timer);
     this.question?.abort();
@@ -142,10 +162,11 @@ class NewScene {
   }
 
   async send() {
-    const workers = this.workers.value ? Number(this.workers.value) : null;
+    const body = { scene: this.text.value, workers: this.workers.value ? Number(this.workers.value) : null };
+    if (!this.replaying.hidden) Object.assign(body, { fit: this.fit.value.trim() || null, score: namesIn(this.score.value) });
     this.submit.disabled = true;
     try {
-      const job = await ask("POST", "/campaigns", { body: { scene: this.text.value, workers }, headers: { "Idempotency-Key": this.key } });
+      const job = await ask("POST", "/campaigns", { body, headers: { "Idempotency-Key": this.key } });
       sessionStorage.removeItem(DRAFT);
       location.hash = `#/campaign/${job.id}`;
     } catch (error) {
@@ -156,28 +177,27 @@ class NewScene {
   }
 }
 
-/** Return a scene to begin a replay of a recording with. */
-function replayOf(name) {
+/** Return a scene to begin a replay of a recording with: its first channel drives, its last one is compared. */
+function replayOf({ name, channels }) {
+  const sampled = channels.filter((one) => one.samples !== null).map((one) => one.name);
+  const drive = sampled.length > 1 ? `drive = "base_acceleration"\nfrom = ${JSON.stringify(sampled[0])}\n` : "";
   return `[scene]
 title = ${JSON.stringify(`Replay of ${name}`)}
 
 [body]
 kind = "beam"
 boundary = "clamped-clamped"
-length = 0.1
-mass_per_length = 0.3
-frequency = 100.0
+length = 0.1            # m
+mass_per_length = 0.3   # kg/m
+frequency = 100.0       # Hz, of the first mode
 modes = 1
 damping_ratio = 0.015
 
 [sensor]
 location = 0.5
-gain = 1.0
 
 [replay]
-recording = ${JSON.stringify(name)}
-drive = "base_acceleration"
-from = "base"
-compare = [{ simulated = "beam.sensor.acceleration", measured = "board" }]
+recordings = [${JSON.stringify(name)}]
+${drive}compare = [{ simulated = "beam.sensor.acceleration", measured = ${JSON.stringify(sampled.at(-1) ?? "")} }]
 `;
 }

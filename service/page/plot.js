@@ -1,7 +1,7 @@
 // A plot on a canvas: zoomed by dragging, keys or buttons; says the values under the pointer; a point can be chosen.
 
 import { button, element, short, tell } from "./dom.js";
-import { drawBar, drawLayer } from "./layers.js";
+import { drawBar, drawLayer, isMap } from "./layers.js";
 import { extent, scaleOf } from "./scale.js";
 
 const NEAR = 14; // pixels within which the pointer is on a point
@@ -48,7 +48,7 @@ export class Plot {
 
   get ranges() {
     const { layers, x, y } = this.content;
-    const room = layers.some((layer) => layer.kind === "cells") ? 0 : 0.04;
+    const room = layers.some(isMap) ? 0 : 0.04;
     const ys = layers.map((layer) => layer.ys);
     if (layers.some((layer) => layer.kind === "stems")) ys.push([0]);
     return this.view ?? { x: extent(layers.map((layer) => layer.xs), room || 0.01, x.log), y: extent(ys, room || 0.01, y.log) };
@@ -63,7 +63,7 @@ export class Plot {
     const colour = (name) => style.getPropertyValue(name).trim();
     pen.scale(dense, dense);
     pen.font = '12px system-ui, "DejaVu Sans", sans-serif';
-    const map = this.content.layers.find((layer) => layer.kind === "cells");
+    const map = this.content.layers.find(isMap);
     const { x, y } = this.ranges;
     const box = this.box = { left: 62, right: width - (map ? 96 : 12), top: 10, bottom: height - 42 };
     this.x = scaleOf(x[0], x[1], box.left, box.right, this.content.x.log);
@@ -73,7 +73,7 @@ export class Plot {
     pen.beginPath();
     pen.rect(box.left, box.top, box.right - box.left, box.bottom - box.top);
     pen.clip();
-    for (const layer of this.content.layers) drawLayer(pen, layer, this.x, this.y, colour(NAMES[layer.colour] ?? NAMES.one));
+    for (const layer of this.content.layers) drawLayer(pen, layer, this.x, this.y, colour(NAMES[layer.colour] ?? NAMES.one), box);
     this.marks(pen, colour);
     pen.restore();
     if (map) drawBar(pen, map.range, map.bar, box.right + 10, box.top, box.bottom - box.top, colour("--muted"), (value) => short(Number(value.toPrecision(3))));
@@ -111,15 +111,18 @@ export class Plot {
 
   /** Draw what is chosen, and the box that is being dragged. */
   marks(pen, colour) {
-    pen.strokeStyle = colour("--text");
-    pen.lineWidth = 2;
     for (const one of [this.chosen, this.pointed]) {
       const layer = one && this.content.layers[one.layer];
       if (!layer || one.place >= layer.xs.length) continue;
       pen.beginPath();
       pen.arc(this.x.place(layer.xs[one.place]), this.y.place(layer.ys[one.place]), 6, 0, 7);
-      pen.stroke();
+      for (const [name, wide] of [["--raised", 5], ["--text", 2]]) { // it is seen on any colour
+        pen.strokeStyle = colour(name);
+        pen.lineWidth = wide;
+        pen.stroke();
+      }
     }
+    pen.strokeStyle = colour("--text");
     if (!this.drag?.moved) return;
     const { from, to } = this.drag;
     pen.lineWidth = 1;
@@ -130,12 +133,12 @@ export class Plot {
     let found = null, best = far * far;
     this.content.layers.forEach((layer, number) => {
       if (layer.kind === "line" && !layer.readable) return;
-      const reach = layer.kind === "cells" ? 2500 : best;
+      if (isMap(layer)) best = Infinity;
       for (let place = 0; place < layer.xs.length; place++) {
         if (layer.xs[place] === null || layer.ys[place] === null) continue;
         const aside = this.x.place(layer.xs[place]) - across, above = this.y.place(layer.ys[place]) - up;
         const distance = aside * aside + above * above;
-        if (distance < Math.max(best, found ? 0 : reach)) { best = distance; found = { layer: number, place }; }
+        if (distance < best) { best = distance; found = { layer: number, place }; }
       }
     });
     return found;
@@ -213,12 +216,11 @@ export class Plot {
   }
 
   step(way) {
-    const number = this.pointed?.layer ?? this.content.layers.findIndex((layer) => layer.kind !== "line" || layer.readable);
-    const layer = this.content.layers[number];
-    if (!layer) return;
-    let place = this.pointed ? this.pointed.place + way : 0;
-    while (place >= 0 && place < layer.xs.length && (layer.xs[place] === null || layer.ys[place] === null)) place += way;
-    if (place >= 0 && place < layer.xs.length) this.point({ layer: number, place }, true);
+    const places = this.content.layers.flatMap((layer, number) => (layer.kind === "line" && !layer.readable ? [] : layer.xs
+      .map((_, place) => ({ layer: number, place })).filter(({ place }) => layer.xs[place] !== null && layer.ys[place] !== null)));
+    const now = places.findIndex((one) => one.layer === this.pointed?.layer && one.place === this.pointed.place);
+    const next = places[now < 0 ? 0 : now + way];
+    if (next) this.point(next, true);
   }
 
   zoomBy(factor, around) {

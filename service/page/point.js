@@ -1,12 +1,12 @@
 // One point of a campaign, simulated again: its motion in time, its phase portrait, its impacts.
 
 import { ask, campaignPath } from "./api.js";
-import { button, element, short, table, tell } from "./dom.js";
+import { button, element, inTitle, inWords, short, table, tell } from "./dom.js";
 import { Plot } from "./plot.js";
 
 const TABLE_ROWS = 200;
 const AGAIN = 1200; // milliseconds until a service that is busy is asked again
-const IMPACT = { impact_time: "Time", impact_phase: "Phase (rad)", impact_velocity: "Velocity", impact_impulse: "Impulse", impact_contact: "Stop", impact_restitution: "Restitution" };
+const IMPACT = { impact_time: "Time", impact_phase: "Phase", impact_velocity: "Velocity", impact_impulse: "Impulse", impact_contact: "Stop", impact_restitution: "Restitution" };
 
 /** Show a point below `host`; of two that are asked for the later one is shown. */
 export async function showPoint(host, id, run, closed = null) {
@@ -14,7 +14,7 @@ export async function showPoint(host, id, run, closed = null) {
   host.asked = mine;
   host.hidden = false;
   const name = closed ? `Point ${run}` : "Motion";
-  const head = element("div", { class: "head" }, element("h2", { tabindex: "-1" }, name), closed && button("Close", closed));
+  const head = element("div", { class: "head" }, element("h2", { tabindex: "-1" }, name), closed && button("Close", closed, { class: "last" }));
   const said = element("p", { class: "muted", role: "status" }, "Simulating …");
   host.replaceChildren(head, said);
   tell(`${name}: simulating`);
@@ -24,7 +24,7 @@ export async function showPoint(host, id, run, closed = null) {
     said.remove();
     host.append(...views(data));
     tell(`${name}: ${data.outcome}`);
-    head.querySelector("h2").focus({ preventScroll: !closed });
+    if (closed) head.querySelector("h2").focus();
   } catch (error) {
     if (host.asked === mine) said.replaceWith(element("p", { class: "problem", role: "alert" }, error.message));
   }
@@ -43,17 +43,18 @@ async function answered(id, run, wanted) {
 
 function views(data) {
   const { samples, impacts, periods } = data;
+  const quantity = (name, label = name.replaceAll("_", " ")) => inWords({ label, units: data.units[name] });
   const facts = { ...data.coordinates, outcome: data.outcome, direction: data.direction };
   const made = [element("dl", { class: "facts" }, Object.entries(facts).map(([key, value]) =>
-    element("div", {}, element("dt", {}, key.replaceAll("_", " ")), element("dd", {}, typeof value === "number" ? short(value) : value))))];
+    element("div", {}, element("dt", {}, inTitle(key)), element("dd", {}, typeof value === "number" ? short(value) : value))))];
   if (data.message) made.push(element("p", { class: "small muted" }, data.message));
   const grid = element("div", { class: "sides" });
-  grid.append(...seriesPlots(samples));
-  const portrait = portraitPlot(samples, periods);
-  if (portrait) grid.append(portrait);
-  if (impacts.impact_time?.length) grid.append(impactPlot(impacts));
+  if (samples.time?.length) grid.append(seriesPlot(samples, quantity), ...portraitPlot(samples, periods, quantity));
+  else made.push(element("p", { class: "muted" }, "There is no motion in time of this point."));
+  if (impacts.impact_time?.length) grid.append(impactPlot(impacts, quantity));
+  if (grid.children.length === 3) grid.firstChild.classList.add("wide");
   made.push(grid);
-  if (impacts.impact_time) made.push(impactTable(impacts));
+  if (impacts.impact_time) made.push(impactTable(impacts, quantity));
   return made;
 }
 
@@ -61,14 +62,13 @@ function panel(title, plot) {
   return element("section", { "aria-label": title }, element("h3", { class: "small" }, title), plot.node);
 }
 
-function seriesPlots(samples) {
+function seriesPlot(samples, quantity) {
   const names = Object.keys(samples).filter((name) => name !== "time");
-  if (!names.length) return [element("p", { class: "muted" }, "This scene records no motion in time.")];
   let chosen = names[0];
   const plot = new Plot("Motion in time", { height: 280 });
   const draw = () => plot.show({
     layers: [{ kind: "line", readable: true, colour: "one", xs: samples.time, ys: samples[chosen] }],
-    x: { label: "time" }, y: { label: chosen },
+    x: { label: quantity("time") }, y: { label: quantity(chosen) },
   });
   const made = panel("Motion in time", plot);
   if (names.length > 1) {
@@ -77,37 +77,37 @@ function seriesPlots(samples) {
     made.querySelector("h3").append(" of ", select);
   }
   draw();
-  return [made];
+  return made;
 }
 
-function portraitPlot(samples, periods) {
+function portraitPlot(samples, periods, quantity) {
   const velocity = Object.keys(samples).find((name) => name === "velocity" || name.endsWith(".velocity"));
   const displacement = velocity?.replace(/velocity$/, "displacement");
-  if (!velocity || !samples[displacement]) return null;
+  if (!velocity || !samples[displacement]) return [];
   const layers = [{ kind: "line", readable: true, colour: "one", name: "orbit", xs: samples[displacement], ys: samples[velocity] }];
   if (periods.strobe_velocity) {
     layers.push({ kind: "points", size: 5, colour: "two", name: "once a period", xs: periods.strobe_displacement, ys: periods.strobe_velocity });
   }
   const plot = new Plot("Phase portrait", { height: 280 });
-  plot.show({ layers, x: { label: displacement }, y: { label: velocity } });
-  return panel("Phase portrait", plot);
+  plot.show({ layers, x: { label: quantity(displacement) }, y: { label: quantity(velocity) } });
+  return [panel("Phase portrait", plot)];
 }
 
-function impactPlot(impacts) {
+function impactPlot(impacts, quantity) {
   const plot = new Plot("Impacts", { height: 280 });
   plot.show({
     layers: [{ kind: "stems", colour: "three", xs: impacts.impact_time, ys: impacts.impact_velocity }],
-    x: { label: "time" }, y: { label: "velocity of approach" },
+    x: { label: quantity("impact_time", "time") }, y: { label: quantity("impact_velocity", "velocity of approach") },
   });
   return panel("Impacts", plot);
 }
 
-function impactTable(impacts) {
+function impactTable(impacts, quantity) {
   const count = impacts.impact_time.length;
   if (!count) return element("p", { class: "muted" }, "No impacts in what is shown.");
   const names = Object.keys(IMPACT).filter((name) => impacts[name]);
   const rows = impacts.impact_time.slice(0, TABLE_ROWS).map((_, place) => names.map((name) => impacts[name][place]));
   return element("details", {}, element("summary", {}, `${count} impacts, as a table`),
     element("div", { class: "scroll tall", tabindex: "0", role: "region", "aria-label": "Impacts as a table" },
-      table("Impacts", names.map((name) => IMPACT[name]), rows)));
+      table("Impacts", names.map((name) => quantity(name, IMPACT[name])), rows)));
 }
