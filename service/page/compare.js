@@ -22,7 +22,8 @@ export function showComparison(main, first = "", second = "") {
     const chosen = [ids.includes(first) ? first : ids[0]];
     chosen.push(ids.includes(second) ? second : ids.find((id) => id !== chosen[0]) ?? chosen[0]);
     const sides = element("div", { class: "sides" });
-    main.append(sides);
+    const same = element("input", { type: "checkbox", id: "same-axes", onchange: () => share(open, same.checked) });
+    main.append(element("p", {}, element("label", { class: "check", for: same.id }, same, "Same axes, zoomed together")), sides);
     chosen.forEach((id, place) => {
       const job = swept.find((one) => one.id === id), name = place ? "Right" : "Left";
       const point = element("div", { hidden: true });
@@ -38,6 +39,10 @@ export function showComparison(main, first = "", second = "") {
     timer = setInterval(() => open.filter((one) => one.data?.state !== "done").forEach((one) => one.refresh()), EVERY);
   }, (error) => main.append(element("p", { class: "problem", role: "alert" }, error.message)));
   return () => { ended = true; clearInterval(timer); open.forEach((one) => one.close()); };
+}
+
+function share(diagrams, whether) {
+  for (const { plot } of diagrams) plot.share(whether ? diagrams.map((one) => one.plot).filter((other) => other !== plot) : []);
 }
 
 function go(chosen, place, other) {

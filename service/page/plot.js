@@ -16,6 +16,7 @@ export class Plot {
   constructor(label, { height = 340, picked = null, zoomed = () => {}, words = null } = {}) {
     Object.assign(this, { label, height, picked, zoomed, words: words ?? this.plainWords });
     this.view = null;
+    this.beside = [];
     this.content = { layers: [], x: {}, y: {} };
     this.canvas = element("canvas", {
       tabindex: "0", role: "application", "aria-roledescription": "plot", "aria-label": `${label}. ${HELP}`,
@@ -43,15 +44,34 @@ export class Plot {
     const named = content.layers.filter((layer) => layer.name);
     this.legend.replaceChildren(...named.map((layer) =>
       element("span", {}, element("span", { class: `key ${layer.colour}` }), layer.name)));
-    this.draw();
+    for (const one of [this, ...this.beside]) one.draw();
   }
 
+  /** What is shown: what was zoomed to, else all that there is here and in the plots that are alike. */
   get ranges() {
+    if (this.view) return this.view;
+    const all = [this, ...this.alike].map((one) => one.extents);
+    return { x: extent(all.map(({ x }) => x), 0), y: extent(all.map(({ y }) => y), 0) };
+  }
+
+  /** The plots beside it that show the same quantities. */
+  get alike() {
+    const { x, y } = this.content;
+    return this.beside.filter(({ content }) => content.x.label === x.label && content.y.label === y.label);
+  }
+
+  get extents() {
     const { layers, x, y } = this.content;
     const room = layers.some(isMap) ? 0 : 0.04;
     const ys = layers.map((layer) => layer.ys);
     if (layers.some((layer) => layer.kind === "stems")) ys.push([0]);
-    return this.view ?? { x: extent(layers.map((layer) => layer.xs), room || 0.01, x.log), y: extent(ys, room || 0.01, y.log) };
+    return { x: extent(layers.map((layer) => layer.xs), room || 0.01, x.log), y: extent(ys, room || 0.01, y.log) };
+  }
+
+  /** Have the axes of other plots that show the same quantities, and be zoomed with them. */
+  share(others) {
+    this.beside = others;
+    this.draw();
   }
 
   draw() {
@@ -231,9 +251,11 @@ export class Plot {
   }
 
   zoomTo(view) {
-    this.view = view;
-    this.draw();
-    this.zoomed(view);
+    for (const one of [this, ...this.alike]) {
+      one.view = view;
+      one.draw();
+      one.zoomed(view);
+    }
   }
 }
 

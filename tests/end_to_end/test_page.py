@@ -2,22 +2,42 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
-from support.browser import browser, sign_in, violations
-from support.served import Served, sweep_text
+from support.browser import PageSession, browser, token_of, violations
+from support.replay_scenes import BOARD, hit
+from support.served import Served, scene_file, sweep_text
+
+from vibroimpact.service.client import RemoteJob
 
 pytestmark = pytest.mark.slow
 SHORT = sweep_text(40, 50, "up")
 LONG = sweep_text(400, 60_000)
-FAILING = f"{sweep_text(12, 50)}[execution]\nimpact_limit = 20\n"
-MAP = f'{sweep_text(6, 20)}"stop[1].restitution" = {{ values = [0.6, 0.7, 0.8] }}\n'
-SECONDS = 30_000
-"""Milliseconds that a campaign may take to begin: each of its processes imports everything."""
+MAP = sweep_text(6, 20) + (
+    '"stop[1].position" = { values = [0.0, 0.5, 1.0] }\n[execution]\nimpact_limit = 30\n'
+)
+"""18 points, of which 3 have too many impacts: of the stop that is at 0."""
+WRONG = "[body]\nstiffness = 1\nmass = -1\n[record]\nrecorded_time = 5\n"
+DROP = """([selector, files]) => {
+  const dropped = new DataTransfer();
+  for (const [name, text] of files) dropped.items.add(new File([text], name));
+  document.querySelector(selector).dispatchEvent(new DragEvent("drop", { dataTransfer: dropped, bubbles: true }));
+}"""
+
+
+@dataclass(frozen=True, slots=True)
+class Jobs:
+    """Jobs that a service was given before its page is looked at."""
+
+    map: RemoteJob
+    fit: RemoteJob
+    estimate: RemoteJob
 
 
 @pytest.fixture(scope="module")
@@ -33,53 +53,24 @@ def served(chromium: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     service.stop()
 
 
-@pytest.fixture(scope="module")
-def ended(served: Served, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """Return the ids of campaigns that have ended."""
-    scene, found = tmp_path_factory.mktemp("scenes") / "scene.toml", {}
+@pytest.fixture(scope="module", autouse=True)
+def jobs(served: Served, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Jobs]:
+    """Submit what the tests look at, first of all: it is computed while they begin."""
+    folder = tmp_path_factory.mktemp("scenes")
     with served.client() as service:
-        for name, text in (("short", SHORT), ("failing", FAILING), ("map", MAP)):
-            scene.write_text(text, encoding="utf-8")
-            found[name] = service.submit(scene, workers=1).wait().id
-    return found
-
-
-class Seen:
-    """A page that is signed in, and what went wrong in it."""
-
-    def __init__(self, chromium: Any, served: Served, view: str = "", **how: Any) -> None:
-        self.context = chromium.new_context(**how)
-        self.page = self.context.new_page()
-        self.page.set_default_timeout(SECONDS)
-        self.wrong: list[str] = []
-        self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
-        self.page.on("console", self._note)
-        sign_in(self.page, served.url, token_of(served), view)
-
-    def _note(self, message: Any) -> None:
-        # of requests that are refused, which each test knows of, the browser tells here too
-        if message.type == "error" and "Failed to load resource" not in message.text:
-            self.wrong.append(message.text)
-
-    def close(self) -> None:
-        self.context.close()
-        assert not self.wrong
-
-
-def token_of(served: Served) -> str:
-    return (served.folder / "token").read_text(encoding="utf-8").strip()
+        recording = service.upload_recording(hit(folder))
+        yield Jobs(
+            service.submit(scene_file(folder, MAP), workers=1),
+            service.submit(scene_file(folder, BOARD), recordings=[recording], fit="body.frequency"),
+            service.estimate("decay", recording, channel="board", start=0.005),
+        )
 
 
 @pytest.fixture
-def seen(chromium: Any, served: Served) -> Iterator[Seen]:
-    one = Seen(chromium, served)
-    yield one
-    one.close()
-
-
-def show(seen: Seen, served: Served, view: str) -> Any:
-    seen.page.goto(f"{served.url}/#/{view}")
-    return seen.page
+def seen(chromium: Any, served: Served) -> Iterator[PageSession]:
+    with PageSession(chromium, served) as session:
+        session.sign_in()
+        yield session
 
 
 def drawn(page: Any) -> int:
@@ -92,51 +83,71 @@ def drawn(page: Any) -> int:
 def test_a_wrong_token_is_refused_and_the_right_one_is_nowhere_in_the_page(
     chromium: Any, served: Served
 ) -> None:
-    page = chromium.new_page()
-    page.goto(served.url)
-    page.get_by_label("Token of the service").fill("wrong")
-    page.keyboard.press("Enter")
-    page.get_by_text("This is not the token of this service.").wait_for()
-    assert violations(page) == []
-    sign_in(page, served.url, token_of(served))
-    kept = page.evaluate(
-        "JSON.stringify([document.cookie, {...localStorage}, {...sessionStorage}, location.href])"
-        " + document.documentElement.outerHTML + [...document.querySelectorAll('input')].map((one) => one.value)"
-    )
-    assert token_of(served) not in kept
-    (cookie,) = page.context.cookies()
-    assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")
-    assert token_of(served) not in cookie["value"]
-    page.reload()
-    page.get_by_role("heading", name="Campaigns").wait_for()
-    page.get_by_role("button", name="Sign out").click()
-    page.get_by_label("Token of the service").wait_for()
-    assert page.context.cookies() == []
-    page.close()
+    token = token_of(served)
+    with PageSession(chromium, served) as seen:
+        page = seen.page
+        page.goto(served.url)
+        page.get_by_label("Token of the service").fill("wrong")
+        page.keyboard.press("Enter")
+        page.get_by_text("This is not the token of this service.").wait_for()
+        assert violations(page) == []
+        seen.sign_in()
+        kept = page.evaluate(
+            "JSON.stringify([document.cookie, {...localStorage}, {...sessionStorage}, location.href])"
+            " + document.documentElement.outerHTML + [...document.querySelectorAll('input')].map((one) => one.value)"
+        )
+        assert token not in kept
+        (cookie,) = page.context.cookies()
+        assert (cookie["httpOnly"], cookie["sameSite"]) == (True, "Strict")
+        assert token not in cookie["value"]
+        page.reload()
+        page.get_by_role("heading", name="Campaigns").wait_for()
+        page.get_by_role("button", name="Sign out").click()
+        page.get_by_label("Token of the service").wait_for()
+        assert page.context.cookies() == []
 
 
-def test_a_scene_is_checked_while_one_types_and_submitted(seen: Seen, served: Served) -> None:
-    page = show(seen, served, "new")
-    page.get_by_role("button", name="Impact oscillator, thesis").wait_for()
-    page.get_by_label("Scene (TOML)").fill("[body]\nstiffness = 1\nmass = -1\n[record]\nrecorded_time = 5\n")
+def test_a_scene_is_checked_while_one_types_and_submitted(seen: PageSession) -> None:
+    page = seen.show("new")
+    page.get_by_role("button", name="Impact oscillator, thesis").click()
+    page.get_by_text("The scene is sound.").wait_for()
+    page.get_by_label("Scene (TOML)").fill(WRONG)
     problem = page.get_by_role("button", name="Line 3: body.mass: expected a number > 0, got -1.")
     problem.click()
     assert page.get_by_role("button", name="Submit").is_disabled()
     assert page.evaluate("document.activeElement.id + getSelection()") == "scenemass = -1"
     assert page.locator("pre .wrong").inner_text() == "3"
     assert violations(page) == []
-    page.get_by_label("Scene (TOML)").fill(SHORT)
+    page.evaluate(DROP, [".editor", [["short.toml", SHORT]]])
     page.get_by_text("The scene is sound.").wait_for()
     page.get_by_label("Workers").fill("1")
     page.get_by_role("button", name="Submit").click()
     page.get_by_role("heading", name="short sweep").wait_for()
     page.locator(".state.done").wait_for()
     page.get_by_text("40 of 40 points").wait_for()
-
-
-def test_a_point_that_is_chosen_shows_its_motion(seen: Seen, served: Served, ended: dict[str, str]) -> None:
-    page = show(seen, served, f"campaign/{ended['short']}")
     assert drawn(page) >= 40
+
+
+def test_a_click_on_a_map_shows_its_point_and_a_drag_zooms(seen: PageSession, jobs: Jobs) -> None:
+    page = seen.show_job(jobs.map)
+    page.get_by_label("Show", exact=True).wait_for()
+    assert drawn(page) == 18
+    page.locator("canvas").first.click(position={"x": 200, "y": 60})
+    page.get_by_role("heading", name="Point ").wait_for()
+    page.get_by_label("Show", exact=True).select_option(label="Over angular frequency")
+    page.get_by_label("position").select_option("1")
+    page.locator('canvas[data-points="6"]').wait_for()
+    box = page.locator("canvas").first.bounding_box()
+    page.mouse.move(box["x"] + 100, box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 330, steps=3)
+    page.mouse.up()
+    page.locator('canvas[data-points="3"]').wait_for()
+
+
+def test_a_point_that_is_chosen_by_keys_shows_its_motion(seen: PageSession, jobs: Jobs) -> None:
+    page = seen.show_job(jobs.map)
+    drawn(page)
     page.locator("canvas[data-points]").focus()
     for _ in range(3):
         page.keyboard.press("ArrowRight")
@@ -154,92 +165,128 @@ def test_a_point_that_is_chosen_shows_its_motion(seen: Seen, served: Served, end
     assert Path(download.value.path()).read_bytes()[:4] == b"\x89HDF"
 
 
-def test_a_click_on_a_map_shows_its_point_and_a_drag_zooms(
-    seen: Seen, served: Served, ended: dict[str, str]
-) -> None:
-    page = show(seen, served, f"campaign/{ended['map']}")
-    page.get_by_label("Show", exact=True).wait_for()
-    assert drawn(page) == 18
-    page.locator("canvas").first.click(position={"x": 200, "y": 120})
-    page.get_by_role("heading", name="Point ").wait_for()
-    page.get_by_label("Show", exact=True).select_option(label="Over angular frequency")
-    page.get_by_label("restitution").wait_for()
-    page.locator('canvas[data-points="6"]').wait_for()
-    box = page.locator("canvas").first.bounding_box()
-    page.mouse.move(box["x"] + 100, box["y"] + 20)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 330, steps=3)
-    page.mouse.up()
-    page.locator('canvas[data-points="3"]').wait_for()
+def test_failed_points_say_why(seen: PageSession, jobs: Jobs) -> None:
+    page = seen.show_job(jobs.map)
+    page.get_by_role("heading", name="3 points did not come to their end").wait_for()
+    assert page.get_by_role("cell", name="impact_limit: 30 impacts").count() == 3
+    page.get_by_role("button", name="Point 0", exact=True).click()
+    page.get_by_text("There is no motion in time of this point.").wait_for()
 
 
-def test_failed_points_say_why(seen: Seen, served: Served, ended: dict[str, str]) -> None:
-    page = show(seen, served, f"campaign/{ended['failing']}")
-    page.get_by_role("heading", name="points did not come to their end").wait_for()
-    page.get_by_role("cell", name="impact_limit: 20 impacts").first.wait_for()
+def test_recordings_are_dropped_replayed_and_deleted(seen: PageSession, jobs: Jobs) -> None:
+    page = seen.show("recordings")
+    columns = "\n".join(f"{k / 100};{k % 7};{k % 5}" for k in range(50))
+    page.get_by_text("What files of text do not say").click()
+    page.get_by_label("Names of the channels").fill("base, tip")
+    page.get_by_label("Units").fill("g, g")
+    page.evaluate(DROP, [".dropped", [["hits.txt", columns], ["bad.txt", "nonsense"]]])
+    page.get_by_text("bad.txt: expected rows of numbers, got none.").wait_for()
+    page.get_by_text("hits.txt was received as hits.nc.").wait_for()
+    page.get_by_text("base (m/s²): 50 samples, tip (m/s²): 50 samples").wait_for()
+    page.get_by_role("link", name="Replay hits.nc").click()
+    page.get_by_text("The scene is sound.").wait_for()
+    assert 'recordings = ["hits.nc"]' in page.get_by_label("Scene (TOML)").input_value()
+    page.get_by_label("Fit").wait_for()
+    page.go_back()
+    page.once("dialog", lambda dialog: dialog.accept())
+    page.get_by_role("button", name="Delete hits.nc").click()
+    page.get_by_role("heading", name="hits.nc").wait_for(state="detached")
 
 
-def test_a_campaign_grows_is_cancelled_and_goes_on_after_the_service_was_killed(
-    chromium: Any, tmp_path: Path
-) -> None:
-    folder = tmp_path / "service"
-    served = Served(folder)
-    port = served.url.rpartition(":")[2]
-    scene = tmp_path / "scene.toml"
-    scene.write_text(LONG, encoding="utf-8")
-    with served.client() as service:
-        job = service.submit(scene, workers=1)
-    seen = Seen(chromium, served, f"#/campaign/{job.id}")
-    page = seen.page
-    try:
-        first = drawn(page)
+def test_an_estimate_is_asked_for_with_all_its_options(seen: PageSession, jobs: Jobs) -> None:
+    page = seen.show("recordings")
+    page.get_by_role("link", name="Estimate hit.nc").click()
+    page.get_by_label("Start").fill("late")
+    page.get_by_role("button", name="Estimate").click()
+    page.get_by_text("estimate.decay.start: Input should be a valid number").wait_for()
+    page.get_by_label("Estimate").select_option("response")
+    page.get_by_label("Drive").select_option("base")
+    page.get_by_label("Band").fill("700, 900")
+    with page.expect_response("**/estimates") as answer:
+        page.get_by_role("button", name="Estimate").click()
+    asked = json.loads(answer.value.request.post_data)["estimate"]
+    assert (asked["kind"], asked["drive"], asked["band"]) == ("response", "base", [700, 900])
+    page.get_by_role("heading", name="response of hit.nc").wait_for()
+
+
+def test_a_fit_and_an_estimate_show_their_figure_and_what_they_said(seen: PageSession, jobs: Jobs) -> None:
+    for job, name, said in ((jobs.fit, "fit", "standard error"), (jobs.estimate, "hit.nc", "damping ratio")):
+        page = seen.show_job(job)
+        picture = page.get_by_role("img", name="Figure of")
+        picture.wait_for()
+        assert name in page.get_by_role("heading", level=1).inner_text()
         page.wait_for_function(
-            "(first) => document.querySelector('canvas').dataset.points > first", arg=first
+            "(one) => one.complete && one.naturalWidth > 100", arg=picture.element_handle()
         )
-        served.kill()
-        page.get_by_text("The service does not answer; trying again.").wait_for()
-        served = Served(folder, "--port", port)
-        page.locator("#banner").wait_for(state="hidden")
-        page.locator(".state.running").wait_for()
-        began = time.monotonic()
-        page.get_by_role("button", name="Cancel").click()
-        page.locator(".state.cancelled").wait_for()
-        assert time.monotonic() - began < 2.0
-        page.get_by_role("button", name="Resume").click()
-        page.get_by_role("button", name="Cancel").click()
-        page.locator(".state.cancelled").wait_for()
-        page.once("dialog", lambda dialog: dialog.accept())
-        page.get_by_role("button", name="Delete").click()
-        page.get_by_text("No campaigns yet.").wait_for()
-        seen.close()
-    finally:
-        served.stop()
+        page.get_by_label("Log").get_by_text(said).wait_for()
+    page = seen.show_job(jobs.fit)
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Fitted scene").click()
+    assert "[replay]" in Path(download.value.path()).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("colours", "width"), [("dark", 1280), ("light", 390)])
 def test_every_view_is_accessible_and_fits(
-    chromium: Any, served: Served, ended: dict[str, str], colours: str, width: int
+    chromium: Any, served: Served, jobs: Jobs, colours: str, width: int
 ) -> None:
-    seen = Seen(chromium, served, color_scheme=colours, viewport={"width": width, "height": 844})
-    views = ("campaigns", "new", "compare", f"campaign/{ended['map']}", f"campaign/{ended['failing']}")
-    for view in (*views, "recordings"):
-        page = show(seen, served, view)
-        page.get_by_role("heading", level=1).wait_for()
-        page.wait_for_load_state("networkidle")
-        assert violations(page) == [], view
-        assert page.evaluate("document.documentElement.scrollWidth") <= width, view
-    seen.close()
+    views = {
+        "campaigns": ".state",
+        "new": ".templates li",
+        "compare": "canvas",
+        "recordings": ".recordings li",
+        "new/replay/hit.nc": "p.good",
+        "estimate/recording/hit.nc": "form select",
+        f"campaign/{jobs.map.id}": "td button",
+        f"campaign/{jobs.fit.id}": "img.figure",
+        f"campaign/{jobs.estimate.id}": "img.figure",
+        "campaign/none": "h1",
+    }
+    with PageSession(
+        chromium, served, color_scheme=colours, viewport={"width": width, "height": 844}
+    ) as seen:
+        seen.sign_in()
+        for view, there in views.items():
+            page = seen.show(view)
+            page.locator(there).first.wait_for()
+            assert violations(page) == [], view
+            assert page.evaluate("document.documentElement.scrollWidth") <= width, view
 
 
-def test_what_is_written_into_the_page_is_not_run(seen: Seen, served: Served) -> None:
-    page = show(seen, served, "campaigns")
-    policy = page.request.get(served.url).headers["content-security-policy"]
-    assert "unsafe" not in policy
-    assert page.evaluate(
-        "new Promise((resolve) => {"
-        " document.addEventListener('securitypolicyviolation', (event) => resolve(event.violatedDirective));"
-        " const script = document.createElement('script'); script.textContent = 'window.ran = 1';"
-        " document.body.append(script); })"
-    ).startswith("script-src")
+def test_what_is_written_into_the_page_is_not_run(seen: PageSession) -> None:
+    page = seen.show("campaigns")
+    assert "unsafe" not in page.request.get(page.url).headers["content-security-policy"]
+    page.evaluate(
+        "const script = document.createElement('script'); script.textContent = 'window.ran = 1';"
+        "document.body.append(script);"
+    )
     assert page.evaluate("window.ran") is None
-    seen.wrong.clear()  # of the violation that was tried here
+    page.wait_for_function("window.violated.length")
+    assert page.evaluate("window.violated.splice(0)") == ["script-src-elem"]
+    seen.wrong.clear()
+
+
+def test_a_campaign_grows_is_cancelled_and_goes_on_after_the_service_was_killed(
+    seen: PageSession, served: Served, tmp_path: Path
+) -> None:
+    with served.client() as service:
+        job = service.submit(scene_file(tmp_path, LONG), workers=1)
+    page = seen.show_job(job)
+    first = drawn(page)
+    page.wait_for_function("(first) => document.querySelector('canvas').dataset.points > first", arg=first)
+    page.get_by_text("Points a second").wait_for()
+    served.kill()
+    page.get_by_text("The service does not answer; trying again.").wait_for()
+    served.restart()
+    page.locator("#banner").wait_for(state="hidden")
+    page.locator(".state.running").wait_for()
+    began = time.monotonic()
+    page.get_by_role("button", name="Cancel").click()
+    page.locator(".state.cancelled").wait_for()
+    assert time.monotonic() - began < 2.0
+    page.get_by_role("button", name="Resume").click()
+    page.get_by_role("button", name="Cancel").click()
+    page.locator(".state.cancelled").wait_for()
+    page.once("dialog", lambda dialog: dialog.accept())
+    page.get_by_role("button", name="Delete").click()
+    page.get_by_role("heading", name="Campaigns").wait_for()
+    page.locator(f"a[href='#/campaign/{job.id}']").wait_for(state="detached")

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from support.command_line import in_this_process
 from support.places import EXAMPLES
-from support.replay_scenes import BOARD, channel, pulse, written
+from support.replay_scenes import BOARD, hit
 from support.served import Served, scene_file
 
 import vibroimpact as vi
@@ -24,19 +24,7 @@ from vibroimpact.service.client import RemoteRecording, ServiceError
 
 pytestmark = pytest.mark.slow
 
-RATE = 20_000.0
 COUPLED = (EXAMPLES / "two_oscillators.toml").read_text(encoding="utf-8").replace("70.0", "2.0")
-
-
-def hit(folder: Path, name: str = "hit.nc", seed: int = 1) -> Path:
-    """Write a recording of a board that is hit through its base and rings at 820 Hz."""
-    time_axis = np.arange(400) / RATE
-    ringing = np.where(
-        time_axis < 0.005, 0.0, np.exp(-60.0 * time_axis) * np.sin(2 * np.pi * 820.0 * time_axis)
-    )
-    noise = np.random.default_rng(seed).normal(size=len(time_axis))
-    base = channel("base", time_axis, pulse(time_axis))
-    return written(folder / name, base, channel("board", time_axis, 3000.0 * ringing + noise))
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,12 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Self
 
 import pytest
+
+from support.served import Served
+from vibroimpact.service.client import RemoteJob
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 ARGUMENTS = (
@@ -22,6 +25,13 @@ ARGUMENTS = (
 )
 MUST = "VIBROIMPACT_BROWSER"
 """Variable that, where it is set, makes tests of the page fail instead of being skipped: `.ci/run`."""
+VIOLATED = """
+window.violated = [];
+document.addEventListener("securitypolicyviolation", (event) => window.violated.push(event.violatedDirective));
+"""
+"""Script that notes what the page tried against its Content-Security-Policy."""
+MOST_MILLISECONDS = 30_000
+"""That anything may take: each process of a job imports everything."""
 RULES = ("wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "best-practice")
 
 
@@ -51,12 +61,64 @@ def browser() -> Iterator[Any]:
         started.close()
 
 
-def sign_in(page: Any, url: str, token: str, view: str = "") -> None:
-    """Open the page of a service and give it its token."""
-    page.goto(f"{url}/{view}")
-    page.get_by_label("Token of the service").fill(token)
-    page.keyboard.press("Enter")
-    page.get_by_role("navigation").wait_for()
+class PageSession:
+    """A page of a service in a context of its own; at its end nothing may have gone wrong in it.
+
+    Parameters
+    ----------
+    chromium : browser
+    served : Served
+    **how
+        Of the context: `color_scheme`, `viewport`, ...
+    """
+
+    def __init__(self, chromium: Any, served: Served, **how: Any) -> None:
+        self._served = served
+        self.wrong: list[str] = []
+        self.context = chromium.new_context(**how)
+        self.context.add_init_script(VIOLATED)
+        self.context.on("request", self._note_request)
+        self.page = self.context.new_page()
+        self.page.set_default_timeout(MOST_MILLISECONDS)
+        self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        self.page.on("console", self._note_message)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        found = [] if kind else self.page.evaluate("window.violated")
+        self.context.close()
+        assert kind or [*self.wrong, *found] == []
+
+    def _note_message(self, message: Any) -> None:
+        # of requests that are refused, which each test knows of, the browser tells here too
+        if message.type == "error" and "Failed to load resource" not in message.text:
+            self.wrong.append(message.text)
+
+    def _note_request(self, request: Any) -> None:
+        if not request.url.startswith(f"{self._served.url}/"):
+            self.wrong.append(f"request to {request.url}")
+
+    def sign_in(self) -> None:
+        """Give the page its token."""
+        self.page.goto(self._served.url)
+        self.page.get_by_label("Token of the service").fill(token_of(self._served))
+        self.page.keyboard.press("Enter")
+        self.page.get_by_role("navigation").wait_for()
+
+    def show(self, view: str) -> Any:
+        """Return the page with one of its views."""
+        self.page.goto(f"{self._served.url}/#/{view}")
+        return self.page
+
+    def show_job(self, job: RemoteJob) -> Any:
+        """Return the page with a job."""
+        return self.show(f"campaign/{job.id}")
+
+
+def token_of(served: Served) -> str:
+    return (served.folder / "token").read_text(encoding="utf-8").strip()
 
 
 def violations(page: Any) -> list[str]:

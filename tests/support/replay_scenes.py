@@ -31,6 +31,7 @@ from = "base"
 compare = [{ simulated = "beam.sensor.acceleration", measured = "board" }]
 """
 G = 9.80665
+HIT_RATE = 20_000.0
 
 
 def channel(name: str, time: Floats, values: Floats, unit: str = "m s-2", trigger: str = "") -> Channel:
@@ -48,3 +49,14 @@ def written(path: Path, *channels: Channel) -> Path:
     """Write a recording of these channels."""
     write_recording(Recording({one.name: one for one in channels}), path)
     return path
+
+
+def hit(folder: Path, name: str = "hit.nc", seed: int = 1) -> Path:
+    """Write a recording of a board that is hit through its base and rings at 820 Hz."""
+    time_axis = np.arange(400) / HIT_RATE
+    ringing = np.where(
+        time_axis < 0.005, 0.0, np.exp(-60.0 * time_axis) * np.sin(2 * np.pi * 820.0 * time_axis)
+    )
+    noise = np.random.default_rng(seed).normal(size=len(time_axis))
+    base = channel("base", time_axis, pulse(time_axis))
+    return written(folder / name, base, channel("board", time_axis, 3000.0 * ringing + noise))

@@ -51,9 +51,12 @@ class Served:
     def __init__(self, folder: Path, *options: str) -> None:
         self.folder = folder
         self.log = folder.with_name(f"{folder.name}.log")
+        self._start("--port", "0", *options)
+
+    def _start(self, *options: str) -> None:
         with self.log.open("ab") as log:
             self.process = subprocess.Popen(
-                [sys.executable, "-c", ENTRY, "serve", "--data", str(folder), "--port", "0", *options],
+                [sys.executable, "-c", ENTRY, "serve", "--data", str(self.folder), *options],
                 stdout=subprocess.PIPE,
                 stderr=log,
                 text=True,
@@ -71,6 +74,10 @@ class Served:
     def kill(self) -> None:
         self.process.kill()
         self.process.communicate()
+
+    def restart(self) -> None:
+        """Start it again at the same address."""
+        self._start("--port", self.url.rpartition(":")[2])
 
     def stop(self) -> None:
         self.process.send_signal(signal.SIGTERM)
