@@ -1,4 +1,4 @@
-"""Debian's Chromium, as a person's browser: found, started, signed in, asked about accessibility."""
+"""Chromium, as a person's browser: found, started, signed in, asked about accessibility."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 from support.served import Served
 from vibroimpact.service.client import RemoteJob
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 ARGUMENTS = (
     "--no-sandbox",
     "--disable-gpu",
@@ -40,7 +40,7 @@ def need_browser() -> Any:
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        absent("playwright cannot be imported: pip install playwright")
+        absent("playwright cannot be imported. In a checkout: pip install -e '.[test]'")
     if CHROMIUM is None:
         absent("no Chromium on PATH. On Debian: apt-get install chromium")
     return sync_playwright()
