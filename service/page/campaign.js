@@ -97,7 +97,10 @@ class CampaignView {
 
   tellTenth() {
     const tenth = this.job.total ? Math.floor((TENTHS * this.job.done) / this.job.total) : 0;
-    if (tenth > this.toldTenth) tell(`${tenth * TENTHS} per cent of the points are done.`);
+    if (tenth > this.toldTenth) {
+      tell(`${tenth * TENTHS} per cent of the points are done.`);
+      this.lookForFailures();
+    }
     this.toldTenth = tenth;
   }
 
@@ -143,7 +146,6 @@ class CampaignView {
   async act(method, rest) {
     const job = await this.ask(method, rest);
     if (!job || this.ended) return;
-    this.failures.hidden = true;
     this.seen(job);
     this.watchEvents();
   }
@@ -161,13 +163,18 @@ class CampaignView {
   /** Show what there is once a campaign has ended. */
   async finish() {
     this.stop();
-    if (!["campaign", "run"].includes(this.job.kind)) return;
     if (this.job.kind === "run" && this.job.state === "done") showPoint(this.point, this.id, 0);
+    await this.lookForFailures();
+  }
+
+  async lookForFailures() {
+    if (this.job.kind !== "campaign" && this.job.kind !== "run") return;
     const found = await this.ask("GET", "/failures?limit=200");
-    if (found?.total) this.showFailures(found);
+    if (found?.total && found.total !== this.failed && !this.ended) this.showFailures(found);
   }
 
   showFailures({ total, items }) {
+    this.failed = total;
     const names = Object.keys(items[0].coordinates);
     const rows = items.map((one) => [
       this.diagram ? button(`Point ${one.run}`, () => showPoint(this.point, this.id, one.run, () => { this.point.hidden = true; })) : String(one.run),

@@ -153,7 +153,7 @@ export class Plot {
     let found = null, best = far * far;
     this.content.layers.forEach((layer, number) => {
       if (layer.kind === "line" && !layer.readable) return;
-      if (isMap(layer)) best = Infinity;
+      if (isMap(layer) && this.isInside(across, up)) best = Infinity;
       for (let place = 0; place < layer.xs.length; place++) {
         if (layer.xs[place] === null || layer.ys[place] === null) continue;
         const aside = this.x.place(layer.xs[place]) - across, above = this.y.place(layer.ys[place]) - up;
@@ -162,6 +162,11 @@ export class Plot {
       }
     });
     return found;
+  }
+
+  isInside(across, up) {
+    const { left, right, top, bottom } = this.box;
+    return across >= left && across <= right && up >= top && up <= bottom;
   }
 
   point(found, aloud = false) {
