@@ -26,7 +26,7 @@ function route() {
   close();
   close = () => {};
   if (!known) return showSignIn();
-  const [name, ...rest] = location.hash.replace(/^#\//, "").split("/").map(decodeURIComponent);
+  const [name, ...rest] = location.hash.replace(/^#\//, "").split("/").map(decoded);
   const [title, show] = VIEWS[name] ?? VIEWS.campaigns;
   document.title = `${title} · vibroimpact`;
   for (const link of navigation.querySelectorAll("a")) {
@@ -36,6 +36,14 @@ function route() {
   }
   main.replaceChildren();
   close = show(main, ...rest) ?? close;
+}
+
+function decoded(part) {
+  try {
+    return decodeURIComponent(part);
+  } catch {
+    return part; // an address that somebody typed; no view knows it
+  }
 }
 
 function signedIn(whether) {

@@ -54,17 +54,23 @@ class NewScene {
   }
 
   async begin(from, given) {
-    this.write(sessionStorage.getItem(DRAFT) ?? "");
+    const draft = sessionStorage.getItem(DRAFT);
+    if (draft) this.write(draft);
+    else this.number([]);
     try {
+      await this.showExamples();
       if (from === "replay") this.write(replayOf(await ask("GET", recordingPath(given))));
       else if (from) await this.copy(from);
-      const examples = await ask("GET", "/examples");
-      this.templates.replaceChildren(...examples.map((one) => element("li", {},
-        button(one.title || one.name, () => { this.write(one.scene); this.text.focus(); }))));
-      examples.forEach((one, place) => this.templates.children[place].firstChild.append(element("small", {}, one.kind)));
     } catch (error) {
       this.say(error.message, "problem");
     }
+  }
+
+  async showExamples() {
+    const examples = await ask("GET", "/examples");
+    this.templates.replaceChildren(...examples.map((one) => element("li", {},
+      button(one.title || one.name, () => { this.write(one.scene); this.text.focus(); }))));
+    examples.forEach((one, place) => this.templates.children[place].firstChild.append(element("small", {}, one.kind)));
   }
 
   /** Begin with what another campaign was submitted as. */

@@ -240,6 +240,7 @@ def test_every_view_is_accessible_and_fits(
         f"campaign/{jobs.map.id}": "td button",
         f"campaign/{jobs.fit.id}": "img.figure",
         "campaign/none": "h1",
+        "new/none": "p.problem",
     }
     with PageSession(
         chromium, served, color_scheme=colours, viewport={"width": width, "height": 844}
