@@ -10,9 +10,9 @@ import numpy as np
 
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.errors import Errors
+from vibroimpact.orchestrator.study.observation import LATE
 from vibroimpact.orchestrator.study.references import Reference
 from vibroimpact.orchestrator.study.statistics import Statistics
-from vibroimpact.orchestrator.study.trials import LATE
 from vibroimpact.orchestrator.study.way import Way
 
 
