@@ -75,7 +75,7 @@ class PlainStepsTrial:
         self._velocity_starts, self._changes = thrown_back(scene)
         self._starts = [n.replace("velocity", "displacement") for n in self._velocity_starts]
         self._starts += self._velocity_starts
-        self._motion = self._driver.inputs([*stranger.displacements, *stranger.velocities])
+        self._motion = self._driver.inputs(["displacement", *stranger.displacements, *stranger.velocities])
         self._state = self._driver.inputs([name.replace("_start", "") for name in self._starts])
 
     def run(self) -> Observation:
@@ -91,8 +91,9 @@ class PlainStepsTrial:
             for i in range(1, math.ceil(end / self._step) + 1):
                 now = min(i * self._step, end)
                 driver.advance(now - origin)
-                seen.note(now, driver.observed()[0])
-                state = self._thrown_back(now, seen)
+                motion = self._motion.get()
+                seen.note(now, float(motion[0]))
+                state = self._thrown_back(now, motion[1:], seen)
                 if state is not None:
                     start = dict(zip(self._starts, state.tolist(), strict=True))
                     moved = {"forcing.phase": (phase + w * now) % (2.0 * math.pi)} if w else {}
@@ -104,9 +105,9 @@ class PlainStepsTrial:
             failure = LATE
         return seen.observation(driver.observed(), began, failure)
 
-    def _thrown_back(self, now: float, seen: _Seen) -> Floats | None:
+    def _thrown_back(self, now: float, motion: Floats, seen: _Seen) -> Floats | None:
         """Return the state after the impulses of all stops that the body is beyond; None where there are none."""
-        displacements, velocities = self._motion.get().copy().reshape(2, -1)
+        displacements, velocities = motion.reshape(2, -1)
         state: Floats | None = None
         for k, stop in enumerate(self._stops):
             beyond = self._signs[k] * (displacements[k] - stop.position) > 0.0
@@ -151,7 +152,7 @@ class PlainForcesTrial:
         inputs = list(dict.fromkeys(stranger.forces))
         self._pushed = [inputs.index(name) for name in stranger.forces]
         self._force = self._driver.inputs(inputs)
-        self._motion = self._driver.inputs([*stranger.displacements, *stranger.velocities])
+        self._motion = self._driver.inputs(["displacement", *stranger.displacements, *stranger.velocities])
         sources = stop_parameters(len(scene.stops), floats)
         self._stops: list[Component] = []
         self._own: list[dict[str, Value]] = []
@@ -180,18 +181,19 @@ class PlainForcesTrial:
             stop.instance.exit_initialization()
         self._first = False
         try:
-            self._show(self._motion.get())
+            self._show(self._motion.get()[1:])
             for i in range(1, math.ceil(end / self._step) + 1):
                 last, now = now, min(i * self._step, end)
                 self._push()
-                motion = self._motion.get().copy()
+                before = self._motion.get()[1:].copy()
                 self._force.set()
                 driver.advance(now)
-                self._show(self._motion.get() if self._newest else motion)
+                motion = self._motion.get()
+                self._show(motion[1:] if self._newest else before)
                 for stop in self._stops:
                     stop.instance.step(last, now - last)
-                seen.note(now, driver.observed()[0])
-                displacements, velocities = self._motion.get().reshape(2, -1)
+                seen.note(now, float(motion[0]))
+                displacements, velocities = motion[1:].reshape(2, -1)
                 for k, position in enumerate(self._positions):
                     inside = self._signs[k] * (displacements[k] - position) > 0.0
                     if inside and not touching[k]:
