@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from vibroimpact.analysis.figures.needed import missing_from, refuse_missing
 from vibroimpact.analysis.figures.page import COLOURS, MARK, canvas, page_style
-from vibroimpact.fmus.errors import DatasetError
 
 _MARKERS = "osD^vP"
 _NEEDED = ("cost", "error", "name", "failure", "on_front", "is_model")
@@ -42,11 +42,7 @@ def draw_accuracy(dataset: xr.Dataset) -> Figure:
     DatasetError
         If a variable is missing.
     """
-    missing = [name for name in _NEEDED if name not in dataset]
-    if missing:
-        raise DatasetError(
-            f"figure: expected what `vibroimpact accuracy` writes, got none of {', '.join(missing)}."
-        )
+    refuse_missing(missing_from(dataset, _NEEDED), "what `vibroimpact accuracy` writes")
     names = list(dict.fromkeys(str(name) for name in dataset["name"].values))
     with page_style():
         figure = canvas(80 + _ROWS * len(names) / 2)

@@ -9,8 +9,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from vibroimpact.analysis.figures.needed import missing_from, refuse_missing
 from vibroimpact.analysis.figures.page import LINE, MARK, canvas, page_style
-from vibroimpact.fmus.errors import DatasetError
 
 _NEEDED = ("share", "seconds", "run_seconds", "name", "changes")
 _BAR_MM = 9
@@ -39,10 +39,8 @@ def draw_effects(dataset: xr.Dataset) -> Figure:
     DatasetError
         If a variable is missing, or there is no effect.
     """
-    missing = [name for name in _NEEDED if name not in dataset]
-    if missing or not dataset["share"].size:
-        got = f"none of {', '.join(missing)}" if missing else "no effect"
-        raise DatasetError(f"figure: expected what `vibroimpact effects` writes, got {got}.")
+    missing = missing_from(dataset, _NEEDED) or ([] if dataset["share"].size else ["effect"])
+    refuse_missing(missing, "what `vibroimpact effects` writes")
     names = [str(name) for name in dataset["name"].values]
     places = np.arange(len(names))[::-1]
     parts = 100.0 * dataset["seconds"].values / dataset["run_seconds"].values[:, None]

@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
+from vibroimpact.analysis.figures.needed import missing_from, refuse_missing
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, LINE, MARK, canvas, page_style
-from vibroimpact.fmus.errors import DatasetError
 
 _NEEDED = (
     "figure",
@@ -48,10 +48,8 @@ def draw_hard_cases(dataset: xr.Dataset) -> Figure:
     DatasetError
         If a variable is missing, or there is no case.
     """
-    missing = [name for name in _NEEDED if name not in dataset]
-    if missing or not dataset["figure"].size:
-        got = f"none of {', '.join(missing)}" if missing else "no case"
-        raise DatasetError(f"figure: expected what `vibroimpact hard-cases` writes, got {got}.")
+    missing = missing_from(dataset, _NEEDED) or ([] if dataset["figure"].size else ["case"])
+    refuse_missing(missing, "what `vibroimpact hard-cases` writes")
     count = dataset["figure"].size
     columns = min(_COLUMNS, count)
     rows = -(-count // columns)

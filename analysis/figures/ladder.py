@@ -9,12 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
+from vibroimpact.analysis.figures.needed import missing_from, refuse_missing
 from vibroimpact.analysis.figures.page import COLOURS, canvas, label, legend_above, page_style
 from vibroimpact.analysis.landmarks import observed_order
-from vibroimpact.fmus.errors import DatasetError
 
 _QUANTITIES = ("error", "energy_drift")
 _MARKERS = "os^Dvx"
+_MEASURED = "Draw what a benchmark of coupling measured."
 #: Most steps that are all labelled in one column's width.
 MOST_LABELS = 4
 _WORDS = {"gauss_seidel": "Gauss-Seidel", "jacobi": "Jacobi"}
@@ -122,34 +123,26 @@ def _label_seconds(axis: Axes) -> None:
 
 def _ladder_of(dataset: xr.Dataset) -> tuple[str, str | None]:
     """Return the dimension of the steps or tolerances, and that of the ways that are compared."""
-    missing = [name for name in ("error", "wall_time") if name not in dataset]
-    if not missing:
-        dims = [str(name) for name in dataset["error"].dims]
-        numbers = [name for name in dims if name in dataset.coords and dataset[name].dtype.kind == "f"]
-        others = [name for name in dims if name not in numbers and name in dataset.coords]
-        is_ladder = len(numbers) == 1 and len(dims) == 1 + len(others) <= 2
-        if is_ladder and set(dataset["wall_time"].dims) == set(dims):
-            return numbers[0], others[0] if others else None
-        missing = ["error and wall_time on the same steps or tolerances"]
-    raise DatasetError(
-        "figure: expected error and wall_time (s) on a ladder of steps or tolerances, "
-        f"got no such {', '.join(missing)}. Draw what a benchmark of coupling measured."
-    )
+    expected = "error and wall_time (s) on a ladder of steps or tolerances"
+    refuse_missing(missing_from(dataset, ("error", "wall_time")), expected, _MEASURED)
+    dims = [str(name) for name in dataset["error"].dims]
+    numbers = [name for name in dims if name in dataset.coords and dataset[name].dtype.kind == "f"]
+    others = [name for name in dims if name not in numbers and name in dataset.coords]
+    is_ladder = len(numbers) == 1 and len(dims) == 1 + len(others) <= 2
+    if not is_ladder or set(dataset["wall_time"].dims) != set(dims):
+        refuse_missing(["ladder that both of them are on"], expected, _MEASURED)
+    return numbers[0], others[0] if others else None
 
 
 def _refuse_other(dataset: xr.Dataset) -> None:
     """Refuse a dataset that is no ladder of macro steps."""
-    missing = [
-        name
-        for name in (*_QUANTITIES, "exchange", "macro_step")
-        if name not in dataset.variables
-        or (name in _QUANTITIES and set(dataset[name].dims) != {"exchange", "macro_step"})
+    missing = missing_from(dataset, (*_QUANTITIES, "exchange", "macro_step"))
+    other = [
+        f"{name} on them"
+        for name in _QUANTITIES
+        if name not in missing and set(dataset[name].dims) != {"exchange", "macro_step"}
     ]
-    if missing:
-        raise DatasetError(
-            "figure: expected error and energy_drift on exchange and macro_step, "
-            f"got no such {', '.join(missing)}. Draw what a benchmark of coupling measured."
-        )
+    refuse_missing([*missing, *other], "error and energy_drift on exchange and macro_step", _MEASURED)
 
 
 def _draw_ladder(axis: Axes, quantity: xr.DataArray) -> None:

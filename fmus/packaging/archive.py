@@ -13,6 +13,7 @@ import tempfile
 import time
 import zipfile
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
 from vibroimpact.fmus.errors import ComponentFileError
@@ -267,7 +268,9 @@ def _sweep(cache: Path) -> None:
             shutil.rmtree(left, ignore_errors=True)
 
 
+@lru_cache(maxsize=64)
 def _described(path: Path, folder: Path, digest: str) -> UnpackedFmu:
+    """Return what the description of an FMU says of it; the digest stands for its contents, which are read once."""
     root = root_of((folder / "modelDescription.xml").read_bytes(), f"{path}: modelDescription.xml")
     version = root.get("fmiVersion", "")
     token = root.get("guid") if version == "2.0" else root.get("instantiationToken")

@@ -25,6 +25,8 @@ from vibroimpact.orchestrator.study import Measured, Study, dataset_of, study_ac
 from vibroimpact.orchestrator.study.choice import advice, error_of_reference, refuse_unreached
 from vibroimpact.orchestrator.study.tuned import tuned_text
 
+MEGABYTE = 1e6
+
 
 def study_scene(
     path: Path,
@@ -99,7 +101,7 @@ def _table(
         f"What accuracy costs: {title}",
         *("<way", "<set", ">value", ">error", ">a run", ">spread"),
         *((">a period",) if of_periods else ()),
-        *(">an impact", ">calls"),
+        *(">an impact", ">calls", ">memory"),
         *((">accounts for",) if scored else ()),
         "<what is wrong",
     )
@@ -115,6 +117,7 @@ def _table(
             *((_known_duration(one.cost_of_one(periods)),) if of_periods else ()),
             _known_duration(one.cost_of_one(one.impacts)),
             str(one.calls) if one.calls >= 0 else "-",
+            f"{one.memory / MEGABYTE:.1f} MB" if one.memory >= 0 else "-",
             *((f"{one.variance:.2f} %",) if scored else ()),
             one.errors.failure,
         )

@@ -45,7 +45,7 @@ def on_free_side(scene: Scene, body: ChainBody | BeamBody, state: tuple[float, .
         return state
     signs = np.array([1.0 if stop.side == "upper" else -1.0 for stop in rigid])
     positions = np.array([stop.position for stop in rigid])
-    shapes = _shapes(body, rigid)
+    shapes = contact_shapes(body, rigid)
     motions = shapes / np.array(body.masses) if isinstance(body, ChainBody) else shapes
     active = np.zeros(len(rigid), dtype=bool)
     moved = active.copy()
@@ -69,7 +69,7 @@ def _smallest(shapes: Floats, motions: Floats, wanted: Floats) -> Floats:
     return np.asarray(motions.T @ forces, dtype=np.float64)
 
 
-def _shapes(body: ChainBody | BeamBody, stops: list[RestitutionStop]) -> Floats:
+def contact_shapes(body: ChainBody | BeamBody, stops: list[RestitutionStop]) -> Floats:
     """Return the displacement of each contact for 1 m of each mass or mode, shape (stop, N)."""
     if isinstance(body, ChainBody):
         return np.eye(body.size)[[stop_mass(body, stop) - 1 for stop in stops]]

@@ -6,8 +6,7 @@ import gc
 import json
 import math
 import time
-import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 
@@ -24,6 +23,7 @@ from vibroimpact.orchestrator.study.balance import balance_of
 from vibroimpact.orchestrator.study.choice import advice, cheapest, error_of_reference, pareto_front
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, errors_of, no_errors
 from vibroimpact.orchestrator.study.measured import Measured, Study
+from vibroimpact.orchestrator.study.memory import UNKNOWN, memory_of_ways
 from vibroimpact.orchestrator.study.models import told_by
 from vibroimpact.orchestrator.study.orbits import orbit_of
 from vibroimpact.orchestrator.study.references import (
@@ -115,6 +115,7 @@ def study_accuracy(
                 measured.append((one, trial))
             told(one)
             found.append(one)
+        _add_memory(given_up_after(studied, late), given, ways, [one for one, _ in measured])
         _time_in_turn(measured, began + budget)
     if reference.chaotic:
         _add_statistics(whole, given_up_after(whole, late), found)
@@ -205,7 +206,7 @@ def _refuse_none(ways: list[Way], scene: Scene) -> list[Way]:
 
 
 def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
-    """Run a way once, counting calls and memory, and compare what it shows; no trial where it failed."""
+    """Run a way once, counting calls, and compare what it shows; no trial where it failed."""
     try:
         trial = way.open(None)
     except (ComponentError, SceneError, DatasetError) as error:
@@ -232,7 +233,7 @@ def _tried(way: Way, reference: Reference) -> tuple[Measured, Trial | None]:
         one.seconds.append(found.seconds)
         return one, None
     if found.seconds < COUNTED:
-        one.calls, one.memory = _counted(way)
+        one.calls = _counted(way)
     return one, trial
 
 
@@ -245,16 +246,24 @@ def _told_by(way: Way, reference: Reference, finest: dict[Scene, Reference]) -> 
     return finest[way.against]
 
 
-def _counted(way: Way) -> tuple[int, int]:
-    """Return the calls of functions of FMUs in a run (-1: not counted), and the most memory of Python for it, bytes."""
+def _add_memory(
+    scene: Scene, given: Mapping[str, float], ways: Sequence[Way], measured: Sequence[Measured]
+) -> None:
+    """Find what memory each way takes that did not fail."""
+    places = {id(way): place for place, way in enumerate(ways)}
+    memory = memory_of_ways(scene, given, [places[id(one.way)] for one in measured])
+    for one in measured:
+        one.memory = memory.get(places[id(one.way)], UNKNOWN)
+
+
+def _counted(way: Way) -> int:
+    """Return the calls of functions of FMUs in a run; -1 where they are not counted."""
     counter = CallCounter()
     trial = way.open(counter.wrap)
-    tracemalloc.start()
     try:
         trial.run()
-        return sum(counter.calls.values()) or -1, tracemalloc.get_traced_memory()[1]
+        return sum(counter.calls.values()) or -1
     finally:
-        tracemalloc.stop()
         trial.close()
 
 
@@ -324,7 +333,12 @@ def dataset_of(study: Study) -> xr.Dataset:
         ),
         "rounds": ("way", [len(one.seconds) for one in found], "1", "runs that were timed"),
         "calls": ("way", [one.calls for one in found], "1", "calls of functions of FMUs in a run"),
-        "memory": ("way", [one.memory for one in found], "byte", "largest memory that Python took for a run"),
+        "memory": (
+            "way",
+            [one.memory for one in found],
+            "byte",
+            "largest resident memory that a process of its own took for it, -1: not measured",
+        ),
         "impacts": ("way", [one.impacts for one in found], "1", "impacts recorded"),
         "energy_residual": (
             "way",

@@ -10,9 +10,9 @@ import numpy as np
 
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.study.errors import Errors
+from vibroimpact.orchestrator.study.observation import LATE
 from vibroimpact.orchestrator.study.references import Reference
 from vibroimpact.orchestrator.study.statistics import Statistics
-from vibroimpact.orchestrator.study.trials import LATE
 from vibroimpact.orchestrator.study.way import Way
 
 
@@ -29,7 +29,7 @@ class Measured:
     calls : int
         Calls of the functions of FMUs in one run; -1 where nobody counts them.
     memory : int
-        Largest memory that Python took for one run, bytes.
+        Largest resident memory that opening it and one run added to a process, bytes; -1 where nobody measures it.
     impacts : int
         How many it showed.
     energy_residual : float

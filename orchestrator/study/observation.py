@@ -9,9 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.models import RestitutionStop
 
 Floats = NDArray[np.float64]
 
+LATE = "did not finish"
+"""Failure of a run that was given up."""
 IMPACT_TIME, IMPACT_VELOCITY, IMPACT_CONTACT = 0, 2, 4
 """Columns of the impacts of a `RunRecord`."""
 
@@ -66,6 +70,29 @@ class Observation:
         return self.highest - self.lowest
 
 
+def ended(impacts: Floats, scene: Scene, forces: Floats) -> Floats:
+    """Return impacts without those whose contact is not over: a record has them when a stop that yields lets go.
+
+    Parameters
+    ----------
+    impacts : ndarray, shape (impact, 3)
+    scene : Scene
+        Of the short form.
+    forces : ndarray, shape (stop,)
+        Of each stop at the end, N.
+
+    Returns
+    -------
+    ndarray, shape (impact, 3)
+    """
+    kept = np.ones(len(impacts), dtype=bool)
+    for k, stop in enumerate(scene.stops):
+        own = np.flatnonzero(impacts[:, 2] == k + 1)
+        if len(own) and forces[k] > 0.0 and not isinstance(stop, RestitutionStop):
+            kept[own[-1]] = False
+    return impacts[kept]
+
+
 def observation_of(record: RunRecord) -> Observation:
     """Return what the record of a run shows.
 
@@ -76,7 +103,7 @@ def observation_of(record: RunRecord) -> Observation:
     """
     failure = ""
     if record.outcome == Outcome.timeout:
-        failure = "did not finish"
+        failure = LATE
     elif record.outcome not in (Outcome.ok, Outcome.stuck):
         failure = f"{record.outcome.name}: {record.message}"
     impacts, periods = _no_impacts(), record.periods

@@ -17,9 +17,9 @@ from vibroimpact.orchestrator.study.observation import (
     IMPACT_CONTACT,
     IMPACT_TIME,
     IMPACT_VELOCITY,
+    LATE,
     Observation,
 )
-from vibroimpact.orchestrator.study.trials import LATE
 
 THINNED = (2, 4, 8, 16, 32)
 """One of how many samples is kept, as a slower board without a filter would have."""

@@ -19,12 +19,12 @@ from vibroimpact.orchestrator.run.parameters import FMU_NAMES, float_parameters,
 from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.run.record import Deadline, DeadlineReached
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.study.observation import Observation
-from vibroimpact.orchestrator.study.trials import LATE
+from vibroimpact.orchestrator.study.observation import LATE, Observation, ended
+from vibroimpact.orchestrator.study.strangers import stranger_of
 
 
 class RevisedTrial:
-    """An oscillator that knows nothing of its stops, as the FMU of another tool: the `[[contact]]` of general scenes.
+    """A body that knows nothing of its stops, as the FMU of another tool: the `[[contact]]` of general scenes.
 
     Steps that end beyond a stop are made again until they end at it; a stop that yields answers with the force, held
     over each step, that closes the energy of the contact; a rigid one throws the body back over a very short step.
@@ -32,7 +32,7 @@ class RevisedTrial:
     Parameters
     ----------
     scene : Scene
-        Of an oscillator with stops.
+        With stops, where a force can act on its body at each of them.
     step : float
         Longest step, s.
     contact_steps : float
@@ -49,14 +49,18 @@ class RevisedTrial:
         wrap: Wrapper | None = None,
     ) -> None:
         floats, integers = float_parameters(scene, None), integer_parameters(scene)
+        self._scene = scene
         self._window = recorded_window(scene, floats)
         count = len(scene.stops)
-        own = {name: v for name, v in floats.items() if not name.startswith("contact[")}
-        self._values: dict[tuple[str, str], Value] = {(BODY, name): value for name, value in own.items()}
+        stranger = stranger_of(scene)
+        self._values: dict[tuple[str, str], Value] = {
+            (BODY, name): value for name, value in stranger.floats.items()
+        }
         self._values |= {target: floats[source] for target, source in stop_parameters(count, floats).items()}
-        body = ComponentSpec(BODY, fmu_path(FMU_NAMES[scene.body.kind]), {})
-        names = [stop_name(k) for k in range(1, count + 1)]
-        contacts = [StopContactSpec(BODY, "displacement", "velocity", "force", name) for name in names]
+        own = {name: value for name, value in stranger.integers.items() if name != "impact_limit"}
+        body = ComponentSpec(BODY, fmu_path(FMU_NAMES[scene.body.kind]), own)
+        at = zip(stranger.displacements, stranger.velocities, stranger.forces, strict=True)
+        contacts = [StopContactSpec(BODY, *names, stop_name(k)) for k, names in enumerate(at, start=1)]
         self._importer = Importer(
             [body, *(stop_of(k, integers) for k in range(1, count + 1))],
             contacts=contacts,
@@ -66,6 +70,9 @@ class RevisedTrial:
         )
         component = self._importer.components[BODY]
         self._motion = component.group("Float64", ["displacement", "velocity"])
+        self._contacts = component.group("Float64", [*stranger.displacements, *stranger.velocities])
+        stops = (self._importer.components[stop_name(k)] for k in range(1, count + 1))
+        self._forces = [stop.group("Float64", ["applied_force"]) for stop in stops]
         self._switch = component.group("Boolean", ["record.extrema"])
         self._extremes = component.group("Float64", ["record.displacement_min", "record.displacement_max"])
         self._positions = np.array([stop.position for stop in scene.stops])
@@ -93,8 +100,9 @@ class RevisedTrial:
             failure = LATE
         lowest, highest = map(float, self._extremes.get())
         displacement, velocity = map(float, self._motion.get())
+        impacts = np.array(self._impacts).reshape(-1, 3)
         return Observation(
-            np.array(self._impacts).reshape(-1, 3),
+            ended(impacts, self._scene, np.array([float(force.get()[0]) for force in self._forces])),
             lowest,
             highest,
             (displacement, velocity),
@@ -106,9 +114,10 @@ class RevisedTrial:
         """Note an arrival, which is told before it is answered: at the stop that the body is at and moves towards."""
         if not self._recording:
             return
-        displacement, velocity = map(float, self._motion.get())
-        off = np.where(self._signs * velocity > 0.0, np.abs(displacement - self._positions), math.inf)
-        self._impacts.append((event.time, abs(velocity), float(off.argmin()) + 1.0))
+        displacements, velocities = self._contacts.get().reshape(2, -1)
+        off = np.where(self._signs * velocities > 0.0, np.abs(displacements - self._positions), math.inf)
+        stop = int(off.argmin())
+        self._impacts.append((event.time, abs(float(velocities[stop])), stop + 1.0))
 
     def close(self) -> None:
         """Free the components."""

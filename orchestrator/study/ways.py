@@ -9,18 +9,15 @@ from typing import Any
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.body_models import BeamBody, OscillatorBody
+from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.models import HertzStop, HuntCrossleyStop, RestitutionStop
 from vibroimpact.orchestrator.study.models import other_models, other_modes
+from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
 from vibroimpact.orchestrator.study.replays import ReplayTrial, rates_of
 from vibroimpact.orchestrator.study.revision import RevisedTrial
 from vibroimpact.orchestrator.study.sampled import SampledTrial
-from vibroimpact.orchestrator.study.trials import (
-    CoupledTrial,
-    ModelExchangeTrial,
-    PlainForcesTrial,
-    PlainStepsTrial,
-)
+from vibroimpact.orchestrator.study.strangers import why_not_pushed, why_not_thrown_back
+from vibroimpact.orchestrator.study.trials import CoupledTrial, ModelExchangeTrial
 from vibroimpact.orchestrator.study.way import Opener, Trial, Way, time_scale, way_by_scene
 
 CONTACT_TOLERANCES = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
@@ -74,10 +71,8 @@ def remarks_on(scene: Scene) -> list[str]:
     """Return what the study of a scene leaves out, and why."""
     remarks = []
     plain = scene.general is None and scene.replay is None and scene.stops
-    if plain and not isinstance(scene.body, OscillatorBody):
-        remarks.append(
-            "plain steps of equal size and step revision: for an oscillator only, whose state a step can be begun from"
-        )
+    if plain:
+        remarks += _remarks_on_strangers(scene)
     rigid = any(isinstance(stop, RestitutionStop) for stop in scene.stops)
     if plain and isinstance(scene.body, BeamBody):
         remarks.append(
@@ -90,6 +85,19 @@ def remarks_on(scene: Scene) -> list[str]:
             "number of modes and its restitution has no meaning without it (docs/contact_laws.md); compliant stops do"
         )
     return remarks
+
+
+def _remarks_on_strangers(scene: Scene) -> list[str]:
+    """Return which ways with a body that knows nothing of its stops are left out, and why."""
+    pushed = why_not_pushed(scene)
+    rigid = [isinstance(stop, RestitutionStop) for stop in scene.stops]
+    thrown_back = why_not_thrown_back(scene) if all(rigid) else pushed
+    if any(rigid) and not all(rigid):
+        thrown_back = "some stops are rigid and others yield"
+    if pushed and pushed == thrown_back:
+        return [f"plain steps of equal size and step revision: {pushed}"]
+    left_out = {"plain steps of equal size": thrown_back, "step revision": pushed}
+    return [f"{way}: {why}" for way, why in left_out.items() if why]
 
 
 def _opens(kind: Callable[..., Trial], *arguments: Any) -> Opener:
@@ -110,7 +118,7 @@ def _fused(scene: Scene) -> list[Way]:
 
 
 def _coupled(scene: Scene) -> list[Way]:
-    if not scene.stops or any(getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in scene.stops):
+    if not scene.stops or _has_memory(scene):
         return []
     yields = any(not isinstance(stop, RestitutionStop) for stop in scene.stops)
     ways = []
@@ -137,7 +145,7 @@ def _coupled(scene: Scene) -> list[Way]:
 
 def _coupled_replay(scene: Scene) -> list[Way]:
     """The body, its stops and the recording, each an FMU of its own."""
-    if any(getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in scene.stops):
+    if _has_memory(scene):
         return []
     return [way_by_scene("coupled, FMI 3.0", "", math.nan, scene, {"execution.how": "coupled"})]
 
@@ -155,9 +163,7 @@ def _opens_replay(scene: Scene, every: int) -> Opener:
 
 def _revised(scene: Scene) -> list[Way]:
     """The body as a stranger, whose arrivals the importer finds by making steps again."""
-    if not isinstance(scene.body, OscillatorBody) or not scene.stops:
-        return []
-    if any(getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in scene.stops):
+    if not scene.stops or why_not_pushed(scene) or _has_memory(scene):
         return []
     scale, name = time_scale(scene), "step revision"
     if all(isinstance(stop, RestitutionStop) for stop in scene.stops):
@@ -183,14 +189,14 @@ def _read_off_samples(scene: Scene, rate: float) -> list[Way]:
 
 def _plain_steps(scene: Scene) -> list[Way]:
     """Steps of equal size, as an importer makes them that knows no events."""
-    if not isinstance(scene.body, OscillatorBody) or not scene.stops:
-        return []
     scale = time_scale(scene)
     ways = []
     rigid = [isinstance(stop, RestitutionStop) for stop in scene.stops]
+    turned = bool(rigid) and all(rigid) and not why_not_thrown_back(scene)
+    pushed = bool(rigid) and not (any(rigid) or why_not_pushed(scene) or _has_memory(scene))
     for count in STEPS_A_PERIOD:
         step = scale / count
-        if all(rigid):
+        if turned:
             ways.append(
                 Way(
                     "plain steps",
@@ -200,7 +206,7 @@ def _plain_steps(scene: Scene) -> list[Way]:
                     _opens(PlainStepsTrial, scene, step),
                 )
             )
-        elif not any(rigid):
+        elif pushed:
             ways += [
                 Way(
                     f"plain steps, {exchange}",
@@ -215,7 +221,7 @@ def _plain_steps(scene: Scene) -> list[Way]:
 
 
 def _integrated(scene: Scene) -> list[Way]:
-    if any(getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in scene.stops):
+    if _has_memory(scene):
         return []
     return [
         Way(
@@ -243,6 +249,11 @@ def _general_ways(scene: Scene) -> list[Way]:
         for exchange in EXCHANGES
         for part in GENERAL_REFINEMENTS
     ]
+
+
+def _has_memory(scene: Scene) -> bool:
+    """Whether a stop relaxes, which is a law of the body's own FMU alone."""
+    return any(getattr(stop, "relaxation_time", 0.0) > 0.0 for stop in scene.stops)
 
 
 def _integrates_contacts(scene: Scene) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,7 +51,7 @@ def exact_flow(
         x = (second + c * first) * start[0] + first * start[1]
         v = -k * first * start[0] + second * start[1]
         turn, force = mp.mpc(0, o.angular_frequency), mpf(o.amplitude) / mpf(o.mass) * mp.expj(mpf(phase))
-        loads = [
+        loads: list[tuple[mp.mpc | mp.mpf, Callable[[mp.mpc], mp.mpc]]] = [
             (
                 force,
                 lambda a: (

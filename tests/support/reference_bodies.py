@@ -162,7 +162,7 @@ def period_one_orbits(
     root = a1 * a1 - 4.0 * a2 * a0
     orbits = []
     for sign in (1.0, -1.0) if root >= 0.0 else ():
-        velocity = (-a1 + sign * math.sqrt(root)) / (2.0 * a2)
+        velocity = float((-a1 + sign * math.sqrt(root)) / (2.0 * a2))
         # Re(y e^{i theta}) = position - alpha V and Re(i y e^{i theta}) = slope V
         turned = complex(position - alpha * velocity, -slope * velocity)
         phase = float(np.angle(turned / y)) % (2.0 * math.pi)

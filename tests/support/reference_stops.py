@@ -34,22 +34,22 @@ class Stop:
     def compliant(self) -> bool:
         return self.law != "restitution"
 
-    def raw_force(self, penetration: Floats, rate: Floats) -> Floats:
+    def raw_force(self, penetration: Floats | float, rate: Floats | float) -> Floats:
         """Return what the law says before it is cut at zero (equations.md 6.9, 6.10), N."""
         if self.law == "kelvin_voigt":
-            return self.stiffness * penetration + self.damping * rate
+            return np.asarray(self.stiffness * penetration + self.damping * rate)
         power = 1.5 if self.law == "hertz" else self.exponent
         loss = 0.0 if self.law == "hertz" else self.damping
         spring = self.stiffness * np.maximum(penetration, 0.0) ** power
         result: Floats = spring * (1.0 + loss * rate)
         return result
 
-    def pressing(self, penetration: Floats, rate: Floats) -> Floats:
+    def pressing(self, penetration: Floats | float, rate: Floats | float) -> Floats:
         """Return a quantity of the sign of the force: the force itself is flat at its zero for the power laws."""
         if self.law == "kelvin_voigt":
             return self.raw_force(penetration, rate)
         loss = 0.0 if self.law == "hertz" else self.damping
-        return np.minimum(penetration, 1.0 + loss * rate)
+        return np.asarray(np.minimum(penetration, 1.0 + loss * rate))
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,9 @@ from support.reference_stops import Forcing, Impact, Press, Stick, Stop, complem
 OUT, PRESSED, SLACK, HELD = "out", "pressed", "slack", "held"
 _SAMPLES = 16
 
+Quantity = Callable[[Floats | float, Floats], Floats]
+"""Of the time and the state, at one instant or at many."""
+
 
 @dataclass(frozen=True)
 class _Mark:
@@ -74,7 +77,8 @@ class Reference:
 
     def gaps(self, y: Floats) -> Floats:
         """Return the penetrations, shape (contacts, ...)."""
-        return ((self._normals @ y[: self.body.modes]).T - self._positions).T
+        found: Floats = ((self._normals @ y[: self.body.modes]).T - self._positions).T
+        return found
 
     def rates(self, y: Floats) -> Floats:
         """Return the velocities into the stops, shape (contacts, ...)."""
@@ -218,34 +222,34 @@ class Reference:
 
     # -- events --------------------------------------------------------------------------------------------------------
 
-    def _watched(self, status: Sequence[str]) -> list[tuple[int, Callable[[Floats, Floats], Floats]]]:
+    def _watched(self, status: Sequence[str]) -> list[tuple[int, Quantity]]:
         """Return the quantities whose rise through zero is an event, with their contact."""
-        watched: list[tuple[int, Callable[[Floats, Floats], Floats]]] = []
-        held = [k for k, s in enumerate(status) if s == HELD]
-        for k, stop in enumerate(self.stops):
+        watched: list[tuple[int, Quantity]] = []
+        for k in range(len(self.stops)):
             if status[k] == HELD:
-                row = held.index(k)
-                watched.append((k, lambda t, y, row=row: -self.held_forces(t, y, status)[1][row]))
-                continue
-
-            def gap(_: Floats, y: Floats, k: int = k) -> Floats:
-                return self.gaps(y)[k]
-
-            def pressing(_: Floats, y: Floats, k: int = k, stop: Stop = stop) -> Floats:
-                return stop.pressing(self.gaps(y)[k], self.rates(y)[k])
-
-            if status[k] == OUT:
-                watched.append((k, gap))
+                watched.append((k, _falling(self._held_force(k, status))))
+            elif status[k] == OUT:
+                watched.append((k, self._gap(k)))
             elif status[k] == PRESSED:
-                watched.append((k, lambda t, y, g=pressing: -g(t, y)))
+                watched.append((k, _falling(self._pressing(k))))
             else:
-                watched.append((k, lambda t, y, g=gap: -g(t, y)))
-                watched.append((k, pressing))
+                watched.append((k, _falling(self._gap(k))))
+                watched.append((k, self._pressing(k)))
         return watched
+
+    def _gap(self, k: int) -> Quantity:
+        return lambda _, y: np.asarray(self.gaps(y)[k])
+
+    def _pressing(self, k: int) -> Quantity:
+        return lambda _, y: self.stops[k].pressing(self.gaps(y)[k], self.rates(y)[k])
+
+    def _held_force(self, k: int, status: Sequence[str]) -> Quantity:
+        row = list(status[:k]).count(HELD)
+        return lambda time, y: np.asarray(self.held_forces(time, y, status)[1][row])
 
     def _first_event(
         self,
-        dense: Callable[[Floats], Floats],
+        dense: Callable[[Floats | float], Floats],
         start: float,
         end: float,
         origin: float,
@@ -259,8 +263,8 @@ class Reference:
         for k, quantity in self._watched(status):
             values = quantity(origin + u, y)
 
-            def at(x: float, g: Callable[[Floats, Floats], Floats] = quantity) -> float:
-                return float(g(np.float64(origin + x), dense(np.float64(x))))
+            def at(x: float, g: Quantity = quantity) -> float:
+                return float(g(origin + x, dense(x)))
 
             root = first_rise(at, u, values, start, end)
             if root is not None and (first is None or root < first[0]):
@@ -274,12 +278,12 @@ class Reference:
         (k,) = self._events
         quantities = [g for owner, g in self._watched(status) if owner == k]
         y = self.integrate(start, before, time, status)
-        quantity = min(quantities, key=lambda g: abs(float(g(np.float64(time), y))))
+        quantity = min(quantities, key=lambda g: abs(float(g(time, y))))
         h = 1e-6 * max(time - start, 1e-9 * self.scale)
         for _ in range(3):
-            value = float(quantity(np.float64(time), y))
+            value = float(quantity(time, y))
             ahead = self.integrate(time, y, time + h, status)
-            slope = (float(quantity(np.float64(time + h), ahead)) - value) / h
+            slope = (float(quantity(time + h, ahead)) - value) / h
             if abs(slope) * h < 1e-14 * self.scale or abs(value / slope) > 1e-6:
                 break  # a graze: the time is known to half the digits only
             time -= value / slope
@@ -416,7 +420,7 @@ class Reference:
             self.presses[self._last_press(k)].end = self.time
             self.presses[self._last_press(k)].velocity_out = -rate
         elif was == SLACK:
-            pressing = float(stop.pressing(np.float64(gap), np.float64(rate)))
+            pressing = float(stop.pressing(gap, rate))
             again = gap > near and abs(pressing) <= near * max(1.0, stop.stiffness)
             self.status[k] = PRESSED if again else OUT
             if again:
@@ -424,3 +428,8 @@ class Reference:
 
     def _last_press(self, k: int) -> int:
         return max(i for i, press in enumerate(self.presses) if press.contact == k + 1)
+
+
+def _falling(quantity: Quantity) -> Quantity:
+    """Return what rises through zero where a quantity falls through it."""
+    return lambda time, y: -quantity(time, y)

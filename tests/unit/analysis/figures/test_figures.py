@@ -317,8 +317,11 @@ def test_the_order_of_an_error_is_not_led_astray_by_rounding_or_by_one_step_that
 
 
 def test_what_is_no_ladder_is_refused_by_name() -> None:
-    with pytest.raises(DatasetError, match="got no such energy_drift"):
+    with pytest.raises(DatasetError, match="got no energy_drift\\. Draw what"):
         figures.draw(ladder().drop_vars("energy_drift"), "convergence")
+    across = ladder().isel(exchange=0).assign(energy_drift=ladder()["energy_drift"])
+    with pytest.raises(DatasetError, match="got no error on them"):
+        figures.draw(across, "convergence")
 
 
 @pytest.mark.parametrize(

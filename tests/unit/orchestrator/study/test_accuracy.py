@@ -17,7 +17,13 @@ from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study import Study, advice, dataset_of, study_accuracy
 from vibroimpact.orchestrator.study.accuracy import studied_scene
 from vibroimpact.orchestrator.study.choice import cheapest
+from vibroimpact.orchestrator.study.errors import errors_of
+from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
 from vibroimpact.orchestrator.study.references import reference_of
+from vibroimpact.orchestrator.study.revision import RevisedTrial
+from vibroimpact.orchestrator.study.trials import CoupledTrial, ModelExchangeTrial
+from vibroimpact.orchestrator.study.way import Trial
+from vibroimpact.orchestrator.study.ways import remarks_on, ways_of
 
 pytestmark = pytest.mark.slow
 
@@ -100,6 +106,150 @@ def test_step_revision_finds_rigid_stops_to_rounding_and_follows_yielding_ones_a
     assert np.all(errors < 1e-10)
     steps, errors = ladder(yielding, "step revision")
     assert observed_order(1.0 / steps, errors) == pytest.approx(2.0, abs=0.2)
+
+
+CHAIN: dict[str, Any] = {
+    "body": {"kind": "chain", "masses": [2.0, 1.0], "stiffnesses": [3.0, 1.0], "dampings": 0.1},
+    "forcing": {"amplitude": [0.0, 1.0], "angular_frequency": 0.8},
+    "record": {"transient_periods": 1, "recorded_periods": 2},
+}
+STRIP: dict[str, Any] = {
+    "body": {
+        **{"kind": "beam", "modes": 3, "damping_ratio": 0.02, "length": 0.25},
+        **{"flexural_rigidity": 0.9333, "mass_per_length": 0.108},
+    },
+    "forcing": {"kind": "uniform", "amplitude": 1.0, "angular_frequency": 165.0},
+    "record": {"transient_periods": 2, "recorded_periods": 2},
+}
+RIGID: dict[str, Any] = {"position": 1e-4, "restitution": 0.6}
+SOFT: dict[str, Any] = {"law": "kelvin_voigt", "position": 1e-4, "stiffness": 1e4, "damping": 1.0}
+
+
+def errors_by_step(scene: Scene, trials: dict[float, Trial]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the steps, or steps a contact, of trials with their errors, those of which no impact is missed."""
+    reference = reference_of(scene)
+    errors = {
+        step: errors_of(trial.run(), reference.observation, reference.scales)
+        for step, trial in trials.items()
+    }
+    good = {step: one.worst() for step, one in errors.items() if not one.failure}
+    return np.array(list(good)), np.array(list(good.values()))
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        CHAIN
+        | {
+            "stop": [
+                {"position": 0.5, "restitution": 0.6, "mass": 1},
+                {"position": -0.6, "side": "lower", "restitution": 0.7, "mass": 2},
+            ]
+        },
+        STRIP
+        | {
+            "forcing": {"amplitude": 0.3, "angular_frequency": 165.0},
+            "stop": [{"position": 1e-3, "restitution": 0.6}],
+            "record": {"recorded_periods": 1},
+        },
+    ],
+    ids=["chain", "beam"],
+)
+def test_a_structure_on_rigid_stops_is_followed_by_plain_steps_and_by_step_revision(
+    tables: dict[str, Any],
+) -> None:
+    scene = studied_scene(Scene.from_dict(tables))
+    assert scene.period is not None
+    steps = [scene.period / count for count in (1009, 5003, 20011)]
+    found, errors = errors_by_step(scene, {step: PlainStepsTrial(scene, step) for step in steps})
+    assert len(found) == 3
+    assert errors[-1] < 0.1 * errors[0]  # of first order: the last step is a twentieth of the first
+    _, errors = errors_by_step(scene, {0.02: RevisedTrial(scene, 0.02 * scene.period)})
+    assert errors[0] < 1e-9
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        CHAIN
+        | {
+            "stop": [
+                {"law": "kelvin_voigt", "position": 0.5, "stiffness": 1e2, "damping": 2.0, "mass": 1},
+                {"law": "hertz", "position": -0.6, "side": "lower", "stiffness": 1e2, "mass": 2},
+            ]
+        },
+        STRIP | {"stop": [SOFT | {"location": 0.6}]},
+    ],
+    ids=["chain", "beam"],
+)
+def test_a_structure_on_yielding_stops_is_followed_by_held_forces_and_by_step_revision(
+    tables: dict[str, Any],
+) -> None:
+    scene = studied_scene(Scene.from_dict(tables))
+    assert scene.period is not None
+    steps = [scene.period / count for count in (1009, 5003)]
+    for exchange in ("jacobi", "gauss_seidel"):
+        trials = {step: PlainForcesTrial(scene, exchange, step) for step in steps}
+        _, errors = errors_by_step(scene, dict(trials))
+        assert errors[1] == pytest.approx(errors[0] / 5.0, rel=0.5)
+    longest = 0.2 * scene.period
+    counts = {1.0 / count: RevisedTrial(scene, longest, count) for count in (10.0, 40.0)}
+    found, errors = errors_by_step(scene, dict(counts))
+    assert observed_order(found, errors) == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "left_out", "kept"),
+    [
+        (
+            {
+                "stop": [SOFT | {"location": 0.6}],
+                "forcing": {"amplitude": 0.3, "angular_frequency": 165.0},
+            },
+            "plain steps of equal size and step revision: a Beam takes one force, where it is forced",
+            None,
+        ),
+        (
+            {"stop": [RIGID, RIGID | {"location": 0.6}]},
+            "step revision: a Beam takes one force",
+            "plain steps",
+        ),
+        (
+            {"stop": [RIGID, SOFT | {"location": 0.6}]},
+            "plain steps of equal size: some stops are rigid and others yield",
+            None,
+        ),
+        (
+            {"stop": [RIGID], "body": STRIP["body"] | {"impact_projection": "collocation"}},
+            "plain steps of equal size: the impacts of a Beam with another projection",
+            "step revision",
+        ),
+    ],
+)
+def test_a_way_that_a_body_does_not_take_is_left_out_by_name(
+    changes: dict[str, Any], left_out: str, kept: str | None
+) -> None:
+    scene = studied_scene(Scene.from_dict(STRIP | changes))
+    assert any(remark.startswith(left_out) for remark in remarks_on(scene))
+    names = {way.name.partition(",")[0] for way in ways_of(scene)}
+    assert names & {"plain steps", "step revision"} == ({kept} if kept else set())
+
+
+def test_an_impact_whose_contact_is_not_over_is_none_of_a_way_either() -> None:
+    # a record has an impact on a stop that yields when its contact is over; here one is not at the end
+    scene = studied_scene(
+        Scene.from_dict(
+            STRIP
+            | {
+                "stop": [SOFT | {"location": 0.6}],
+                "forcing": {"amplitude": 0.3, "angular_frequency": 165.0},
+            }
+        )
+    )
+    ways = (CoupledTrial(scene, "3.0"), CoupledTrial(scene, "2.0"), ModelExchangeTrial(scene, 1e-8))
+    _, errors = errors_by_step(scene, dict(enumerate(ways)))
+    assert len(errors) == 3
+    assert len(reference_of(scene).observation.impacts) == 1
 
 
 def test_samples_tell_impacts_as_late_as_they_are_apart() -> None:

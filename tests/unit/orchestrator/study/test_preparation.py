@@ -15,9 +15,11 @@ from hypothesis import strategies as st
 import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.convergence import ModeRuns, converged_modes
 from vibroimpact.orchestrator.study.errors import errors_of
-from vibroimpact.orchestrator.study.preparation import converged_modes, prepared_scene, with_found_modes
+from vibroimpact.orchestrator.study.preparation import prepared_scene, with_found_modes
 from vibroimpact.orchestrator.study.references import observed, scales_of
+from vibroimpact.orchestrator.study.swept_modes import SweepPlaces, modes_of_sweep
 
 STRIP: dict[str, Any] = {
     "body": {
@@ -75,6 +77,57 @@ def test_the_point_of_a_sweep_that_takes_most_modes_decides() -> None:
     assert found.runs == 2
     assert "3 points" not in str(found.found["estimated_error_of"])
     assert "2 points" in str(found.found["estimated_error_of"])
+
+
+def resonance(points: int, stiffness: float = 1e5) -> Scene:
+    """A sweep through the second natural frequency, 1036 rad/s, near which alone the strip reaches its stop."""
+    scene = strip(
+        **{"body.damping_ratio": 0.005, "record.recorded_periods": 5, "record.impacts": False},
+        **{"stop[1].position": 1e-3, "stop[1].stiffness": stiffness, "execution.tolerance": 2e-2},
+    )
+    return scene.with_sweep({"forcing.angular_frequency": {"start": 800, "stop": 1600, "points": points}})
+
+
+def test_a_resonance_between_the_ends_of_a_sweep_decides() -> None:
+    swept = resonance(161)
+    places = SweepPlaces(swept)
+    ends = converged_modes([ModeRuns(places.scene_at(place), 2e-2) for place in places.ends()], 2e-2)
+    found = prepared_scene(swept)
+    assert found.body.size > ends.modes
+    assert len(places.ends()) < int(found.found["modes_checked_points"]) <= 32 + 32 + 3
+    assert "modes_unmet_points" not in found.found
+    errors = {place: error_of(places.scene_at((place,)), found.body.size) for place in range(38, 58)}
+    assert max(errors.values()) <= 2e-2
+    alone = {place: error_of(places.scene_at((place,)), ends.modes) for place in range(40, 56, 2)}
+    assert max(alone.values()) > 2e-2  # the ends alone would not have done
+
+
+def test_the_modes_of_a_sweep_follow_from_the_scene_alone(tmp_path: Path) -> None:
+    small = resonance(7)
+    assert prepared_scene(small).found == prepared_scene(small).found
+    first = vi.campaign(small, tmp_path / "campaign", workers=1, progress=False)
+    again = vi.campaign(small, tmp_path / "campaign", workers=1, progress=False)
+    assert first.attrs["modes_checked_points"] == 7  # all that there are
+    assert first.identical(again)
+
+
+def test_a_point_that_no_number_of_modes_meets_is_told_and_does_not_stop_the_sweep() -> None:
+    notes: list[str] = []
+    found = prepared_scene(resonance(801, stiffness=1e6), notes.append)
+    assert str(found.found["modes_unmet_points"]).startswith("forcing.angular_frequency = 10")
+    assert "no number of modes meets execution.tolerance = 0.02 at forcing.angular_frequency = 10" in notes[1]
+    with pytest.raises(SceneError, match=r"tolerance = 0.02 at forcing.angular_frequency = 1014, got "):
+        modes_of_sweep(
+            resonance(3, stiffness=1e6).with_sweep({"forcing.angular_frequency": [1000.0, 1014.0]}), 2e-2
+        )
+
+
+def test_keys_that_move_together_are_looked_at_where_they_meet() -> None:
+    together = {"values": [1e4, 1e3, 2e3], "zip": "stop"}, {"values": [1e-4, 3e-4, 2e-4], "zip": "stop"}
+    swept = strip().with_sweep(dict(zip(("stop[1].stiffness", "stop[1].position"), together, strict=True)))
+    places = SweepPlaces(swept)
+    assert places.ends() == [(1,), (0,), (2,)]
+    assert places.values_at((1,)) == {"stop[1].stiffness": 1e3, "stop[1].position": 3e-4}
 
 
 def test_residual_vectors_are_found_with_the_modes_before_them() -> None:
@@ -151,7 +204,7 @@ def test_chaotic_motion_is_compared_by_its_statistics() -> None:
         **{"stop[1].position": 0.0, "stop[1].damping": 0.0, "forcing.angular_frequency": 130.0},
         **{"forcing.amplitude": 1.0, "body.damping_ratio": 0.005, "record.recorded_periods": 100},
     )
-    found = converged_modes(scene, 0.2)
+    found = converged_modes([ModeRuns(scene, 0.2)], 0.2)
     assert found.by == "statistics"
     assert found.error <= 0.2
 
@@ -207,7 +260,7 @@ def test_the_estimated_error_of_modes_holds_against_64(
         **{"record.recorded_periods": 5},
     )
     try:
-        found = converged_modes(scene, 3e-3)
+        found = converged_modes([ModeRuns(scene, 3e-3)], 3e-3)
     except SceneError as refused:
         assert "expected a number of modes that meets" in str(refused)  # noqa: PT017
         return

@@ -1,0 +1,93 @@
+"""What memory a way takes: each runs once in a process of its own, whose resident memory the system counts."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
+
+from vibroimpact.fmus.errors import VibroimpactError
+from vibroimpact.orchestrator.campaign.lone_process import ProcessDied, call_alone
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.way import Way
+from vibroimpact.orchestrator.study.ways import ways_of
+
+UNKNOWN = -1
+"""Where nobody measures it."""
+IS_MEASURED = sys.platform == "linux"
+"""Elsewhere the resident memory of a process that was forked is not told by its peak."""
+
+
+def memory_of_ways(scene: Scene, given: Mapping[str, float], places: Sequence[int]) -> dict[int, int]:
+    """Return the largest resident memory that ways add to a process, Python's and that of the FMUs, bytes.
+
+    A process is started that loads this package and nothing else; each way is opened and run once in a fork of it, so
+    that none finds what another has left. Libraries of FMUs and Python modules that a way loads count, too.
+
+    Parameters
+    ----------
+    scene : Scene
+        Without a sweep.
+    given : mapping of str to float
+        What `ways_of` is given beside the scene.
+    places : sequence of int
+        Of the ways that are measured, in the order of `ways_of`.
+
+    Returns
+    -------
+    dict of int to int
+        By place; what a process that died would have taken is missing. Nothing where the system does not tell, or
+        the FMUs run in processes of their own.
+    """
+    guarded = scene.general.guard if scene.general is not None else scene.execution.guard
+    if guarded or not IS_MEASURED:
+        return {}
+    try:
+        found: dict[int, int] = call_alone(_in_forks, scene, dict(given), tuple(places))
+    except ProcessDied:
+        return {}
+    return found
+
+
+def _in_forks(scene: Scene, given: dict[str, float], places: tuple[int, ...]) -> dict[int, int]:
+    ways = ways_of(scene, **given)
+    found = {place: memory_in_fork(ways[place]) for place in places}
+    return {place: memory for place, memory in found.items() if memory != UNKNOWN}
+
+
+def memory_in_fork(way: Way) -> int:
+    """Open and run a way in a fork of this process; return what its resident memory grew by at most, bytes."""
+    answers, answer = os.pipe()
+    with warnings.catch_warnings():
+        # the other thread waits for the end of the parent alone, and holds nothing
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process = os.fork()
+    if process == 0:
+        try:
+            os.close(answers)
+            os.write(answer, str(_growth(way)).encode())
+        finally:
+            os._exit(0)  # whatever it was, nothing else of this process runs twice
+    os.close(answer)
+    with os.fdopen(answers) as pipe:
+        said = pipe.read()
+    os.waitpid(process, 0)
+    return int(said) if said else UNKNOWN
+
+
+def _growth(way: Way) -> int:
+    before = _peak()
+    try:
+        trial = way.open(None)
+        trial.run()
+    except VibroimpactError:
+        return UNKNOWN
+    return _peak() - before
+
+
+def _peak() -> int:
+    """Return the largest resident memory that this process has had, bytes."""
+    import resource
+
+    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

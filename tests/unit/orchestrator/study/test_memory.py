@@ -1,0 +1,71 @@
+"""Memory of ways: what the FMUs take counts as what Python takes, and no way finds what another left."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from typing import Any
+
+import pytest
+
+from vibroimpact.orchestrator.fmi.instance import Wrapper
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.study.memory import IS_MEASURED, memory_in_fork, memory_of_ways
+from vibroimpact.orchestrator.study.observation import Observation
+from vibroimpact.orchestrator.study.way import Trial, Way
+from vibroimpact.orchestrator.study.ways import ways_of
+
+pytestmark = pytest.mark.skipif(not IS_MEASURED, reason="this system does not tell it")
+
+MEGABYTE = 10**6
+SAMPLED: dict[str, Any] = {
+    "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.1},
+    "forcing": {"amplitude": 0.5, "angular_frequency": 1.0},
+    "stop": [{"law": "restitution", "position": 1.0, "restitution": 0.7}],
+    "record": {"recorded_periods": 20},
+}
+
+
+class OfC:
+    """Takes memory as a library in C does, of which Python knows nothing, and frees it."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+
+    def run(self) -> Observation:
+        library = ctypes.CDLL(None)
+        library.malloc.restype = ctypes.c_void_p
+        block = ctypes.c_void_p(library.malloc(ctypes.c_size_t(self._size)))
+        ctypes.memset(block, 1, self._size)
+        library.free(block)
+        return Observation()
+
+    def close(self) -> None:
+        return None
+
+
+def way_of(size: int) -> Way:
+    def opened(wrap: Wrapper | None) -> Trial:
+        return OfC(size)
+
+    return Way("of C", "", math.nan, {}, opened)
+
+
+def test_memory_of_c_counts_though_it_is_free_again() -> None:
+    for _ in range(2):  # and no fork finds what another has left
+        assert 50 * MEGABYTE <= memory_in_fork(way_of(50 * MEGABYTE)) <= 53 * MEGABYTE
+    assert memory_in_fork(way_of(0)) < 3 * MEGABYTE
+
+
+def test_a_way_that_keeps_more_samples_takes_more_memory() -> None:
+    scene, given = Scene.from_dict(SAMPLED), {"rate": 200.0}
+    names = [way.name for way in ways_of(scene, **given)]
+    fused, rates = names.index("fused"), [k for k, name in enumerate(names) if name == "read off samples"]
+    memory = memory_of_ways(scene, given, [fused, *rates])
+    assert list(memory) == [fused, *rates]
+    assert 0 < memory[fused] < memory[rates[-1]]  # 3200 samples a s for 126 s
+
+
+def test_memory_of_fmus_in_processes_of_their_own_is_not_told() -> None:
+    guarded = SAMPLED | {"execution": {"how": "coupled", "guard": True}}
+    assert memory_of_ways(Scene.from_dict(guarded), {}, [0]) == {}
