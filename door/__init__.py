@@ -64,6 +64,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.simulation import import_ssp as import_ssp
     from vibroimpact.simulation import replay as replay
     from vibroimpact.simulation import run as run
+    from vibroimpact.simulation import sensitivity as sensitivity
 
     __version__: str
 
@@ -99,6 +100,7 @@ _NAMES = {
         "import_ssp",
         "replay",
         "run",
+        "sensitivity",
     ),
 }
 _HOMES = {name: home for home, names in _NAMES.items() for name in names}

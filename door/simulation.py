@@ -14,6 +14,7 @@ import xarray as xr
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import SceneCost, run_campaign, run_scene
 from vibroimpact.orchestrator.campaign import cost_of as scene_cost
@@ -270,6 +271,55 @@ def effects(scene: SceneLike, path: PathLike | None = None) -> xr.Dataset:
     if path is not None:
         write_results(dataset, _path(path), kind="effects")
     return dataset.assign_attrs(results_kind="effects")
+
+
+def sensitivity(
+    dataset: xr.Dataset | PathLike,
+    path: PathLike | None = None,
+    *,
+    of: str | Sequence[str] = (),
+    level: float = LEVEL,
+    resamples: int = RESAMPLES,
+    seed: int = 0,
+) -> xr.Dataset:
+    """Estimate how much of the variance of each result each drawn key of a campaign accounts for (Sobol indices).
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset or path
+        A campaign with `sample = { design = "saltelli", ... }`, opened, or its file or folder.
+    path : path, optional
+        The dataset to write as well (.nc).
+    of : str or sequence of str
+        Quantities to look at: `displacement_range`, ...; none: all that there are.
+    level : float
+        Of the bootstrap intervals.
+    resamples, seed : int
+        Of the bootstrap.
+
+    Returns
+    -------
+    xarray.Dataset
+        `first_order`, `total_order`, `first_order_interval` and `total_order_interval` on `quantity`, `parameter` and
+        the other keys of the sweep; `attrs["remarks"]` says what was left out.
+
+    Raises
+    ------
+    DatasetError
+        The dataset has no whole Saltelli design, or nothing that varies over it.
+    UsageError
+        There is no such quantity; or the level, the number of resamples or the seed makes no sense.
+
+    Examples
+    --------
+    >>> sensitivity("campaign").total_order.sel(quantity="displacement_range")    # doctest: +SKIP
+    """
+    opened = dataset if isinstance(dataset, xr.Dataset) else open_dataset(_path(dataset))
+    names = [of] if isinstance(of, str) else list(of)
+    found = sensitivity_report(opened, names, level=level, resamples=resamples, seed=seed)
+    if path is not None:
+        write_results(found, _path(path), kind="sensitivity")
+    return found.assign_attrs(results_kind="sensitivity")
 
 
 def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> xr.Dataset:

@@ -19,6 +19,8 @@ AnyFile = Annotated[
 ]
 #: Of the correlation dimension: `intervals.dimension` has the same, and takes long to load.
 EMBEDDING, THEILER = 6, 1
+#: Of the intervals of Sobol indices: `sensitivity.report` has the same, and takes long to load.
+LEVEL, RESAMPLES = 0.95, 1000
 _KINDS_HELP = (
     "auto; of a sweep bifurcation, map, impacts-per-period, strobe, shapes, scores; of a run run, portrait, strobe, "
     "impact-map, return-map, spectrum, energies; of a recording or replay spectrum too; of a benchmark convergence, "
@@ -32,6 +34,7 @@ def register(app: typer.Typer) -> None:
     app.add_typer(estimate, name="estimate")
     app.command("spikes")(spikes)
     app.command("describe")(describe)
+    app.command("sensitivity")(sensitivity)
     fmu_commands.command("replay")(replay_fmu)
 
 
@@ -153,6 +156,33 @@ def describe(file: AnyFile) -> None:
     from vibroimpact.analysis.commands.describe import describe_file
 
     describe_file(file)
+
+
+def sensitivity(
+    file: Annotated[Path, typer.Argument(help="Dataset of a campaign with drawn keys (.nc), or its folder.")],
+    output: DatasetFile = None,
+    figure: FigureFile = None,
+    of: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Quantity to look at, displacement_range or another; again for more; default: all."
+        ),
+    ] = None,
+    level: Annotated[float, typer.Option(help="Of the bootstrap intervals, 0 to 1.")] = LEVEL,
+    resamples: Annotated[int, typer.Option(help="Of the bootstrap.")] = RESAMPLES,
+    seed: Annotated[int, typer.Option(help="Of the bootstrap.")] = 0,
+    force: Force = False,
+) -> None:
+    """Say how much of the variance of each result each drawn key of a campaign accounts for (Sobol indices).
+
+    First order: by the key alone; total: with all that it takes part in; each with a bootstrap interval. The scene has
+    two keys or more with a distribution and sample = { design = "saltelli", points = 256 } in [sweep].
+
+    Example: vibroimpact sensitivity campaign -o sensitivity.nc --figure sensitivity.png
+    """
+    from vibroimpact.analysis.commands.sensitivity import show_sensitivity
+
+    show_sensitivity(file, output, figure, of or (), level, resamples, seed, force)
 
 
 def replay_fmu(

@@ -22,6 +22,7 @@ from vibroimpact.analysis.figures.recordings import draw_recording
 from vibroimpact.analysis.figures.replay import draw_replay, recordings_of
 from vibroimpact.analysis.figures.runs import draw_run
 from vibroimpact.analysis.figures.scores import draw_scores
+from vibroimpact.analysis.figures.sensitivity import draw_sensitivity
 from vibroimpact.analysis.figures.series import sampled_variables
 from vibroimpact.analysis.figures.spectra import (
     draw_recording_spectrum,
@@ -43,7 +44,16 @@ from vibroimpact.fmus.wording import option
 
 Data = xr.Dataset | Recording
 Family = Literal[
-    "runs", "recording", "replay", "estimates", "spikes", "accuracy", "effects", "hard_cases", "ladder"
+    "runs",
+    "recording",
+    "replay",
+    "estimates",
+    "spikes",
+    "accuracy",
+    "effects",
+    "sensitivity",
+    "hard_cases",
+    "ladder",
 ]
 _WORDS: dict[Family, str] = {
     "runs": "a dataset of runs",
@@ -53,6 +63,7 @@ _WORDS: dict[Family, str] = {
     "spikes": "spikes",
     "accuracy": "a study of accuracy",
     "effects": "a study of effects",
+    "sensitivity": "a study of sensitivity",
     "hard_cases": "hard cases",
     "ladder": "what a benchmark measured",
 }
@@ -151,6 +162,7 @@ KINDS: dict[str, FigureKind] = {
     "intervals": FigureKind({"spikes": lambda data, view: draw_intervals(data)}),
     "accuracy": FigureKind({"accuracy": lambda data, view: draw_accuracy(data)}),
     "effects": FigureKind({"effects": lambda data, view: draw_effects(data)}),
+    "sensitivity": FigureKind({"sensitivity": lambda data, view: draw_sensitivity(data)}),
     "hard-cases": FigureKind({"hard_cases": lambda data, view: draw_hard_cases(data)}),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
@@ -212,6 +224,7 @@ def _family(data: Data) -> Family:
         "spikes": "spikes",
         "accuracy": "accuracy",
         "effects": "effects",
+        "sensitivity": "sensitivity",
         "hard_cases": "hard_cases",
     }
     written = str(data.attrs.get("results_kind", ""))

@@ -97,6 +97,7 @@ def kinds() -> dict[str, Picture]:
         "effects": _of(
             "effects", "parts", "vibroimpact effects examples/thesis/figure_7_11.toml -o parts.nc"
         ),
+        "sensitivity": _of("sensitivity", "shares", "vibroimpact sensitivity tolerances.nc -o shares.nc"),
         "hard-cases": _of("hard-cases", "cases", "vibroimpact hard-cases -o cases.nc"),
         "convergence": _of("convergence", "ladder"),
         "work-precision": _of("work-precision", "ladder"),

@@ -33,7 +33,16 @@ COMMAND_GROUP = "vibroimpact.commands"
 PANELS = {
     "Simulate": ("check", "run", "campaign", "demo"),
     "Look": ("plot", "describe"),
-    "Measure and compare": ("accuracy", "effects", "hard-cases", "import", "replay", "estimate", "spikes"),
+    "Measure and compare": (
+        "accuracy",
+        "effects",
+        "sensitivity",
+        "hard-cases",
+        "import",
+        "replay",
+        "estimate",
+        "spikes",
+    ),
     "Exchange": ("fmu", "ssp"),
     "Serve": ("serve", "submit", "status", "fetch", "cancel"),
 }

@@ -98,7 +98,7 @@ def constant_file_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
     every = [*keys, *(axis.key for axis in scene.sweep)]
     short = {key: coordinate_name(key, every) for key in keys}
     twice = Counter(short.values())
-    taken = RESERVED_NAMES | set(coordinate_names(scene).values()) | set(stored_samples(scene))
+    taken = _taken(scene) | set(coordinate_names(scene).values()) | set(stored_samples(scene))
     wanted = [name if twice[name] == 1 else key for key, name in short.items()]
     return dict(zip(short, file_names(wanted, taken), strict=True))
 
@@ -106,12 +106,18 @@ def constant_file_names(scene: Scene, keys: Iterable[str]) -> dict[str, str]:
 def coordinate_names(scene: Scene) -> dict[str, str]:
     """Return the name that each swept key has in the file, by key."""
     keys = [axis.key for axis in scene.sweep]
-    return dict(zip(keys, file_names([scene.sweep_coordinate_name(key) for key in keys]), strict=True))
+    wanted = [scene.sweep_coordinate_name(key) for key in keys]
+    return dict(zip(keys, file_names(wanted, _taken(scene)), strict=True))
+
+
+def _taken(scene: Scene) -> frozenset[str]:
+    """Return the names that no number of a scene may have in the file: what has the name of a dimension is along it."""
+    return RESERVED_NAMES | set(shared_dimensions(scene.sweep).values())
 
 
 def stored_samples(scene: Scene) -> tuple[str, ...]:
     """Return the name that each sampled variable has in the file, in the order of the scene."""
-    return file_names(sample_variables(scene), RESERVED_NAMES | set(coordinate_names(scene).values()))
+    return file_names(sample_variables(scene), _taken(scene) | set(coordinate_names(scene).values()))
 
 
 def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:

@@ -24,6 +24,7 @@ from vibroimpact.orchestrator.scene.designs import (
 from vibroimpact.orchestrator.scene.fields import listed
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, problems_of, quoted, read_table
 from vibroimpact.orchestrator.scene.sweep import (
+    SCATTERED,
     Adaptive,
     SweepAxis,
     axis_of_range,
@@ -31,7 +32,7 @@ from vibroimpact.orchestrator.scene.sweep import (
     log_axis,
     run_count,
 )
-from vibroimpact.orchestrator.scene.sweep_models import AxisTable, SampleTable
+from vibroimpact.orchestrator.scene.sweep_models import MOST_POINTS_PER_AXIS, AxisTable, SampleTable
 
 FORMS = "{ start = 0.6, stop = 1.6, points = 401 } or { values = [0.6, 0.7] }"
 SAMPLE = "sample"
@@ -91,6 +92,8 @@ def _form_problems(key: str, table: AxisTable) -> Iterator[Problem]:
 
 
 _MOMENTS = ("low", "high", "mean", "deviation")
+_WIDEST = 10.0
+"""Deviations from the mean beyond which nothing is drawn."""
 
 
 def _range_problems(key: str, table: AxisTable, given: Sequence[str]) -> Iterator[Problem]:
@@ -98,7 +101,9 @@ def _range_problems(key: str, table: AxisTable, given: Sequence[str]) -> Iterato
     if table.start is None or table.stop is None or table.points is None:
         missing = [name for name in _RANGE if name not in given]
         yield Problem(where, FORMS, listed(given, "and") or "neither", f"Add {listed(missing, 'and')}.")
-    elif table.spacing == "log" and not table.start * table.stop > 0.0:
+    elif table.spacing == "log" and not (
+        min(table.start, table.stop) > 0.0 or max(table.start, table.stop) < 0.0
+    ):
         got = f"start = {quoted(table.start)} and stop = {quoted(table.stop)}"
         expected = 'ends that are both > 0, or both < 0, of a range with spacing = "log"'
         yield Problem(where, expected, got, 'No ratio leads from one to the other: use spacing = "linear".')
@@ -129,8 +134,12 @@ def _distribution_problems(key: str, table: AxisTable) -> Iterator[Problem]:
         yield Problem(where, "low < high", got, "Exchange them.")
     elif table.distribution == "log-uniform" and not low > 0.0:
         yield Problem(where, "low > 0 of a log-uniform distribution", got, 'Use distribution = "uniform".')
-    elif not math.isfinite(high - low) and table.distribution == "uniform":
+    elif table.distribution == "uniform" and not math.isfinite(high - low):
         yield Problem(where, "ends whose distance is a number", got, "Bring them nearer.")
+    elif table.distribution == "log-uniform" and not math.isfinite(high / low):
+        yield Problem(where, "ends whose ratio is a number", got, "Bring them nearer.")
+    elif table.distribution == "normal" and not math.isfinite(_WIDEST * (table.deviation or 0.0)):
+        yield Problem(where, "a deviation whose multiples are numbers", quoted(table.deviation), "Lower it.")
     elif table.distribution == "normal" and not has_probability(
         table.mean or 0.0, table.deviation or 1.0, low, high
     ):
@@ -160,7 +169,7 @@ def _company_problems(key: str, table: AxisTable) -> Iterator[Problem]:
     if drawn_or_zipped and table.adaptive is not None:
         where = key_path(("sweep", key, "adaptive"))
         yield Problem(where, f"no adaptive beside {drawn_or_zipped}", "one", "An adaptive axis moves alone.")
-    if table.zip is not None and (table.zip in RESERVED_NAMES or table.zip == DRAW):
+    if table.zip is not None and table.zip in RESERVED_NAMES | {DRAW, SCATTERED}:
         where = key_path(("sweep", key, "zip"))
         yield Problem(
             where, "a name that datasets do not use themselves", quoted(table.zip), "Choose another."
@@ -213,22 +222,44 @@ def _drawn_values(
                 Problem(key_path(("sweep", key)), f"{SAMPLE} beside a distribution", "none", hint)
             )
         return {}
+    if not isinstance(sample, dict):
+        problems.append(
+            Problem(
+                key_path(("sweep", SAMPLE)), "a table", quoted(sample), f"Write {SAMPLE} = {_SAMPLE_FORM}."
+            )
+        )
+        return {}
     design = read_table(SampleTable, sample, ("sweep", SAMPLE), problems)
     if design is None or not keys:
         return {}
-    if design.design in BALANCED and design.points.bit_count() != 1:
-        lower = 1 << (design.points.bit_length() - 1)
-        hint = f"Use {lower} or {2 * lower}."
-        place = key_path(("sweep", SAMPLE, "points"))
-        problems.append(
-            Problem(place, f"a power of 2 of a {design.design} design", quoted(design.points), hint)
-        )
+    if found := list(_design_problems(design, list(keys))):
+        problems += found
         return {}
     shares = unit_design(design.design, design.points, len(keys), design.seed)
     return {
         key: drawn(shares[:, place], _quantile(table), *_ends(table))
         for place, (key, table) in enumerate(keys.items())
     }
+
+
+def _design_problems(design: SampleTable, keys: Sequence[str]) -> Iterator[Problem]:
+    """Yield what is wrong with a design for these keys."""
+    place, points = key_path(("sweep", SAMPLE, "points")), design.points
+    if design.design in BALANCED and points.bit_count() != 1:
+        lower = 1 << (points.bit_length() - 1)
+        hint = f"Use {lower} or {2 * lower}."
+        yield Problem(place, f"a power of 2 of a {design.design} design", quoted(points), hint)
+    elif design.design == "saltelli" and len(keys) < 2:
+        hint = 'Nothing is compared with one: use design = "sobol", or draw another key.'
+        yield Problem(
+            key_path(("sweep", SAMPLE, "design")), "two drawn keys or more beside saltelli", keys[0], hint
+        )
+    elif design.design == "saltelli" and points * (len(keys) + 2) > MOST_POINTS_PER_AXIS:
+        most = 1 << ((MOST_POINTS_PER_AXIS // (len(keys) + 2)).bit_length() - 1)
+        got = f"{points}, which is {points * (len(keys) + 2)} runs of {len(keys)} keys"
+        yield Problem(
+            place, f"at most {most} points of a saltelli design", got, "It has keys + 2 runs for each."
+        )
 
 
 def _quantile(table: AxisTable) -> Quantile:
@@ -277,6 +308,8 @@ def _group_problems(axes: Sequence[SweepAxis]) -> Iterator[Problem]:
         values, times = Counter(together).most_common(1)[0]
         if times > 1:
             hint = "Each point is run once: remove the repeated value or lower points."
+            if name == DRAW:
+                hint = "Drawn values have 12 digits: widen the distribution or lower points."
             got = f"{', '.join(map(quoted, values))} {times} times"
             yield Problem(where, "values that differ from each other", got, hint)
         if name and name in {axis.key.rpartition(".")[2] for axis in axes}:
@@ -330,6 +363,11 @@ def _refinement_problems(axis: SweepAxis, count: int) -> Iterator[Problem]:
             "two values or more of an adaptive axis",
             "1",
             "Points are put between them.",
+        )
+    elif not math.isfinite(values[-1] - values[0]):
+        got = f"{quoted(values[0])} and {quoted(values[-1])}"
+        yield Problem(
+            key_path(("sweep", axis.key)), "ends whose distance is a number", got, "Bring them nearer."
         )
     elif tolerance < finest:
         hint = "Numbers of this size are no finer."

@@ -38,7 +38,7 @@ class AdaptiveTable(SceneTable):
     tolerance: Annotated[
         Finite,
         Field(gt=0),
-        Rule(unit="of the key", doc="intervals where the motion jumps are halved until they are no wider"),
+        Rule(doc="intervals where the motion jumps are halved until they are no wider"),
     ]
     at_most: Annotated[
         int | None,
@@ -51,7 +51,10 @@ class AdaptiveTable(SceneTable):
     jump: Annotated[
         Finite,
         Field(gt=0, le=1),
-        Rule(doc="change of the recorded range, over the largest one, that counts as a jump"),
+        Rule(
+            "a number > 0 and <= 1",
+            doc="change of the recorded range, over the largest one, that counts as a jump",
+        ),
     ] = 0.05
 
 

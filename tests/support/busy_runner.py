@@ -19,6 +19,7 @@ import numpy as np
 
 from vibroimpact.analysis.dataset import Outcome, RunRecord
 from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.guard.guarded import make_runner
 from vibroimpact.orchestrator.scene import Scene
 
 ROUNDS_PER_MILLISECOND = 4400
@@ -88,6 +89,25 @@ class OtherBuildRunner(SceneRunner):
     def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
         super().__init__(scene, execution=execution)
         self.fmu_hashes = {"Busy": "1" * 64}
+
+
+class UnhurriedRunner:
+    """The real runner of a scene, asleep for a while at each point: time to kill what runs it."""
+
+    def __init__(self, scene: Scene, *, execution: str = "auto") -> None:
+        self._runner = make_runner(scene, execution=execution)
+        self.execution = self._runner.execution
+        self.instruction_set = self._runner.instruction_set
+        self.fmu_hashes = self._runner.fmu_hashes
+
+    def run(self, values: Mapping[str, float], start: tuple[float, float] | None) -> RunRecord:
+        """Run one point, after 5 ms."""
+        time.sleep(0.005)
+        return self._runner.run(values, start)
+
+    def close(self) -> None:
+        """End the real runner."""
+        self._runner.close()
 
 
 class BrittleRunner(BusyRunner):

@@ -85,6 +85,15 @@ def test_two_stops_are_named_as_a_sweep_of_both_would_name_them(tmp_path: Path) 
     assert "N/m^1.5" in found.stop_2_stiffness.attrs["long_name"]
 
 
+def test_a_number_with_the_name_of_a_dimension_has_another_name(tmp_path: Path) -> None:
+    for dimension, value in {"amplitude": 0.5, "damping_ratio": 0.05}.items():
+        sweep = f'[sweep]\n"body.mass" = {{ values = [1.0, 2.0], zip = "{dimension}" }}'
+        dataset = opened(tmp_path, SCENE.format(position=0.1, sweep=sweep))
+        assert dataset.displacement_range.dims == dataset.mass.dims == (dimension,)
+        assert constants(dataset)[f"{dimension}_2"] == value
+        assert dimension not in dataset.coords
+
+
 def test_of_two_keys_for_one_thing_the_one_that_counts_is_there(tmp_path: Path) -> None:
     text = SCENE.format(position=0.1, sweep="").replace("angular_frequency = 0.8", "frequency = 0.2")
     found = constants(opened(tmp_path, text.replace("damping_ratio = 0.05", "damping = 0.1")))

@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError
 from vibroimpact.orchestrator.scene import Scene, parse_scene
 from vibroimpact.orchestrator.scene.designs import drawn, log_uniform, normal, uniform, unit_design
-from vibroimpact.orchestrator.scene.sweep import expand
+from vibroimpact.orchestrator.scene.sweep import SweepAxis, expand
 
 TEXT = """
 [body]
@@ -30,6 +31,14 @@ recorded_time = 5
 
 def swept(*lines: str) -> Scene:
     return parse_scene(TEXT + "\n".join(lines), "scene.toml")
+
+
+def read(*lines: str) -> tuple[tuple[SweepAxis, ...], list[str]]:
+    """Return the axes of a sweep, or its problems."""
+    try:
+        return swept(*lines).sweep, []
+    except SceneError as problem:
+        return (), str(problem).splitlines()
 
 
 def problems(*lines: str) -> list[str]:
@@ -117,6 +126,29 @@ BAD = {
         SOBOL,
         '"body.mass" = { distribution = "normal", mean = 1, deviation = 0.1, low = 5 }',
     ],
+    "expected ends whose ratio is a number": [
+        SOBOL,
+        '"body.stiffness" = { distribution = "log-uniform", low = 1e-300, high = 1e300 }',
+    ],
+    "expected ends whose distance is a number, got low = -1.7e+308": [
+        SOBOL,
+        '"body.velocity_start" = { distribution = "uniform", low = -1.7e308, high = 1.7e308 }',
+    ],
+    "expected a deviation whose multiples are numbers, got 1e+308": [
+        SOBOL,
+        '"body.velocity_start" = { distribution = "normal", mean = 0, deviation = 1e308 }',
+    ],
+    "Drawn values have 12 digits: widen the distribution": [SOBOL, UNIFORM % (1, 1.0000000000000002)],
+    'sweep.sample: expected a table, got "sobol". Write sample = {': ['sample = "sobol"', UNIFORM % (1, 2)],
+    "expected two drawn keys or more beside saltelli, got body.mass": [
+        SOBOL.replace("sobol", "saltelli"),
+        UNIFORM % (1, 2),
+    ],
+    "expected at most 131072 points of a saltelli design, got 262144, which is 1048576 runs of 2 keys": [
+        SOBOL.replace('sobol", points = 8', 'saltelli", points = 262144'),
+        UNIFORM % (1, 2),
+        (UNIFORM % (1, 2)).replace("mass", "stiffness"),
+    ],
     "expected a distribution beside them, got low": [
         '"body.mass" = { start = 1, stop = 2, points = 3, low = 0 }'
     ],
@@ -126,6 +158,9 @@ BAD = {
     ],
     'expected "independent" beside zip': ['"body.mass" = { values = [1, 2], zip = "size", path = "up" }'],
     "expected a name that datasets do not use themselves": ['"body.mass" = { values = [1, 2], zip = "run" }'],
+    'expected a name that datasets do not use themselves, got "point"': [
+        '"body.mass" = { values = [1, 2], zip = "point" }'
+    ],
     "expected a zip that is no name of a swept key": ['"body.mass" = { values = [1, 2], zip = "mass" }'],
 }
 
@@ -146,6 +181,33 @@ BAD_ADAPTIVE = {
     ],
     "expected more than 5 points, got 5": [
         f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 5 }} }}'
+    ],
+    "expected a number > 0 and <= 1, got 0.": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 90, jump = 0 }} }}'
+    ],
+    'expected a number > 0, got "1e-3". Write the number alone, without quotes.': [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = "1e-3", at_most = 90 }} }}'
+    ],
+    "expected a number > 0, got nan": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = nan, at_most = 90 }} }}'
+    ],
+    "expected a whole number from 2 to 1000000, got 90.0": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 90.0 }} }}'
+    ],
+    "expected a table with tolerance and at_most, got true": [
+        f'"body.mass" = {{ {RANGE}, adaptive = true }}'
+    ],
+    "expected more than 5 points, got 2": [
+        f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 2 }} }}'
+    ],
+    "expected two values or more of an adaptive axis, got 1": [
+        '"body.mass" = { values = [1], adaptive = { tolerance = 1e-3, at_most = 9 } }'
+    ],
+    "expected ends whose distance is a number, got -1.7e+308 and 1.7e+308": [
+        '"body.velocity_start" = { values = [-1.7e308, 1.7e308], adaptive = { tolerance = 1e300, at_most = 9 } }'
+    ],
+    "expected no adaptive beside zip": [
+        '"body.mass" = { values = [1, 2], zip = "size", adaptive = { tolerance = 1e-3, at_most = 9 } }'
     ],
     "expected the most points of the sweep, got nothing": [
         f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3 }} }}'
@@ -191,3 +253,92 @@ def test_a_whole_number_is_not_adaptive() -> None:
     line = '"body.modes" = { values = [1, 4], adaptive = { tolerance = 1, at_most = 9 } }'
     with pytest.raises(SceneError, match="expected a key between whose values there are others"):
         parse_scene(text + line, "scene.toml")
+
+
+sizes = st.floats(-300.0, 300.0).map(lambda power: 10.0**power)
+
+
+@given(start=sizes, stop=sizes, points=st.integers(2, 50), sign=st.sampled_from([-1.0, 1.0]))
+def test_a_log_axis_has_its_ends_one_sign_and_one_ratio(
+    start: float, stop: float, points: int, sign: float
+) -> None:
+    ends = f"start = {sign * start}, stop = {sign * stop}, points = {points}"
+    axes, told = read(f'"body.velocity_start" = {{ {ends}, spacing = "log" }}')
+    if told:
+        assert "values that differ from each other" in told[0]
+        assert start == pytest.approx(stop, rel=1e-12)
+        return
+    (axis,) = axes
+    assert (axis.values[0], axis.values[-1]) == (sign * start, sign * stop)
+    assert all(value * sign > 0.0 for value in axis.values)
+    steps = np.diff(np.log(np.abs(axis.values)))
+    assert steps == pytest.approx(np.full(points - 1, steps.mean()), abs=1e-12, rel=1e-9)
+
+
+@given(
+    st.lists(st.lists(st.integers(0, 3), min_size=1, max_size=3), min_size=1, max_size=3),
+    st.sampled_from(["independent", "up-down"]),
+)
+def test_the_points_of_zipped_axes_are_one_of_each_group(groups: list[list[int]], path: str) -> None:
+    """A group is a number of keys that move together; its first number is how many values they have."""
+    free = iter(
+        ["body.mass", "body.stiffness", "body.damping", "body.displacement_start", "body.velocity_start"]
+    )
+    lines, lengths = [], []
+    for number, group in enumerate(groups):
+        keys = [key for key, _ in zip(free, group, strict=False)]
+        count = group[0] + 1
+        values = [round(0.1 + 0.1 * place, 1) for place in range(count)]
+        lines += [f'"{key}" = {{ values = {values}, zip = "group_{number}" }}' for key in keys]
+        lengths += [count] if keys else []
+    lines.append(f'"stop[1].position" = {{ values = [1.0, 2.0], path = "{path}" }}')
+    scene = swept(*lines)
+    points = [point for branch in expand(scene) for point in branch.points]
+    ways = 2 if path == "up-down" else 1
+    assert len(points) == scene.runs == math.prod(lengths) * 2 * ways
+    assert [point.index for point in points] == list(range(scene.runs))
+    assert len({tuple(sorted(point.values.items())) for point in points}) == scene.runs // ways
+
+
+@given(
+    design=st.sampled_from(["random", "sobol", "saltelli"]),
+    power=st.integers(0, 5),
+    kind=st.sampled_from(["uniform", "log-uniform", "normal"]),
+    low=sizes,
+    ratio=st.floats(1.0, 1e12),
+)
+def test_any_distribution_gives_sound_values_or_problems(
+    design: str, power: int, kind: str, low: float, ratio: float
+) -> None:
+    high = min(low * ratio, 1e300)
+    moments = f", mean = {low}, deviation = {0.1 * high}" if kind == "normal" else ""
+    lines = [
+        f'sample = {{ design = "{design}", points = {2**power} }}',
+        f'"body.stiffness" = {{ distribution = "{kind}", low = {low}, high = {high}{moments} }}',
+        UNIFORM % (1, 2),
+    ]
+    axes, told = read(*lines)
+    if told:
+        assert all(": expected " in problem and ", got " in problem for problem in told)
+        return
+    first, second = axes
+    assert len(first.values) == len(second.values) == 2**power * (4 if design == "saltelli" else 1)
+    assert all(low <= value <= high for value in first.values)
+
+
+def test_a_drawn_frequency_in_hertz_is_the_motion_of_one_in_radians() -> None:
+    text = TEXT.replace("recorded_time = 5", "recorded_periods = 5")
+    tables = "[forcing]\namplitude = 1\n%s = 1\n[[stop]]"
+    drawn_text = text.replace("[[stop]]", tables % "frequency") + SOBOL
+    line = '"forcing.frequency" = { distribution = "uniform", low = 0.1, high = 0.4 }'
+    scene = parse_scene(f"{drawn_text}\n{line}", "scene.toml")
+    hertz = np.array(scene.sweep[0].values)
+    listed_text = text.replace("[[stop]]", tables % "angular_frequency")
+    radians = f'"forcing.angular_frequency" = {{ values = {(2.0 * math.pi * hertz).tolist()} }}'
+    one, other = (
+        vi.run(each, progress=False) for each in (scene, parse_scene(listed_text + radians, "s.toml"))
+    )
+    assert one.frequency.attrs["units"] == "Hz"
+    assert one.frequency.values.tolist() == hertz.tolist()
+    other = other.isel(angular_frequency=np.argsort(np.argsort(hertz)))
+    np.testing.assert_allclose(one.displacement_range, other.displacement_range, rtol=1e-9)

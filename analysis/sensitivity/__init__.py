@@ -1,0 +1,8 @@
+"""How much of the variance of a result each drawn key of a campaign accounts for: Sobol indices with intervals."""
+
+from __future__ import annotations
+
+from vibroimpact.analysis.sensitivity.indices import Indices, sobol_indices
+from vibroimpact.analysis.sensitivity.report import LEVEL, RESAMPLES, sensitivity_report
+
+__all__ = ["LEVEL", "RESAMPLES", "Indices", "sensitivity_report", "sobol_indices"]
