@@ -131,6 +131,8 @@ def test_a_click_on_a_map_shows_its_point_and_a_drag_zooms(seen: PageSession, jo
     page = seen.show_job(jobs.map)
     page.get_by_label("Show", exact=True).wait_for()
     assert drawn(page) == 18
+    page.locator("canvas").first.hover(position={"x": 210, "y": 70})
+    assert "range of the displacement" in page.locator(".tip").first.inner_text()
     page.locator("canvas").first.click(position={"x": 200, "y": 60})
     page.get_by_role("heading", name=POINT).wait_for()
     page.get_by_label("Show", exact=True).select_option(label="Over angular frequency")
