@@ -20,6 +20,7 @@ from vibroimpact.analysis.dataset import (
     RULES,
     Direction,
     RunRecord,
+    merge_datasets,
     read_flat,
 )
 from vibroimpact.analysis.dataset.schema import attributes_of, known_unit, unit_in
@@ -35,6 +36,7 @@ from vibroimpact.orchestrator.campaign.chunks import (
     run_points,
 )
 from vibroimpact.orchestrator.campaign.manifest import read_manifest
+from vibroimpact.orchestrator.campaign.rounds import Rounds, adaptive_axes
 from vibroimpact.orchestrator.run import named_runner
 from vibroimpact.orchestrator.scene import Scene, load_scene, parse_scene
 from vibroimpact.orchestrator.scene.models import TimeSeries
@@ -66,7 +68,7 @@ def simulated(path: Path, results: Path, run: int) -> dict[str, Any]:
     """Return the motion of one point, ready for JSON."""
     given = load_scene(path)
     scene = _as_it_ran(given, results)
-    place, branch = _place_of(scene, run)
+    place, branch = _place_of(scene, results, run)
     start = None if place.first else _start_of(results, branch, run)
     watched = _watched(scene, place)
     runner = named_runner(watched, DEFAULT_RUNNER)
@@ -104,14 +106,17 @@ def _as_it_ran(given: Scene, results: Path) -> Scene:
     return given if manifest is None else parse_scene(manifest.scene_text, given.source)
 
 
-def _place_of(scene: Scene, run: int) -> tuple[BranchPoint, Branch]:
-    branches = expand(scene)
-    for number, branch in enumerate(branches):
-        first = branch.points.first_index
-        if first <= run < first + len(branch.points):
-            (place,) = points_of(branches, Chunk(number, run, run + 1))
-            return place, branch
-    raise UsageError(f"run: expected a point of this campaign, got {run}.")
+def _place_of(scene: Scene, results: Path, run: int) -> tuple[BranchPoint, Branch]:
+    """Return a point with its branch; of an adaptive sweep the rounds before it say where both are."""
+    if adaptive_axes(scene):
+        branch = Rounds(scene).branch_of(merge_datasets(files_of(results)), run)
+    else:
+        ends = ((one, one.points.first_index + len(one.points)) for one in expand(scene))
+        branch = next((one for one, end in ends if run < end), None)
+    if branch is None:
+        raise UsageError(f"run: expected a point of this campaign, got {run}.")
+    (place,) = points_of([branch], Chunk(0, run, run + 1))
+    return place, branch
 
 
 def _start_of(results: Path, branch: Branch, run: int) -> State | None:

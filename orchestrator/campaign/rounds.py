@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from vibroimpact.analysis.dataset import Direction, merge_datasets, read_flat
+from vibroimpact.analysis.dataset import Direction, merge_datasets, read_flat, take_runs
 from vibroimpact.analysis.jumps import RunClasses, classes_of
 from vibroimpact.orchestrator.campaign.chunks import CARRYING, Chunk, State, points_of
 from vibroimpact.orchestrator.campaign.extension import final_states
@@ -87,6 +87,29 @@ class Rounds:
                 parts = self._parts(stored(), branches, first, stop)
             self._take(merge_datasets([part.path for part in parts]))
             branches, first, number = self._next(stop), stop, number + 1
+
+    def branch_of(self, rows: xr.Dataset, run: int) -> Branch | None:
+        """Return the branch of a run; None where no round has it, or one before it is not complete.
+
+        Parameters
+        ----------
+        rows : xarray.Dataset
+            Runs that are computed, one-dimensional.
+        run : int
+        """
+        branches, first = expand(self._scene), 0
+        runs = rows.run_index.values
+        while branches:
+            last = branches[-1].points
+            stop = last.first_index + len(last)
+            if run < stop:
+                return next(one for one in branches if run < one.points.first_index + len(one.points))
+            places = np.flatnonzero((runs >= first) & (runs < stop))
+            if places.size < stop - first:
+                return None
+            self._take(take_runs(rows, places))
+            branches, first = self._next(stop), stop
+        return None
 
     def _parts(
         self, stored: Sequence[StoredPart], branches: Sequence[Branch], first: int, stop: int

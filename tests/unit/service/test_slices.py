@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import vibroimpact as vi
-from vibroimpact.orchestrator.campaign import run_scene
+from vibroimpact.orchestrator.campaign import run_campaign, run_scene
 from vibroimpact.service.landed import LandedReader, files_of
 from vibroimpact.service.page_api import examples_folder
 from vibroimpact.service.point_process import simulated
@@ -106,6 +106,24 @@ def test_a_point_of_a_path_is_simulated_from_where_the_one_before_ended(file: Pa
             assert found["coordinates"]["angular_frequency"] == runs.angular_frequency.values[run]
     with pytest.raises(vi.VibroimpactError, match="expected a point of this campaign, got 80"):
         simulated(file.parent / "scene.toml", file.parent, 80)
+
+
+@pytest.mark.slow
+def test_a_point_of_a_later_round_is_simulated_from_where_it_began(tmp_path: Path) -> None:
+    adaptive = 'points = 9, path = "up-down", adaptive = { tolerance = 0.001, at_most = 200 } }'
+    text = SCENE.replace('points = 20, path = "up-down" }', adaptive)
+    run_campaign(vi.Scene.from_text(text), tmp_path / "campaign", workers=1)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(text, encoding="utf-8")
+    with vi.open_dataset(tmp_path / "campaign") as dataset:
+        runs = dataset.vibroimpact.runs.load()
+    assert runs.sizes["run"] > 40, "there are rounds beside the first"
+    for place in range(30, runs.sizes["run"], 7):
+        found = simulated(scene, tmp_path / "campaign", int(runs.run_index[place]))
+        assert found["coordinates"]["angular_frequency"] == runs.angular_frequency.values[place]
+        assert found["periods"]["strobe_displacement"] == pytest.approx(
+            runs.strobe_displacement.values[place].tolist(), rel=1e-6
+        )
 
 
 def test_failures_are_the_runs_with_their_outcome_and_reason(file: Path) -> None:
