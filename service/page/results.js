@@ -1,7 +1,7 @@
 // What a job leaves: its figure, what it said, its files.
 
-import { address, askText, campaignPath } from "./api.js";
-import { element, titleOf } from "./dom.js";
+import { address, ask, askText, campaignPath } from "./api.js";
+import { choice, element, titleOf } from "./dom.js";
 
 const TOLD = ["replay", "estimate"]; // their results are their figure and what they say; others have a diagram or a motion
 
@@ -35,8 +35,15 @@ export class Results {
   }
 
   drawn(job) {
-    const made = figure(campaignPath(this.id, "/figure?format=svg"), `Figure of ${titleOf(job)}`);
-    return TOLD.includes(job.kind) ? made : element("details", {}, element("summary", {}, "Figure"), made);
+    const place = element("div"), kinds = element("div");
+    const draw = (kind) => place.replaceChildren(figure(campaignPath(this.id, `/figure?format=svg&kind=${kind}`), `Figure of ${titleOf(job)}`));
+    const begin = async () => {
+      if (place.children.length) return;
+      draw("auto");
+      const names = await figureKinds().catch(() => []); // the banner says that nobody answers
+      if (names.length) kinds.replaceChildren(choice("Kind of figure", names.map((name) => [name, name.replaceAll("-", " ")]), "auto", draw));
+    };
+    return element("details", { open: TOLD.includes(job.kind), ontoggle: begin }, element("summary", {}, "Figure"), kinds, place);
   }
 
   async readLog() {
@@ -53,9 +60,16 @@ export class Results {
   }
 }
 
-/** Return a picture that the service draws, asked for once it is seen. */
+/** Return the kinds of figures that the service draws. */
+async function figureKinds() {
+  const { paths } = await ask("GET", "/openapi.json");
+  const { parameters } = paths[address("/campaigns/{name}/figure")].get;
+  return parameters.find(({ name }) => name === "kind").schema.enum;
+}
+
+/** Return a picture that the service draws, or why there is none. */
 export function figure(path, text) {
-  const made = element("img", { class: "figure", loading: "lazy", alt: text, src: address(path) });
-  made.addEventListener("error", () => made.replaceWith(element("p", { class: "small muted" }, "There is no figure of this.")));
+  const made = element("img", { class: "figure", alt: text, src: address(path) });
+  made.addEventListener("error", () => askText(path).catch((error) => made.replaceWith(element("p", { class: "problem" }, error.message))));
   return made;
 }
