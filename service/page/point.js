@@ -17,6 +17,10 @@ export async function showPoint(host, id, run, closed = null) {
   const head = element("div", { class: "head" }, element("h2", { tabindex: "-1" }, name), closed && button("Close", closed, { class: "last" }));
   const said = element("p", { class: "muted", role: "status" }, "Simulating …");
   host.replaceChildren(head, said);
+  if (closed) { // at once: what is done while it is simulated is not interrupted
+    head.querySelector("h2").focus({ preventScroll: true });
+    host.scrollIntoView({ block: "nearest" });
+  }
   tell(`${name}: simulating`);
   try {
     const data = await answered(id, run, () => host.asked === mine);
@@ -24,7 +28,6 @@ export async function showPoint(host, id, run, closed = null) {
     said.remove();
     host.append(...views(data));
     tell(`${name}: ${data.outcome}`);
-    if (closed) head.querySelector("h2").focus();
   } catch (error) {
     if (host.asked === mine) said.replaceWith(element("p", { class: "problem", role: "alert" }, error.message));
   }
