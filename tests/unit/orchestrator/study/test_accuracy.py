@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from support.fmu_factory import mass
 from support.places import EXAMPLES
 
 import vibroimpact as vi
@@ -18,6 +20,7 @@ from vibroimpact.orchestrator.study import Study, advice, dataset_of, study_accu
 from vibroimpact.orchestrator.study.accuracy import studied_scene
 from vibroimpact.orchestrator.study.choice import cheapest
 from vibroimpact.orchestrator.study.errors import errors_of
+from vibroimpact.orchestrator.study.memory import IS_MEASURED
 from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
 from vibroimpact.orchestrator.study.references import reference_of
 from vibroimpact.orchestrator.study.revision import RevisedTrial
@@ -377,6 +380,29 @@ def test_a_general_scene_is_studied_over_exchanges_and_steps() -> None:
     for exchange, order in (("jacobi", 1.0), ("gauss_seidel", 1.0), ("iterated", 2.0)):
         steps, errors = ladder(study, f"coupled, {exchange}")
         assert observed_order(steps, errors) == pytest.approx(order, abs=0.2), exchange
+
+
+def test_a_component_of_another_tool_that_restores_no_state_is_named(tmp_path: Path) -> None:
+    theirs = mass(tmp_path, states=False)
+    tables = {
+        "component": {
+            "theirs": {"fmu": str(theirs), "parameters": {"x": 0.5, "k": 4.0}},
+            "ours": {"fmu": "Oscillator", "parameters": {"mass": 1.0, "stiffness": 1.0, "damping": 0.1}},
+        },
+        "connection": [
+            {"from": "theirs.x", "to": "ours.force", "gain": 0.5, "gain_unit": "N/m"},
+            {"from": "ours.displacement", "to": "theirs.f", "gain": 0.5, "gain_unit": "N/m"},
+        ],
+        "record": {"recorded_time": 2.0, "variables": ["ours.displacement", "theirs.x"], "rate": 20.0},
+        "execution": {"macro_step": 0.1, "guard": False},
+    }
+    study = study_accuracy(Scene.from_dict(tables), budget=1.0)
+    assert study.remarks[0].startswith("iterated exchange with theirs: steps cannot be repeated")
+    steps, errors = ladder(study, "coupled, gauss_seidel")
+    assert observed_order(steps, errors) == pytest.approx(1.0, abs=0.2)
+    np.testing.assert_array_equal(errors, ladder(study, "coupled, iterated")[1])
+    assert study.chosen is not None
+    assert all(one.memory > 0 for one in study.measured) or not IS_MEASURED
 
 
 CHAOTIC_COMPONENTS: dict[str, Any] = {
