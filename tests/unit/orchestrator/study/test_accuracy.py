@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -9,12 +10,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 from support.fmu_factory import mass
 from support.places import EXAMPLES
 
 import vibroimpact as vi
 from vibroimpact.analysis.landmarks import ImpactOscillator, observed_order
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.commands.accuracy import table_of
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study import Study, advice, dataset_of, study_accuracy
 from vibroimpact.orchestrator.study.accuracy import studied_scene
@@ -307,6 +310,19 @@ def test_what_it_costs_is_counted_too(rigid: Study) -> None:
     assert {one.calls for one in rigid.measured if "CVode" in one.way.name} == {-1}  # FMPy calls it
     assert all(len(one.seconds) >= 3 for one in (fused, coupled))
     assert 0.0 < fused.cost < coupled.cost
+
+
+@pytest.mark.parametrize(("width", "has_all"), [(80, False), (140, True)])
+def test_a_narrow_terminal_has_fewer_columns_and_the_names_of_all_ways(
+    rigid: Study, width: int, has_all: bool
+) -> None:
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(table_of("one", rigid.measured, "all", 0.0, width, 40.0))
+    text = console.export_text()
+    assert "coupled," in text
+    assert "value" in text
+    assert ("memory" in text) == has_all
+    assert "\N{HORIZONTAL ELLIPSIS}" not in text
 
 
 def test_the_dataset_says_what_was_found(rigid: Study) -> None:
