@@ -13,7 +13,8 @@ from matplotlib.ticker import NullFormatter
 from vibroimpact.analysis.figures.needed import missing_from, refuse_missing
 from vibroimpact.analysis.figures.page import COLOURS, MARK, canvas, page_style
 
-_MARKERS = "osD^vP"
+_MARKERS = "osD^vP<"
+"""One more than there are colours: that many times as many ways look different."""
 _NEEDED = ("cost", "error", "name", "failure", "on_front", "is_model")
 _ROUNDING = 1e-16
 """Error below which nothing is told apart; an error of 0 is drawn there."""

@@ -26,6 +26,8 @@ from vibroimpact.orchestrator.study.choice import advice, error_of_reference, re
 from vibroimpact.orchestrator.study.tuned import tuned_text
 
 MEGABYTE = 1e6
+WIDE = 120
+"""Letters in a line of a terminal from which on the table has all columns; the dataset has them in any case."""
 
 
 def study_scene(
@@ -77,11 +79,12 @@ def _shown(title: str, quantity: str) -> Iterator[Callable[[Measured], None]]:
         yield _say_tried
         return
     found: list[Measured] = []
-    with Live(console=wide_terminal(), transient=True) as live:
+    console = wide_terminal()
+    with Live(console=console, transient=True) as live:
 
         def told(one: Measured) -> None:
             found.append(one)
-            live.update(_table(title, found, quantity, 0.0))
+            live.update(table_of(title, found, quantity, 0.0, console.width))
 
         yield told
 
@@ -91,22 +94,43 @@ def _say_tried(one: Measured) -> None:
     say(f"  {one.way.label}: {said}")
 
 
-def _table(
-    title: str, measured: Sequence[Measured], quantity: str, known: float, periods: float = math.nan
+def table_of(
+    title: str,
+    measured: Sequence[Measured],
+    quantity: str,
+    known: float,
+    width: int,
+    periods: float = math.nan,
 ) -> Table:
-    """Return what was measured as a table; `known` is the error of the reference, `periods` how many a run has."""
+    """Return what was measured as a table.
+
+    Parameters
+    ----------
+    known : float
+        Error of the reference.
+    width : int
+        Of the terminal: a narrow one gets fewer columns, lest it cuts the names of the ways.
+    periods : float
+        Forcing periods of a run; NaN where nothing forces it.
+    """
     scored = any(one.variance == one.variance for one in measured)
-    of_periods = periods == periods
+    wide = width >= WIDE
+    of_periods = wide and periods == periods
     rows = table(
         f"What accuracy costs: {title}",
         *("<way", "<set", ">value", ">error", ">a run", ">spread"),
         *((">a period",) if of_periods else ()),
-        *(">an impact", ">calls", ">memory"),
+        *((">an impact", ">calls", ">memory") if wide else ()),
         *((">accounts for",) if scored else ()),
         "<what is wrong",
     )
     for one in measured:
         spread = (max(one.seconds) - min(one.seconds)) / one.cost if len(one.seconds) > 1 else math.nan
+        each = (
+            _known_duration(one.cost_of_one(one.impacts)),
+            str(one.calls) if one.calls >= 0 else "-",
+            f"{one.memory / MEGABYTE:.1f} MB" if one.memory >= 0 else "-",
+        )
         rows.add_row(
             f"{one.way.name}{' (another model)' if one.way.model else ''}",
             one.way.knob or "-",
@@ -115,9 +139,7 @@ def _table(
             duration(one.cost) if one.seconds else "-",
             "-" if math.isnan(spread) else f"{100.0 * spread:.0f} %",
             *((_known_duration(one.cost_of_one(periods)),) if of_periods else ()),
-            _known_duration(one.cost_of_one(one.impacts)),
-            str(one.calls) if one.calls >= 0 else "-",
-            f"{one.memory / MEGABYTE:.1f} MB" if one.memory >= 0 else "-",
+            *(each if wide else ()),
             *((f"{one.variance:.2f} %",) if scored else ()),
             one.errors.failure,
         )
@@ -130,10 +152,8 @@ def _known_duration(seconds: float) -> str:
 
 def _print(study: Study) -> None:
     known = error_of_reference(study.reference, study.quantity)
-    rows = _table(
-        study.scene.title or study.scene.source, study.measured, study.quantity, known, study.periods
-    )
-    wide_terminal().print(rows)
+    console, title = wide_terminal(), study.scene.title or study.scene.source
+    console.print(table_of(title, study.measured, study.quantity, known, console.width, study.periods))
     motion = f"Motion: {study.orbit}. " if study.orbit else ""
     say(f"{motion}Reference: {study.reference.name}, known to {known:.0e}.")
     if study.modes_reference:

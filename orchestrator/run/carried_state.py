@@ -7,6 +7,7 @@ then rest on their stops. All other motion is kept. A compliant stop is just pre
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.core import beam_modes
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
-from vibroimpact.orchestrator.scene.models import RestitutionStop
+from vibroimpact.orchestrator.scene.models import RestitutionStop, Stop
 from vibroimpact.orchestrator.scene.places import stop_location, stop_mass
 
 Floats = NDArray[np.float64]
@@ -69,7 +70,7 @@ def _smallest(shapes: Floats, motions: Floats, wanted: Floats) -> Floats:
     return np.asarray(motions.T @ forces, dtype=np.float64)
 
 
-def contact_shapes(body: ChainBody | BeamBody, stops: list[RestitutionStop]) -> Floats:
+def contact_shapes(body: ChainBody | BeamBody, stops: Sequence[Stop]) -> Floats:
     """Return the displacement of each contact for 1 m of each mass or mode, shape (stop, N)."""
     if isinstance(body, ChainBody):
         return np.eye(body.size)[[stop_mass(body, stop) - 1 for stop in stops]]

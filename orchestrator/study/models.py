@@ -51,7 +51,7 @@ def other_models(scene: Scene, speed: float) -> list[Way]:
 
 
 def other_modes(scene: Scene) -> list[Way]:
-    """Return fewer and more modes: of a beam natural ones, and with residual vectors; of a chain fewer than all.
+    """Return fewer and more modes: of a beam natural ones, and with residual vectors of its stops; of a chain fewer.
 
     They are told by the most of them. With rigid stops on a beam nothing converges, and none is shown.
     """
@@ -62,7 +62,8 @@ def other_modes(scene: Scene) -> list[Way]:
         return []
     most = max(LEAST_TRIED_MODES, 4 * body.size)
     counts = sorted({n for n in MODES_TRIED if n <= most} | {body.size})
-    changes = [{"body.modes": n, "body.residual": residual} for residual in (False, True) for n in counts]
+    kinds = (False, True) if scene.stops else (False,)  # a residual vector is that of a stop
+    changes = [{"body.modes": n, "body.residual": residual} for residual in kinds for n in counts]
     able = [change for change in changes if can_have(scene, change)]
     if not able:
         return []

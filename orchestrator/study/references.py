@@ -17,10 +17,16 @@ from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
-from vibroimpact.orchestrator.scene.models import HertzStop, HuntCrossleyStop, RestitutionStop
+from vibroimpact.orchestrator.scene.models import (
+    HertzStop,
+    HuntCrossleyStop,
+    KelvinVoigtStop,
+    RestitutionStop,
+)
 from vibroimpact.orchestrator.study.errors import QUANTITIES, Scales, errors_of
 from vibroimpact.orchestrator.study.observation import Floats, Observation
 from vibroimpact.orchestrator.study.replays import span_of
+from vibroimpact.orchestrator.study.strangers import contact_masses
 from vibroimpact.orchestrator.study.way import opened_trial
 
 DISTURBANCE = 1e-9
@@ -41,6 +47,9 @@ FINEST_STEP = 1.0 / 16.0
 """Macro step of the reference of a general scene, over that of the scene."""
 SAFETY = 64.0
 """What an estimated error is multiplied with, to be a bound in practice."""
+
+CONTACT_SAFETY = 8.0
+"""Likewise the part of it that is the rounding of how deep a stop is pressed in."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +150,8 @@ def reference_of(scene: Scene) -> Reference:
     }
     sensitivity = max(largest.values()) / DISTURBANCE if keys else math.nan
     chaotic = any(change.failure for change in changes) or max(largest.values()) > CHAOTIC
-    error = {name: SAFETY * ROUNDING * (1.0 + value / DISTURBANCE) for name, value in largest.items()}
+    rounding = ROUNDING * (SAFETY + CONTACT_SAFETY * _shallowness(best, observation))
+    error = {name: rounding * (1.0 + value / DISTURBANCE) for name, value in largest.items()}
     name = "the fused run, exact between events" + (
         "" if scene.replay is None else " and between samples, which are joined by lines"
     )
@@ -156,6 +166,23 @@ def reference_of(scene: Scene) -> Reference:
     if closed is not None:
         observation, name = closed, "the closed form of the P(1,1) motion"
     return Reference(observation, name, error, sensitivity, chaotic, scales)
+
+
+def _shallowness(scene: Scene, observation: Observation) -> float:
+    """Return the position of a Kelvin-Voigt stop over how deep it is pressed in, the largest; 0 without one.
+
+    The depth is the difference of two displacements of the size of the position, and its rounding is an error of the
+    velocity after the contact of sqrt(stiffness / mass) times that, whatever the velocity.
+    """
+    if not len(observation.impacts):
+        return 0.0
+    fastest = float(np.abs(observation.impacts[:, 1]).max())
+    rates = [
+        abs(stop.position) * math.sqrt(stop.stiffness / mass)
+        for stop, mass in zip(scene.stops, contact_masses(scene), strict=True)
+        if isinstance(stop, KelvinVoigtStop)
+    ]
+    return max(rates, default=0.0) / fastest if fastest > 0.0 else 0.0
 
 
 def observed(scene: Scene) -> Observation:

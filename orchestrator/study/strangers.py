@@ -99,6 +99,26 @@ def thrown_back(scene: Scene) -> tuple[tuple[str, ...], Floats]:
     return names, motions / (shapes * motions).sum(axis=1)[:, None]
 
 
+def contact_masses(scene: Scene) -> Floats:
+    """Return the mass that each stop feels when it is hit, kg: of a beam that of its modes.
+
+    Returns
+    -------
+    ndarray, shape (stop,)
+    """
+    body = scene.body
+    if not isinstance(body, BeamBody):
+        return np.array([body.mass_at(stop.mass) for stop in scene.stops])
+    line = body.mass_per_length
+    if line is None:
+        assert body.width is not None
+        assert body.thickness is not None
+        assert body.density is not None
+        line = body.width * body.thickness * body.density
+    shapes = contact_shapes(body, scene.stops)
+    return np.asarray(line * body.length / (shapes**2).sum(axis=1))
+
+
 def _is_pushed(scene: Scene, body: BeamBody) -> bool:
     """Whether the one force input of a beam can act at all of its stops."""
     where = {stop_location(stop) for stop in scene.stops}

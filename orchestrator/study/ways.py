@@ -6,10 +6,12 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+from vibroimpact.orchestrator.importer.component import description_of
 from vibroimpact.orchestrator.run.parameters import float_parameters
 from vibroimpact.orchestrator.run.point import recorded_window
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody
+from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.models import HertzStop, HuntCrossleyStop, RestitutionStop
 from vibroimpact.orchestrator.study.models import other_models, other_modes
 from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
@@ -70,6 +72,11 @@ def ways_of(scene: Scene, *, speed: float = math.nan, rate: float = math.nan) ->
 def remarks_on(scene: Scene) -> list[str]:
     """Return what the study of a scene leaves out, and why."""
     remarks = []
+    if scene.general is not None and (fixed := _not_repeated(scene.general)):
+        remarks.append(
+            f"iterated exchange with {', '.join(fixed)}: steps cannot be repeated, since the FMU does not restore its "
+            "state; it is stepped once, last, with the newest values, in each of the exchanges"
+        )
     plain = scene.general is None and scene.replay is None and scene.stops
     if plain:
         remarks += _remarks_on_strangers(scene)
@@ -248,6 +255,16 @@ def _general_ways(scene: Scene) -> list[Way]:
         )
         for exchange in EXCHANGES
         for part in GENERAL_REFINEMENTS
+    ]
+
+
+def _not_repeated(general: GeneralScene) -> list[str]:
+    """Return the components that take values of others and do not restore their states."""
+    targets = {connection.target[0] for connection in general.connections}
+    return [
+        one.name
+        for one in general.components
+        if one.name in targets and not description_of(one.fmu).coSimulation.canGetAndSetFMUstate
     ]
 
 

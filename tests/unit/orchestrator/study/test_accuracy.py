@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import io
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
+from support.fmu_factory import mass
 from support.places import EXAMPLES
 
 import vibroimpact as vi
 from vibroimpact.analysis.landmarks import ImpactOscillator, observed_order
 from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.commands.accuracy import table_of
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study import Study, advice, dataset_of, study_accuracy
 from vibroimpact.orchestrator.study.accuracy import studied_scene
 from vibroimpact.orchestrator.study.choice import cheapest
 from vibroimpact.orchestrator.study.errors import errors_of
+from vibroimpact.orchestrator.study.memory import IS_MEASURED
 from vibroimpact.orchestrator.study.plain_steps import PlainForcesTrial, PlainStepsTrial
 from vibroimpact.orchestrator.study.references import reference_of
 from vibroimpact.orchestrator.study.revision import RevisedTrial
@@ -306,6 +312,19 @@ def test_what_it_costs_is_counted_too(rigid: Study) -> None:
     assert 0.0 < fused.cost < coupled.cost
 
 
+@pytest.mark.parametrize(("width", "has_all"), [(80, False), (140, True)])
+def test_a_narrow_terminal_has_fewer_columns_and_the_names_of_all_ways(
+    rigid: Study, width: int, has_all: bool
+) -> None:
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(table_of("one", rigid.measured, "all", 0.0, width, 40.0))
+    text = console.export_text()
+    assert "coupled," in text
+    assert "value" in text
+    assert ("memory" in text) == has_all
+    assert "\N{HORIZONTAL ELLIPSIS}" not in text
+
+
 def test_the_dataset_says_what_was_found(rigid: Study) -> None:
     dataset = dataset_of(rigid)
     assert dataset.attrs["chosen"] == "fused"
@@ -377,6 +396,29 @@ def test_a_general_scene_is_studied_over_exchanges_and_steps() -> None:
     for exchange, order in (("jacobi", 1.0), ("gauss_seidel", 1.0), ("iterated", 2.0)):
         steps, errors = ladder(study, f"coupled, {exchange}")
         assert observed_order(steps, errors) == pytest.approx(order, abs=0.2), exchange
+
+
+def test_a_component_of_another_tool_that_restores_no_state_is_named(tmp_path: Path) -> None:
+    theirs = mass(tmp_path, states=False)
+    tables = {
+        "component": {
+            "theirs": {"fmu": str(theirs), "parameters": {"x": 0.5, "k": 4.0}},
+            "ours": {"fmu": "Oscillator", "parameters": {"mass": 1.0, "stiffness": 1.0, "damping": 0.1}},
+        },
+        "connection": [
+            {"from": "theirs.x", "to": "ours.force", "gain": 0.5, "gain_unit": "N/m"},
+            {"from": "ours.displacement", "to": "theirs.f", "gain": 0.5, "gain_unit": "N/m"},
+        ],
+        "record": {"recorded_time": 2.0, "variables": ["ours.displacement", "theirs.x"], "rate": 20.0},
+        "execution": {"macro_step": 0.1, "guard": False},
+    }
+    study = study_accuracy(Scene.from_dict(tables), budget=1.0)
+    assert study.remarks[0].startswith("iterated exchange with theirs: steps cannot be repeated")
+    steps, errors = ladder(study, "coupled, gauss_seidel")
+    assert observed_order(steps, errors) == pytest.approx(1.0, abs=0.2)
+    np.testing.assert_array_equal(errors, ladder(study, "coupled, iterated")[1])
+    assert study.chosen is not None
+    assert all(one.memory > 0 for one in study.measured) or not IS_MEASURED
 
 
 CHAOTIC_COMPONENTS: dict[str, Any] = {
