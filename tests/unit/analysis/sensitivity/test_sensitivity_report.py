@@ -83,6 +83,12 @@ def test_a_key_beside_the_drawn_ones_stays_a_dimension():
     )
 
 
+def test_a_dimension_with_a_name_of_the_report_is_refused() -> None:
+    found = ran(SCENE.replace("128", "8") + '"body.stiffness" = { values = [1.0, 2.0], zip = "bound" }\n')
+    with pytest.raises(vi.VibroimpactError, match="bound: expected a dimension of another name"):
+        sensitivity_report(found)
+
+
 def test_runs_that_failed_are_left_out_with_their_blocks_and_told(dataset: xr.Dataset):
     outcome = dataset.outcome.copy(data=dataset.outcome.values.copy())
     outcome[[3, 17, 18]] = [Outcome.error, Outcome.crash, Outcome.timeout]
