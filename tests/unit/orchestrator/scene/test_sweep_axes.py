@@ -342,3 +342,27 @@ def test_a_drawn_frequency_in_hertz_is_the_motion_of_one_in_radians() -> None:
     assert one.frequency.values.tolist() == hertz.tolist()
     other = other.isel(angular_frequency=np.argsort(np.argsort(hertz)))
     np.testing.assert_allclose(one.displacement_range, other.displacement_range, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("record", "text"),
+    [
+        ("each_period = false", "record.each_period: expected true beside an adaptive axis, got false."),
+        (
+            "extrema = false\nstrobe = false\nimpacts = false",
+            "record: expected impacts, or the extrema or strobe of periods, beside an adaptive axis, got none of them.",
+        ),
+        ("extrema = false\nstrobe = false\neach_period = false", ""),
+    ],
+)
+def test_an_adaptive_axis_needs_what_tells_motions_apart(record: str, text: str) -> None:
+    forced = TEXT.replace("[[stop]]", "[forcing]\namplitude = 1\nangular_frequency = 1\n[[stop]]")
+    forced = forced.replace("recorded_time = 5", f"recorded_periods = 5\n{record}")
+    line = f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 90 }} }}'
+    if not text:
+        assert parse_scene(forced + line, "scene.toml").runs == 5
+        return
+    with pytest.raises(SceneError) as caught:
+        parse_scene(forced + line, "scene.toml")
+    (problem,) = str(caught.value).splitlines()
+    assert text in problem
