@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.places import ROOT
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError
@@ -366,3 +367,12 @@ def test_an_adaptive_axis_needs_what_tells_motions_apart(record: str, text: str)
         parse_scene(forced + line, "scene.toml")
     (problem,) = str(caught.value).splitlines()
     assert text in problem
+
+
+def test_an_adaptive_axis_of_components_needs_their_events() -> None:
+    text = (ROOT / "examples" / "two_oscillators.toml").read_text()
+    line = f'[sweep]\n"connection[1].gain" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 90 }} }}'
+    assert parse_scene(f"{text}\n{line}", "scene.toml").runs == 5
+    silent = text.replace("rate = 20", "rate = 20\nevents = false")
+    with pytest.raises(SceneError, match=r"record\.events: expected true beside an adaptive axis, got false"):
+        parse_scene(f"{silent}\n{line}", "scene.toml")
