@@ -11,8 +11,9 @@ import xarray as xr
 from support.command_line import in_this_process
 
 import vibroimpact as vi
+from vibroimpact.analysis.commands import options
 from vibroimpact.analysis.dataset import Outcome, open_measured
-from vibroimpact.analysis.sensitivity import sensitivity_report
+from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
 
 SCENE = """
 [body]
@@ -246,3 +247,7 @@ def test_a_file_that_is_no_campaign_is_one_line(tmp_path: Path):
         result = in_this_process("sensitivity", file)
         assert result.returncode == 2
         assert len(result.stderr.splitlines()) == 1
+
+
+def test_the_command_has_the_defaults_of_the_function() -> None:
+    assert (options.LEVEL, options.RESAMPLES) == (LEVEL, RESAMPLES)
