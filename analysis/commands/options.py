@@ -175,8 +175,8 @@ def sensitivity(
 ) -> None:
     """Say how much of the variance of each result each drawn key of a campaign accounts for (Sobol indices).
 
-    First order: by the key alone; total: with all that it takes part in; each with a bootstrap interval. The scene has
-    two keys or more with a distribution and sample = { design = "saltelli", points = 256 } in [sweep].
+    First order: by the key alone; total: with all that it takes part in; each with a bootstrap interval. The sweep of
+    the scene has two keys or more with a distribution, and sample = { design = "saltelli", points = 256 }.
 
     Example: vibroimpact sensitivity campaign -o sensitivity.nc --figure sensitivity.png
     """

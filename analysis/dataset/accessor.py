@@ -44,7 +44,7 @@ class VibroimpactAccessor:
         if run_id.dims == ("run",):
             return kept
         if run_id.dims:
-            flat = kept.stack(run=run_id.dims, create_index=False)
+            flat = _stacked(kept, run_id)
         else:  # what is said of the only run is along `run` too
             said = {name for name, one in kept.coords.items() if not one.dims} - set(constant_names(kept))
             flat = kept.reset_coords(said).expand_dims("run").set_coords(said)
@@ -142,6 +142,21 @@ def _the_run(dataset: xr.Dataset, exact: bool, selection: dict[str, Any]) -> tup
         raise DatasetError(_not_one(columns, found, selection))
     point = {name: values[found[0]] for name, values in columns.items() if name != "run_id"}
     return int(run_id.values.ravel()[found[0]]), point
+
+
+def _stacked(dataset: xr.Dataset, run_id: xr.DataArray) -> xr.Dataset:
+    """Return a dataset with one dimension `run` in place of those of its runs, in whatever order they are."""
+    runs = set(run_id.dims)
+    # xarray cannot stack what has no size: where every run failed there is no period
+    nothing = {name: one for name, one in dataset.variables.items() if runs <= set(one.dims) and not one.size}
+    if not run_id.size:
+        return dataset.stack(run=run_id.dims, create_index=False)
+    flat = dataset.drop_vars(nothing).stack(run=run_id.dims, create_index=False)
+    for name, variable in nothing.items():
+        rest = [dim for dim in variable.dims if dim not in runs]
+        shape = (run_id.size, *(variable.sizes[dim] for dim in rest))
+        flat[name] = (("run", *rest), np.empty(shape, variable.dtype), variable.attrs)
+    return flat
 
 
 def _coordinates(dataset: xr.Dataset, run_id: xr.DataArray) -> dict[str, NDArray[Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
 from vibroimpact.analysis.dataset.schema import swept_names
 from vibroimpact.analysis.jumps.classes import classes_of
 from vibroimpact.fmus.errors import DatasetError
@@ -32,7 +33,7 @@ def jumps_of(dataset: xr.Dataset, jump: float = JUMP) -> xr.Dataset:
     Raises
     ------
     DatasetError
-        The dataset sweeps more than one parameter, or none.
+        The dataset sweeps more than one parameter, or none; or it has one value for all periods.
 
     Examples
     --------
@@ -42,6 +43,15 @@ def jumps_of(dataset: xr.Dataset, jump: float = JUMP) -> xr.Dataset:
     if len(names) != 1:
         raise DatasetError(
             f"jumps: expected one swept parameter, got {', '.join(names) or 'none'}. Select values of the others."
+        )
+    if any(
+        dataset[name].attrs.get("long_name") == words
+        for name, words in OF_ALL_PERIODS.items()
+        if name in dataset
+    ):
+        raise DatasetError(
+            "jumps: expected values of each recorded period, got one for all. "
+            "Run it without each_period = false."
         )
     runs = dataset.vibroimpact.runs
     values = runs[names[0]].values

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,12 +90,12 @@ def sobol_indices(
     >>> found.total_order.round(1).tolist()
     [[0.8, 0.2]]
     """
-    if not 0.0 < level < 1.0:
-        raise UsageError(f"level: expected a number between 0 and 1, got {level}.")
-    if not 2 <= resamples <= 10**6:
-        raise UsageError(f"resamples: expected a whole number from 2 to 1000000, got {resamples}.")
-    if seed < 0:
-        raise UsageError(f"seed: expected a whole number >= 0, got {seed}.")
+    if not (isinstance(level, Real) and 0.0 < level < 1.0):
+        raise UsageError(f"level: expected a number between 0 and 1, got {level!r}.")
+    if not (isinstance(resamples, Integral) and 2 <= resamples <= 10**6):
+        raise UsageError(f"resamples: expected a whole number from 2 to 1000000, got {resamples!r}.")
+    if not (isinstance(seed, Integral) and seed >= 0):
+        raise UsageError(f"seed: expected a whole number >= 0, got {seed!r}.")
     quantities, keys = a.shape[1], mixed.shape[1]
     whole = np.isfinite(a) & np.isfinite(b) & np.isfinite(mixed).all(axis=1)
     found = np.full((2, quantities, keys, 3), np.nan)

@@ -55,6 +55,10 @@ def sensitivity_report(
     >>> sensitivity_report(open_dataset("campaign")).total_order      # doctest: +SKIP
     """
     design = design_of(dataset)
+    if taken := sorted({"quantity", "parameter", "bound"} & set(map(str, dataset["outcome"].dims))):
+        raise DatasetError(
+            f"sensitivity: {taken[0]}: expected a dimension of another name. Rename it in Python."
+        )
     found = quantities_of(dataset)
     names = _chosen([str(name) for name in found.data_vars], of)
     others = [str(dim) for dim in dataset["outcome"].dims if dim != DRAW]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -36,7 +36,14 @@ def read_general_sweep(draft: GeneralDraft) -> tuple[tuple[SweepAxis, ...], list
         lambda key, entry: _key_problems(key, entry, draft),
         lambda axis: _axis_problems(axis, draft),
     )
-    return axes, [*problems, *sweep_problems(axes), *_names_differ(axes)]
+    return axes, [*problems, *sweep_problems(axes), *_names_differ(axes), *_events_tell_motions(axes, draft)]
+
+
+def _events_tell_motions(axes: Sequence[SweepAxis], draft: GeneralDraft) -> Iterator[Problem]:
+    is_adaptive = any(axis.adaptive is not None for axis in axes)
+    if is_adaptive and draft.record is not None and not draft.record.events:
+        hint = "Without them nothing but outcomes is compared."
+        yield Problem("record.events", "true beside an adaptive axis", "false", hint)
 
 
 def _key_problems(key: str, entry: object, draft: GeneralDraft) -> Iterator[Problem]:

@@ -38,6 +38,7 @@ def rule_problems(draft: Draft) -> list[Problem]:
         *REPLAY_RULES,
         _record_counts_what_there_is,
         _samples_fit,
+        _adaptive_axes_can_tell_motions,
         _coupling_is_asked_for,
     )
     return [problem for rule in rules for problem in rule(draft)] + list(sweep_problems(draft.axes))
@@ -143,6 +144,21 @@ def _samples_fit(draft: Draft) -> Iterator[Problem]:
     )
     samples = draft.record.time_series.rate * duration
     yield from sample_problems("record.time_series.rate", samples, "periods" if forced else "time")
+
+
+def _adaptive_axes_can_tell_motions(draft: Draft) -> Iterator[Problem]:
+    if draft.record is None or all(axis.adaptive is None for axis in draft.axes):
+        return
+    record, beside = draft.record, "beside an adaptive axis"
+    of_periods = bool(record.recorded_periods) and (record.extrema or record.strobe)
+    if not (record.impacts or of_periods):
+        hint = "Without them nothing but outcomes is compared."
+        yield Problem(
+            "record", f"impacts, or the extrema or strobe of periods, {beside}", "none of them", hint
+        )
+    elif of_periods and not record.each_period:
+        hint = "Motions are told by how they repeat from period to period: remove it."
+        yield Problem("record.each_period", f"true {beside}", "false", hint)
 
 
 def sample_problems(key: str, samples: float, recorded: str) -> Iterator[Problem]:

@@ -78,6 +78,21 @@ def test_runs_that_failed_are_a_class_of_their_own(dataset: xr.Dataset) -> None:
     assert jumps.period.values.tolist()[1:3] == [[2, 0], [0, 1]]
 
 
+def test_one_value_for_all_periods_tells_no_motions_apart() -> None:
+    text = SCENE.replace("recorded_periods = 10", "recorded_periods = 10\neach_period = false")
+    line = '"forcing.angular_frequency" = { values = [0.6, 0.8] }'
+    with pytest.raises(vi.VibroimpactError, match="expected values of each recorded period, got one for all"):
+        jumps_of(vi.run(vi.Scene.from_text(text + line), progress=False))
+
+
+def test_where_every_run_failed_there_is_no_jump() -> None:
+    late = SCENE.replace("[sweep]", "[execution]\ndeadline = 1e-9\n[sweep]")
+    line = '"forcing.angular_frequency" = { values = [0.6, 0.8, 1.0] }'
+    found = vi.run(vi.Scene.from_text(late + line), progress=False)
+    assert found.vibroimpact.runs.displacement_max.shape == (3, 0)
+    assert jumps_of(found).sizes["jump"] == 0
+
+
 @pytest.mark.parametrize(
     ("keys", "got"), [((), "none"), (("body.damping_ratio", "stop[1].position"), "damping_ratio, position")]
 )

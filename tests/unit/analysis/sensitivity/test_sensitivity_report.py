@@ -11,8 +11,9 @@ import xarray as xr
 from support.command_line import in_this_process
 
 import vibroimpact as vi
+from vibroimpact.analysis.commands import options
 from vibroimpact.analysis.dataset import Outcome, open_measured
-from vibroimpact.analysis.sensitivity import sensitivity_report
+from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
 
 SCENE = """
 [body]
@@ -81,6 +82,42 @@ def test_a_key_beside_the_drawn_ones_stays_a_dimension():
     np.testing.assert_allclose(
         found.total_order.sel(stiffness=9.0), alone.total_order.squeeze("stiffness"), rtol=1e-9
     )
+
+
+def test_indices_along_a_path_are_drawn_as_lines_up_and_down_apart() -> None:
+    path = '"forcing.angular_frequency" = { start = 0.9, stop = 1.1, points = 3, path = "up-down" }\n'
+    text = SCENE.replace("128", "8").replace("transient_periods = 100", "transient_periods = 10")
+    found = vi.sensitivity(ran(text + path), of="displacement_range")
+    assert found.total_order.dims == ("quantity", "direction", "angular_frequency", "parameter")
+    (axis,) = vi.draw(found).axes
+    assert [line.get_label() for line in axis.lines] == [
+        f"{name}, {way}" for name in ("amplitude", "damping") for way in ("up", "down")
+    ]
+    assert [line.get_linestyle() for line in axis.lines] == ["-", "--"] * 2
+    np.testing.assert_array_equal(axis.lines[0].get_ydata(), found.total_order[0, 0, :, 0])
+    two = found.expand_dims(gap=[1.0, 2.0], axis=1)
+    with pytest.raises(
+        vi.VibroimpactError, match="expected indices along one other key at most, got gap, direction"
+    ):
+        vi.draw(two)
+
+
+def test_bars_are_the_indices_of_what_varies(dataset: xr.Dataset) -> None:
+    found = vi.sensitivity(dataset)
+    axes = vi.draw(found).axes
+    assert [axis.get_title() for axis in axes] == ["displacement range", "velocity rms"]
+    for quantity, axis in zip(("displacement_range", "velocity_rms"), axes, strict=True):
+        first, total = (
+            [bar.get_width() for bar in group] for group in axis.containers if hasattr(group, "patches")
+        )
+        assert first == found.first_order.sel(quantity=quantity).values.tolist()
+        assert total == found.total_order.sel(quantity=quantity).values.tolist()
+
+
+def test_a_dimension_with_a_name_of_the_report_is_refused() -> None:
+    found = ran(SCENE.replace("128", "8") + '"body.stiffness" = { values = [1.0, 2.0], zip = "bound" }\n')
+    with pytest.raises(vi.VibroimpactError, match="bound: expected a dimension of another name"):
+        sensitivity_report(found)
 
 
 def test_runs_that_failed_are_left_out_with_their_blocks_and_told(dataset: xr.Dataset):
@@ -210,3 +247,7 @@ def test_a_file_that_is_no_campaign_is_one_line(tmp_path: Path):
         result = in_this_process("sensitivity", file)
         assert result.returncode == 2
         assert len(result.stderr.splitlines()) == 1
+
+
+def test_the_command_has_the_defaults_of_the_function() -> None:
+    assert (options.LEVEL, options.RESAMPLES) == (LEVEL, RESAMPLES)

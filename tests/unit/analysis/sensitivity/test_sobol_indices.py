@@ -155,6 +155,9 @@ def test_fewer_than_eight_blocks_have_no_indices():
         ({"level": 1.0}, "level: expected a number between 0 and 1, got 1.0"),
         ({"level": math.nan}, "level: expected a number between 0 and 1, got nan"),
         ({"resamples": 1}, "resamples: expected a whole number from 2 to 1000000, got 1"),
+        ({"level": "high"}, "level: expected a number between 0 and 1, got 'high'"),
+        ({"resamples": 10.5}, "resamples: expected a whole number from 2 to 1000000, got 10.5"),
+        ({"seed": None}, "seed: expected a whole number >= 0, got None"),
         ({"seed": -1}, "seed: expected a whole number >= 0, got -1"),
     ],
 )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from support.places import ROOT
 
 import vibroimpact as vi
 from vibroimpact.fmus.errors import SceneError
@@ -342,3 +343,36 @@ def test_a_drawn_frequency_in_hertz_is_the_motion_of_one_in_radians() -> None:
     assert one.frequency.values.tolist() == hertz.tolist()
     other = other.isel(angular_frequency=np.argsort(np.argsort(hertz)))
     np.testing.assert_allclose(one.displacement_range, other.displacement_range, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("record", "text"),
+    [
+        ("each_period = false", "record.each_period: expected true beside an adaptive axis, got false."),
+        (
+            "extrema = false\nstrobe = false\nimpacts = false",
+            "record: expected impacts, or the extrema or strobe of periods, beside an adaptive axis, got none of them.",
+        ),
+        ("extrema = false\nstrobe = false\neach_period = false", ""),
+    ],
+)
+def test_an_adaptive_axis_needs_what_tells_motions_apart(record: str, text: str) -> None:
+    forced = TEXT.replace("[[stop]]", "[forcing]\namplitude = 1\nangular_frequency = 1\n[[stop]]")
+    forced = forced.replace("recorded_time = 5", f"recorded_periods = 5\n{record}")
+    line = f'"body.mass" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 90 }} }}'
+    if not text:
+        assert parse_scene(forced + line, "scene.toml").runs == 5
+        return
+    with pytest.raises(SceneError) as caught:
+        parse_scene(forced + line, "scene.toml")
+    (problem,) = str(caught.value).splitlines()
+    assert text in problem
+
+
+def test_an_adaptive_axis_of_components_needs_their_events() -> None:
+    text = (ROOT / "examples" / "two_oscillators.toml").read_text()
+    line = f'[sweep]\n"connection[1].gain" = {{ {RANGE}, adaptive = {{ tolerance = 1e-3, at_most = 90 }} }}'
+    assert parse_scene(f"{text}\n{line}", "scene.toml").runs == 5
+    silent = text.replace("rate = 20", "rate = 20\nevents = false")
+    with pytest.raises(SceneError, match=r"record\.events: expected true beside an adaptive axis, got false"):
+        parse_scene(f"{silent}\n{line}", "scene.toml")
