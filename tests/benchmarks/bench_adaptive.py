@@ -6,7 +6,7 @@
   cells: pairs of neighbours between which the motion jumps, and how many of them have both points in the adaptive map.
 
 It leaves the table of jumps, the two pictures of docs/campaigns.md and a sentence for each. On two cores it takes some
-six minutes and 1 GB of memory; `--quick` has steps and cells that are eight times as wide.
+eight minutes and 1 GB of memory; `--quick` has steps and cells that are eight times as wide.
 
 Run with `python tests/benchmarks/bench_adaptive.py [--output results/benchmarks] [--quick]`.
 """
