@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
-from xarray.backends import BackendArray, NetCDF4DataStore
+from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from vibroimpact.analysis.dataset.accessor import VibroimpactAccessor  # noqa: F401  # for `ds.vibroimpact`
@@ -29,6 +29,7 @@ from vibroimpact.analysis.dataset.schema import (
     constant_names,
     swept_names,
 )
+from vibroimpact.analysis.files.lazy_store import LazyStore
 from vibroimpact.analysis.files.opening import one_error, opened_netcdf
 from vibroimpact.analysis.files.probing import check_sound, refuse_changed
 from vibroimpact.fmus.errors import DatasetError
@@ -209,7 +210,7 @@ def _open_flat(file: Path) -> xr.Dataset:
 def _open_checked(path: str | os.PathLike[str]) -> xr.Dataset:
     """Open a file lazily, once it is known to be sound: seconds are not dates, and numbers are as they are stored."""
     state = check_sound(path)
-    store = NetCDF4DataStore.open(os.path.abspath(path))
+    store = LazyStore(os.path.abspath(path))
     try:
         refuse_changed(path, state)
         stored, _ = store.load()

@@ -49,6 +49,7 @@ from vibroimpact.analysis.dataset.schema import (
 )
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
+from vibroimpact.analysis.files.opening import NETCDF_LOCK
 from vibroimpact.fmus.errors import DatasetError
 
 _TEXT_CHUNK = 4096
@@ -399,18 +400,20 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike[str], *, compress
 def _image(dataset: xr.Dataset, compression: int) -> memoryview:
     """Return the bytes of the NetCDF-4 file of a dataset."""
     linked = " ".join(("run_index", "direction", *swept_names(dataset), *constant_names(dataset)))
-    file = netCDF4.Dataset("dataset.nc", "w", format="NETCDF4", memory=1)
-    # Every value is written below: filling first would write everything twice.
-    file.set_fill_off()
-    file.setncatts(dict(dataset.attrs))
-    for name, size in dataset.sizes.items():
-        file.createDimension(str(name), size)
-    for name, variable in dataset.variables.items():
-        is_data = variable.dims[:1] == ("run",) and name not in dataset.coords
-        labels = " connection" if "interface" in variable.dims else ""
-        labels += " compared" if "comparison" in variable.dims else ""
-        _store(file, str(name), variable, compression, linked + labels if is_data else None)
-    return memoryview(file.close())
+    loaded = dataset.compute()  # what is read of another file wants the lock, too
+    with NETCDF_LOCK:
+        file = netCDF4.Dataset("dataset.nc", "w", format="NETCDF4", memory=1)
+        # Every value is written below: filling first would write everything twice.
+        file.set_fill_off()
+        file.setncatts(dict(loaded.attrs))
+        for name, size in loaded.sizes.items():
+            file.createDimension(str(name), size)
+        for name, variable in loaded.variables.items():
+            is_data = variable.dims[:1] == ("run",) and name not in loaded.coords
+            labels = " connection" if "interface" in variable.dims else ""
+            labels += " compared" if "comparison" in variable.dims else ""
+            _store(file, str(name), variable, compression, linked + labels if is_data else None)
+        return memoryview(file.close())
 
 
 def _store(

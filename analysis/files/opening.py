@@ -8,10 +8,13 @@ from contextlib import contextmanager
 from typing import Any
 
 import netCDF4
+from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
 from vibroimpact.analysis.files.probing import UnsoundFileError, check_sound, refuse_changed
 from vibroimpact.fmus.errors import DatasetError
 
+NETCDF_LOCK: Any = NETCDF4_PYTHON_LOCK
+"""Held while the NetCDF library works, which is not made for threads; the one that xarray reads under."""
 DAMAGE = (
     *(
         OSError,
@@ -48,7 +51,7 @@ def opened_netcdf(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
     """
     with one_error(path):
         state = check_sound(path)
-        with netCDF4.Dataset(os.path.abspath(path), "r") as file:
+        with NETCDF_LOCK, netCDF4.Dataset(os.path.abspath(path), "r") as file:
             refuse_changed(path, state)
             file.set_auto_maskandscale(False)
             yield file

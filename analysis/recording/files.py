@@ -15,7 +15,7 @@ from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.schema import CONVENTIONS, RAGGED
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
-from vibroimpact.analysis.files.opening import one_error, opened_netcdf
+from vibroimpact.analysis.files.opening import NETCDF_LOCK, one_error, opened_netcdf
 from vibroimpact.analysis.recording.channels import (
     QUALITY_FLAGS,
     RECORDING_SCHEMA,
@@ -59,28 +59,30 @@ def write_recording(recording: Recording, path: str | os.PathLike[str]) -> None:
     problems = list(problems_of(recording))
     if problems:
         raise DatasetError("\n".join(f"recording: {problem}" for problem in problems))
-    file = netCDF4.Dataset("recording.nc", "w", format="NETCDF4", memory=1)
-    file.setncatts(
-        {
-            "Conventions": CONVENTIONS,
-            "recording_schema": RECORDING_SCHEMA,
-            "history": "recorded or imported by vibroimpact",
-            "title": f"recording {recording.attrs.get('source_file', '')}".strip(),
-            **{key: value for key, value in recording.attrs.items() if key != "opened_from"},
-            # the library lists variables by name; people want the columns as they were
-            "variable_order": " ".join((*recording.channels, *recording.events, *recording.scalars)),
-        }
-    )
-    _store_channels(file, recording)
-    for train in recording.events.values():
-        _store_events(file, train)
-    for name, scalar in recording.scalars.items():
-        variable = file.createVariable(name, "f8", ())
-        variable.setncatts({"units": scalar.unit, "long_name": scalar.label or name})
-        if scalar.overrange:
-            variable.setncattr("overrange", 1)
-        variable[...] = scalar.value
-    write_atomically(path, *sealed(file.close()))
+    with NETCDF_LOCK:
+        file = netCDF4.Dataset("recording.nc", "w", format="NETCDF4", memory=1)
+        file.setncatts(
+            {
+                "Conventions": CONVENTIONS,
+                "recording_schema": RECORDING_SCHEMA,
+                "history": "recorded or imported by vibroimpact",
+                "title": f"recording {recording.attrs.get('source_file', '')}".strip(),
+                **{key: value for key, value in recording.attrs.items() if key != "opened_from"},
+                # the library lists variables by name; people want the columns as they were
+                "variable_order": " ".join((*recording.channels, *recording.events, *recording.scalars)),
+            }
+        )
+        _store_channels(file, recording)
+        for train in recording.events.values():
+            _store_events(file, train)
+        for name, scalar in recording.scalars.items():
+            variable = file.createVariable(name, "f8", ())
+            variable.setncatts({"units": scalar.unit, "long_name": scalar.label or name})
+            if scalar.overrange:
+                variable.setncattr("overrange", 1)
+            variable[...] = scalar.value
+        image = file.close()
+    write_atomically(path, *sealed(image))
 
 
 def _store_channels(file: netCDF4.Dataset, recording: Recording) -> None:

@@ -1,0 +1,62 @@
+from __future__ import annotations
+
+import gc
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from support.dataset_examples import dataset_of, record
+
+from vibroimpact.analysis import open_dataset
+from vibroimpact.analysis.dataset import write_dataset
+
+THREADS = """
+import sys, threading
+from vibroimpact.analysis import open_dataset
+from vibroimpact.analysis.dataset import read_flat, write_dataset
+
+failed = []
+
+def work(number):
+    try:
+        for turn in range(25):
+            runs = open_dataset(sys.argv[1]).vibroimpact.runs  # dropped, not closed
+            assert runs.final_displacement.values.size == 3000
+            if turn % 5 == number:
+                write_dataset(read_flat(sys.argv[1]), f"{sys.argv[1]}-{number}")
+    except BaseException as error:
+        failed.append(error)
+        raise
+
+threads = [threading.Thread(target=work, args=(number,)) for number in range(3)]
+for thread in threads:
+    thread.start()
+for thread in threads:
+    thread.join()
+sys.exit(len(failed))
+"""
+
+
+def test_threads_read_and_write_side_by_side(tmp_path: Path) -> None:
+    write_dataset(
+        dataset_of([record(float(value), impacts=1) for value in range(3000)]), tmp_path / "runs.nc"
+    )
+    # in a process of its own, which such a fault takes with it
+    command = [sys.executable, "-c", THREADS, str(tmp_path / "runs.nc")]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr[-2000:]
+
+
+def test_a_dropped_dataset_reads_on_where_something_of_it_is_left(tmp_path: Path) -> None:
+    write_dataset(dataset_of([record(1.0), record(2.0)]), tmp_path / "runs.nc")
+    final = open_dataset(tmp_path / "runs.nc").final_displacement
+    gc.collect()
+    assert np.array_equal(final.values, [1.0, 2.0])
+
+
+def test_a_closed_dataset_is_closed_once(tmp_path: Path) -> None:
+    write_dataset(dataset_of([record(1.0)]), tmp_path / "runs.nc")
+    opened = open_dataset(tmp_path / "runs.nc")
+    opened.close()
+    opened.close()
