@@ -125,8 +125,37 @@ def rests(draw: st.DrawFn) -> tuple[Modes, list[Stop], Array, float]:
     return Modes(natural, ratio, force, frequency), stops, 1.5 * shape, draw(st.floats(0.5, 2.0)) / frequency
 
 
+@st.composite
+def coupled_rests(draw: st.DrawFn) -> tuple[Modes, list[Stop], Array, float]:
+    """Bodies that are pressed to one to four stops, damped at single points, strongly, or by their modes."""
+    n = draw(st.integers(1, 7))
+    numbers = st.lists(st.floats(0.1, 1.0), min_size=n, max_size=n).map(np.array)
+    signs = st.lists(st.sampled_from([-1.0, 1.0]), min_size=n, max_size=n).map(np.array)
+    natural = 0.3 + np.cumsum(draw(numbers)) * draw(st.sampled_from([1.0, 3.0]))
+    frequency, ratio, coupling = draw(st.floats(0.05, 0.5)), 0.0, None
+    if draw(st.booleans()):
+        point = draw(numbers) * draw(signs)
+        coupling = draw(st.sampled_from([0.0, 0.01, 0.1])) * np.diag(natural**2)
+        coupling += draw(st.sampled_from([0.01, 0.3, 3.0])) * np.outer(point, point)
+    else:
+        ratio = draw(st.sampled_from([0.0, 0.01, 0.3, 3.0])) * draw(numbers)
+    stops, load = [], np.zeros(n)
+    for _ in range(draw(st.integers(1, min(n, 4)))):
+        shape = draw(numbers) * draw(signs)
+        load += shape / (shape @ shape)
+        if draw(st.booleans()):
+            stops.append(Stop(shape, 0.0, restitution=0.2))
+            continue
+        stiffness = 10.0 ** draw(st.floats(2.0, 5.0))
+        damping = draw(st.sampled_from([0.0, 0.1, 1.0])) * 2.0 * math.sqrt(stiffness / (shape @ shape))
+        stops.append(Stop(shape, 0.0, law="kelvin_voigt", stiffness=stiffness, damping=damping))
+    force = 0.2 * draw(st.floats(0.0, 1.0)) * load
+    modes = Modes(natural, ratio, force, frequency, coupling=coupling)
+    return modes, stops, 1.5 * load, draw(st.floats(0.5, 2.0)) / frequency
+
+
 @FEW
-@given(rests(), st.sampled_from([1, 3, 40]))
+@given(st.one_of(rests(), coupled_rests()), st.sampled_from([1, 3, 40]))
 def test_a_rest_is_the_same_motion_as_by_series(
     scene: tuple[Modes, list[Stop], Array, float], steps: int
 ) -> None:

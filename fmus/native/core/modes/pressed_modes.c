@@ -10,9 +10,6 @@ enum { MOST_SWEEPS = 60 };
 static const double CLOSE = 1e-9;
 /* Rates nearer to each other, to their conjugate or to 0 than this times their size do not tell their vectors apart. */
 static const double APART = 1e-6;
-/* Largest error of a motion that is taken apart and put together again, relative to its terms; and largest terms,
- * relative to the motion: they cancel next to critical damping. */
-static const double RECOVERED = 1e-13, LARGEST_TERMS = 1e3;
 /* Growth that is rounding, as a share of the rate. */
 static const double NO_GROWTH = 1e-13;
 
@@ -70,7 +67,7 @@ static void sum_modes(const search *s, const zero *z, vi_complex *sum, vi_comple
         const int j = s->mode[i];
         const vi_complex a = inverse_distance(s, z, s->pole[j]), b = inverse_distance(s, z, conjugate(s->pole[j]));
         const vi_complex both = vi_complex_add(a, b);
-        const double n = s->body->shape[j];
+        const double n = s->body->shape[0][j];
         const vi_complex g = vi_complex_scale(n * n, vi_complex_multiply(a, b));
         *sum = vi_complex_add(*sum, g);
         *slope = vi_complex_subtract(*slope, vi_complex_multiply(g, both));
@@ -106,9 +103,9 @@ static vi_complex step_of(const search *s, int i)
     const vi_complex rate = rate_of(s, &s->zero[i]);
     vi_complex value, slope, poles;
     sum_modes(s, &s->zero[i], &value, &slope, &poles);
-    if (!body->held) { /* 1 + Z sum */
-        const vi_complex z = {body->stiffness + body->damping * rate.re, body->damping * rate.im};
-        slope = vi_complex_add(vi_complex_multiply(z, slope), vi_complex_scale(body->damping, value));
+    if (!body->held[0]) { /* 1 + Z sum */
+        const vi_complex z = {body->stiffness[0] + body->damping[0] * rate.re, body->damping[0] * rate.im};
+        slope = vi_complex_add(vi_complex_multiply(z, slope), vi_complex_scale(body->damping[0], value));
         value = vi_complex_multiply(z, value);
         value.re += 1.0;
     }
@@ -182,7 +179,7 @@ static void guess_between(search *s)
     const vi_pressed_body *body = s->body;
     for (int i = 0; i + 1 < s->count; ++i) {
         const int a = s->mode[i], b = s->mode[i + 1];
-        const double na = body->shape[a] * body->shape[a], nb = body->shape[b] * body->shape[b];
+        const double na = body->shape[0][a] * body->shape[0][a], nb = body->shape[0][b] * body->shape[0][b];
         const double share = fmin(fmax(na / (na + nb), NOT_ON_A_POLE), 1.0 - NOT_ON_A_POLE);
         guess(s, body->square[a] + share * (body->square[b] - body->square[a]),
               body->decay[a] + share * (body->decay[b] - body->decay[a]), 0.5 * (s->pole[a].im + s->pole[b].im));
@@ -196,10 +193,10 @@ static void stop_mode(const search *s, double *square, double *decay)
     const int last = s->mode[s->count - 1];
     double mobility = 0.0;
     for (int j = 0; j < body->modes; ++j) {
-        mobility += body->shape[j] * body->shape[j];
+        mobility += body->shape[0][j] * body->shape[0][j];
     }
-    *square = body->square[last] + body->stiffness * mobility;
-    *decay = body->decay[last] + 0.5 * body->damping * mobility;
+    *square = body->square[last] + body->stiffness[0] * mobility;
+    *decay = body->decay[last] + 0.5 * body->damping[0] * mobility;
 }
 
 /* Its two rates are real where the dashpot is strong. */
@@ -234,24 +231,23 @@ static void add_term(vi_pressed_modes *found, const search *s, const zero *z)
     const double size = vi_complex_size(rate);
     rate.re = rate.re > 0.0 && rate.re < NO_GROWTH * size ? 0.0 : rate.re;
     found->rate[m] = rate;
-    found->force[m] = -1.0;
+    found->force[m][0] = (vi_complex){-1.0, 0.0};
     memset(vector, 0, sizeof found->vector[m]);
     vi_complex norm = {0.0, 0.0}, touch = {0.0, 0.0};
     for (int i = 0; i < s->count; ++i) {
         const int j = s->mode[i];
         const vi_complex a = inverse_distance(s, z, s->pole[j]), b = inverse_distance(s, z, conjugate(s->pole[j]));
-        vector[j] = vi_complex_scale(body->shape[j], vi_complex_multiply(a, b));
+        vector[j] = vi_complex_scale(body->shape[0][j], vi_complex_multiply(a, b));
         const vi_complex slope = {2.0 * (rate.re + body->decay[j]), 2.0 * rate.im};
         norm = vi_complex_add(norm, vi_complex_multiply(slope, vi_complex_multiply(vector[j], vector[j])));
     }
-    if (!body->held) { /* n.vector = -1/Z */
-        const vi_complex z_now = {body->stiffness + body->damping * rate.re, body->damping * rate.im};
+    if (!body->held[0]) { /* n.vector = -1/Z */
+        const vi_complex z_now = {body->stiffness[0] + body->damping[0] * rate.re, body->damping[0] * rate.im};
         const vi_complex at = vi_complex_scale(-1.0, vi_complex_invert(z_now));
-        touch = vi_complex_scale(body->damping, at);
+        touch = vi_complex_scale(body->damping[0], at);
         norm = vi_complex_add(norm, vi_complex_multiply(touch, at));
     }
-    found->touch[m][0] = touch.re;
-    found->touch[m][1] = touch.im;
+    found->touch[m][0] = touch;
     found->share[m] = vi_complex_scale(z->pair ? 2.0 : 1.0, vi_complex_invert(norm));
 }
 
@@ -262,36 +258,8 @@ static void add_free(vi_pressed_modes *found, const vi_pressed_body *body, int j
     found->rate[m] = pole_of(body, j);
     memset(found->vector[m], 0, sizeof found->vector[m]);
     found->vector[m][j] = (vi_complex){1.0, 0.0};
-    found->force[m] = found->touch[m][0] = found->touch[m][1] = 0.0;
+    found->force[m][0] = found->touch[m][0] = (vi_complex){0.0, 0.0};
     found->share[m] = (vi_complex){0.0, -1.0 / found->rate[m].im};
-}
-
-static void exchange(vi_pressed_modes *found, int a, int b)
-{
-    vi_complex vector[VI_MODES];
-    const vi_complex rate = found->rate[a], share = found->share[a];
-    const double force = found->force[a], touch[2] = {found->touch[a][0], found->touch[a][1]};
-    memcpy(vector, found->vector[a], sizeof vector);
-    memcpy(found->vector[a], found->vector[b], sizeof vector);
-    memcpy(found->vector[b], vector, sizeof vector);
-    memcpy(found->touch[a], found->touch[b], sizeof touch);
-    memcpy(found->touch[b], touch, sizeof touch);
-    found->rate[a] = found->rate[b];
-    found->share[a] = found->share[b];
-    found->force[a] = found->force[b];
-    found->rate[b] = rate;
-    found->share[b] = share;
-    found->force[b] = force;
-}
-
-/* Slow ones first; they are nearly in order. */
-static void sort(vi_pressed_modes *found)
-{
-    for (int m = 1; m < found->terms; ++m) {
-        for (int l = m; l > 0 && vi_complex_square(found->rate[l]) < vi_complex_square(found->rate[l - 1]); --l) {
-            exchange(found, l, l - 1);
-        }
-    }
 }
 
 /* ---- checks ---- */
@@ -315,49 +283,12 @@ static bool apart(const vi_pressed_modes *found)
     return true;
 }
 
-/* Is a motion that starts like this put together again from its parts, which are not much larger? */
-static bool recovers(const vi_pressed_modes *found, const vi_pressed_body *body, const double q[], const double p[])
-{
-    vi_complex part[VI_TERMS];
-    double displacement[VI_MODES], velocity[VI_MODES], error = 0.0, wrong = 0.0, terms = 0.0, rates = 0.0, whole = 0.0;
-    vi_pressed_parts(found, body, q, p, part);
-    vi_pressed_sum(found, part, displacement, velocity);
-    for (int m = 0; m < found->terms; ++m) {
-        for (int j = 0; j < body->modes; ++j) {
-            const double size = vi_complex_size(part[m]) * vi_complex_size(found->vector[m][j]);
-            terms += size;
-            rates += size * vi_complex_size(found->rate[m]);
-        }
-    }
-    for (int j = 0; j < body->modes; ++j) {
-        whole += fabs(q[j]) + fabs(p[j]) / vi_complex_size(found->rate[0]);
-        error += fabs(displacement[j] - q[j]);
-        wrong += fabs(velocity[j] - p[j]);
-    }
-    return error <= RECOVERED * terms && wrong <= RECOVERED * rates && terms <= LARGEST_TERMS * whole;
-}
-
-/* Do the vectors tell all motions? Two of them, one of all displacements and one of all velocities, tell. */
-static bool complete(const vi_pressed_modes *found, const vi_pressed_body *body)
-{
-    double x[VI_MODES], none[VI_MODES] = {0.0}, along = 0.0, square = 0.0;
-    for (int j = 0; j < body->modes; ++j) {
-        x[j] = j % 2 == 0 ? 1.0 : 0.5 + 1.0 / (double)(j + 1);
-        along += body->shape[j] * x[j];
-        square += body->shape[j] * body->shape[j];
-    }
-    for (int j = 0; j < body->modes && body->held; ++j) {
-        x[j] -= along / square * body->shape[j];
-    }
-    return recovers(found, body, x, none) && recovers(found, body, none, x);
-}
-
 /* One mode against a stop: a quadratic. */
 static bool find_single(vi_pressed_modes *found, const vi_pressed_body *body)
 {
-    const double n = body->shape[0];
-    const double decay = body->decay[0] + 0.5 * body->damping * n * n;
-    const double square = body->square[0] + body->stiffness * n * n;
+    const double n = body->shape[0][0];
+    const double decay = body->decay[0] + 0.5 * body->damping[0] * n * n;
+    const double square = body->square[0] + body->stiffness[0] * n * n;
     const double root = sqrt(square), left = (root - decay) * (root + decay), rest = sqrt(fabs(left));
     const int pair = left > 0.0;
     const vi_complex rates[2] = {{pair ? -decay : -square / (decay + rest), pair ? rest : 0.0}, {-(decay + rest), 0.0}};
@@ -365,14 +296,12 @@ static bool find_single(vi_pressed_modes *found, const vi_pressed_body *body)
     for (int m = 0; m < found->terms; ++m) {
         found->rate[m] = rates[m];
         found->vector[m][0] = (vi_complex){1.0, 0.0};
-        const vi_complex z = {body->stiffness + body->damping * rates[m].re, body->damping * rates[m].im};
+        const vi_complex z = {body->stiffness[0] + body->damping[0] * rates[m].re, body->damping[0] * rates[m].im};
         /* of a vector of 1 the force is Z n: scaled to -1 as all others are */
         const vi_complex scale = vi_complex_scale(-1.0, vi_complex_invert(vi_complex_scale(n, z)));
         found->vector[m][0] = scale;
-        found->force[m] = -1.0;
-        const vi_complex touch = vi_complex_scale(body->damping * n, scale);
-        found->touch[m][0] = touch.re;
-        found->touch[m][1] = touch.im;
+        found->force[m][0] = (vi_complex){-1.0, 0.0};
+        found->touch[m][0] = vi_complex_scale(body->damping[0] * n, scale);
         const vi_complex slope = {2.0 * (rates[m].re + decay), 2.0 * rates[m].im};
         const vi_complex norm = vi_complex_multiply(slope, vi_complex_multiply(scale, scale));
         found->share[m] = vi_complex_scale(pair ? 2.0 : 1.0, vi_complex_invert(norm));
@@ -384,7 +313,7 @@ static bool find_coupled(vi_pressed_modes *found, search *s, bool real)
 {
     s->zeros = 0;
     guess_between(s);
-    if (!s->body->held) {
+    if (!s->body->held[0]) {
         guess_stop(s, real);
     }
     if (!find_zeros(s)) {
@@ -395,12 +324,12 @@ static bool find_coupled(vi_pressed_modes *found, search *s, bool real)
         add_term(found, s, &s->zero[i]);
     }
     for (int j = 0; j < s->body->modes; ++j) {
-        if (s->body->shape[j] == 0.0) {
+        if (s->body->shape[0][j] == 0.0) {
             add_free(found, s->body, j);
         }
     }
-    sort(found);
-    return apart(found) && complete(found, s->body);
+    vi_pressed_terms_sort(found);
+    return apart(found) && vi_pressed_terms_are_complete(found, s->body);
 }
 
 bool vi_pressed_modes_find(vi_pressed_modes *found, const vi_pressed_body *body)
@@ -408,7 +337,7 @@ bool vi_pressed_modes_find(vi_pressed_modes *found, const vi_pressed_body *body)
     search s = {.body = body};
     found->modes = body->modes;
     for (int j = 0; j < body->modes; ++j) {
-        if (body->shape[j] != 0.0) {
+        if (body->shape[0][j] != 0.0) {
             s.mode[s.count++] = j;
         }
         s.pole[j] = pole_of(body, j);
@@ -417,50 +346,13 @@ bool vi_pressed_modes_find(vi_pressed_modes *found, const vi_pressed_body *body)
         return false;
     }
     if (body->modes == 1) {
-        return !body->held && find_single(found, body) && apart(found) && complete(found, body);
+        return !body->held[0] && find_single(found, body) && apart(found) && vi_pressed_terms_are_complete(found, body);
     }
     for (int j = 0; j < body->modes; ++j) {
-        if (!(s.pole[j].im >= APART * sqrt(body->square[j])) || (body->shape[j] == 0.0 && !(s.pole[j].im > 0.0))) {
+        if (!(s.pole[j].im >= APART * sqrt(body->square[j])) || (body->shape[0][j] == 0.0 && !(s.pole[j].im > 0.0))) {
             return false;
         }
     }
-    const bool real = !body->held && strong_dashpot(&s);
-    return find_coupled(found, &s, real) || (!body->held && find_coupled(found, &s, !real));
-}
-
-/* ---- use ---- */
-
-void vi_pressed_parts(const vi_pressed_modes *modes, const vi_pressed_body *body, const double q[], const double p[],
-                      vi_complex part[])
-{
-    double load[VI_MODES], along = 0.0;
-    for (int j = 0; j < modes->modes; ++j) {
-        load[j] = 2.0 * body->decay[j] * q[j] + p[j];
-        along += body->shape[j] * q[j];
-    }
-    for (int m = 0; m < modes->terms; ++m) {
-        const vi_complex *vector = modes->vector[m];
-        vi_complex at = {0.0, 0.0}, rest = {modes->touch[m][0] * along, modes->touch[m][1] * along};
-        for (int j = 0; j < modes->modes; ++j) {
-            at.re += vector[j].re * q[j];
-            at.im += vector[j].im * q[j];
-            rest.re += vector[j].re * load[j];
-            rest.im += vector[j].im * load[j];
-        }
-        part[m] = vi_complex_multiply(modes->share[m], vi_complex_add(vi_complex_multiply(modes->rate[m], at), rest));
-    }
-}
-
-void vi_pressed_sum(const vi_pressed_modes *modes, const vi_complex part[], double q[], double p[])
-{
-    for (int j = 0; j < modes->modes; ++j) {
-        q[j] = p[j] = 0.0;
-    }
-    for (int m = 0; m < modes->terms; ++m) {
-        const vi_complex x = part[m], v = vi_complex_multiply(modes->rate[m], x), *vector = modes->vector[m];
-        for (int j = 0; j < modes->modes; ++j) {
-            q[j] += x.re * vector[j].re - x.im * vector[j].im;
-            p[j] += v.re * vector[j].re - v.im * vector[j].im;
-        }
-    }
+    const bool real = !body->held[0] && strong_dashpot(&s);
+    return find_coupled(found, &s, real) || (!body->held[0] && find_coupled(found, &s, !real));
 }

@@ -17,7 +17,7 @@ static int nearest_resonance(const vi_pressed_body *body, vi_complex s)
     double least = HUGE_VAL;
     int nearest = -1;
     for (int j = 0; j < body->modes; ++j) {
-        const double n = body->shape[j], size = vi_complex_size(dynamic_stiffness(body, s, j)) / (n * n);
+        const double n = body->shape[0][j], size = vi_complex_size(dynamic_stiffness(body, s, j)) / (n * n);
         if (n != 0.0 && size < least) {
             least = size;
             nearest = j;
@@ -30,15 +30,15 @@ void vi_pressed_response(const vi_pressed_body *body, vi_complex s, const vi_com
                          vi_complex q[], vi_complex *force)
 {
     const int last = nearest_resonance(body, s);
-    const double n = body->shape[last];
+    const double n = body->shape[0][last];
     const vi_complex least = vi_complex_scale(1.0 / n, dynamic_stiffness(body, s, last));
     const vi_complex whole = vi_complex_scale(1.0 / n, load[last]); /* force = whole - least q[last] */
-    const vi_complex z = {body->stiffness + body->damping * s.re, body->damping * s.im};
-    vi_complex given = offset, compliance = body->held ? (vi_complex){0.0, 0.0} : vi_complex_invert(z);
+    const vi_complex z = {body->stiffness[0] + body->damping[0] * s.re, body->damping[0] * s.im};
+    vi_complex given = offset, compliance = body->held[0] ? (vi_complex){0.0, 0.0} : vi_complex_invert(z);
     for (int j = 0; j < body->modes; ++j) {
-        if (j != last && body->shape[j] != 0.0) {
-            const vi_complex g = vi_complex_scale(body->shape[j], vi_complex_invert(dynamic_stiffness(body, s, j)));
-            compliance = vi_complex_add(compliance, vi_complex_scale(body->shape[j], g));
+        if (j != last && body->shape[0][j] != 0.0) {
+            const vi_complex g = vi_complex_scale(body->shape[0][j], vi_complex_invert(dynamic_stiffness(body, s, j)));
+            compliance = vi_complex_add(compliance, vi_complex_scale(body->shape[0][j], g));
             given = vi_complex_subtract(given, vi_complex_multiply(g, load[j]));
         }
     }
@@ -49,7 +49,7 @@ void vi_pressed_response(const vi_pressed_body *body, vi_complex s, const vi_com
     *force = vi_complex_subtract(whole, vi_complex_multiply(least, q[last]));
     for (int j = 0; j < body->modes; ++j) {
         if (j != last) {
-            const vi_complex pressed = vi_complex_subtract(load[j], vi_complex_scale(body->shape[j], *force));
+            const vi_complex pressed = vi_complex_subtract(load[j], vi_complex_scale(body->shape[0][j], *force));
             q[j] = vi_complex_divide(pressed, dynamic_stiffness(body, s, j));
         }
     }

@@ -12,7 +12,7 @@ enum { MOST_SWEEPS = 60 }; /* ten are usual */
 typedef struct {
     int rows, columns;
     double (*a)[VI_MODES];
-    int row[VI_MODES + 1], column[VI_MODES]; /* where the rows and columns came from */
+    int row[VI_ROWS], column[VI_MODES]; /* where the rows and columns came from */
 } elimination;
 
 static double dot(int n, const double x[], const double y[])
@@ -98,7 +98,7 @@ static void reflect(int first, int last, const double v[], double x[])
 
 /* X = Q R by Householder's reflections; x[k] is column k on entry, and the unit vector of reflection k after it. R, an
  * upper triangle, is left in r[k], its column k. */
-static void factor(int rows, int rank, double x[][VI_MODES + 1], double r[][VI_MODES + 1])
+static void factor(int rows, int rank, double x[][VI_ROWS], double r[][VI_ROWS])
 {
     for (int k = 0; k < rank; ++k) {
         double *v = x[k];
@@ -119,7 +119,7 @@ static void factor(int rows, int rank, double x[][VI_MODES + 1], double r[][VI_M
 
 /* Row k of R D Y', in the order of the columns of a. The pivots do not grow with j, so that the terms of a row are
  * at most of the size of its pivot and their rounding is small beside it. */
-static void product_row(const elimination *e, int rank, int k, const double (*r)[VI_MODES + 1], double row[])
+static void product_row(const elimination *e, int rank, int k, const double (*r)[VI_ROWS], double row[])
 {
     for (int i = 0; i < e->columns; ++i) {
         double sum = 0.0;
@@ -177,9 +177,9 @@ static bool orthogonalise_all(int columns, int rank, vi_singular *s)
 }
 
 /* Left vectors from their coordinates in the columns of Q. */
-static void leave_reflections(const elimination *e, int rank, const double (*reflection)[VI_MODES + 1], double left[])
+static void leave_reflections(const elimination *e, int rank, const double (*reflection)[VI_ROWS], double left[])
 {
-    double x[VI_MODES + 1] = {0.0};
+    double x[VI_ROWS] = {0.0};
     memcpy(x, left, (size_t)rank * sizeof *x);
     for (int k = rank - 1; k >= 0; --k) {
         reflect(k, e->rows, reflection[k], x);
@@ -229,7 +229,7 @@ static elimination begin(int rows, int columns, double (*a)[VI_MODES])
 }
 
 /* Columns of the unit lower triangle X. */
-static void columns_of_x(const elimination *e, int rank, double x[][VI_MODES + 1])
+static void columns_of_x(const elimination *e, int rank, double x[][VI_ROWS])
 {
     for (int k = 0; k < rank; ++k) {
         for (int i = 0; i < e->rows; ++i) {
@@ -246,11 +246,11 @@ bool vi_singular_find(int rows, int columns, double a[][VI_MODES], vi_singular *
     memset(singular, 0, sizeof *singular);
     elimination e = begin(rows, columns, a);
     const int rank = singular->rank = eliminate(&e);
-    double x[VI_MODES][VI_MODES + 1];
+    double x[VI_MODES][VI_ROWS];
     columns_of_x(&e, rank, x);
     factor(rows, rank, x, singular->left); /* R, until the next loop is through with it */
     for (int k = 0; k < rank; ++k) {
-        product_row(&e, rank, k, (const double (*)[VI_MODES + 1])singular->left, singular->right[k]);
+        product_row(&e, rank, k, (const double (*)[VI_ROWS])singular->left, singular->right[k]);
     }
     memset(singular->left, 0, sizeof singular->left);
     for (int k = 0; k < rank; ++k) {
@@ -258,7 +258,7 @@ bool vi_singular_find(int rows, int columns, double a[][VI_MODES], vi_singular *
     }
     const bool converged = orthogonalise_all(columns, rank, singular);
     for (int k = 0; k < rank; ++k) {
-        leave_reflections(&e, rank, (const double (*)[VI_MODES + 1])x, singular->left[k]);
+        leave_reflections(&e, rank, (const double (*)[VI_ROWS])x, singular->left[k]);
     }
     sort_and_normalise(rows, columns, singular);
     return converged;

@@ -3,6 +3,8 @@
 #include <math.h>
 #include <string.h>
 
+#include "body/modal/structure_held.h"
+#include "modes/pressed_modes.h"
 #include "modes/pressed_response.h"
 #include "motion/ripple.h"
 
@@ -12,17 +14,85 @@ static const double LARGEST_RESPONSE = 64.0;
 static const double SHORT = 0.5;
 enum { SERIES = 14 };
 
+/* ---- what the body rests on ---- */
+
+static bool is_linear(const vi_structure *s, int k)
+{
+    if (s->state->status[k] == VI_CONTACT_HELD) {
+        return true;
+    }
+    const vi_contact_law *law = &s->contacts[k].law;
+    return s->state->status[k] == VI_CONTACT_YIELDING && !s->state->leaving[k] && law->law == VI_LAW_KELVIN_VOIGT
+           && law->stiffness > 0.0 && !vi_structure_is_kept(s, k);
+}
+
+int vi_pressed_contacts(const vi_structure *s, int32_t port[VI_PORTS])
+{
+    int count = 0;
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->state->status[k] == VI_CONTACT_FREE) {
+            continue;
+        }
+        if (!is_linear(s, k)) {
+            return 0;
+        }
+        port[count++] = k;
+    }
+    return count;
+}
+
+static void describe(const vi_structure *s, const int32_t port[], int contacts, vi_pressed_body *body)
+{
+    const vi_structure_model *model = s->model;
+    body->modes = model->modes;
+    body->contacts = contacts;
+    body->coupled = model->coupled && model->modes > 1;
+    for (int j = 0; j < model->modes; ++j) {
+        body->square[j] = model->mode[j].stiffness;
+        body->decay[j] = 0.5 * vi_structure_damping(model, j, j);
+        if (body->coupled) {
+            memcpy(body->coupling[j], model->coupling[j], (size_t)model->modes * sizeof body->coupling[j][0]);
+        }
+    }
+    for (int i = 0; i < contacts; ++i) {
+        const int k = port[i];
+        const vi_contact_law *law = &s->contacts[k].law;
+        body->held[i] = s->state->status[k] == VI_CONTACT_HELD;
+        body->stiffness[i] = body->held[i] ? 0.0 : law->stiffness;
+        body->damping[i] = body->held[i] ? 0.0 : law->damping;
+        for (int j = 0; j < model->modes; ++j) {
+            body->shape[i][j] = vi_structure_direction(s, k) * model->shape[k][j];
+        }
+    }
+}
+
 /* ---- modes, kept ---- */
 
-static bool rests_as(const vi_pressed *pressed, const vi_structure_model *model, const vi_pressed_body *body)
+static bool same_body(const vi_pressed_body *a, const vi_pressed_body *b)
+{
+    const size_t size = (size_t)a->modes * sizeof(double);
+    bool same = a->modes == b->modes && a->contacts == b->contacts && a->coupled == b->coupled
+                && memcmp(a->square, b->square, size) == 0 && memcmp(a->decay, b->decay, size) == 0;
+    for (int i = 0; i < a->contacts && same; ++i) {
+        same = a->held[i] == b->held[i] && a->stiffness[i] == b->stiffness[i] && a->damping[i] == b->damping[i]
+               && memcmp(a->shape[i], b->shape[i], size) == 0;
+    }
+    for (int j = 0; j < a->modes && same && a->coupled; ++j) {
+        same = memcmp(a->coupling[j], b->coupling[j], size) == 0;
+    }
+    return same;
+}
+
+/* Does it rest as asked, seen from the same points? */
+static bool rests_as(const vi_pressed *pressed, const vi_structure_model *model, const int32_t port[])
 {
     const size_t size = (size_t)model->modes * sizeof(double);
-    bool same = pressed->known && pressed->contacts == model->contacts && pressed->body.modes == body->modes
-                && pressed->body.held == body->held && pressed->body.stiffness == body->stiffness
-                && pressed->body.damping == body->damping && memcmp(pressed->body.square, body->square, size) == 0
-                && memcmp(pressed->body.decay, body->decay, size) == 0
-                && memcmp(pressed->body.shape, body->shape, size) == 0
+    bool same = pressed->known != VI_MODES_UNKNOWN && pressed->contacts == model->contacts
+                && same_body(&pressed->asked, &pressed->body)
                 && memcmp(pressed->observed, model->observed, size) == 0;
+    for (int i = 0; i < pressed->asked.contacts && same; ++i) {
+        same = pressed->port[i] == port[i];
+    }
     for (int l = 0; l < model->contacts && same; ++l) {
         same = memcmp(pressed->shape[l], model->shape[l], size) == 0;
     }
@@ -46,77 +116,107 @@ static void weigh_all(vi_pressed *pressed, const vi_structure_model *model)
         weigh(&pressed->modes, model->shape[l], pressed->weight[l]);
     }
     weigh(&pressed->modes, model->observed, pressed->weight[VI_SEEN_OBSERVED]);
-    for (int m = 0; m < pressed->modes.terms; ++m) {
-        pressed->weight[VI_SEEN_FORCE][m] = (vi_complex){pressed->modes.force[m], 0.0};
-    }
-}
-
-static void describe(const vi_structure *s, int k, vi_pressed_body *body)
-{
-    const vi_structure_model *model = s->model;
-    const vi_contact_law *law = &s->contacts[k].law;
-    const bool held = s->state->status[k] == VI_CONTACT_HELD;
-    body->modes = model->modes;
-    body->held = held;
-    body->stiffness = held ? 0.0 : law->stiffness;
-    body->damping = held ? 0.0 : law->damping;
-    for (int j = 0; j < model->modes; ++j) {
-        body->square[j] = model->mode[j].stiffness;
-        body->decay[j] = 0.5 * vi_structure_damping(model, j, j);
-        body->shape[j] = vi_structure_direction(s, k) * model->shape[k][j];
-    }
-}
-
-const vi_pressed *vi_pressed_find(const vi_structure *s, int k)
-{
-    const vi_structure_model *model = s->model;
-    vi_pressed *pressed = s->pressed;
-    vi_pressed_body body;
-    describe(s, k, &body);
-    if (!rests_as(pressed, model, &body)) {
-        pressed->known = 1;
-        pressed->contacts = model->contacts;
-        pressed->body = body;
-        memcpy(pressed->shape, model->shape, sizeof pressed->shape);
-        memcpy(pressed->observed, model->observed, sizeof pressed->observed);
-        pressed->usable = vi_pressed_modes_find(&pressed->modes, &pressed->body);
-        if (pressed->usable) {
-            weigh_all(pressed, model);
+    for (int i = 0; i < pressed->body.contacts; ++i) {
+        for (int m = 0; m < pressed->modes.terms; ++m) {
+            pressed->weight[VI_SEEN_FORCE + i][m] = pressed->modes.force[m][i];
         }
     }
-    return pressed->usable ? pressed : NULL;
+}
+
+static void begin(vi_pressed *pressed, const vi_structure_model *model, const int32_t port[])
+{
+    pressed->known = VI_MODES_NOT_TOLD;
+    pressed->sought = 0;
+    pressed->still.known = pressed->harmonic.known = 0;
+    pressed->contacts = model->contacts;
+    pressed->body = pressed->asked;
+    memcpy(pressed->port, port, sizeof pressed->port);
+    memcpy(pressed->shape, model->shape, sizeof pressed->shape);
+    memcpy(pressed->observed, model->observed, sizeof pressed->observed);
+    const bool one = pressed->body.contacts == 1 && !pressed->body.coupled;
+    if (one && vi_pressed_modes_find(&pressed->modes, &pressed->body)) {
+        pressed->known = VI_MODES_OF_ONE;
+        weigh_all(pressed, model);
+    }
+}
+
+const vi_pressed *vi_pressed_find(const vi_structure *s, bool all)
+{
+    vi_pressed *pressed = s->pressed;
+    int32_t port[VI_PORTS] = {0};
+    const int contacts = vi_pressed_contacts(s, port);
+    describe(s, port, contacts, &pressed->asked);
+    if (!rests_as(pressed, s->model, port)) {
+        begin(pressed, s->model, port);
+    }
+    if (pressed->known == VI_MODES_NOT_TOLD && all && !pressed->sought) {
+        pressed->sought = 1;
+        if (vi_coupled_modes_find(&pressed->modes, &pressed->body, &pressed->work)) {
+            pressed->known = VI_MODES_OF_ALL;
+            vi_coupled_equations_find(&pressed->still, &pressed->body, (vi_complex){0.0, 0.0});
+            weigh_all(pressed, s->model);
+        }
+    }
+    const bool told = pressed->known == VI_MODES_OF_ONE || (all && pressed->known == VI_MODES_OF_ALL);
+    return told ? pressed : NULL;
 }
 
 /* ---- the flow ---- */
 
-/* The responses to the harmonic force and to the loads from `at` on with their slopes; `position`: of the stop,
- * towards it. */
-static void respond(vi_pressed_flow *flow, const vi_structure *s, const double held[], double position)
+/* The response to loads in the form Re(load e^(s t)), s being 0 or the forcing's. */
+static void answer(const vi_pressed *pressed, vi_complex s, const vi_complex load[], const vi_complex offset[],
+                   vi_complex q[], vi_complex force[])
 {
-    const vi_pressed_body *body = &flow->pressed->body;
-    const vi_complex none = {0.0, 0.0};
-    vi_complex load[VI_MODES], found[VI_MODES], force;
-    double rate = 0.0;
-    for (int j = 0; j < body->modes; ++j) {
+    if (pressed->known == VI_MODES_OF_ONE) {
+        vi_pressed_response(&pressed->body, s, load, offset[0], q, force);
+    } else {
+        vi_coupled_response(s.im == 0.0 ? &pressed->still : &pressed->harmonic, &pressed->body, load, offset, q, force);
+    }
+}
+
+static void respond_to_forcing(vi_pressed_flow *flow, const vi_structure *s)
+{
+    const vi_complex none[VI_PORTS] = {{0.0, 0.0}};
+    vi_complex load[VI_MODES];
+    for (int j = 0; j < flow->pressed->body.modes; ++j) {
         load[j] = (vi_complex){s->model->mode[j].force, 0.0};
     }
-    vi_pressed_response(body, (vi_complex){0.0, flow->angular_frequency}, load, none, flow->harmonic,
-                        &flow->harmonic_force);
+    answer(flow->pressed, (vi_complex){0.0, flow->angular_frequency}, load, none, flow->harmonic, flow->harmonic_force);
+}
+
+/* To the loads from now on, with their slopes. */
+static void respond_to_loads(vi_pressed_flow *flow, const vi_structure *s, const double held[])
+{
+    const vi_pressed *pressed = flow->pressed;
+    const vi_pressed_body *body = &pressed->body;
+    const vi_complex still = {0.0, 0.0};
+    vi_complex load[VI_MODES], found[VI_MODES], force[VI_PORTS], offset[VI_PORTS] = {{0.0, 0.0}};
     for (int j = 0; j < body->modes; ++j) {
         load[j] = (vi_complex){s->state->held_rate[j], 0.0};
     }
-    vi_pressed_response(body, none, load, none, found, &force);
-    flow->force_rate = force.re;
+    answer(pressed, still, load, offset, found, force);
     for (int j = 0; j < body->modes; ++j) {
         flow->level_rate[j] = found[j].re;
-        load[j] = (vi_complex){held[j] - 2.0 * body->decay[j] * found[j].re, 0.0};
-        rate += body->shape[j] * found[j].re;
     }
-    const double behind = body->held ? 0.0 : body->damping * rate / body->stiffness;
-    vi_pressed_response(body, none, load, (vi_complex){position - behind, 0.0}, found, &force);
-    flow->force_level = force.re;
+    for (int i = 0; i < body->contacts; ++i) {
+        const int k = pressed->port[i];
+        double rate = 0.0;
+        for (int j = 0; j < body->modes; ++j) {
+            rate += body->shape[i][j] * flow->level_rate[j];
+        }
+        const double behind = body->held[i] ? 0.0 : body->damping[i] * rate / body->stiffness[i];
+        offset[i].re = vi_structure_direction(s, k) * s->contacts[k].position - behind;
+        flow->force_rate[i] = force[i].re;
+    }
+    for (int j = 0; j < body->modes; ++j) {
+        load[j] = (vi_complex){held[j] - vi_pressed_drag(body, j, flow->level_rate), 0.0};
+    }
+    answer(pressed, still, load, offset, found, force);
     for (int j = 0; j < body->modes; ++j) {
         flow->level[j] = found[j].re;
+    }
+    for (int i = 0; i < body->contacts; ++i) {
+        flow->force_level[i] = force[i].re;
     }
 }
 
@@ -138,8 +238,16 @@ static bool keeps_digits(const vi_pressed_flow *flow, const vi_structure *s, dou
     return response <= LARGEST_RESPONSE * way && response_speed <= LARGEST_RESPONSE * speed;
 }
 
-bool vi_pressed_flow_start(vi_pressed_flow *flow, const vi_structure *s, int k, const vi_pressed *pressed,
-                           double length)
+/* The equations of the response to the forcing, which may have another frequency than when the modes were found. */
+static void know_harmonic(vi_pressed *pressed, double angular_frequency)
+{
+    vi_coupled_equations *harmonic = &pressed->harmonic;
+    if (pressed->known == VI_MODES_OF_ALL && !(harmonic->known && harmonic->s.im == angular_frequency)) {
+        vi_coupled_equations_find(harmonic, &pressed->body, (vi_complex){0.0, angular_frequency});
+    }
+}
+
+bool vi_pressed_flow_start(vi_pressed_flow *flow, const vi_structure *s, const vi_pressed *pressed, double length)
 {
     const vi_phase phase = vi_structure_phase(s);
     const double w = s->model->clock.angular_frequency;
@@ -149,7 +257,9 @@ bool vi_pressed_flow_start(vi_pressed_flow *flow, const vi_structure *s, int k, 
     flow->angular_frequency = w;
     flow->since = flow->since_low = 0.0;
     vi_structure_held_now(s, held);
-    respond(flow, s, held, vi_structure_direction(s, k) * s->contacts[k].position);
+    know_harmonic(s->pressed, w);
+    respond_to_forcing(flow, s);
+    respond_to_loads(flow, s, held);
     for (int j = 0; j < pressed->body.modes; ++j) {
         const vi_complex harmonic = flow->harmonic[j];
         const double x = harmonic.re * phase.cosine - harmonic.im * phase.sine;
@@ -161,16 +271,31 @@ bool vi_pressed_flow_start(vi_pressed_flow *flow, const vi_structure *s, int k, 
     return keeps_digits(flow, s, length);
 }
 
-/* Nothing but the exact flow has moved the body since, under the same loads. */
-static bool goes_on(const vi_pressed_flow *flow, const vi_structure *s, int k, const double held[])
+/* Do the contacts stand, and are their stops, as they were? */
+static bool same_stops(const vi_structure *s)
 {
     const vi_rest_origin *origin = &s->state->rest;
-    const vi_pressed_body *body = &flow->pressed->body;
-    if (origin->contact != k + 1 || origin->stiffness != body->stiffness || origin->damping != body->damping
-        || origin->position != s->contacts[k].position || s->model->varies) {
+    for (int k = 0; k < s->model->contacts; ++k) {
+        const vi_contact *contact = &s->contacts[k];
+        if (origin->status[k] != s->state->status[k]
+            || (origin->status[k] != VI_CONTACT_FREE
+                && (origin->position[k] != contact->position || origin->stiffness[k] != contact->law.stiffness
+                    || origin->damping[k] != contact->law.damping))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool vi_pressed_goes_on(const vi_structure *s)
+{
+    const vi_rest_origin *origin = &s->state->rest;
+    double held[VI_MODES];
+    if (!origin->known || s->model->varies || !same_stops(s)) {
         return false;
     }
-    for (int j = 0; j < body->modes; ++j) {
+    vi_structure_held_now(s, held);
+    for (int j = 0; j < s->model->modes; ++j) {
         if (s->state->q[j] != origin->reached_q[j] || s->state->p[j] != origin->reached_p[j]
             || held[j] != origin->held[j] || s->state->held_rate[j] != 0.0) {
             return false;
@@ -179,25 +304,27 @@ static bool goes_on(const vi_pressed_flow *flow, const vi_structure *s, int k, c
     return true;
 }
 
-void vi_pressed_flow_follow(vi_pressed_flow *flow, const vi_structure *s, int k)
+void vi_pressed_flow_follow(vi_pressed_flow *flow, const vi_structure *s)
 {
     vi_rest_origin *origin = &s->state->rest;
-    const vi_pressed_body *body = &flow->pressed->body;
-    double held[VI_MODES];
-    vi_structure_held_now(s, held);
-    if (goes_on(flow, s, k, held)) {
+    if (vi_pressed_goes_on(s)) {
         memcpy(flow->part, origin->part, sizeof flow->part);
         flow->since = vi_clock_elapsed_twofold(&s->model->clock, origin->at, s->state->now, &flow->since_low);
         return;
     }
     memset(origin, 0, sizeof *origin);
+    origin->known = 1;
     origin->at = s->state->now;
     memcpy(origin->part, flow->part, (size_t)flow->pressed->modes.terms * sizeof flow->part[0]);
-    memcpy(origin->held, held, (size_t)body->modes * sizeof held[0]);
-    origin->position = s->contacts[k].position;
-    origin->stiffness = body->stiffness;
-    origin->damping = body->damping;
-    origin->contact = k + 1;
+    vi_structure_held_now(s, origin->held);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        origin->status[k] = s->state->status[k];
+        if (origin->status[k] != VI_CONTACT_FREE) {
+            origin->position[k] = s->contacts[k].position;
+            origin->stiffness[k] = s->contacts[k].law.stiffness;
+            origin->damping[k] = s->contacts[k].law.damping;
+        }
+    }
 }
 
 void vi_pressed_flow_reach(const vi_structure *s)
@@ -247,19 +374,20 @@ static double integral(vi_complex rate, vi_complex start, vi_complex end, double
     return sum.re;
 }
 
-double vi_pressed_flow_impulse(const vi_pressed_flow *flow, double u)
+double vi_pressed_flow_impulse(const vi_pressed_flow *flow, int i, double u)
 {
     const vi_pressed_modes *modes = &flow->pressed->modes;
     const double first = flow->angle, angle = first + flow->angular_frequency * u;
-    const vi_complex start = vi_complex_multiply(flow->harmonic_force, (vi_complex){cos(first), sin(first)});
-    const vi_complex end = vi_complex_multiply(flow->harmonic_force, (vi_complex){cos(angle), sin(angle)});
+    const vi_complex start = vi_complex_multiply(flow->harmonic_force[i], (vi_complex){cos(first), sin(first)});
+    const vi_complex end = vi_complex_multiply(flow->harmonic_force[i], (vi_complex){cos(angle), sin(angle)});
     vi_complex from[VI_TERMS], part[VI_TERMS];
-    double sum = (flow->force_level + 0.5 * flow->force_rate * u) * u
+    double sum = (flow->force_level[i] + 0.5 * flow->force_rate[i] * u) * u
                  + integral((vi_complex){0.0, flow->angular_frequency}, start, end, u);
     vi_pressed_flow_parts(flow, 0.0, from);
     vi_pressed_flow_parts(flow, u, part);
     for (int m = 0; m < modes->terms; ++m) {
-        sum += modes->force[m] * integral(modes->rate[m], from[m], part[m], u);
+        const vi_complex force = modes->force[m][i];
+        sum += integral(modes->rate[m], vi_complex_multiply(force, from[m]), vi_complex_multiply(force, part[m]), u);
     }
     return sum;
 }
@@ -272,10 +400,11 @@ vi_pressed_sight vi_pressed_sight_of(const vi_pressed_flow *flow, int seen, doub
     const double *shape = seen == VI_SEEN_OBSERVED ? pressed->observed : seen < VI_PORTS ? pressed->shape[seen] : NULL;
     vi_pressed_sight sight = {.weight = pressed->weight[seen], .sign = sign, .offset = offset};
     if (shape == NULL) {
-        sight.cosine = flow->harmonic_force.re;
-        sight.sine = -flow->harmonic_force.im;
-        sight.level = flow->force_level;
-        sight.level_rate = flow->force_rate;
+        const int i = seen - VI_SEEN_FORCE;
+        sight.cosine = flow->harmonic_force[i].re;
+        sight.sine = -flow->harmonic_force[i].im;
+        sight.level = flow->force_level[i];
+        sight.level_rate = flow->force_rate[i];
     }
     for (int j = 0; j < pressed->body.modes && shape != NULL; ++j) {
         sight.cosine += shape[j] * flow->harmonic[j].re;

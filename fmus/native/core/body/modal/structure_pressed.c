@@ -1,10 +1,12 @@
 #include "body/modal/structure_pressed.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "body/landing.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure_forces.h"
+#include "body/modal/structure_held.h"
 #include "motion/majorant.h"
 
 /* Segments by series before a rest counts as long: most contacts are over by then. */
@@ -12,33 +14,12 @@ enum { PATIENCE = 16 };
 /* Least step, in radians of the fastest rate, that is worth an evaluation of all terms; and a whole rest, times the
  * number of modes where these must be found anew for it. */
 static const double LEAST_STEP = 8.0, LEAST_REST = 32.0;
+/* Likewise where they are those of several contacts, or of coupled damping, times the square of the number of modes. */
+static const double ALL_MODES = 2.0;
 /* Rounding of what must not fall to zero, in roundings of its terms: nearer to zero the series decide. */
 static const double MARGIN = 16.0;
 
 /* ---- is this a long rest? ---- */
-
-static bool is_linear(const vi_structure *s, int k)
-{
-    const int32_t status = s->state->status[k];
-    return status == VI_CONTACT_HELD
-           || (status == VI_CONTACT_YIELDING && !s->state->leaving[k] && s->contacts[k].law.law == VI_LAW_KELVIN_VOIGT);
-}
-
-/* The one contact that the body rests on, all others being free; -1: none. */
-static int rests_on(const vi_structure *s)
-{
-    int found = -1;
-    for (int k = 0; k < s->model->contacts; ++k) {
-        if (s->state->status[k] == VI_CONTACT_FREE) {
-            continue;
-        }
-        if (found >= 0 || !is_linear(s, k)) {
-            return -1;
-        }
-        found = k;
-    }
-    return found;
-}
 
 /* A body that stands still stays where it is to the last bit. */
 static bool moves(const vi_structure *s)
@@ -52,20 +33,36 @@ static bool moves(const vi_structure *s)
 }
 
 /* Rate that no motion of the resting body exceeds, rad/s. */
-static double fastest_rate(const vi_structure *s, int k)
+static double fastest_rate(const vi_structure *s, const int32_t port[], int contacts)
 {
-    if (s->state->status[k] == VI_CONTACT_HELD) {
-        return s->model->fastest;
+    double stiffness = 0.0, damping = 0.0;
+    for (int i = 0; i < contacts; ++i) {
+        const int k = port[i];
+        const double mobility = s->state->status[k] == VI_CONTACT_HELD ? 0.0 : s->model->compliance[k][k];
+        stiffness += s->contacts[k].law.stiffness * mobility;
+        damping += s->contacts[k].law.damping * mobility;
     }
-    const double mobility = s->model->compliance[k][k];
-    return s->model->fastest + sqrt(s->contacts[k].law.stiffness * mobility) + s->contacts[k].law.damping * mobility;
+    return s->model->fastest + sqrt(stiffness) + damping;
+}
+
+/* Radians of the fastest rate from which a rest pays the finding of its modes. */
+static double pays(const vi_structure *s)
+{
+    return s->model->varies ? LEAST_REST * (double)s->model->modes : LEAST_REST;
+}
+
+/* And the modes of several contacts, or of coupled damping; the series have spent so many already. */
+static bool pays_for_all(const vi_structure *s, double radians)
+{
+    const double modes = (double)s->model->modes, spent = s->model->varies ? 0.0 : (double)s->state->series;
+    return radians + spent >= ALL_MODES * modes * modes || vi_pressed_goes_on(s);
 }
 
 /* ---- how far nothing happens ---- */
 
 typedef struct {
     int count;
-    vi_pressed_sight sight[VI_PORTS]; /* the force of the contact, clearances of the others */
+    vi_pressed_sight sight[VI_PORTS]; /* forces of the contacts that it rests on, clearances of the others */
 } guard;
 
 /* Size of the terms that the contact's force is the sum of, N. */
@@ -80,26 +77,25 @@ static double force_size(const vi_structure *s, int k)
     for (int j = 0; j < model->modes; ++j) {
         const vi_mode *mode = &model->mode[j];
         const double loads = fabs(mode->force) + fabs(s->state->held[j]);
-        const double drag = vi_structure_damping(model, j, j) * fabs(s->state->p[j]);
+        const double drag = vi_structure_drag_size(model, j, s->state->p);
         size += fabs(model->shape[k][j]) * (loads + mode->stiffness * fabs(s->state->q[j]) + drag);
     }
-    return size / model->compliance[k][k];
+    return size / vi_structure_mobility_left(s, k);
 }
 
-static void start_guard(const vi_structure *s, int k, const vi_pressed_flow *flow, double length, guard *g)
+static void start_guard(const vi_structure *s, const vi_pressed_flow *flow, double length, guard *g)
 {
     const double rounding = MARGIN * VI_ROUNDING;
     g->count = 0;
-    for (int l = 0; l < s->model->contacts; ++l) {
-        if (l != k && !vi_structure_watched(s, l)) {
-            continue;
-        }
+    for (int i = 0; i < flow->pressed->body.contacts; ++i) {
         vi_pressed_sight *sight = &g->sight[g->count++];
-        const double sign = vi_structure_direction(s, l);
-        if (l == k) {
-            *sight = vi_pressed_sight_of(flow, VI_SEEN_FORCE, -1.0, 0.0, length);
-            sight->offset = -rounding * (sight->scale + force_size(s, k));
-        } else {
+        *sight = vi_pressed_sight_of(flow, VI_SEEN_FORCE + i, -1.0, 0.0, length);
+        sight->offset = -rounding * (sight->scale + force_size(s, flow->pressed->port[i]));
+    }
+    for (int l = 0; l < s->model->contacts; ++l) {
+        if (s->state->status[l] == VI_CONTACT_FREE && vi_structure_watched(s, l)) {
+            vi_pressed_sight *sight = &g->sight[g->count++];
+            const double sign = vi_structure_direction(s, l);
             *sight = vi_pressed_sight_of(flow, l, sign, sign * s->contacts[l].position, length);
             sight->offset -= rounding * (sight->scale + vi_structure_displacement_size(s, l));
         }
@@ -195,27 +191,31 @@ static void extreme(const vi_structure *s, const vi_pressed_flow *flow, double s
 
 /* ---- a rest ---- */
 
-/* Is the observed point the one that is held? */
-static bool sees_only_the_stop(const vi_structure *s, int k)
+/* Is the observed point one that is held? */
+static bool sees_only_the_stop(const vi_structure *s)
 {
-    for (int j = 0; j < s->model->modes; ++j) {
-        if (s->model->observed[j] != s->model->shape[k][j]) {
-            return false;
+    const size_t size = (size_t)s->model->modes * sizeof(double);
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->state->status[k] == VI_CONTACT_HELD && memcmp(s->model->observed, s->model->shape[k], size) == 0) {
+            return true;
         }
     }
-    return s->state->status[k] == VI_CONTACT_HELD;
+    return false;
 }
 
-static void rest(const vi_structure *s, int k, const vi_pressed_flow *flow, double fastest, double u)
+static void rest(const vi_structure *s, const vi_pressed_flow *flow, double fastest, double u)
 {
     vi_structure_state *state = s->state;
     vi_budget_spend(&state->budget, (int64_t)flow->pressed->modes.terms * s->model->modes / 4);
-    if (s->record->extrema && !sees_only_the_stop(s, k)) {
+    if (s->record->extrema && !sees_only_the_stop(s)) {
         extreme(s, flow, 1.0, fastest, u);
         extreme(s, flow, -1.0, fastest, u);
     }
-    if (state->status[k] == VI_CONTACT_YIELDING) {
-        state->touch_down[k].impulse += vi_pressed_flow_impulse(flow, u);
+    for (int i = 0; i < flow->pressed->body.contacts; ++i) {
+        const int k = flow->pressed->port[i];
+        if (state->status[k] == VI_CONTACT_YIELDING) {
+            state->touch_down[k].impulse += vi_pressed_flow_impulse(flow, i, u);
+        }
     }
     vi_pressed_flow_end(flow, u, state->q, state->p);
     vi_structure_project(s);
@@ -225,34 +225,38 @@ static void rest(const vi_structure *s, int k, const vi_pressed_flow *flow, doub
     }
 }
 
-double vi_structure_rest_on(const vi_structure *s, double length, double room)
+/* Follow a rest that is long enough for its modes. */
+static double rest_for_long(const vi_structure *s, const vi_pressed *pressed, double fastest, double length, double room)
 {
-    vi_structure_state *state = s->state;
-    const int k = rests_on(s);
-    if (s->pressed == NULL || k < 0 || state->series < PATIENCE || state->follow_energies || !moves(s)
-        || (s->model->coupled && s->model->modes > 1)) {
-        return 0.0;
-    }
-    const double fastest = fastest_rate(s, k);
-    const double pays = s->model->varies ? LEAST_REST * (double)s->model->modes : LEAST_REST;
-    if (!(length * fastest >= pays)) {
-        return 0.0;
-    }
-    const vi_pressed *pressed = vi_pressed_find(s, k);
     vi_pressed_flow flow;
     guard g;
     double u = 0.0;
-    if (pressed != NULL && vi_pressed_flow_start(&flow, s, k, pressed, length)) {
-        vi_pressed_flow_follow(&flow, s, k);
-        start_guard(s, k, &flow, length, &g);
+    if (vi_pressed_flow_start(&flow, s, pressed, length)) {
+        vi_pressed_flow_follow(&flow, s);
+        start_guard(s, &flow, length, &g);
         u = certain(s, &flow, &g, length + room, LEAST_STEP / fastest);
         u = u >= length + room ? length : u < length ? u : 0.0;
     }
     if (u < length) {
-        state->series = 0; /* something is about to happen */
+        s->state->series = 0; /* something is about to happen */
     }
     if (u > 0.0) {
-        rest(s, k, &flow, fastest, u);
+        rest(s, &flow, fastest, u);
     }
     return u;
+}
+
+double vi_structure_rest_on(const vi_structure *s, double length, double room)
+{
+    int32_t port[VI_PORTS];
+    if (s->pressed == NULL || s->state->series < PATIENCE || s->state->follow_energies || !moves(s)) {
+        return 0.0;
+    }
+    const int contacts = vi_pressed_contacts(s, port);
+    const double fastest = fastest_rate(s, port, contacts);
+    if (contacts == 0 || !(length * fastest >= pays(s))) {
+        return 0.0;
+    }
+    const vi_pressed *pressed = vi_pressed_find(s, pays_for_all(s, length * fastest));
+    return pressed != NULL ? rest_for_long(s, pressed, fastest, length, room) : 0.0;
 }

@@ -16,7 +16,7 @@
 #include "body/complaint.h"
 #include "body/record.h"
 #include "contact/contact.h"
-#include "modes/pressed_modes.h"
+#include "modes/pressed_terms.h"
 #include "motion/clock.h"
 #include "motion/flow.h"
 #include "motion/origin.h"
@@ -79,8 +79,9 @@ typedef struct {
     vi_complex part[VI_TERMS];                       /* then */
     double held[VI_MODES];                           /* constant loads meanwhile */
     double reached_q[VI_MODES], reached_p[VI_MODES]; /* at the end of the last rest counted from here */
-    double position, stiffness, damping;             /* of the stop; held: no stiffness */
-    int64_t contact;                                 /* 1-based; 0: there is none */
+    double position[VI_PORTS], stiffness[VI_PORTS], damping[VI_PORTS]; /* of the stops that it rests on */
+    int64_t status[VI_PORTS];                        /* of all contacts */
+    int64_t known;                                   /* 64 bits: no padding, whose bytes a saved state would show */
 } vi_rest_origin;
 
 typedef struct {

@@ -1,0 +1,324 @@
+#include "modes/coupled_modes.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Held contacts count as independent where what the others leave of a shape is more than this share of it. */
+static const double INDEPENDENT = 1e-6;
+/* A rate with an imaginary part below this share of it is real; one below the square root's is nearly critical. */
+static const double REAL = 1e-12, CRITICAL = 1e-6;
+/* Growth that is rounding, as a share of the rate. */
+static const double NO_GROWTH = 1e-13;
+
+static double dot(int n, const double x[], const double y[])
+{
+    double sum = 0.0;
+    for (int j = 0; j < n; ++j) {
+        sum += x[j] * y[j];
+    }
+    return sum;
+}
+
+/* ---- held contacts ---- */
+
+static void reflect(int n, const double unit[], double x[])
+{
+    const double twice = 2.0 * dot(n, unit, x);
+    for (int j = 0; j < n; ++j) {
+        x[j] -= twice * unit[j];
+    }
+}
+
+/* Householder's reflections, after which motions that keep the held contacts in place have no first components. */
+static bool reflect_held(const vi_pressed_body *body, vi_coupled_work *work)
+{
+    const int n = body->modes;
+    work->reflections = 0;
+    for (int k = 0; k < body->contacts; ++k) {
+        const int i = work->reflections;
+        double *v = work->reflection[i];
+        if (!body->held[k]) {
+            continue;
+        }
+        if (i >= n - 1) {
+            return false;
+        }
+        memcpy(v, body->shape[k], (size_t)n * sizeof *v);
+        for (int l = 0; l < i; ++l) {
+            reflect(n, work->reflection[l], v);
+            work->triangle[l][i] = v[l];
+            v[l] = 0.0; /* what the reflections so far have dealt with */
+        }
+        for (int l = 0; l < i; ++l) {
+            v[l] = 0.0;
+        }
+        const double length = sqrt(dot(n, v, v)), whole = sqrt(dot(n, body->shape[k], body->shape[k]));
+        if (!(length > INDEPENDENT * whole)) {
+            return false;
+        }
+        const double diagonal = v[i] > 0.0 ? -length : length;
+        work->triangle[i][i] = diagonal;
+        v[i] -= diagonal;
+        const double size = sqrt(dot(n, v, v));
+        for (int j = 0; j < n; ++j) {
+            v[j] /= size;
+        }
+        work->reflections = i + 1;
+    }
+    return true;
+}
+
+static void reflect_in(const vi_pressed_body *body, const vi_coupled_work *work, double x[])
+{
+    for (int i = 0; i < work->reflections; ++i) {
+        reflect(body->modes, work->reflection[i], x);
+    }
+}
+
+static void reflect_out(const vi_pressed_body *body, const vi_coupled_work *work, double x[])
+{
+    for (int i = work->reflections - 1; i >= 0; --i) {
+        reflect(body->modes, work->reflection[i], x);
+    }
+}
+
+/* The forces of the held contacts of which the loads are `load`. */
+static void holding(const vi_pressed_body *body, const vi_coupled_work *work, double load[], double force[])
+{
+    reflect_in(body, work, load);
+    for (int i = work->reflections - 1; i >= 0; --i) {
+        force[i] = load[i];
+        for (int l = i + 1; l < work->reflections; ++l) {
+            force[i] -= work->triangle[i][l] * force[l];
+        }
+        force[i] /= work->triangle[i][i];
+    }
+}
+
+/* ---- modes without damping ---- */
+
+static void add_row(const vi_pressed_body *body, vi_coupled_work *work, double x[], int row)
+{
+    reflect_in(body, work, x);
+    memcpy(work->factor[row], x + work->reflections, (size_t)(body->modes - work->reflections) * sizeof *x);
+}
+
+static bool find_real_modes(const vi_pressed_body *body, vi_coupled_work *work)
+{
+    const int n = body->modes, left = n - work->reflections;
+    int rows = n;
+    for (int j = 0; j < n; ++j) {
+        double x[VI_MODES] = {0.0};
+        x[j] = sqrt(body->square[j]);
+        add_row(body, work, x, j);
+    }
+    for (int k = 0; k < body->contacts; ++k) {
+        double x[VI_MODES];
+        for (int j = 0; j < n; ++j) {
+            x[j] = sqrt(body->stiffness[k]) * body->shape[k][j];
+        }
+        if (!body->held[k]) {
+            add_row(body, work, x, rows++);
+        }
+    }
+    if (!vi_singular_find(rows, left, work->factor, &work->real) || work->real.rank != left) {
+        return false;
+    }
+    for (int i = 0; i < left; ++i) {
+        double *shape = work->shape[i];
+        memset(shape, 0, sizeof work->shape[i]);
+        memcpy(shape + work->reflections, work->real.right[i], (size_t)left * sizeof *shape);
+        reflect_out(body, work, shape);
+    }
+    return true;
+}
+
+/* Displacements of the contacts that press, small ones of slow modes to their own digits. */
+static void look_at_contacts(const vi_pressed_body *body, vi_coupled_work *work)
+{
+    int row = body->modes;
+    for (int k = 0; k < body->contacts; ++k) {
+        for (int i = 0; i < work->real.rank; ++i) {
+            work->at[k][i] = body->held[k] ? 0.0
+                                           : work->real.value[i] * work->real.left[i][row] / sqrt(body->stiffness[k]);
+        }
+        row += !body->held[k];
+    }
+}
+
+static void couple(const vi_pressed_body *body, vi_coupled_work *work)
+{
+    for (int i = 0; i < work->real.rank; ++i) {
+        double drag[VI_MODES];
+        for (int j = 0; j < body->modes; ++j) {
+            drag[j] = vi_pressed_drag(body, j, work->shape[i]);
+        }
+        for (int l = 0; l <= i; ++l) {
+            double sum = dot(body->modes, drag, work->shape[l]);
+            for (int k = 0; k < body->contacts; ++k) {
+                sum += body->held[k] ? 0.0 : body->damping[k] * work->at[k][i] * work->at[k][l];
+            }
+            work->damping[i][l] = work->damping[l][i] = sum;
+        }
+    }
+}
+
+/* ---- damped modes ---- */
+
+/* States are ordered by modes, the fast ones first: what a rotation rounds then is small beside what it turns. */
+static int state_of(const vi_coupled_work *work, int i)
+{
+    return 2 * (work->real.rank - 1 - i);
+}
+
+static void fill_matrix(vi_coupled_work *work)
+{
+    const int modes = work->real.rank;
+    for (int k = 0; k < 2 * modes; ++k) {
+        memset(work->matrix[k], 0, sizeof work->matrix[k]);
+    }
+    for (int i = 0; i < modes; ++i) {
+        const int at = state_of(work, i);
+        work->matrix[at][at + 1].im = work->matrix[at + 1][at].im = work->real.value[i];
+        for (int l = 0; l < modes; ++l) {
+            work->matrix[at + 1][state_of(work, l) + 1].re = -work->damping[i][l];
+        }
+    }
+}
+
+/* The rate of a vector, Rayleigh's quotient: its error is the square of the vector's. */
+static vi_complex rate_of(const vi_coupled_work *work, const vi_complex vector[])
+{
+    vi_complex sum = {0.0, 0.0};
+    for (int i = 0; i < work->real.rank; ++i) {
+        const int at = state_of(work, i);
+        const vi_complex stiff = vi_complex_scale(2.0 * work->real.value[i], vector[at]);
+        vi_complex drag = {-stiff.im, stiff.re};
+        for (int l = 0; l < work->real.rank; ++l) {
+            drag = vi_complex_subtract(drag, vi_complex_scale(work->damping[i][l], vector[state_of(work, l) + 1]));
+        }
+        sum = vi_complex_add(sum, vi_complex_multiply(drag, vector[at + 1]));
+    }
+    return sum;
+}
+
+/* A contact's displacement, or a mode's, for a term whose modes without damping move by x. */
+static vi_complex weighed(int modes, const double weight[], const vi_complex x[])
+{
+    vi_complex sum = {0.0, 0.0};
+    for (int i = 0; i < modes; ++i) {
+        sum.re += weight[i] * x[i].re;
+        sum.im += weight[i] * x[i].im;
+    }
+    return sum;
+}
+
+/* The forces of the held contacts: what they take off the others' and the body's own. */
+static void add_holding(vi_pressed_modes *found, const vi_pressed_body *body, const vi_coupled_work *work, int m)
+{
+    const vi_complex rate = found->rate[m], *vector = found->vector[m];
+    double re[VI_MODES], im[VI_MODES], load[VI_MODES], across[VI_MODES], force[VI_PORTS], turned[VI_PORTS];
+    for (int j = 0; j < body->modes; ++j) {
+        re[j] = vector[j].re;
+        im[j] = vector[j].im;
+    }
+    for (int j = 0; j < body->modes; ++j) {
+        const vi_complex drag = {vi_pressed_drag(body, j, re), vi_pressed_drag(body, j, im)};
+        vi_complex sum = vi_complex_multiply(rate, vi_complex_add(drag, vi_complex_multiply(rate, vector[j])));
+        sum = vi_complex_add(sum, vi_complex_scale(body->square[j], vector[j]));
+        for (int k = 0; k < body->contacts; ++k) {
+            sum = vi_complex_add(sum, vi_complex_scale(body->held[k] ? 0.0 : body->shape[k][j], found->force[m][k]));
+        }
+        load[j] = -sum.re;
+        across[j] = -sum.im;
+    }
+    holding(body, work, load, force);
+    holding(body, work, across, turned);
+    for (int k = 0, i = 0; k < body->contacts; ++k) {
+        if (body->held[k]) {
+            found->force[m][k] = (vi_complex){force[i], turned[i]};
+            ++i;
+        }
+    }
+}
+
+static void add_term(vi_pressed_modes *found, const vi_pressed_body *body, const vi_coupled_work *work, vi_complex rate,
+                     const vi_complex state[])
+{
+    const int m = found->terms++, modes = work->real.rank;
+    vi_complex x[VI_MODES];
+    found->rate[m] = rate;
+    found->share[m] = vi_complex_scale(rate.im > 0.0 ? -2.0 : -1.0, rate);
+    for (int i = 0; i < modes; ++i) {
+        x[i] = vi_complex_scale(1.0 / work->real.value[i], state[state_of(work, i)]);
+    }
+    for (int j = 0; j < body->modes; ++j) {
+        vi_complex sum = {0.0, 0.0};
+        for (int i = 0; i < modes; ++i) {
+            sum.re += work->shape[i][j] * x[i].re;
+            sum.im += work->shape[i][j] * x[i].im;
+        }
+        found->vector[m][j] = sum;
+    }
+    for (int k = 0; k < body->contacts; ++k) {
+        const vi_complex at = weighed(modes, work->at[k], x);
+        const vi_complex z = {body->stiffness[k] + body->damping[k] * rate.re, body->damping[k] * rate.im};
+        found->touch[m][k] = body->held[k] ? (vi_complex){0.0, 0.0} : vi_complex_scale(body->damping[k], at);
+        found->force[m][k] = body->held[k] ? (vi_complex){0.0, 0.0} : vi_complex_multiply(z, at);
+    }
+    if (work->reflections > 0) {
+        add_holding(found, body, work, m);
+    }
+}
+
+/* The slowest rate of those that are left, of a pair and its conjugate the former; -1: none. */
+static int slowest(int states, const vi_complex rate[], const bool taken[])
+{
+    int best = -1;
+    for (int k = 0; k < states; ++k) {
+        if (!taken[k] && (best < 0 || vi_complex_square(rate[k]) < vi_complex_square(rate[best]))) {
+            best = k;
+        }
+    }
+    return best;
+}
+
+/* Terms in order of their rates; false where some are nearly critical, or none of a pair. */
+static bool add_terms(vi_pressed_modes *found, const vi_pressed_body *body, const vi_coupled_work *work)
+{
+    const int states = 2 * work->real.rank;
+    vi_complex rate[VI_STATES];
+    bool taken[VI_STATES] = {false};
+    int told = 0;
+    for (int k = 0; k < states; ++k) {
+        rate[k] = rate_of(work, work->vector[k]);
+        const double size = vi_complex_size(rate[k]);
+        rate[k].im = fabs(rate[k].im) <= REAL * size ? 0.0 : rate[k].im;
+        rate[k].re = rate[k].re > 0.0 && rate[k].re < NO_GROWTH * size ? 0.0 : rate[k].re;
+        if (!(size > 0.0) || !isfinite(size) || rate[k].re > 0.0
+            || (rate[k].im != 0.0 && fabs(rate[k].im) < CRITICAL * size)) {
+            return false;
+        }
+        taken[k] = rate[k].im < 0.0;
+        told += rate[k].im > 0.0 ? 2 : rate[k].im == 0.0 ? 1 : 0;
+    }
+    for (int k = slowest(states, rate, taken); k >= 0; k = slowest(states, rate, taken)) {
+        taken[k] = true;
+        add_term(found, body, work, rate[k], work->vector[k]);
+    }
+    return told == states;
+}
+
+bool vi_coupled_modes_find(vi_pressed_modes *found, const vi_pressed_body *body, vi_coupled_work *work)
+{
+    found->modes = body->modes;
+    found->terms = 0;
+    if (!reflect_held(body, work) || !find_real_modes(body, work)) {
+        return false;
+    }
+    look_at_contacts(body, work);
+    couple(body, work);
+    fill_matrix(work);
+    return vi_symmetric_find(2 * work->real.rank, work->matrix, work->vector) && add_terms(found, body, work)
+           && vi_pressed_terms_are_complete(found, body);
+}
