@@ -62,6 +62,73 @@ def test_what_a_stiff_stop_carries_is_the_load_on_it(stiffness: float) -> None:
         assert body.forces[0] == pytest.approx(10.0 + math.cos(60.0), rel=1e-6)
 
 
+#: Three masses of 1 kg, springs of 1 N/m to each other and to the ground; a damper to the ground at the middle one.
+SPRINGS = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
+DAMPER = 0.4
+
+
+def between_stiff_stops(stiffness: float, damping: float) -> tuple[mp.matrix, mp.matrix]:
+    """Return the response of the three masses, pressed outwards to two stops, to the slow force and to the preload."""
+    with mp.workdps(30):
+        still = mp.matrix(SPRINGS.tolist())
+        still[0, 0] += mp.mpf(stiffness)
+        still[2, 2] += mp.mpf(stiffness)
+        damped = mp.diag([mp.mpf(damping), mp.mpf(DAMPER), mp.mpf(damping)])
+        slow = mp.mpf(SLOW)
+        response = mp.lu_solve(
+            still - slow**2 * mp.eye(3) + 1j * slow * damped, mp.matrix([0, mp.mpf("0.3"), mp.mpf(FORCE)])
+        )
+        return response, mp.lu_solve(still, mp.matrix([-2 * PRELOAD, 0, PRELOAD]))
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e6, 1e8, 1e12])
+@pytest.mark.parametrize("ratio", [0.0, 0.1, 3.0])
+def test_a_chain_between_two_stiff_stops_is_released_at_the_zero_of_its_force(
+    stiffness: float, ratio: float
+) -> None:
+    # the two stops' own modes are equal but for what the chain couples them by; energies are recorded
+    damping = 2.0 * ratio * math.sqrt(stiffness)
+    response, still = between_stiff_stops(stiffness, damping)
+    square, shapes = np.linalg.eigh(SPRINGS)
+    natural, law = np.sqrt(square), {"law": "kelvin_voigt", "stiffness": stiffness, "damping": damping}
+    stops = [Stop(shapes[2], 0.0, **law), Stop(shapes[0], 0.0, side="lower", **law)]
+    modes = Modes(
+        natural,
+        0.0,
+        shapes.T @ [0.0, 0.3, FORCE],
+        SLOW,
+        coupling=shapes.T @ np.diag([0.0, DAMPER, 0.0]) @ shapes,
+    )
+    start = np.array([float(mp.re(response[i]) + still[i]) for i in range(3)])
+    speed = np.array([float(mp.re(1j * SLOW * response[i])) for i in range(3)])
+    with mp.workdps(30):
+        force = (mp.mpf(stiffness) + 1j * mp.mpf(damping) * mp.mpf(SLOW)) * response[2]
+        level = mp.mpf(stiffness) * still[2]
+        released = (mp.acos(-level / abs(force)) - mp.arg(force)) / mp.mpf(SLOW)
+
+        def power(t: mp.mpf) -> mp.mpf:
+            turn, slow = mp.expj(mp.mpf(SLOW) * t), 1j * mp.mpf(SLOW)
+            loads = [-2 * PRELOAD, mp.mpf("0.3") * mp.re(turn), PRELOAD + mp.mpf(FORCE) * mp.re(turn)]
+            return mp.fsum(load * mp.re(slow * x * turn) for load, x in zip(loads, response, strict=True))
+
+        def drag(t: mp.mpf) -> mp.mpf:
+            return mp.mpf(DAMPER) * mp.re(1j * mp.mpf(SLOW) * response[1] * mp.expj(mp.mpf(SLOW) * t)) ** 2
+
+        half = released / 2
+        work, loss = float(mp.quad(power, [0, half])), float(mp.quad(drag, [0, half]))
+    with Structure(modes, stops, shapes.T @ start, shapes.T @ speed, energies=True) as body:
+        held, began = shapes.T @ [-2.0 * PRELOAD, 0.0, PRELOAD], time.process_time()
+        assert body.advance(float(half), held=held) == DONE
+        assert body.forcing_work == pytest.approx(work, rel=1e-12)
+        assert body.damping_loss == pytest.approx(loss, rel=1e-12)
+        assert body.advance(0.5 * PERIOD - float(half), held=held) == DONE
+        # by series a stop of 1e12 N/m takes 60 s
+        assert time.process_time() - began < 1.0
+        end = body.impacts[0, 1] + body.impacts[0, 7]
+        # what its displacements, of order 1, can tell of the way that it presses a stop in
+        assert end == pytest.approx(float(released), abs=1e-11 + 4e-15 * stiffness)
+
+
 def clamped_beam(modes: int) -> tuple[Modes, Array]:
     """Return a clamped-free beam in units of its first mode, pressed and lifted at its tip; its tip's shape."""
     found = beam_modes("clamped_free", modes)
@@ -82,7 +149,8 @@ def test_a_rest_of_many_modes_costs_like_a_flight() -> None:
     # twice as long; 2 ms and 0.8 s on one machine
     assert seconds[0] < 0.1 * seconds[1]
     early = ends[0][: len(ends[1])]
-    assert np.abs(early[:, 1:3] - ends[1][:, 1:3]).max() <= SEQUENCE
+    # three chatters, each of which multiplies rounding
+    assert np.abs(early[:, 1:3] - ends[1][:, 1:3]).max() <= 4.0 * SEQUENCE
 
 
 def test_a_rest_that_is_cut_keeps_its_energy() -> None:
@@ -155,17 +223,24 @@ def coupled_rests(draw: st.DrawFn) -> tuple[Modes, list[Stop], Array, float]:
 
 
 @FEW
-@given(st.one_of(rests(), coupled_rests()), st.sampled_from([1, 3, 40]))
+@given(
+    st.one_of(rests(), coupled_rests()),
+    st.sampled_from([1, 3, 40]),
+    st.booleans(),
+    st.sampled_from([0.0, 0.02, -0.02]),
+)
 def test_a_rest_is_the_same_motion_as_by_series(
-    scene: tuple[Modes, list[Stop], Array, float], steps: int
+    scene: tuple[Modes, list[Stop], Array, float], steps: int, energies: bool, slope: float
 ) -> None:
     modes, stops, load, duration = scene
     runs = []
     for by_series in (False, True):
-        with Structure(modes, stops, extrema=True, by_series=by_series) as body:
-            for _ in range(steps):
-                body.advance(duration / steps, held=load, most_impacts=60)
+        with Structure(modes, stops, extrema=True, energies=energies, by_series=by_series) as body:
+            for step in range(steps):
+                held = (1.0 + slope * step / steps) * load
+                body.advance(duration / steps, held=held, held_rate=slope / duration * load, most_impacts=60)
             end = [*body.displacement, *body.velocity, body.displacement_max, body.displacement_min]
+            end += [body.forcing_work, body.damping_loss, body.contact_loss]
             runs.append((body.time, body.statuses, np.array(end), body.impacts, body.sticks))
     (at, statuses, end, impacts, sticks), (_, by, last, hits, rested) = runs
     # what rounding has grown to after so many impacts

@@ -202,7 +202,7 @@ static vi_complex rate_of(const vi_coupled_work *work, const vi_complex vector[]
     return sum;
 }
 
-/* A contact's displacement, or a mode's, for a term whose modes without damping move by x. */
+/* A contact's displacement where modes without damping move by x. */
 static vi_complex weighed(int modes, const double weight[], const vi_complex x[])
 {
     vi_complex sum = {0.0, 0.0};
@@ -242,29 +242,37 @@ static void add_holding(vi_pressed_modes *found, const vi_pressed_body *body, co
     }
 }
 
+/* What modes without damping that move by x are in all modes. */
+static void combine(const vi_pressed_body *body, const vi_coupled_work *work, const vi_complex x[], vi_complex sum[])
+{
+    memset(sum, 0, (size_t)body->modes * sizeof *sum);
+    for (int i = 0; i < work->real.rank; ++i) {
+        for (int j = 0; j < body->modes; ++j) {
+            sum[j].re += work->shape[i][j] * x[i].re;
+            sum[j].im += work->shape[i][j] * x[i].im;
+        }
+    }
+}
+
 static void add_term(vi_pressed_modes *found, const vi_pressed_body *body, const vi_coupled_work *work, vi_complex rate,
                      const vi_complex state[])
 {
     const int m = found->terms++, modes = work->real.rank;
-    vi_complex x[VI_MODES];
+    const vi_complex over = vi_complex_invert(rate);
+    vi_complex x[VI_MODES], pull[VI_MODES];
     found->rate[m] = rate;
     found->share[m] = vi_complex_scale(rate.im > 0.0 ? -2.0 : -1.0, rate);
     for (int i = 0; i < modes; ++i) {
-        x[i] = vi_complex_scale(1.0 / work->real.value[i], state[state_of(work, i)]);
+        const vi_complex at = state[state_of(work, i)];
+        x[i] = vi_complex_scale(1.0 / work->real.value[i], at);
+        /* rate + damping, of a vector, is its stiffness over -rate: no difference of large numbers */
+        pull[i] = vi_complex_scale(-work->real.value[i], vi_complex_multiply(over, at));
     }
-    for (int j = 0; j < body->modes; ++j) {
-        vi_complex sum = {0.0, 0.0};
-        for (int i = 0; i < modes; ++i) {
-            sum.re += work->shape[i][j] * x[i].re;
-            sum.im += work->shape[i][j] * x[i].im;
-        }
-        found->vector[m][j] = sum;
-    }
+    combine(body, work, x, found->vector[m]);
+    combine(body, work, pull, found->pull[m]);
     for (int k = 0; k < body->contacts; ++k) {
-        const vi_complex at = weighed(modes, work->at[k], x);
         const vi_complex z = {body->stiffness[k] + body->damping[k] * rate.re, body->damping[k] * rate.im};
-        found->touch[m][k] = body->held[k] ? (vi_complex){0.0, 0.0} : vi_complex_scale(body->damping[k], at);
-        found->force[m][k] = body->held[k] ? (vi_complex){0.0, 0.0} : vi_complex_multiply(z, at);
+        found->force[m][k] = vi_complex_multiply(z, weighed(modes, work->at[k], x)); /* 0 of a held one, for now */
     }
     if (work->reflections > 0) {
         add_holding(found, body, work, m);

@@ -37,11 +37,6 @@ static vi_complex pole_of(const vi_pressed_body *body, int j)
     return (vi_complex){-decay, sqrt((natural - decay) * (natural + decay))};
 }
 
-static vi_complex conjugate(vi_complex a)
-{
-    return (vi_complex){a.re, -a.im};
-}
-
 static vi_complex origin_of(const search *s, const zero *z)
 {
     return z->base < 0 ? (vi_complex){0.0, 0.0} : s->pole[z->base];
@@ -65,7 +60,7 @@ static void sum_modes(const search *s, const zero *z, vi_complex *sum, vi_comple
     *sum = *slope = *poles = (vi_complex){0.0, 0.0};
     for (int i = 0; i < s->count; ++i) {
         const int j = s->mode[i];
-        const vi_complex a = inverse_distance(s, z, s->pole[j]), b = inverse_distance(s, z, conjugate(s->pole[j]));
+        const vi_complex a = inverse_distance(s, z, s->pole[j]), b = inverse_distance(s, z, vi_complex_conjugate(s->pole[j]));
         const vi_complex both = vi_complex_add(a, b);
         const double n = s->body->shape[0][j];
         const vi_complex g = vi_complex_scale(n * n, vi_complex_multiply(a, b));
@@ -89,7 +84,7 @@ static vi_complex repulsion(const search *s, int i)
             sum = vi_complex_add(sum, vi_complex_invert(vi_complex_add(apart, within)));
         }
         if (other->pair) {
-            const vi_complex mirrored = vi_complex_add(conjugate(origin), conjugate(other->offset));
+            const vi_complex mirrored = vi_complex_add(vi_complex_conjugate(origin), vi_complex_conjugate(other->offset));
             sum = vi_complex_add(sum, inverse_distance(s, z, mirrored));
         }
     }
@@ -236,7 +231,7 @@ static void add_term(vi_pressed_modes *found, const search *s, const zero *z)
     vi_complex norm = {0.0, 0.0}, touch = {0.0, 0.0};
     for (int i = 0; i < s->count; ++i) {
         const int j = s->mode[i];
-        const vi_complex a = inverse_distance(s, z, s->pole[j]), b = inverse_distance(s, z, conjugate(s->pole[j]));
+        const vi_complex a = inverse_distance(s, z, s->pole[j]), b = inverse_distance(s, z, vi_complex_conjugate(s->pole[j]));
         vector[j] = vi_complex_scale(body->shape[0][j], vi_complex_multiply(a, b));
         const vi_complex slope = {2.0 * (rate.re + body->decay[j]), 2.0 * rate.im};
         norm = vi_complex_add(norm, vi_complex_multiply(slope, vi_complex_multiply(vector[j], vector[j])));
@@ -247,7 +242,11 @@ static void add_term(vi_pressed_modes *found, const search *s, const zero *z)
         touch = vi_complex_scale(body->damping[0], at);
         norm = vi_complex_add(norm, vi_complex_multiply(touch, at));
     }
-    found->touch[m][0] = touch;
+    for (int j = 0; j < body->modes; ++j) {
+        const vi_complex turn = {rate.re + 2.0 * body->decay[j], rate.im};
+        found->pull[m][j] = vi_complex_add(vi_complex_multiply(turn, vector[j]),
+                                           vi_complex_scale(body->shape[0][j], touch));
+    }
     found->share[m] = vi_complex_scale(z->pair ? 2.0 : 1.0, vi_complex_invert(norm));
 }
 
@@ -258,7 +257,9 @@ static void add_free(vi_pressed_modes *found, const vi_pressed_body *body, int j
     found->rate[m] = pole_of(body, j);
     memset(found->vector[m], 0, sizeof found->vector[m]);
     found->vector[m][j] = (vi_complex){1.0, 0.0};
-    found->force[m][0] = found->touch[m][0] = (vi_complex){0.0, 0.0};
+    found->force[m][0] = (vi_complex){0.0, 0.0};
+    memset(found->pull[m], 0, sizeof found->pull[m]);
+    found->pull[m][j] = (vi_complex){-found->rate[m].re, found->rate[m].im}; /* rate + 2 decay */
     found->share[m] = (vi_complex){0.0, -1.0 / found->rate[m].im};
 }
 
@@ -301,7 +302,8 @@ static bool find_single(vi_pressed_modes *found, const vi_pressed_body *body)
         const vi_complex scale = vi_complex_scale(-1.0, vi_complex_invert(vi_complex_scale(n, z)));
         found->vector[m][0] = scale;
         found->force[m][0] = (vi_complex){-1.0, 0.0};
-        found->touch[m][0] = vi_complex_scale(body->damping[0] * n, scale);
+        const vi_complex turn = {rates[m].re + 2.0 * decay, rates[m].im};
+        found->pull[m][0] = vi_complex_multiply(turn, scale);
         const vi_complex slope = {2.0 * (rates[m].re + decay), 2.0 * rates[m].im};
         const vi_complex norm = vi_complex_multiply(slope, vi_complex_multiply(scale, scale));
         found->share[m] = vi_complex_scale(pair ? 2.0 : 1.0, vi_complex_invert(norm));

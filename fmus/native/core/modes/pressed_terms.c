@@ -11,17 +11,17 @@ static const double RECOVERED = 1e-13, LARGEST_TERMS = 1e3;
 
 static void exchange(vi_pressed_modes *found, int a, int b)
 {
-    vi_complex vector[VI_MODES], at_contacts[VI_PORTS];
+    vi_complex vector[VI_MODES], force[VI_PORTS];
     const vi_complex rate = found->rate[a], share = found->share[a];
     memcpy(vector, found->vector[a], sizeof vector);
     memcpy(found->vector[a], found->vector[b], sizeof vector);
     memcpy(found->vector[b], vector, sizeof vector);
-    memcpy(at_contacts, found->touch[a], sizeof at_contacts);
-    memcpy(found->touch[a], found->touch[b], sizeof at_contacts);
-    memcpy(found->touch[b], at_contacts, sizeof at_contacts);
-    memcpy(at_contacts, found->force[a], sizeof at_contacts);
-    memcpy(found->force[a], found->force[b], sizeof at_contacts);
-    memcpy(found->force[b], at_contacts, sizeof at_contacts);
+    memcpy(vector, found->pull[a], sizeof vector);
+    memcpy(found->pull[a], found->pull[b], sizeof vector);
+    memcpy(found->pull[b], vector, sizeof vector);
+    memcpy(force, found->force[a], sizeof force);
+    memcpy(found->force[a], found->force[b], sizeof force);
+    memcpy(found->force[b], force, sizeof force);
     found->rate[a] = found->rate[b];
     found->share[a] = found->share[b];
     found->rate[b] = rate;
@@ -45,7 +45,7 @@ static bool recovers(const vi_pressed_modes *found, const vi_pressed_body *body,
 {
     vi_complex part[VI_TERMS];
     double displacement[VI_MODES], velocity[VI_MODES], error = 0.0, wrong = 0.0, terms = 0.0, rates = 0.0, whole = 0.0;
-    vi_pressed_parts(found, body, q, p, part);
+    vi_pressed_parts(found, q, p, part);
     vi_pressed_sum(found, part, displacement, velocity);
     for (int m = 0; m < found->terms; ++m) {
         for (int j = 0; j < body->modes; ++j) {
@@ -118,39 +118,16 @@ double vi_pressed_drag(const vi_pressed_body *body, int j, const double x[])
     return sum;
 }
 
-/* What of a start in q and p bears on all parts: the modal momenta with what the dampings add, and the displacements of
- * the contacts. */
-static void weigh_start(const vi_pressed_body *body, const double q[], const double p[], double load[], double along[])
+void vi_pressed_parts(const vi_pressed_modes *modes, const double q[], const double p[], vi_complex part[])
 {
-    for (int j = 0; j < body->modes; ++j) {
-        load[j] = p[j] + vi_pressed_drag(body, j, q);
-    }
-    for (int k = 0; k < body->contacts; ++k) {
-        along[k] = 0.0;
-        for (int j = 0; j < body->modes; ++j) {
-            along[k] += body->shape[k][j] * q[j];
-        }
-    }
-}
-
-void vi_pressed_parts(const vi_pressed_modes *modes, const vi_pressed_body *body, const double q[], const double p[],
-                      vi_complex part[])
-{
-    double load[VI_MODES], along[VI_PORTS];
-    weigh_start(body, q, p, load, along);
     for (int m = 0; m < modes->terms; ++m) {
-        const vi_complex *vector = modes->vector[m];
-        vi_complex at = {0.0, 0.0}, rest = {0.0, 0.0};
-        for (int k = 0; k < body->contacts; ++k) {
-            rest = vi_complex_add(rest, vi_complex_scale(along[k], modes->touch[m][k]));
-        }
+        const vi_complex *vector = modes->vector[m], *pull = modes->pull[m];
+        vi_complex sum = {0.0, 0.0};
         for (int j = 0; j < modes->modes; ++j) {
-            at.re += vector[j].re * q[j];
-            at.im += vector[j].im * q[j];
-            rest.re += vector[j].re * load[j];
-            rest.im += vector[j].im * load[j];
+            sum.re += pull[j].re * q[j] + vector[j].re * p[j];
+            sum.im += pull[j].im * q[j] + vector[j].im * p[j];
         }
-        part[m] = vi_complex_multiply(modes->share[m], vi_complex_add(vi_complex_multiply(modes->rate[m], at), rest));
+        part[m] = vi_complex_multiply(modes->share[m], sum);
     }
 }
 

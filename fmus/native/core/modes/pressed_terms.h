@@ -36,7 +36,7 @@ typedef struct {
     vi_complex vector[VI_TERMS][VI_MODES]; /* kg^(-1/2) m */
     vi_complex force[VI_TERMS][VI_PORTS];  /* of the stops for that vector */
     vi_complex share[VI_TERMS];            /* 2 (a pair) or 1 over the term's norm: see vi_pressed_parts */
-    vi_complex touch[VI_TERMS][VI_PORTS];  /* damping n.vector of a stop: what its dashpot adds to that */
+    vi_complex pull[VI_TERMS][VI_MODES];   /* rate vector + D vector + sum_k damping_k n_k (n_k.vector) */
 } vi_pressed_modes;
 
 /* (D x)_j */
@@ -48,8 +48,7 @@ void vi_pressed_terms_sort(vi_pressed_modes *modes);
 bool vi_pressed_terms_are_complete(const vi_pressed_modes *modes, const vi_pressed_body *body);
 
 /* The motion q(t) = Re sum part_m vector_m e^(rate_m t) that starts at displacement q with velocity p. */
-void vi_pressed_parts(const vi_pressed_modes *modes, const vi_pressed_body *body, const double q[], const double p[],
-                      vi_complex part[]);
+void vi_pressed_parts(const vi_pressed_modes *modes, const double q[], const double p[], vi_complex part[]);
 
 /* Re sum part_m vector_m, and with each part times its rate: displacement and velocity. */
 void vi_pressed_sum(const vi_pressed_modes *modes, const vi_complex part[], double q[], double p[]);

@@ -28,6 +28,11 @@ static inline vi_complex vi_complex_scale(double factor, vi_complex a)
     return (vi_complex){factor * a.re, factor * a.im};
 }
 
+static inline vi_complex vi_complex_conjugate(vi_complex a)
+{
+    return (vi_complex){a.re, -a.im};
+}
+
 static inline double vi_complex_square(vi_complex a)
 {
     return a.re * a.re + a.im * a.im;

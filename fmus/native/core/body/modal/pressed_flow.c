@@ -267,7 +267,7 @@ bool vi_pressed_flow_start(vi_pressed_flow *flow, const vi_structure *s, const v
         q[j] = s->state->q[j] - flow->level[j] - x;
         p[j] = s->state->p[j] - flow->level_rate[j] - v;
     }
-    vi_pressed_parts(&pressed->modes, &pressed->body, q, p, flow->part);
+    vi_pressed_parts(&pressed->modes, q, p, flow->part);
     return keeps_digits(flow, s, length);
 }
 
@@ -360,18 +360,24 @@ void vi_pressed_flow_end(const vi_pressed_flow *flow, double u, double q[], doub
     }
 }
 
-/* (e^(rate u) - 1) / rate of a term that is `start` at first and `end` at last. */
-static double integral(vi_complex rate, vi_complex start, vi_complex end, double u)
+vi_complex vi_term_integral(vi_complex rate, vi_complex start, vi_complex end, double u)
 {
     if (vi_complex_size(rate) * u > SHORT) {
-        return vi_complex_divide(vi_complex_subtract(end, start), rate).re;
+        return vi_complex_divide(vi_complex_subtract(end, start), rate);
     }
     vi_complex term = vi_complex_scale(u, start), sum = term;
     for (int n = 2; n < SERIES; ++n) {
         term = vi_complex_scale(u / (double)n, vi_complex_multiply(rate, term));
         sum = vi_complex_add(sum, term);
     }
-    return sum.re;
+    return sum;
+}
+
+vi_complex vi_product_integral(vi_complex rate, vi_complex start, vi_complex end, vi_complex other_rate,
+                               vi_complex other_start, vi_complex other_end, double u)
+{
+    return vi_term_integral(vi_complex_add(rate, other_rate), vi_complex_multiply(start, other_start),
+                            vi_complex_multiply(end, other_end), u);
 }
 
 double vi_pressed_flow_impulse(const vi_pressed_flow *flow, int i, double u)
@@ -382,12 +388,13 @@ double vi_pressed_flow_impulse(const vi_pressed_flow *flow, int i, double u)
     const vi_complex end = vi_complex_multiply(flow->harmonic_force[i], (vi_complex){cos(angle), sin(angle)});
     vi_complex from[VI_TERMS], part[VI_TERMS];
     double sum = (flow->force_level[i] + 0.5 * flow->force_rate[i] * u) * u
-                 + integral((vi_complex){0.0, flow->angular_frequency}, start, end, u);
+                 + vi_term_integral((vi_complex){0.0, flow->angular_frequency}, start, end, u).re;
     vi_pressed_flow_parts(flow, 0.0, from);
     vi_pressed_flow_parts(flow, u, part);
     for (int m = 0; m < modes->terms; ++m) {
         const vi_complex force = modes->force[m][i];
-        sum += integral(modes->rate[m], vi_complex_multiply(force, from[m]), vi_complex_multiply(force, part[m]), u);
+        sum += vi_term_integral(modes->rate[m], vi_complex_multiply(force, from[m]), vi_complex_multiply(force, part[m]),
+                                u).re;
     }
     return sum;
 }

@@ -72,6 +72,11 @@ void vi_pressed_flow_parts(const vi_pressed_flow *flow, double u, vi_complex par
 /* Modal state after u. */
 void vi_pressed_flow_end(const vi_pressed_flow *flow, double u, double q[], double p[]);
 
+/* Integral over u seconds of what grows at `rate` from `start` to `end`, and of a product of two such. */
+vi_complex vi_term_integral(vi_complex rate, vi_complex start, vi_complex end, double u);
+vi_complex vi_product_integral(vi_complex rate, vi_complex start, vi_complex end, vi_complex other_rate,
+                               vi_complex other_start, vi_complex other_end, double u);
+
 /* Integral of the force of the i-th contact that it rests on over u seconds, N s. */
 double vi_pressed_flow_impulse(const vi_pressed_flow *flow, int i, double u);
 

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "body/landing.h"
+#include "body/modal/pressed_energies.h"
 #include "body/modal/pressed_flow.h"
 #include "body/modal/structure_forces.h"
 #include "body/modal/structure_held.h"
@@ -217,8 +218,13 @@ static void rest(const vi_structure *s, const vi_pressed_flow *flow, double fast
             state->touch_down[k].impulse += vi_pressed_flow_impulse(flow, i, u);
         }
     }
+    double before[VI_MODES];
+    memcpy(before, state->q, sizeof before);
     vi_pressed_flow_end(flow, u, state->q, state->p);
     vi_structure_project(s);
+    if (state->follow_energies) {
+        vi_energies_of_rest(s, flow, before, u);
+    }
     vi_pressed_flow_reach(s);
     if (s->record->extrema) {
         vi_record_extend(s->record, vi_structure_at(s->model, s->model->observed, state->q));
@@ -249,7 +255,7 @@ static double rest_for_long(const vi_structure *s, const vi_pressed *pressed, do
 double vi_structure_rest_on(const vi_structure *s, double length, double room)
 {
     int32_t port[VI_PORTS];
-    if (s->pressed == NULL || s->state->series < PATIENCE || s->state->follow_energies || !moves(s)) {
+    if (s->pressed == NULL || s->state->series < PATIENCE || !moves(s)) {
         return 0.0;
     }
     const int contacts = vi_pressed_contacts(s, port);
