@@ -254,19 +254,27 @@ static void combine(const vi_pressed_body *body, const vi_coupled_work *work, co
     }
 }
 
+/* Of a mode without damping, whose state is (natural x, -i rate x): by the larger of the two, which has its digits. */
+static vi_complex displacement(const vi_complex state[2], double natural, vi_complex rate)
+{
+    if (natural >= vi_complex_size(rate)) {
+        return vi_complex_scale(1.0 / natural, state[0]);
+    }
+    return vi_complex_divide((vi_complex){-state[1].im, state[1].re}, rate);
+}
+
 static void add_term(vi_pressed_modes *found, const vi_pressed_body *body, const vi_coupled_work *work, vi_complex rate,
                      const vi_complex state[])
 {
     const int m = found->terms++, modes = work->real.rank;
-    const vi_complex over = vi_complex_invert(rate);
     vi_complex x[VI_MODES], pull[VI_MODES];
     found->rate[m] = rate;
     found->share[m] = vi_complex_scale(rate.im > 0.0 ? -2.0 : -1.0, rate);
     for (int i = 0; i < modes; ++i) {
-        const vi_complex at = state[state_of(work, i)];
-        x[i] = vi_complex_scale(1.0 / work->real.value[i], at);
+        const double natural = work->real.value[i];
+        x[i] = displacement(&state[state_of(work, i)], natural, rate);
         /* rate + damping, of a vector, is its stiffness over -rate: no difference of large numbers */
-        pull[i] = vi_complex_scale(-work->real.value[i], vi_complex_multiply(over, at));
+        pull[i] = vi_complex_scale(-natural * natural, vi_complex_divide(x[i], rate));
     }
     combine(body, work, x, found->vector[m]);
     combine(body, work, pull, found->pull[m]);

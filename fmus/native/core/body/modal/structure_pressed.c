@@ -66,24 +66,6 @@ typedef struct {
     vi_pressed_sight sight[VI_PORTS]; /* forces of the contacts that it rests on, clearances of the others */
 } guard;
 
-/* Size of the terms that the contact's force is the sum of, N. */
-static double force_size(const vi_structure *s, int k)
-{
-    const vi_structure_model *model = s->model;
-    double size = 0.0;
-    if (s->state->status[k] == VI_CONTACT_YIELDING) {
-        const vi_contact_law *law = &s->contacts[k].law;
-        return law->stiffness * vi_structure_displacement_size(s, k) + law->damping * vi_structure_velocity_size(s, k);
-    }
-    for (int j = 0; j < model->modes; ++j) {
-        const vi_mode *mode = &model->mode[j];
-        const double loads = fabs(mode->force) + fabs(s->state->held[j]);
-        const double drag = vi_structure_drag_size(model, j, s->state->p);
-        size += fabs(model->shape[k][j]) * (loads + mode->stiffness * fabs(s->state->q[j]) + drag);
-    }
-    return size / vi_structure_mobility_left(s, k);
-}
-
 static void start_guard(const vi_structure *s, const vi_pressed_flow *flow, double length, guard *g)
 {
     const double rounding = MARGIN * VI_ROUNDING;
@@ -91,7 +73,7 @@ static void start_guard(const vi_structure *s, const vi_pressed_flow *flow, doub
     for (int i = 0; i < flow->pressed->body.contacts; ++i) {
         vi_pressed_sight *sight = &g->sight[g->count++];
         *sight = vi_pressed_sight_of(flow, VI_SEEN_FORCE + i, -1.0, 0.0, length);
-        sight->offset = -rounding * (sight->scale + force_size(s, flow->pressed->port[i]));
+        sight->offset = -rounding * sight->scale;
     }
     for (int l = 0; l < s->model->contacts; ++l) {
         if (s->state->status[l] == VI_CONTACT_FREE && vi_structure_watched(s, l)) {
