@@ -225,11 +225,11 @@ static void start_series(vi_segment *s, double x, double v)
     c[0] = 0.0;
     c[1] = v;
     for (int n = 0; n + 2 <= VI_SERIES_ORDER; ++n) {
-        const double k = (double)n;
+        const double k = (double)n, share = 1.0 / ((k + 1.0) * (k + 2.0)); /* no division waits for the term before */
         const double held = n == 0 ? s->held - mode->stiffness * x : n == 1 ? s->held_rate : 0.0;
         const double load = drive[0] + held - 2.0 * mode->decay * (k + 1.0) * c[n + 1] - mode->stiffness * c[n];
-        c[n + 2] = load / ((k + 1.0) * (k + 2.0));
-        const double next = -drive[0] * w * w / ((k + 1.0) * (k + 2.0));
+        c[n + 2] = load * share;
+        const double next = -drive[0] * w * w * share;
         drive[0] = drive[1];
         drive[1] = next;
     }

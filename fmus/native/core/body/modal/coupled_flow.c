@@ -75,10 +75,11 @@ static void free_load(const vi_drift *drift, const vi_drift_start *start, double
         const double first = start->held[j] - mode->stiffness * start->q[j];
         const double held = n == 0 ? first : n == 1 ? start->held_rate[j] : 0.0;
         load[j] = drive * mode->force + held - mode->stiffness * drift->modal[n][j];
-        if (!model->coupled) {
-            load[j] -= 2.0 * mode->decay * order * drift->modal[n + 1][j];
-            continue;
-        }
+    }
+    for (int j = 0; j < model->modes && !model->coupled; ++j) {
+        load[j] -= 2.0 * model->mode[j].decay * order * drift->modal[n + 1][j];
+    }
+    for (int j = 0; j < model->modes && model->coupled; ++j) {
         for (int i = 0; i < model->modes; ++i) {
             load[j] -= model->coupling[j][i] * order * drift->modal[n + 1][i];
         }
@@ -208,7 +209,7 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
         drift->penetration[k][0] = start->penetration[k];
     }
     for (int n = 0; n + 2 <= VI_ORDER; ++n) {
-        const double next = -drive[0] * w * w / ((double)(n + 1) * (double)(n + 2));
+        const double share = 1.0 / ((double)(n + 1) * (double)(n + 2)), next = -drive[0] * w * w * share;
         free_load(drift, start, drive[0], n, load);
         for (int k = 0; k < model->contacts; ++k) {
             if (start->press[k].kind == VI_PRESS_LINEAR || start->press[k].kind == VI_PRESS_POWER) {
@@ -220,7 +221,7 @@ void vi_drift_begin(vi_drift *drift, const vi_structure_model *model, const vi_d
             hold(drift, start, n, load);
         }
         for (int j = 0; j < model->modes; ++j) {
-            drift->modal[n + 2][j] = load[j] / ((double)(n + 1) * (double)(n + 2));
+            drift->modal[n + 2][j] = load[j] * share;
         }
         extend_penetrations(drift, start, n + 2);
         drive[0] = drive[1];

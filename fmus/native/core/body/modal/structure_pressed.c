@@ -10,8 +10,8 @@
 #include "body/modal/structure_held.h"
 #include "motion/majorant.h"
 
-/* Segments by series before a rest counts as long: most contacts are over by then. */
-enum { PATIENCE = 16 };
+/* Segments by series before a rest counts as long: most contacts with stops that yield are over by then. */
+enum { PATIENCE = 16, PATIENCE_HELD = 4 };
 /* Least step, in radians of the fastest rate, that is worth an evaluation of all terms; and a whole rest, times the
  * number of modes where these must be found anew for it. */
 static const double LEAST_STEP = 8.0, LEAST_REST = 32.0;
@@ -44,6 +44,16 @@ static double fastest_rate(const vi_structure *s, const int32_t port[], int cont
         damping += s->contacts[k].law.damping * mobility;
     }
     return s->model->fastest + sqrt(stiffness) + damping;
+}
+
+static int64_t patience(const vi_structure *s)
+{
+    for (int k = 0; k < s->model->contacts; ++k) {
+        if (s->state->status[k] == VI_CONTACT_YIELDING) {
+            return PATIENCE;
+        }
+    }
+    return PATIENCE_HELD;
 }
 
 /* Radians of the fastest rate from which a rest pays the finding of its modes. */
@@ -237,12 +247,12 @@ static double rest_for_long(const vi_structure *s, const vi_pressed *pressed, do
 double vi_structure_rest_on(const vi_structure *s, double length, double room)
 {
     int32_t port[VI_PORTS];
-    if (s->pressed == NULL || s->state->series < PATIENCE || !moves(s)) {
+    if (s->pressed == NULL || s->state->series < PATIENCE_HELD || !moves(s)) {
         return 0.0;
     }
     const int contacts = vi_pressed_contacts(s, port);
     const double fastest = fastest_rate(s, port, contacts);
-    if (contacts == 0 || !(length * fastest >= pays(s))) {
+    if (contacts == 0 || s->state->series < patience(s) || !(length * fastest >= pays(s))) {
         return 0.0;
     }
     const vi_pressed *pressed = vi_pressed_find(s, pays_for_all(s, length * fastest));
