@@ -73,12 +73,12 @@ def cases() -> list[Case]:
     coupled = Modes(NATURAL, 0.0, FORCE, SLOW, coupling=SHAPES.T @ damper @ SHAPES)
     return [
         Case("pressed on one stop", light, (last,)),
-        Case("the same, energies", light, (last,), energies=True),
+        Case("pressed on one stop, energies", light, (last,), energies=True),
         Case("pressed on one stop, coupled damping", coupled, (last,)),
         Case("pressed on one stop, overdamped modes", strong, (last,)),
         Case("pressed on two stops", light, (last, first)),
-        Case("the same, energies", light, (last, first), energies=True),
-        Case("the same, coupled damping", coupled, (last, first)),
+        Case("pressed on two stops, energies", light, (last, first), energies=True),
+        Case("pressed on two stops, coupled damping", coupled, (last, first)),
         Case("held on one stop, pressed on another", light, (held, first)),
     ]
 
@@ -115,7 +115,7 @@ def draw(figures: list[Figure], path: Path) -> None:
     axes.set_xscale("log")
     axes.set_xlabel("processor time of 100 s at rest, ms")
     axes.set_title("Four masses at rest on stops of 1e8 N/m")
-    axes.legend()
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
     figure.tight_layout()
     figure.savefig(path, dpi=150)
     plt.close(figure)
