@@ -29,41 +29,39 @@ static void reflect(int n, const double unit[], double x[])
     }
 }
 
-/* Householder's reflections, after which motions that keep the held contacts in place have no first components. */
+/* Add the reflection after which motions that keep this contact in place, and those before it, have no first components;
+ * false where it is next to dependent on those. */
+static bool add_reflection(int n, const double shape[], vi_coupled_work *work)
+{
+    const int i = work->reflections;
+    double *v = work->reflection[i];
+    memcpy(v, shape, (size_t)n * sizeof *v);
+    for (int l = 0; l < i; ++l) {
+        reflect(n, work->reflection[l], v);
+        work->triangle[l][i] = v[l];
+        v[l] = 0.0; /* later reflections leave it as it is */
+    }
+    const double length = sqrt(dot(n, v, v));
+    if (!(length > INDEPENDENT * sqrt(dot(n, shape, shape)))) {
+        return false;
+    }
+    work->triangle[i][i] = v[i] > 0.0 ? -length : length;
+    v[i] -= work->triangle[i][i];
+    const double size = sqrt(dot(n, v, v));
+    for (int j = 0; j < n; ++j) {
+        v[j] /= size;
+    }
+    work->reflections = i + 1;
+    return true;
+}
+
 static bool reflect_held(const vi_pressed_body *body, vi_coupled_work *work)
 {
-    const int n = body->modes;
     work->reflections = 0;
     for (int k = 0; k < body->contacts; ++k) {
-        const int i = work->reflections;
-        double *v = work->reflection[i];
-        if (!body->held[k]) {
-            continue;
-        }
-        if (i >= n - 1) {
+        if (body->held[k] && (work->reflections >= body->modes - 1 || !add_reflection(body->modes, body->shape[k], work))) {
             return false;
         }
-        memcpy(v, body->shape[k], (size_t)n * sizeof *v);
-        for (int l = 0; l < i; ++l) {
-            reflect(n, work->reflection[l], v);
-            work->triangle[l][i] = v[l];
-            v[l] = 0.0; /* what the reflections so far have dealt with */
-        }
-        for (int l = 0; l < i; ++l) {
-            v[l] = 0.0;
-        }
-        const double length = sqrt(dot(n, v, v)), whole = sqrt(dot(n, body->shape[k], body->shape[k]));
-        if (!(length > INDEPENDENT * whole)) {
-            return false;
-        }
-        const double diagonal = v[i] > 0.0 ? -length : length;
-        work->triangle[i][i] = diagonal;
-        v[i] -= diagonal;
-        const double size = sqrt(dot(n, v, v));
-        for (int j = 0; j < n; ++j) {
-            v[j] /= size;
-        }
-        work->reflections = i + 1;
     }
     return true;
 }
