@@ -185,7 +185,9 @@ class PointLoop:
             return PreparedPoints(points.first, table, begin, end, columns, forced, periods=False)
         if self.chained:
             columns["forcing.phase"][~points.first] = 0.0
-        with np.errstate(over="ignore"):  # a period beyond all numbers is one for the body to refuse
+        with np.errstate(
+            over="ignore", invalid="ignore"
+        ):  # a period beyond all numbers is the body's to refuse
             begin, end = forced_window(self.scene.record, columns["forcing.phase"], angular_frequency)
         return PreparedPoints(points.first, table, begin, end, columns, forced, self._periods(forced))
 

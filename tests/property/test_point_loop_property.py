@@ -116,7 +116,7 @@ def test_a_point_that_its_body_refuses_fails_alone_with_its_message() -> None:
     text = OSCILLATOR.format(
         mass=1.0, stiffness=1.0, damping="", displacement=0.0, law=LAWS[0], second="", record=FORCED[0],
         limit=MOST_IMPACTS, sweep='"forcing.angular_frequency" = { values = [1.0, 1e-308, 2.0] }',
-        forcing="[forcing]\namplitude = 3.0\nangular_frequency = 1.0",
+        forcing="[forcing]\namplitude = 3.0\nangular_frequency = 1.0\nphase = 1.0",
     )  # fmt: skip
     loop, alone = in_both_ways(parse_scene(text, "refused.toml"))
     assert loop.outcome.values.tolist() == [0, 3, 0]
