@@ -49,14 +49,13 @@ async def _stream(store: Store, name: str, last: int, request: Request) -> Async
     """Yield the events of a job after one of them, those to come as well, until it has ended."""
     silent = 0.0
     while not await request.is_disconnected():
-        found = await asyncio.to_thread(store.events, name, after=last)
+        try:
+            found, ended = await asyncio.to_thread(_news, store, name, last)
+        except KeyError:
+            return  # it was deleted
         for event in found:
             last, silent = event.id, 0.0
             yield _event_lines(event)
-        try:
-            ended = store.job(name).state in ENDED
-        except KeyError:
-            return  # it was deleted
         if ended and not found:
             return
         if not found:
@@ -65,6 +64,12 @@ async def _stream(store: Store, name: str, last: int, request: Request) -> Async
             if silent >= HEARTBEAT:
                 silent = 0.0
                 yield ": alive\n\n"
+
+
+def _news(store: Store, name: str, last: int) -> tuple[list[Event], bool]:
+    """Return the events after one of them, and whether the job had ended before they were read: then they are all."""
+    ended = store.job(name).state in ENDED
+    return store.events(name, after=last), ended
 
 
 def _event_lines(event: Event) -> str:
