@@ -16,6 +16,9 @@ from starlette.routing import Match
 from vibroimpact.service.child import FULL
 
 _FULL_DATABASE = ("SQLITE_FULL", "SQLITE_IOERR_WRITE", "SQLITE_IOERR_FSYNC", "SQLITE_IOERR_SHMSIZE")
+_HELD_DATABASE = ("SQLITE_BUSY", "SQLITE_LOCKED")
+RETRY_HELD = 2
+"""Seconds after which a client may ask again that found the database held."""
 METHODS = ("GET", "POST", "DELETE")
 MEDIA_TYPE = "application/problem+json"
 
@@ -48,6 +51,11 @@ def answer(
     return JSONResponse(content | members, status, dict(headers or {}), MEDIA_TYPE)
 
 
+def is_held(error: Exception) -> bool:
+    """Return whether an error is that of a database that another program holds."""
+    return getattr(error, "sqlite_errorname", "").startswith(_HELD_DATABASE)
+
+
 def is_full(error: Exception) -> bool:
     """Return whether an error is that of a full disk, under a file or under the database."""
     if isinstance(error, sqlite3.Error):
@@ -75,6 +83,12 @@ def answer_problems(app: FastAPI) -> None:
     @app.exception_handler(OSError)
     @app.exception_handler(sqlite3.Error)
     def of_the_disk(_: Request, error: Exception) -> JSONResponse:
+        if is_held(error):
+            return answer(
+                HTTPStatus.SERVICE_UNAVAILABLE,
+                "expected the database of the service, got one that another program holds. Ask again.",
+                {"Retry-After": str(RETRY_HELD)},
+            )
         if not is_full(error):
             raise error
         return answer(

@@ -47,6 +47,8 @@ LOG = logging.getLogger("vibroimpact.service")
 DATABASE = "service.sqlite"
 PROGRESS_READ = 20
 """Events of progress, the last ones, over which the rate of a job is taken."""
+HELD_SECONDS = 1.0
+"""How long a database that another program holds is waited for; all other requests wait meanwhile."""
 MOST_EVENTS_READ = 500
 """Events that one question is answered with."""
 
@@ -180,7 +182,9 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._lock = threading.RLock()
-        self._connection = sqlite3.connect(folder / DATABASE, check_same_thread=False, isolation_level=None)
+        self._connection = sqlite3.connect(
+            folder / DATABASE, HELD_SECONDS, check_same_thread=False, isolation_level=None
+        )
         self._connection.execute("PRAGMA journal_mode = WAL")
         self._connection.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
         self._refuse_other_layout()
@@ -367,18 +371,23 @@ class Store:
             LOG.info("job", extra={"job": name, "state": values["state"], "why": values.get("message", "")})
         return bool(changed)
 
-    def requeue_running(self) -> None:
-        """Put the jobs that a dead service was running back into the queue, and end those it was to cancel."""
+    def requeue_running(self, why: str) -> None:
+        """Put the jobs whose process has gone back into the queue, and end those that were to be cancelled."""
         for job in self.jobs_in(State.running):
-            self.change(job.id, state=State.queued, message="the service was restarted")
+            self.change(job.id, state=State.queued, message=why)
         for job in self.jobs_in(State.cancelling):
             self.change(job.id, state=State.cancelled, ended=time.time())
 
-    def delete(self, name: str) -> None:
-        """Forget a job and its events; its folder is the caller's."""
+    def delete(self, name: str) -> bool:
+        """Forget a job that has ended, and its events; return whether it had. Its folder is the caller's."""
         with self.transaction() as database:
-            for table, column in (("events", "job"), ("requests", "job"), ("jobs", "id")):
-                database.execute(f"DELETE FROM {table} WHERE {column} = ?", (name,))
+            places = ", ".join("?" for _ in ENDED)
+            deleted = database.execute(
+                f"DELETE FROM jobs WHERE id = ? AND state IN ({places})", (name, *ENDED)
+            ).rowcount
+            for table in ("events", "requests") if deleted else ():
+                database.execute(f"DELETE FROM {table} WHERE job = ?", (name,))
+        return bool(deleted)
 
     # ---- events ----
 

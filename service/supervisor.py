@@ -23,7 +23,7 @@ from typing import Any, Self
 from vibroimpact.fmus.python_child import ending, python_command
 from vibroimpact.service.child import kill_session
 from vibroimpact.service.job_process import INTERRUPTED, LATER, Work
-from vibroimpact.service.problems import is_full
+from vibroimpact.service.problems import is_full, is_held
 from vibroimpact.service.store import LOG, Job, State, Store
 
 GRACE = 0.5
@@ -58,7 +58,7 @@ class Supervisor:
     def start(self) -> None:
         """Take up what a dead service has left, and begin."""
         self._store.remove_strays()
-        self._store.requeue_running()
+        self._store.requeue_running("the service was restarted")
         self._thread.start()
 
     def close(self) -> None:
@@ -82,20 +82,33 @@ class Supervisor:
     # ---- the queue ----
 
     def _work(self) -> None:
+        was_cut_off = False
         while not self._closing.is_set():
-            job = self._store.next_queued()
-            if job is None:
-                self._closing.wait(IDLE)
-                continue
             try:
-                self._run(job)
-            except (OSError, sqlite3.Error) as error:
-                if is_full(error):
-                    LOG.warning("no room on the disk", extra={"job": job.id})
-                    self._closing.wait(PAUSE)
-                    continue
-                # of its folder; the queue goes on with the next
-                self._end(job, State.failed, f"its folder cannot be used: {error}")
+                if was_cut_off:
+                    self._store.requeue_running("the database could not be used")
+                was_cut_off = False
+                self._take()
+            except sqlite3.Error as error:
+                was_cut_off = True
+                LOG.warning("the database cannot be used", extra={"why": str(error)})
+                self._closing.wait(PAUSE)
+
+    def _take(self) -> None:
+        """Run the job that has waited longest, or wait for one."""
+        job = self._store.next_queued()
+        if job is None:
+            self._closing.wait(IDLE)
+            return
+        try:
+            self._run(job)
+        except OSError as error:
+            if is_full(error):
+                LOG.warning("no room on the disk", extra={"job": job.id})
+                self._closing.wait(PAUSE)
+                return
+            # of its folder; the queue goes on with the next
+            self._end(job, State.failed, f"its folder cannot be used: {error}")
 
     def _run(self, job: Job) -> None:
         started = self._store.change(
@@ -173,13 +186,13 @@ class Supervisor:
         return told
 
     def _note_progress(self, job: Job, told: Told) -> None:
-        """Note how far a job is; where the disk is full, the next look or its end does."""
+        """Note how far a job is; where the database takes nothing now, the next look or its end does."""
         try:
             self._store.change(job.id, total=told.total, done=told.done)
         except sqlite3.Error as error:
-            if not is_full(error):
+            if not _passes(error):
                 raise
-            LOG.warning("no room on the disk", extra={"job": job.id})
+            LOG.warning("its progress is not noted", extra={"job": job.id, "why": str(error)})
 
     def _note_end(self, job: Job, code: int, told: Told) -> None:
         if self._store.job(job.id).state == State.cancelling:
@@ -213,14 +226,14 @@ class Supervisor:
         self._change(job, state=state, ended=time.time(), message=message, **known)
 
     def _change(self, job: Job, **values: Any) -> None:
-        """Note what became of a job, as soon as the disk has room for it; else the next start of the service does."""
+        """Note what became of a job, as soon as the database takes it; else the next start of the service does."""
         while True:
             try:
                 self._store.change(job.id, **values)
             except sqlite3.Error as error:
-                if not is_full(error):
+                if not _passes(error):
                     raise
-                LOG.warning("no room on the disk", extra={"job": job.id})
+                LOG.warning("its end is not noted yet", extra={"job": job.id, "why": str(error)})
                 if self._closing.wait(PAUSE):
                     return
             else:
@@ -279,6 +292,11 @@ class JobLog:
             self._file.write(f"{line}\n".encode())
         except OSError as error:
             LOG.warning("a line of its log is lost", extra={"job": self._job, "why": str(error)})
+
+
+def _passes(error: sqlite3.Error) -> bool:
+    """Return whether what hinders the database may pass by itself."""
+    return is_full(error) or is_held(error)
 
 
 def _said(line: str) -> dict[str, Any]:

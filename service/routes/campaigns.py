@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from http import HTTPStatus
 from typing import Annotated, Any
@@ -101,12 +102,12 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
     def cancel(name: str) -> JobAnswer:
         """End a campaign that waits or runs; what it has computed stays, and can be resumed."""
         job = known_job(store, name)
-        if not supervisor.cancel(name) and store.job(name).state in ENDED:
+        if not supervisor.cancel(name) and known_job(store, name).state in ENDED:
             raise ProblemError(
                 HTTPStatus.CONFLICT,
                 f"{name}: expected a campaign that waits or runs, got one that is {job.state}.",
             )
-        return job_answer(store.job(name))
+        return job_answer(known_job(store, name))
 
     @router.post(
         "/campaigns/{name}/resume",
@@ -122,7 +123,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
                 HTTPStatus.CONFLICT,
                 f"{name}: expected a campaign that was cancelled or has failed, got one that is {job.state}.",
             )
-        return job_answer(store.job(name))
+        return job_answer(known_job(store, name))
 
     @router.delete(
         "/campaigns/{name}",
@@ -132,13 +133,13 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
     def delete(name: str) -> None:
         """Forget a campaign that has ended, with its folder."""
         job = known_job(store, name)
-        if job.state not in ENDED:
+        if not store.delete(name):
             raise ProblemError(
                 HTTPStatus.CONFLICT,
                 f"{name}: expected a campaign that has ended, got one that is {job.state}. Cancel it first.",
             )
-        store.delete(name)
-        shutil.rmtree(store.folder_of(name))
+        with contextlib.suppress(FileNotFoundError):  # somebody has removed it
+            shutil.rmtree(store.folder_of(name))
 
     return router
 

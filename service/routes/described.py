@@ -47,7 +47,10 @@ class ProblemAnswer(BaseModel):
 def problems(*statuses: HTTPStatus) -> dict[int | str, dict[str, Any]]:
     """Return how a route is described to refuse."""
     content = {MEDIA_TYPE: {"schema": ProblemAnswer.model_json_schema()}}
-    always = (HTTPStatus.BAD_REQUEST, HTTPStatus.UNAUTHORIZED, HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+    always = (
+        *(HTTPStatus.BAD_REQUEST, HTTPStatus.UNAUTHORIZED, HTTPStatus.REQUEST_ENTITY_TOO_LARGE),
+        HTTPStatus.SERVICE_UNAVAILABLE,
+    )
     return {int(one): {"description": one.phrase, "content": content} for one in (*always, *statuses)}
 
 

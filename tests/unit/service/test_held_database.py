@@ -1,0 +1,116 @@
+"""A database that another program holds, or that fails for a while, delays the service and ends nothing."""
+
+from __future__ import annotations
+
+import asyncio
+import sqlite3
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+from fastapi import FastAPI
+
+from vibroimpact.service import store as store_module
+from vibroimpact.service import supervisor as module
+from vibroimpact.service.problems import answer_problems
+from vibroimpact.service.store import DATABASE, Asked, Job, Kind, State, Store
+from vibroimpact.service.supervisor import Supervisor
+
+ASKED = Asked(Kind.run, "held", "a scene")
+WORKS = 'import time; time.sleep(0.3); print(\'{"total": 1, "done": 1}\')'
+
+
+@pytest.fixture
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Store]:
+    """Of a service whose jobs are done in an instant, and which waits for nothing long."""
+    monkeypatch.setattr(store_module, "HELD_SECONDS", 0.01)
+    monkeypatch.setattr(module, "PAUSE", 0.05)
+    monkeypatch.setattr(module, "IDLE", 0.02)
+    monkeypatch.setattr(module, "python_command", lambda *_: [sys.executable, "-c", WORKS])
+    opened = Store(tmp_path)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def supervisor(store: Store) -> Iterator[Supervisor]:
+    running = Supervisor(store)
+    running.start()
+    yield running
+    running.close()
+
+
+def holder(store: Store) -> sqlite3.Connection:
+    """Return another program's connection, which holds the database until it is closed."""
+    other = sqlite3.connect(store.folder / DATABASE, isolation_level=None)
+    other.execute("BEGIN IMMEDIATE")
+    return other
+
+
+def until(store: Store, job: Job, state: State) -> Job:
+    end = time.monotonic() + 20.0
+    while store.job(job.id).state != state:
+        assert time.monotonic() < end, store.job(job.id)
+        time.sleep(0.01)
+    return store.job(job.id)
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_a_job_that_waits_begins_when_the_database_is_let_go(store: Store) -> None:
+    job, _ = store.submit(ASKED)
+    other = holder(store)
+    time.sleep(0.2)
+    other.close()
+    assert until(store, job, State.done).done == 1
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_the_end_of_a_job_is_noted_when_the_database_is_let_go(store: Store) -> None:
+    job, _ = store.submit(ASKED)
+    until(store, job, State.running)
+    other = holder(store)
+    time.sleep(0.6)
+    other.close()
+    assert until(store, job, State.done).attempts == 1
+
+
+@pytest.mark.usefixtures("supervisor")
+def test_a_job_is_taken_up_again_after_a_database_that_failed(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job, _ = store.submit(ASKED)
+    until(store, job, State.running)
+    with monkeypatch.context() as patched:
+
+        def fails(*_: object, **__: object) -> bool:
+            raise sqlite3.OperationalError("disk I/O error")
+
+        patched.setattr(store, "change", fails)
+        time.sleep(0.6)
+    assert until(store, job, State.done).attempts == 2
+
+
+def test_who_asks_meanwhile_is_told_to_ask_again(store: Store) -> None:
+    app = FastAPI()
+    answer_problems(app)
+
+    @app.post("/")
+    def submit() -> dict[str, Any]:
+        return {"id": store.submit(ASKED)[0].id}
+
+    async def asked() -> httpx.Response:
+        transport = httpx.ASGITransport(app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://service") as client:
+            return await client.post("/")
+
+    other = holder(store)
+    refused = asyncio.run(asked())
+    other.close()
+    assert (refused.status_code, refused.headers["Retry-After"]) == (503, "2")
+    assert "another program holds" in refused.json()["detail"]
+    assert not list((store.folder / "jobs").glob("*"))
+    assert asyncio.run(asked()).status_code == 200
