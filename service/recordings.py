@@ -73,8 +73,24 @@ class RecordingStore:
                 path.unlink()
 
     def path(self, name: str) -> Path:
-        """Return the file of a recording by its id."""
+        """Return where the file of a recording is, by its id."""
         return self.folder / f"{name}.nc"
+
+    def file(self, recording: StoredRecording) -> Path:
+        """Return the file of a recording.
+
+        Raises
+        ------
+        UsageError
+            Somebody has removed it.
+        """
+        path = self.path(recording.id)
+        if not path.is_file():
+            raise UsageError(
+                f"{recording.name}: expected its file, got none: somebody has removed it. "
+                "Delete the recording and upload it again."
+            )
+        return path
 
     def find(self, name: str) -> StoredRecording:
         """Return a recording by its id or its name.

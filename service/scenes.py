@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.fmus.errors import SceneError
+from vibroimpact.fmus.errors import SceneError, UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
 from vibroimpact.fmus.shipped import components
 from vibroimpact.orchestrator.scene import Scene, parse_scene
@@ -138,7 +138,9 @@ def known_fmus(shelf: Shelf) -> list[str]:
 def linked(key: str, name: Any, shelf: Shelf, files: dict[str, Path]) -> list[str]:
     """Note the file of a recording; return what is wrong with its name."""
     try:
-        files[name] = shelf.recordings.path(shelf.recordings.find(str(name)).id)
+        files[name] = shelf.recordings.file(shelf.recordings.find(str(name)))
+    except UsageError as error:
+        return [f"{SOURCE}: {key}: {error}"]
     except KeyError:
         return [
             f"{SOURCE}: {key}: expected the name of a recording of this service, got {str(name)[:200]!r}. "

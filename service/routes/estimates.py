@@ -14,7 +14,7 @@ from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.recordings import RecordingStore
 from vibroimpact.service.routes.accepting import IdempotencyKey, accepted
 from vibroimpact.service.routes.described import JobAnswer, problems
-from vibroimpact.service.routes.recordings import known_recording
+from vibroimpact.service.routes.recordings import file_of, known_recording
 from vibroimpact.service.routes.results import dataset_of
 from vibroimpact.service.store import Asked, Kind, Store
 
@@ -63,7 +63,7 @@ def _data_of(given: EstimateRequest, store: Store, recordings: RecordingStore) -
     """Return what an estimate is made of: its name in the folder of the job, and its file."""
     if given.recording is not None and given.campaign is None:
         recording = known_recording(recordings, given.recording)
-        return recording.name, recordings.path(recording.id)
+        return recording.name, file_of(recordings, recording)
     if given.campaign is not None and given.recording is None:
         job, path = dataset_of(store, given.campaign)
         return f"{job.id}.nc", path

@@ -6,6 +6,7 @@ import asyncio
 import hashlib
 import json
 from http import HTTPStatus
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Query, Request, Response
@@ -59,10 +60,18 @@ def known_recording(recordings: RecordingStore, name: str) -> StoredRecording:
         ) from None
 
 
+def file_of(recordings: RecordingStore, recording: StoredRecording) -> Path:
+    """Return the file of a recording; 409 where it has gone."""
+    try:
+        return recordings.file(recording)
+    except UsageError as error:
+        raise ProblemError(HTTPStatus.CONFLICT, str(error)) from None
+
+
 def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter:
     """Return the routes of recordings."""
     router = APIRouter(tags=["recordings"])
-    absent = problems(HTTPStatus.NOT_FOUND, HTTPStatus.UNPROCESSABLE_ENTITY)
+    absent = problems(HTTPStatus.NOT_FOUND, HTTPStatus.CONFLICT, HTTPStatus.UNPROCESSABLE_ENTITY)
 
     @router.post(
         "/recordings",
@@ -133,7 +142,7 @@ def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter
     def file(name: str) -> FileResponse:
         """Return a recording as NetCDF, whole or a range of it."""
         found = known_recording(recordings, name)
-        path = recordings.path(found.id)
+        path = file_of(recordings, found)
         return FileResponse(path, media_type="application/x-netcdf", filename=found.name)
 
     @router.get("/recordings/{name}/figure", response_class=Response, responses={200: DRAWN, **absent})
@@ -141,7 +150,7 @@ def recordings_router(recordings: RecordingStore, uploads: Uploads) -> APIRouter
         name: str, file_format: Annotated[Literal["png", "svg"], Query(alias="format")] = "png"
     ) -> Response:
         """Draw the channels of a recording."""
-        path = recordings.path(known_recording(recordings, name).id)
+        path = file_of(recordings, known_recording(recordings, name))
         return Response(drawn(path, file_format), media_type=MEDIA[file_format])
 
     @router.delete("/recordings/{name}", status_code=HTTPStatus.NO_CONTENT, responses=absent)
@@ -160,7 +169,7 @@ def _settings(text: str) -> str:
     """Return import settings as they are compared and handed on."""
     try:
         given: Any = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         given = None
     if not isinstance(given, dict):
         raise ProblemError(

@@ -23,9 +23,13 @@ def dataset_of(store: Store, name: str) -> tuple[Job, Path]:
     """Return a job that is done, and its dataset; 409 where it is not."""
     job = known_job(store, name)
     path = store.dataset_of(job)
-    if job.state != State.done or not path.is_file():
+    if job.state != State.done:
         raise ProblemError(
             HTTPStatus.CONFLICT, f"{name}: expected a campaign that is done, got one that is {job.state}."
+        )
+    if not path.is_file():
+        raise ProblemError(
+            HTTPStatus.CONFLICT, f"{name}: expected its dataset, got none: somebody has removed it."
         )
     return job, path
 

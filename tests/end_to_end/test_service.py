@@ -155,6 +155,19 @@ def test_a_job_whose_folder_is_gone_fails_and_the_queue_goes_on(served: Served, 
         service.submit(scene_file(tmp_path, SHORT), workers=1).wait()
 
 
+def test_a_campaign_whose_folder_somebody_has_removed_says_so_and_is_deleted(
+    served: Served, raw: httpx.Client, tmp_path: Path
+) -> None:
+    with served.client() as service:
+        job = service.submit(scene_file(tmp_path, SHORT), workers=1).wait()
+    shutil.rmtree(served.folder / "jobs" / job.id)
+    for what in ("dataset", "figure"):
+        answer = raw.get(f"/campaigns/{job.id}/{what}")
+        assert (answer.status_code, "somebody has removed it" in answer.text) == (409, True)
+    assert raw.delete(f"/campaigns/{job.id}").status_code == 204
+    assert raw.get(f"/campaigns/{job.id}").status_code == 404
+
+
 def test_the_same_key_is_the_same_campaign_and_another_body_is_refused(raw: httpx.Client) -> None:
     header = {"Idempotency-Key": "mine"}
     first = raw.post("/campaigns", json={"scene": SHORT}, headers=header)

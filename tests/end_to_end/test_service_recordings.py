@@ -132,6 +132,29 @@ def test_what_is_no_recording_is_refused_and_leaves_nothing(
     assert not list(served.folder.glob(".upload-*"))
 
 
+@pytest.mark.parametrize("settings", ["[", "[]", "[" * 3999, '{"a":' * 700])
+def test_settings_that_are_no_object_are_refused(raw: httpx.Client, settings: str) -> None:
+    answer = raw.post("/recordings", params={"name": "a.txt", "settings": settings}, content=b"0 1\n1 2\n")
+    assert answer.status_code == 422
+    assert answer.json()["detail"].startswith("settings: expected a JSON object")
+
+
+def test_a_recording_whose_file_somebody_has_removed_is_named_and_can_be_deleted(
+    served: Served, raw: httpx.Client, tmp_path: Path
+) -> None:
+    with served.client() as service:
+        found = service.upload_recording(hit(tmp_path, seed=3), name="removed.nc")
+    (served.folder / "recordings" / f"{found.id}.nc").unlink()
+    decay = {"recording": found.name, "estimate": {"kind": "decay"}}
+    asked = [raw.get(f"/recordings/removed.nc/{what}") for what in ("file", "figure")]
+    for answer in (*asked, raw.post("/estimates", json=decay)):
+        assert (answer.status_code, "somebody has removed it" in answer.text) == (409, True)
+        assert str(served.folder) not in answer.text
+    replayed = raw.post("/campaigns", json={"scene": BOARD, "recordings": ["removed.nc"]})
+    assert (replayed.status_code, "somebody has removed it" in replayed.text) == (422, True)
+    assert raw.delete("/recordings/removed.nc").status_code == 204
+
+
 def test_uploads_without_an_honest_length_are_refused_or_forgotten(served: Served, raw: httpx.Client) -> None:
     assert raw.post("/recordings?name=a.txt", content=iter([b"0 1\n"])).status_code == 413
     place = httpx.URL(served.url)
