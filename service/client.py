@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 from urllib.parse import quote
 
 from vibroimpact.fmus.errors import UsageError
@@ -22,6 +23,9 @@ URL_VARIABLE, TOKEN_VARIABLE = "VIBROIMPACT_SERVICE", "VIBROIMPACT_TOKEN"
 DEFAULT_URL = "http://127.0.0.1:8737"
 SECONDS = 30.0
 """For one answer."""
+BLOCK = 2**20
+"""Of a file that is uploaded, read at a time, byte."""
+_TOKEN = re.compile(r"[!-~]+")
 UPLOAD_SECONDS = 600.0
 """For the answer to an upload, which comes when the file is imported, after those before it."""
 
@@ -64,6 +68,11 @@ class Service:
             raise UsageError(
                 f"token: expected the token of the service at {base}, got none. Set {TOKEN_VARIABLE}, or say "
                 "the folder of the service, which has it in the file `token`."
+            )
+        if not _TOKEN.fullmatch(secret):
+            raise UsageError(
+                f"token: expected printable characters of ASCII without blanks, got others. {TOKEN_VARIABLE} or the "
+                "file `token` in the folder of the service has it."
             )
         headers = {"Authorization": f"Bearer {secret}"}
         try:
@@ -143,7 +152,7 @@ class Service:
     def _accepted_job(self, path: str, asked: dict[str, Any]) -> RemoteJob:
         # one key for all attempts: an answer that is lost on the way starts nothing twice
         key = {"Idempotency-Key": uuid.uuid4().hex}
-        return RemoteJob(self, self.ask("POST", path, json=asked, headers=key).json())
+        return RemoteJob(self, self.told("POST", path, json=asked, headers=key))
 
     def upload_recording(
         self,
@@ -175,18 +184,24 @@ class Service:
         return str(self._upload("/fmus", path, {"name": Path(path).name})["name"])
 
     def _upload(self, path: str, file: str | os.PathLike[str], parameters: dict[str, str]) -> Any:
+        if Path(file).exists() and not Path(file).is_file():
+            raise UsageError(f"{file}: expected a file to upload, got something else.")
         try:
             with open(file, "rb") as content:
-                size = {"Content-Length": str(os.fstat(content.fileno()).st_size)}
-                return self.ask(
-                    "POST", path, params=parameters, content=content, headers=size, timeout=UPLOAD_SECONDS
-                ).json()
+                size = os.fstat(content.fileno()).st_size
+                return self.told(
+                    *("POST", path),
+                    params=parameters,
+                    content=_blocks(content, size),
+                    headers={"Content-Length": str(size)},
+                    timeout=UPLOAD_SECONDS,
+                )
         except OSError as error:
             raise UsageError(f"{file}: expected a file to upload, got {error.strerror}.") from None
 
     def recording(self, name: str) -> RemoteRecording:
         """Return a recording by its id or its name."""
-        return RemoteRecording(self, self.ask("GET", f"/recordings/{quote(name, safe='')}").json())
+        return RemoteRecording(self, self.told("GET", f"/recordings/{quote(name, safe='')}"))
 
     def recordings(self) -> Iterator[RemoteRecording]:
         """Yield all recordings, the newest first."""
@@ -194,7 +209,7 @@ class Service:
 
     def job(self, name: str) -> RemoteJob:
         """Return a campaign by its id."""
-        return RemoteJob(self, self.ask("GET", f"/campaigns/{name}").json())
+        return RemoteJob(self, self.told("GET", f"/campaigns/{quote(name, safe='')}"))
 
     def jobs(self) -> Iterator[RemoteJob]:
         """Yield all campaigns, the newest first."""
@@ -205,7 +220,7 @@ class Service:
         cursor: int | None = None
         while True:
             parameters = {} if cursor is None else {"cursor": cursor}
-            page = self.ask("GET", path, params=parameters).json()
+            page = self.told("GET", path, params=parameters)
             yield from page["items"]
             cursor = page["next"]
             if cursor is None:
@@ -223,9 +238,29 @@ class Service:
 
         try:
             answer = self._http.request(method, path, **request)
-        except httpx.HTTPError as error:
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
             raise self._silent(error) from None
         return _accepted(answer)
+
+    def told(self, method: str, path: str, **request: Any) -> dict[str, Any]:
+        """Return what the service tells: a JSON object.
+
+        Raises
+        ------
+        ServiceError
+            It was refused, nobody answered, or somebody else.
+        """
+        answer = self.ask(method, path, **request)
+        try:
+            told = answer.json()
+        except ValueError:
+            told = None
+        if not isinstance(told, dict):
+            got = answer.headers.get("Content-Type", "nothing")
+            raise ServiceError(
+                f"{self._base}: expected a service of vibroimpact, got another's answer ({got})."
+            )
+        return told
 
     @contextlib.contextmanager
     def stream(self, path: str, **request: Any) -> Iterator[httpx.Response]:
@@ -234,10 +269,10 @@ class Service:
 
         try:
             with self._http.stream("GET", path, **request) as answer:
-                if answer.is_error:
+                if not answer.is_success:
                     answer.read()
                 yield _accepted(answer)
-        except httpx.HTTPError as error:
+        except (httpx.HTTPError, httpx.InvalidURL) as error:
             raise self._silent(error) from None
 
     def _silent(self, error: Exception) -> ServiceError:
@@ -256,10 +291,19 @@ def _token_in(folder: str | os.PathLike[str] | None) -> str:
         return path.read_text(encoding="utf-8").strip()
     except OSError as error:
         raise UsageError(f"{path}: expected the token of a service, got {error.strerror}.") from None
+    except UnicodeDecodeError:
+        raise UsageError(f"{path}: expected the token of a service, got no text.") from None
+
+
+def _blocks(file: BinaryIO, size: int) -> Iterator[bytes]:
+    """Yield so much of a file, which may grow meanwhile."""
+    while size > 0 and (block := file.read(min(size, BLOCK))):
+        size -= len(block)
+        yield block
 
 
 def _accepted(answer: httpx.Response) -> httpx.Response:
-    if not answer.is_error:
+    if answer.is_success:
         return answer
     try:
         told = answer.json()

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import secrets
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from vibroimpact.analysis.files.atomic import refuse_special
 from vibroimpact.fmus.errors import UsageError, VibroimpactError
 
 if TYPE_CHECKING:
@@ -55,7 +57,7 @@ class RemoteJob:
 
     def refresh(self) -> RemoteJob:
         """Ask the service where the campaign is."""
-        self.status = self._service.ask("GET", f"/campaigns/{self.id}").json()
+        self.status = self._service.told("GET", f"/campaigns/{self.id}")
         return self
 
     def events(self, after: int = 0) -> Iterator[dict[str, Any]]:
@@ -106,12 +108,12 @@ class RemoteJob:
 
     def cancel(self) -> RemoteJob:
         """Cancel it; what it has computed stays."""
-        self.status = self._service.ask("POST", f"/campaigns/{self.id}/cancel").json()
+        self.status = self._service.told("POST", f"/campaigns/{self.id}/cancel")
         return self
 
     def resume(self) -> RemoteJob:
         """Let it go on."""
-        self.status = self._service.ask("POST", f"/campaigns/{self.id}/resume").json()
+        self.status = self._service.told("POST", f"/campaigns/{self.id}/resume")
         return self
 
     def fetch(self, path: str | os.PathLike[str]) -> Path:
@@ -169,14 +171,22 @@ class RemoteRecording:
 
 
 def _fetched(service: Service, path: str, target: Path) -> Path:
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        refuse_special(target)
+    except OSError as error:
+        raise _no_place(target, error) from None
+    part = target.with_name(f".{os.getpid()}-{secrets.token_hex(4)}.part")
     try:
         with service.stream(path) as answer, part.open("wb") as file:
             for block in answer.iter_bytes():
                 file.write(block)
         part.replace(target)
     except OSError as error:
-        raise UsageError(f"{target}: expected a place for a file, got {error.strerror}.") from None
+        raise _no_place(target, error) from None
     finally:
         part.unlink(missing_ok=True)
     return target
+
+
+def _no_place(target: Path, error: OSError) -> UsageError:
+    return UsageError(f"{target}: expected a place for a file, got {error.strerror}.")

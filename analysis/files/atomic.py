@@ -2,10 +2,28 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 from contextlib import suppress
 from pathlib import Path
+
+
+def refuse_special(path: str | os.PathLike[str]) -> None:
+    """Refuse a path at which something is that is no file: renaming a file there would put it in its place.
+
+    Who may do anything would so replace `/dev/null` for all of the machine.
+
+    Raises
+    ------
+    OSError
+        It is a folder, a device, a pipe or a socket.
+    """
+    target = Path(path)
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(target))
+    if target.exists() and not target.is_file():
+        raise OSError(errno.EINVAL, "a device, a pipe or a socket", os.fspath(target))
 
 
 def write_atomically(path: str | os.PathLike[str], *content: bytes | memoryview) -> None:
@@ -23,9 +41,11 @@ def write_atomically(path: str | os.PathLike[str], *content: bytes | memoryview)
     Raises
     ------
     OSError
-        If the file cannot be written (no space, no permission, no folder), with the system's reason.
+        If the file cannot be written (no space, no permission, no folder, no place for a file), with the system's
+        reason.
     """
     target = Path(path)
+    refuse_special(target)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.{secrets.token_hex(4)}.tmp")
     try:
         with open(temporary, "xb") as file:

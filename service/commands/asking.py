@@ -81,7 +81,8 @@ def cancel_campaign(name: str, url: str | None, folder: Path | None) -> None:
 
 
 def _placed(scene: Path, problem: dict[str, object]) -> str:
-    return f"{scene}: line {problem.get('line')}: {problem.get('message')}"
+    line = f"line {problem['line']}: " if "line" in problem else ""
+    return f"{scene}: {line}{problem.get('message')}"
 
 
 def _line(status: dict[str, object]) -> str:
