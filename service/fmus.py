@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
+from vibroimpact.analysis.files.folder_lock import make_folder
 from vibroimpact.fmus.errors import ComponentFileError, UsageError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.fmus.packaging.fmpy_door import read_description
@@ -29,7 +30,7 @@ class FmuStore:
     def __init__(self, folder: Path, takes_uploads: bool) -> None:
         self.folder, self.takes_uploads = folder, takes_uploads
         self._lock = threading.Lock()
-        folder.mkdir(exist_ok=True, mode=0o700)
+        make_folder(folder)
         for part in folder.glob(".*"):  # of uploads that a kill has cut off
             part.unlink()
 

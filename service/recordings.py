@@ -12,11 +12,14 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from vibroimpact.analysis.files.folder_lock import make_folder
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.python_child import ending, python_command
 from vibroimpact.service.child import kill_session
 from vibroimpact.service.store import OUTPUTS, Store
 
+PART = "part-"
+"""Beginning of the name of a file that is being imported."""
 MOST_RECORDINGS = 1000
 """Recordings that a service keeps."""
 IMPORT_SECONDS = 120.0
@@ -66,11 +69,9 @@ class RecordingStore:
     def __init__(self, store: Store) -> None:
         self._store = store
         self.folder = store.folder / "recordings"
-        self.folder.mkdir(exist_ok=True, mode=0o700)
-        known = {self.path(name).name for (name,) in store.rows("SELECT id FROM recordings")}
-        for path in self.folder.iterdir():  # of uploads that a kill has cut off
-            if path.name not in known:
-                path.unlink()
+        make_folder(self.folder)
+        for path in self.folder.glob(f"{PART}*"):  # of uploads that a kill has cut off
+            path.unlink()
 
     def path(self, name: str) -> Path:
         """Return where the file of a recording is, by its id."""
@@ -134,7 +135,7 @@ class RecordingStore:
         if known is not None:
             return known
         identifier = uuid.uuid4().hex
-        target = self.path(identifier)
+        target = self.folder / f"{PART}{identifier}.nc"
         channels = imported(file, target, settings)
         try:
             with self._store.transaction() as database:
@@ -144,8 +145,10 @@ class RecordingStore:
                         "INSERT INTO recordings (id, name, source, bytes, channels, created) VALUES (?, ?, ?, ?, ?, ?)",
                         (identifier, name, source, target.stat().st_size, json.dumps(channels), time.time()),
                     )
+                    target.rename(self.path(identifier))
         except BaseException:
             target.unlink(missing_ok=True)
+            self.path(identifier).unlink(missing_ok=True)
             raise
         if there is not None:  # another upload of the same was faster
             target.unlink()

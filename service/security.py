@@ -34,6 +34,7 @@ HEADERS = (
 )
 
 _LENGTH = re.compile(rb"[0-9]{1,15}")
+_TOKEN = re.compile(r"[!-~]+")
 _JOB = re.compile(r"/campaigns/([0-9a-f]{32})")
 
 Scope = MutableMapping[str, Any]
@@ -49,24 +50,36 @@ def token_of(folder: Path) -> str:
     Raises
     ------
     UsageError
-        Others may read the file, or it is empty.
+        Others may read the file, or there is no token in it.
     """
     path = folder / "token"
     try:
         handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     except FileExistsError:
-        if os.name == "posix" and path.stat().st_mode & 0o077:
+        if os.name == "posix" and path.is_file() and path.stat().st_mode & 0o077:
             raise UsageError(
                 f"{path}: expected a file that only you can read, got mode {path.stat().st_mode & 0o777:04o}. "
                 "Others may know the token: delete the file, and a new one is made."
             ) from None
-        token = path.read_text(encoding="utf-8").strip()
-        if not token:
-            raise UsageError(f"{path}: expected a token, got an empty file. Delete it.") from None
-        return token
+        return _token_in(path)
+    except OSError as error:
+        raise UsageError(f"{path}: expected a file for the token, got {error.strerror}.") from None
     token = secrets.token_urlsafe(32)
     with os.fdopen(handle, "w", encoding="utf-8") as file:
         file.write(f"{token}\n")
+    return token
+
+
+def _token_in(path: Path) -> str:
+    try:
+        token = path.read_text(encoding="ascii").strip()
+    except OSError as error:
+        raise UsageError(f"{path}: expected a token, got {error.strerror}. Delete it.") from None
+    except UnicodeDecodeError:
+        raise UsageError(f"{path}: expected a token, got no text of ASCII. Delete it.") from None
+    if not _TOKEN.fullmatch(token):
+        got = "blanks in it" if token else "an empty file"
+        raise UsageError(f"{path}: expected a token, got {got}. Delete it.")
     return token
 
 

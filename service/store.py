@@ -7,9 +7,11 @@ numbered once and for all, so that a reader who comes back asks for those after 
 
 from __future__ import annotations
 
+import contextlib
 import json
 import logging
 import os
+import re
 import shutil
 import sqlite3
 import threading
@@ -17,7 +19,6 @@ import time
 import uuid
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from pathlib import Path
@@ -47,6 +48,10 @@ LOG = logging.getLogger("vibroimpact.service")
 DATABASE = "service.sqlite"
 PROGRESS_READ = 20
 """Events of progress, the last ones, over which the rate of a job is taken."""
+FORGOTTEN = ".forgotten"
+"""Ending of the folder of a job while it is removed."""
+LOG_FILE = "log.txt"
+"""What the process of a job says, in the folder of the job: there since it has begun."""
 HELD_SECONDS = 1.0
 """How long a database that another program holds is waited for; all other requests wait meanwhile."""
 MOST_EVENTS_READ = 500
@@ -185,10 +190,17 @@ class Store:
         self._connection = sqlite3.connect(
             folder / DATABASE, HELD_SECONDS, check_same_thread=False, isolation_level=None
         )
-        self._connection.execute("PRAGMA journal_mode = WAL")
-        self._connection.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
-        self._refuse_other_layout()
-        self._connection.executescript(f"{SCHEMA}PRAGMA user_version = {LAYOUT};")
+        try:
+            self._connection.execute("PRAGMA journal_mode = WAL")
+            self._connection.execute("PRAGMA synchronous = FULL")  # what was accepted survives a power cut
+            self._refuse_other_layout()
+            self._connection.executescript(f"{SCHEMA}PRAGMA user_version = {LAYOUT};")
+        except sqlite3.DatabaseError as error:
+            self._connection.close()
+            raise UsageError(
+                f"{folder / DATABASE}: expected the database of a service, got: {error}. "
+                "The campaigns in `jobs` open with the commands all the same."
+            ) from None
 
     def _refuse_other_layout(self) -> None:
         is_there = self._connection.execute("SELECT COUNT(*) FROM sqlite_master").fetchone()[0]
@@ -210,7 +222,7 @@ class Store:
         with self._lock:
             return self._connection.execute(question, values).fetchall()
 
-    @contextmanager
+    @contextlib.contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
         """Open a transaction, which is taken back where what is done in it fails."""
         with self._lock:
@@ -287,11 +299,25 @@ class Store:
             raise
 
     def remove_strays(self) -> None:
-        """Remove the folders of jobs that were not accepted, or forgotten, when the service was killed."""
+        """Remove the folders of jobs that were not accepted, or forgotten, when the service was killed.
+
+        What has begun and is unknown is another database's, of a backup for example: it is left alone.
+        """
         known = {name for (name,) in self.rows("SELECT id FROM jobs")}
         for folder in (self.folder / "jobs").glob("*"):
-            if folder.name not in known:
-                shutil.rmtree(folder)
+            if folder.name.endswith(FORGOTTEN) or (_JOB.fullmatch(folder.name) and not has_begun(folder)):
+                if folder.name not in known:
+                    shutil.rmtree(folder)
+            elif folder.name not in known:
+                LOG.warning("a folder of no known job is left alone", extra={"why": folder.name})
+
+    def remove_folder(self, name: str) -> None:
+        """Remove the folder of a job that was forgotten, as far as it is there."""
+        folder = self.folder_of(name)
+        doomed = folder.with_name(f"{name}{FORGOTTEN}")  # a kill while it is removed leaves no job's folder
+        with contextlib.suppress(FileNotFoundError):
+            folder.rename(doomed)
+            shutil.rmtree(doomed)
 
     def job(self, name: str) -> Job:
         """Return a job.
@@ -408,6 +434,11 @@ class Store:
         return [Event(number, job, at, kind, json.loads(data)) for number, job, at, kind, data in rows]
 
 
+def has_begun(folder: Path) -> bool:
+    """Return whether the job of a folder was ever started."""
+    return (folder / LOG_FILE).exists()
+
+
 def _link(file: Path, name: Path) -> None:
     try:
         os.link(file, name)
@@ -417,6 +448,7 @@ def _link(file: Path, name: Path) -> None:
         shutil.copyfile(file, name)
 
 
+_JOB = re.compile(r"[0-9a-f]{32}")
 _COLUMNS = ", ".join(one.name for one in fields(Job))
 
 

@@ -24,7 +24,7 @@ from vibroimpact.fmus.python_child import ending, python_command
 from vibroimpact.service.child import kill_session
 from vibroimpact.service.job_process import INTERRUPTED, LATER, Work
 from vibroimpact.service.problems import is_full, is_held
-from vibroimpact.service.store import LOG, Job, State, Store
+from vibroimpact.service.store import LOG, LOG_FILE, Job, State, Store
 
 GRACE = 0.5
 """Seconds that a cancelled job has to end in good order, before it and its workers are killed."""
@@ -124,7 +124,7 @@ class Supervisor:
             return  # cancelled in the same instant
         folder = self._store.folder_of(job.id)
         try:
-            with JobLog(folder / "log.txt", job.id) as log:
+            with JobLog(folder / LOG_FILE, job.id) as log:
                 log.write(f"--- {time.strftime('%Y-%m-%d %H:%M:%S')} attempt {job.attempts + 1}")
                 process = self._open(job, folder)
                 with process:  # closes its pipes

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import shutil
 from http import HTTPStatus
 from typing import Annotated, Any
 
@@ -138,8 +136,7 @@ def campaigns_router(store: Store, supervisor: Supervisor, shelf: Shelf) -> APIR
                 HTTPStatus.CONFLICT,
                 f"{name}: expected a campaign that has ended, got one that is {job.state}. Cancel it first.",
             )
-        with contextlib.suppress(FileNotFoundError):  # somebody has removed it
-            shutil.rmtree(store.folder_of(name))
+        store.remove_folder(name)
 
     return router
 

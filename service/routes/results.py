@@ -13,7 +13,7 @@ from vibroimpact.analysis.figures import KINDS
 from vibroimpact.service.drawing import DRAWN, MEDIA, drawn
 from vibroimpact.service.problems import ProblemError
 from vibroimpact.service.routes.described import known_job, problems
-from vibroimpact.service.store import Job, State, Store
+from vibroimpact.service.store import LOG_FILE, Job, State, Store
 
 MOST_LOG = 2**20
 """Of a log, the end that is shown, byte."""
@@ -58,7 +58,7 @@ def results_router(store: Store) -> APIRouter:
     def log(name: str) -> Response:
         """Return the end of what its process said."""
         known_job(store, name)
-        path = store.folder_of(name) / "log.txt"
+        path = store.folder_of(name) / LOG_FILE
         content = path.read_bytes()[-MOST_LOG:] if path.is_file() else b""
         return Response(content, media_type="text/plain; charset=utf-8")
 
