@@ -20,7 +20,8 @@ _STYLES = ("-", "--", ":", "-.")
 
 def draw_scores(dataset: xr.Dataset) -> Figure:
     """Draw the variance accounted for against the swept parameter with the most values, a line for each other point."""
-    swept = [name for name in varied(dataset) if name in dataset.variance_accounted_for.dims]
+    scored = dataset["variance_accounted_for"].dims if "variance_accounted_for" in dataset else ()
+    swept = [name for name in varied(dataset) if name in scored]
     if not swept:
         raise DatasetError(
             "figure: expected replays over a grid of values or of recordings, got none. Draw a replay's own dataset."

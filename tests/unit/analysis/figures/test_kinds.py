@@ -418,3 +418,11 @@ def test_slopes_of_intervals_end_at_the_grid_on_which_the_instants_were_written(
         x = line.get_xdata()[np.isfinite(line.get_ydata())]
         assert text.xy[0] in x
         assert (x >= text.xy[0]).sum() >= 0.8 * x.size
+
+
+def test_runs_that_replayed_nothing_have_no_scores() -> None:
+    runs = dataset_of([record(1.0), record(2.0)], coordinates={"mass": np.array([1.0, 2.0])})
+    with pytest.raises(
+        DatasetError, match="expected replays over a grid of values or of recordings, got none"
+    ):
+        figures.draw(runs, "scores")
