@@ -22,8 +22,15 @@ def say(**what: Any) -> None:
     sys.stdout.flush()
 
 
-def end_with_service() -> None:
-    """End this process and what it has started as soon as standard input does: then the service is gone."""
+def begin_as_child() -> None:
+    """Keep standard output for what is said, and end with the service.
+
+    What an FMU prints goes to standard error, and so into the log. When standard input ends the service is gone: this
+    process is killed then, with what it has started.
+    """
+    sys.stdout.flush()
+    sys.stdout = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
     threading.Thread(target=_wait_for_end, daemon=True).start()
 
 

@@ -14,7 +14,7 @@ from typing import Any
 from vibroimpact.analysis.recording import Recording, write_recording
 from vibroimpact.fmus.errors import VibroimpactError
 from vibroimpact.hardware.recordings import import_recording
-from vibroimpact.service.child import FULL, end_with_service, say
+from vibroimpact.service.child import FULL, begin_as_child, say
 
 MOST_MEMORY = 8 * 2**30
 """Address space of the process, byte."""
@@ -43,7 +43,7 @@ def contents(recording: Recording) -> list[dict[str, Any]]:
 def main(arguments: list[str]) -> int:
     """Import the file that the arguments name; return the exit code."""
     file, target, settings = Path(arguments[0]), Path(arguments[1]), json.loads(arguments[2])
-    end_with_service()
+    begin_as_child()
     limit_memory()
     try:
         recording = import_recording(file, settings)

@@ -23,7 +23,7 @@ from vibroimpact.orchestrator.campaign import CampaignInterrupted, run_campaign,
 from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.preparation import prepared_scene
-from vibroimpact.service.child import FULL, end_with_service, say
+from vibroimpact.service.child import FULL, begin_as_child, say
 
 SAID_EVERY, SAID_PART = 0.25, 1.0 / 500.0
 """Seconds between two lines of progress, at least, and part of all points: each becomes an event that is kept."""
@@ -136,7 +136,7 @@ def _replay(scene: Scene, folder: Path, fit: str | None = None, score: list[str]
 def main(arguments: list[str]) -> int:
     """Run the job that the arguments name; return the exit code."""
     folder, work = Path(arguments[0]), Work(**json.loads(arguments[1]))
-    end_with_service()
+    begin_as_child()
     try:
         run(folder, work)
     except CampaignInterrupted as interrupted:

@@ -173,8 +173,9 @@ class Supervisor:
         errors.start()
         for line in process.stdout:
             said = _said(line)
-            if "total" in said:
-                told.total, told.done = said["total"], said["done"]
+            total, done = said.get("total"), said.get("done")
+            if isinstance(total, int) and isinstance(done, int):
+                told.total, told.done = total, done
                 self._note_progress(job, told)
             told.failed = said.get("failed", told.failed)
             told.later = said.get("later", told.later)
