@@ -49,7 +49,7 @@ from vibroimpact.analysis.dataset.schema import (
 )
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
-from vibroimpact.analysis.files.opening import NETCDF_LOCK
+from vibroimpact.analysis.files.open_files import netcdf_lock
 from vibroimpact.fmus.errors import DatasetError
 
 _TEXT_CHUNK = 4096
@@ -401,7 +401,7 @@ def _image(dataset: xr.Dataset, compression: int) -> memoryview:
     """Return the bytes of the NetCDF-4 file of a dataset."""
     linked = " ".join(("run_index", "direction", *swept_names(dataset), *constant_names(dataset)))
     loaded = dataset.compute()  # what is read of another file wants the lock, too
-    with NETCDF_LOCK:
+    with netcdf_lock():
         file = netCDF4.Dataset("dataset.nc", "w", format="NETCDF4", memory=1)
         # Every value is written below: filling first would write everything twice.
         file.set_fill_off()

@@ -1,7 +1,7 @@
 """A NetCDF file that xarray reads lazily, from any thread.
 
-xarray reads values under a lock, since the NetCDF library is not made for threads; it opens files, reads attributes and
-closes what was dropped without it. Here all of this is done under the lock.
+xarray reads values under its lock; it opens files, reads attributes and closes what was dropped without it. Here all of
+this is done under the lock, and a file is open once (`open_files`).
 """
 
 from __future__ import annotations
@@ -9,17 +9,13 @@ from __future__ import annotations
 import weakref
 from typing import Any
 
-import netCDF4
 from xarray.backends import NetCDF4DataStore
 
-from vibroimpact.analysis.files.opening import NETCDF_LOCK
-
-_dropped: list[netCDF4.Dataset] = []
-"""Files that nobody uses any more, and that could not be closed at once."""
+from vibroimpact.analysis.files.open_files import drop, give_back, netcdf_lock, take
 
 
 class LazyStore(NetCDF4DataStore):
-    """An open file; it is closed with the dataset that is made of it, or when that is dropped.
+    """An open file; it is given back with the dataset that is made of it, or when that is dropped.
 
     Parameters
     ----------
@@ -28,17 +24,15 @@ class LazyStore(NetCDF4DataStore):
     """
 
     def __init__(self, path: str) -> None:
-        with NETCDF_LOCK:
-            while _dropped:
-                _dropped.pop().close()
-            self._root = netCDF4.Dataset(path, "r")
+        with netcdf_lock():
+            self._file = take(path)
             try:
-                super().__init__(self._root)  # type: ignore[no-untyped-call]
+                super().__init__(self._file.root)  # type: ignore[no-untyped-call]
                 self._loaded, self._encoding = super().load(), super().get_encoding()  # type: ignore[no-untyped-call]
             except BaseException:
-                self._root.close()
+                give_back(self._file)
                 raise
-        self._at_end = weakref.finalize(self, _close, self._root)
+        self._at_end = weakref.finalize(self, drop, self._file)
 
     def load(self) -> Any:
         """Return variables and attributes, without the values of the former."""
@@ -49,16 +43,7 @@ class LazyStore(NetCDF4DataStore):
         return self._encoding
 
     def close(self, **_: Any) -> None:
-        """Close the file; once more is nothing."""
+        """Give the file back; once more is nothing."""
         if self._at_end.detach():
-            with NETCDF_LOCK:
-                self._root.close()
-
-
-def _close(root: netCDF4.Dataset) -> None:
-    # the garbage collector may call this while this very thread holds the lock
-    if NETCDF_LOCK.locked():
-        _dropped.append(root)
-        return
-    with NETCDF_LOCK:
-        root.close()
+            with netcdf_lock():
+                give_back(self._file)

@@ -8,13 +8,11 @@ from contextlib import contextmanager
 from typing import Any
 
 import netCDF4
-from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK
 
+from vibroimpact.analysis.files.open_files import reading
 from vibroimpact.analysis.files.probing import UnsoundFileError, check_sound, refuse_changed
 from vibroimpact.fmus.errors import DatasetError
 
-NETCDF_LOCK: Any = NETCDF4_PYTHON_LOCK
-"""Held while the NetCDF library works, which is not made for threads; the one that xarray reads under."""
 DAMAGE = (
     *(
         OSError,
@@ -51,9 +49,8 @@ def opened_netcdf(path: str | os.PathLike[str]) -> Iterator[netCDF4.Dataset]:
     """
     with one_error(path):
         state = check_sound(path)
-        with NETCDF_LOCK, netCDF4.Dataset(os.path.abspath(path), "r") as file:
+        with reading(os.path.abspath(path)) as file:
             refuse_changed(path, state)
-            file.set_auto_maskandscale(False)
             yield file
 
 

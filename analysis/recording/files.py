@@ -15,7 +15,8 @@ from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.schema import CONVENTIONS, RAGGED
 from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
-from vibroimpact.analysis.files.opening import NETCDF_LOCK, one_error, opened_netcdf
+from vibroimpact.analysis.files.open_files import netcdf_lock
+from vibroimpact.analysis.files.opening import one_error, opened_netcdf
 from vibroimpact.analysis.recording.channels import (
     QUALITY_FLAGS,
     RECORDING_SCHEMA,
@@ -59,7 +60,7 @@ def write_recording(recording: Recording, path: str | os.PathLike[str]) -> None:
     problems = list(problems_of(recording))
     if problems:
         raise DatasetError("\n".join(f"recording: {problem}" for problem in problems))
-    with NETCDF_LOCK:
+    with netcdf_lock():
         file = netCDF4.Dataset("recording.nc", "w", format="NETCDF4", memory=1)
         file.setncatts(
             {

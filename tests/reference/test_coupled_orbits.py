@@ -122,6 +122,7 @@ SHORT_FORM: dict[str, list[dict[str, float]]] = {
         for gap, f in ((0.001, 4.9), (0.002, 5.5), (0.003, 6.1))
     ],
     "single_run.toml": [{}],
+    "tolerances.toml": [{"stop[1].position": 0.0021, "body.stiffness": 103.0}],
     "two_stops.toml": [{}],
 }
 
