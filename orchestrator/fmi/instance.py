@@ -108,9 +108,10 @@ class Instance(ABC):
         if status > WARNING or status < OK:
             self.is_fatal = self.is_fatal or status == FATAL
             word = STATUS_WORDS[status] if 0 <= status < len(STATUS_WORDS) else f"status {status}"
-            self._fail(function, f"returned {word} at time {self.time:.17g}")
+            self.fail(function, f"returned {word} at time {self.time:.17g}")
 
-    def _fail(self, function: str, what: str) -> NoReturn:
+    def fail(self, function: str, what: str) -> NoReturn:
+        """Raise ComponentError: what a function of the FMU did, and the last line that it logged."""
         lines = self.log.take()
         reason = lines[-1] if lines else "the component logged nothing"
         # Our own components say who and where too: once is enough.
@@ -230,7 +231,7 @@ class Instance(ABC):
     def _refuse_end(self, rule: str, reached: float) -> NoReturn:
         """Raise the error of a step that says it has ended where none can."""
         self.time = self._step_time.value
-        self._fail(
+        self.fail(
             "DoStep",
             f"said that a step of {self._step_size.value:.12g} s has ended at time {reached:.12g} "
             f"(lastSuccessfulTime), expected {rule}, at time {self.time:.17g}",

@@ -82,7 +82,7 @@ class Instance2(Instance):
             c_int(1),  # loggingOn: some FMUs report even fatal errors only then
         )
         if not pointer:
-            self._fail("Instantiate", f"made no instance of {self.fmu.source}")
+            self.fail("Instantiate", f"made no instance of {self.fmu.source}")
         self._pointer.value = pointer
 
     def _take_kept(self) -> bool:

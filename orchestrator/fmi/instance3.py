@@ -67,7 +67,7 @@ class Instance3(Instance):
             *texts, *flags, *no_variables, self.log.environment, callback("fmi3"), c_void_p()
         )
         if not pointer:
-            self._fail("InstantiateCoSimulation", f"made no instance of {self.fmu.source}")
+            self.fail("InstantiateCoSimulation", f"made no instance of {self.fmu.source}")
         self._pointer.value = pointer
 
     def _bind_events(self) -> None:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vibroimpact.fmus import fmu_path
+from vibroimpact.fmus.core import runs, stepping
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.orchestrator.fmi.instance import DISCARD, WrapOf
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
@@ -52,6 +56,7 @@ class BodyDriver(RecordedBody):
         super().__init__(self._group)
         self._floats = self._group("Float64", tuple(floats))
         self.float_names = tuple(floats)
+        self._held: tuple[str, ...] | None = None  # what a block of samples reads
         self.integers = []
         for kind, is_boolean in (("Int64", False), ("Boolean", True)):
             values = {name: v for name, v in integers.items() if isinstance(v, bool) is is_boolean}
@@ -77,6 +82,7 @@ class BodyDriver(RecordedBody):
         """Start a run at time 0 with these parameters; it may take `deadline` seconds of wall time."""
         self._deadline.begin(deadline)
         self.rows.blocks = []
+        self._held = None
         instance = self.instance
         instance.log.take()  # what the run before has left is not said of this one
         instance.reset()
@@ -103,6 +109,51 @@ class BodyDriver(RecordedBody):
                 self.take_rows()
             else:
                 instance.time = end
+
+    def hold(
+        self, ends: NDArray[np.float64], forces: NDArray[np.float64], outputs: Sequence[str]
+    ) -> NDArray[np.float64]:
+        """Advance from sample to sample by one call, a force held before each; nothing is recorded meanwhile.
+
+        Parameters
+        ----------
+        ends : ndarray, shape (sample,)
+            s, ascending, after the time reached.
+        forces : ndarray, shape (sample,)
+            N, each held until the sample at its place.
+        outputs : sequence of str
+            Variables of the body that are read at each sample.
+
+        Returns
+        -------
+        ndarray, shape (sample, output)
+
+        Raises
+        ------
+        ImpactLimitReached
+            At the limit of impacts of the run.
+        ComponentError
+            The body fails.
+        """
+        instance, references = self.instance, self.references
+        if self._held != tuple(outputs):
+            self.record(impacts=False, extrema=False, periods=False)
+            self._held = tuple(outputs)
+            self._read = np.array([references[name] for name in outputs], dtype=np.uint32)
+        functions = [instance.address_of(name) for name in runs.RunsFmu.FUNCTIONS]
+        fmu = runs.RunsFmu(instance.pointer, *functions, instance.log.environment)
+        variables = runs.RunsVariables(runs.address(self._read), len(self._read))
+        plan = stepping.HoldPlan(references["force"], references["force_rate"], variables)
+        samples = np.empty((len(ends), len(outputs)))
+        arrays = map(runs.address, (ends, forces, samples))
+        block = stepping.HoldBlock(len(ends), *arrays, 0, instance.time)
+        end = stepping.hold_samples(fmu, plan, block)
+        instance.time = block.time
+        if end == stepping.HoldEnd.limit:
+            raise ImpactLimitReached
+        if end == stepping.HoldEnd.refused:
+            instance.fail("DoStep", f"refused the step to the sample at time {ends[block.at]:.17g}")
+        return samples
 
     def close(self) -> None:
         """Free the instance."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
+from vibroimpact.orchestrator.run.fused import BodyDriver
 from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
 from vibroimpact.orchestrator.run.point import built_for, driver_of
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
@@ -181,6 +182,56 @@ class Session:
                 group.set()
             rows[i] = driver.sampled() if plain else self.sample()
         return rows
+
+    def hold(self, times: Floats, forces: Floats) -> Floats:
+        """Go through all instants, a force held between them; return the outputs at the end of each step.
+
+        The loop runs in C: one call for all samples, bit for bit what `advance` gives one by one. From the first call
+        on nothing is recorded, so that a session may go on for days.
+
+        Parameters
+        ----------
+        times : ndarray, shape (sample + 1,)
+            s from the session's time 0, ascending; the first is now.
+        forces : ndarray, shape (sample,)
+            N, each from one of the instants to the next.
+
+        Returns
+        -------
+        ndarray, shape (sample, outputs)
+
+        Raises
+        ------
+        UsageError
+            Instants that do not ascend from now, another number of forces, a force that is no number, a coupled
+            session, a chain, or outputs that the FMU does not have as they are (those of a forced scene).
+        ImpactLimitReached
+            The run has met `execution.impact_limit`.
+
+        Examples
+        --------
+        >>> from vibroimpact.orchestrator.scene import parse_scene
+        >>> text = "[body]\\nmass = 1\\nstiffness = 0\\n[record]\\nrecorded_time = 1"
+        >>> with Session(parse_scene(text, "free.toml"), ["velocity"]) as session:
+        ...     session.begin()
+        ...     session.hold(np.array([0.0, 1.0, 2.0]), np.array([3.0, -1.0])).tolist()
+        [[3.0], [2.0]]
+        """
+        driver = self._driver
+        if not isinstance(driver, BodyDriver) or not self._has("force"):
+            raise UsageError("hold: expected a fused oscillator or beam, got another body or a coupled one.")
+        if not self._plan.is_plain(self._forcing):
+            raise UsageError(
+                f"hold: expected an unforced scene and outputs of its FMU, got {', '.join(self.outputs)}."
+            )
+        if len(times) != len(forces) + 1 or times[0] != driver.time or not (np.diff(times) > 0.0).all():
+            raise UsageError(
+                f"hold: expected ascending instants from {driver.time:.17g} s on, one more than forces."
+            )
+        if not np.isfinite(forces).all():
+            raise UsageError("hold: expected finite forces, got one that is no number.")
+        ends = np.ascontiguousarray(times[1:], dtype=np.float64)
+        return driver.hold(ends, np.ascontiguousarray(forces, dtype=np.float64), self._plan.variables)
 
     def impacts(self) -> Floats:
         """Return the impacts so far, shape (impact, 7): columns `analysis.schema.IMPACT_COLUMNS`."""

@@ -9,6 +9,7 @@ from support.tolerance import PARTITION
 from vibroimpact.fmus.core import Oscillator, flow
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run import Session
+from vibroimpact.orchestrator.run.session import Floats
 from vibroimpact.orchestrator.scene import parse_scene
 
 FREE = "[body]\nmass = 2\nstiffness = 800\ndamping = 1.6\n[record]\nrecorded_time = 1\n"
@@ -65,3 +66,46 @@ def test_an_input_that_the_body_does_not_have_is_one_clear_error() -> None:
             UsageError, match=r"torque: expected an input of the body \(force, base_acceleration\)"
         ):
             session.advance(0.1, {"torque": (1.0, 0.0)})
+
+
+YIELDING = "[[stop]]\nposition = 0.01\nlaw = 'kelvin_voigt'\nstiffness = 1e5\ndamping = 20\n"
+
+
+def square_wave(samples: int) -> Floats:
+    return np.where(np.arange(samples) // 150 % 2, -6.0, 6.0)
+
+
+@pytest.mark.parametrize("scene", [STOPPED, FREE + YIELDING], ids=["rigid", "yielding"])
+def test_a_block_of_samples_is_bit_for_bit_what_single_steps_give(scene: str) -> None:
+    # steps of a power of 2: times are sums of them without rounding
+    step, forces = 2.0**-10, square_wave(3000)
+    times = step * np.arange(len(forces) + 1)
+    names = ["displacement", "velocity", "contact_force[1]"]
+    with Session(parse_scene(scene, "stop.toml"), names) as session:
+        session.begin()
+        rows = np.concatenate(
+            [session.hold(times[i : i + 1001], forces[i : i + 1000]) for i in range(0, 3000, 1000)]
+        )
+        assert len(session.impacts()) == 0  # or memory would grow for as long as a rig is served
+        session.begin()
+        single = [list(session.advance(step, {"force": (force, 0.0)}).values()) for force in forces]
+        assert len(session.impacts()) > 5
+    np.testing.assert_array_equal(rows, single)
+
+
+def test_a_block_that_cannot_be_is_one_clear_error() -> None:
+    two = np.array([0.0, 0.1])
+    with Session(parse_scene(FREE, "free.toml")) as session:
+        session.begin()
+        for times, forces in ((two[::-1], [1.0]), (two, [1.0, 2.0]), (two + 1.0, [1.0])):
+            with pytest.raises(UsageError, match="expected ascending instants from 0 s on"):
+                session.hold(times, np.array(forces))
+        with pytest.raises(UsageError, match="expected finite forces"):
+            session.hold(two, np.array([np.nan]))
+    forced = FREE.replace("[record]", "[forcing]\namplitude = 1\nfrequency = 1\n[record]").replace(
+        "recorded_time = 1", "recorded_periods = 1"
+    )
+    with Session(parse_scene(forced, "forced.toml")) as session:
+        session.begin()
+        with pytest.raises(UsageError, match="expected an unforced scene"):
+            session.hold(two, np.array([1.0]))
