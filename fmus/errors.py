@@ -76,6 +76,10 @@ class ComponentFileError(ComponentError):
     exit_code = 2
 
 
+class RigError(VibroimpactError):
+    """A rig refused a call, or failed, while a program used it."""
+
+
 class DatasetError(VibroimpactError):
     """A dataset does not follow the schema of `vibroimpact.analysis.dataset`, or cannot be read."""
 

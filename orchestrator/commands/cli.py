@@ -44,6 +44,7 @@ PANELS = {
         "spikes",
     ),
     "Exchange": ("fmu", "ssp"),
+    "Rigs": ("rig",),
     "Serve": ("serve", "submit", "status", "fetch", "cancel"),
 }
 """The commands as `--help` shows them, in the order in which they are used; those of other packages come last."""

@@ -204,7 +204,7 @@ class Session:
         ------
         UsageError
             Instants that do not ascend from now, another number of forces, a force that is no number, a coupled
-            session, a chain, or outputs that the FMU does not have as they are (those of a forced scene).
+            session, a chain, or outputs that the FMU does not have as they are (accelerations under forcing).
         ImpactLimitReached
             The run has met `execution.impact_limit`.
 
@@ -222,7 +222,7 @@ class Session:
             raise UsageError("hold: expected a fused oscillator or beam, got another body or a coupled one.")
         if not self._plan.is_plain(self._forcing):
             raise UsageError(
-                f"hold: expected an unforced scene and outputs of its FMU, got {', '.join(self.outputs)}."
+                f"hold: expected outputs that the FMU has as they are, got {', '.join(self.outputs)}."
             )
         if len(times) != len(forces) + 1 or times[0] != driver.time or not (np.diff(times) > 0.0).all():
             raise UsageError(

@@ -46,7 +46,8 @@ class TimeSeriesPlan:
 
     def is_plain(self, forcing: Forcing | None) -> bool:
         """Whether the sampled variables are those of the FMU, one by one: nothing is left for `row` to do."""
-        return forcing is None and self._columns == [[place] for place in range(len(self.names))]
+        untouched = forcing is None or not any(n.startswith(("forcing", "acceleration")) for n in self.names)
+        return untouched and self._columns == [[place] for place in range(len(self.names))]
 
     def row(
         self,

@@ -1,0 +1,62 @@
+"""The door to nidaqmx: NI's client, the messages of its protocol, and gRPC, in the extra `hardware`.
+
+The messages are in a private folder of nidaqmx, hence the bounds of its version in pyproject.toml.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from vibroimpact.fmus.errors import UsageError
+
+try:
+    import grpc
+    import nidaqmx
+    from nidaqmx import constants
+    from nidaqmx._stubs import nidaqmx_pb2
+    from nidaqmx.error_codes import DAQmxErrors
+    from nidaqmx.errors import DaqError, DaqNotFoundError, RpcError
+    from nidaqmx.system import System
+except ImportError as _missing:
+    raise UsageError(
+        f"rig: expected the package nidaqmx with gRPC, got none ({_missing}). "
+        "Install it: pip install 'vibroimpact[hardware]', or in a clone pip install '.[hardware]'."
+    ) from None
+
+#: Of NI's service, as the client calls it.
+SERVICE = "nidaqmx_grpc.NiDAQmx"
+METHODS: dict[str, Any] = dict(nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"].methods_by_name)
+"""Descriptor of each method of the service, by its name."""
+
+#: The default of gRPC, 4 MiB, loses the samples of larger reads.
+LARGEST_MESSAGE = 256 * 2**20
+CHANNEL_OPTIONS = [
+    ("grpc.max_receive_message_length", LARGEST_MESSAGE),
+    ("grpc.max_send_message_length", LARGEST_MESSAGE),
+]
+
+__all__ = [
+    "CHANNEL_OPTIONS",
+    "METHODS",
+    "SERVICE",
+    "DAQmxErrors",
+    "DaqError",
+    "DaqNotFoundError",
+    "RpcError",
+    "System",
+    "constants",
+    "grpc",
+    "message_class",
+    "nidaqmx",
+    "open_channel",
+]
+
+
+def message_class(descriptor: Any) -> Any:
+    """Return the class of a message of the protocol."""
+    return getattr(nidaqmx_pb2, descriptor.name)
+
+
+def open_channel(address: str) -> Any:
+    """Return a gRPC channel to `host:port`, for large reads."""
+    return grpc.insecure_channel(address, options=CHANNEL_OPTIONS)

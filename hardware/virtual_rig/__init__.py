@@ -1,0 +1,1 @@
+"""A rig without a board: a server of NI's DAQmx protocol whose plant is a scene."""

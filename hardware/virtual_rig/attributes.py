@@ -1,0 +1,223 @@
+"""Attributes that the virtual rig models, by NI's numbers; every other one is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from vibroimpact.hardware.daqmx import DAQmxErrors, constants
+from vibroimpact.hardware.virtual_rig.board import Board
+from vibroimpact.hardware.virtual_rig.refusal import Refusal
+from vibroimpact.hardware.virtual_rig.tasks import ALLOW_REGENERATION, FINITE, INPUT, OUTPUT, Channel, Task
+
+VERSION = (24, 5, 0)
+"""Of the driver whose behaviour is modelled."""
+
+_VOLTAGE = constants.UsageTypeAI.VOLTAGE.value
+_VOLTS = constants.VoltageUnits.VOLTS.value
+_ON_DEMAND = constants.SampleTimingType.ON_DEMAND.value
+_SAMPLE_CLOCK = constants.SampleTimingType.SAMPLE_CLOCK.value
+_DIGITAL_EDGE = constants.TriggerType.DIGITAL_EDGE.value
+_NO_TRIGGER = constants.TriggerType.NONE.value
+_BITS = constants.ResolutionType.BITS.value
+
+
+def terminals(board: Board, word: str) -> str:
+    """Return the names of the inputs (`ai`) or outputs (`ao`) of the device, as NI lists them."""
+    count = board.profile.inputs if word == "ai" else board.profile.outputs
+    return ", ".join(f"{board.name}/{word}{number}" for number in range(count))
+
+
+def _pairs(ranges: tuple[float, ...]) -> list[float]:
+    return [edge for each in ranges for edge in (-each, each)]
+
+
+SYSTEM: dict[int, Callable[[Board], Any]] = {
+    0x1272: lambda board: VERSION[0],
+    0x1923: lambda board: VERSION[1],
+    0x2F22: lambda board: VERSION[2],
+    0x193B: lambda board: board.name,
+    # saved channels, scales and tasks: there are none
+    0x1265: lambda board: "",
+    0x1266: lambda board: "",
+    0x1267: lambda board: "",
+}
+DEVICE: dict[int, Callable[[Board], Any]] = {
+    0x0631: lambda board: board.profile.product,
+    0x29A9: lambda board: board.profile.category,
+    0x22CA: lambda board: True,  # is simulated
+    0x231E: lambda board: terminals(board, "ai"),
+    0x231F: lambda board: terminals(board, "ao"),
+    # digital lines and ports, counters: there are none
+    **{number: lambda board: "" for number in (0x2320, 0x2321, 0x2322, 0x2323, 0x2324, 0x2325)},
+    0x298C: lambda board: board.profile.highest_rate(1),
+    0x298D: lambda board: board.profile.conversion_rate,
+    0x298F: lambda board: board.profile.simultaneous,
+    0x2990: lambda board: _pairs(board.profile.ranges),
+    0x2997: lambda board: board.profile.output_rate,
+    0x299B: lambda board: _pairs((board.profile.output_range,)),
+    0x2996: lambda board: True,  # outputs have a sample clock
+    0x2984: lambda board: False,  # analog triggers
+    0x2985: lambda board: True,  # digital triggers
+    0x2FD2: lambda board: [_VOLTAGE],
+    0x2FD3: lambda board: [_VOLTAGE],
+}
+TASK: dict[int, Callable[[Task], Any]] = {
+    0x1276: lambda task: task.name,
+    0x1273: lambda task: _names(task),
+    0x2181: lambda task: len(task.channels),
+}
+TIMING: dict[int, Callable[[Task], Any]] = {
+    0x1347: lambda task: _ON_DEMAND if task.clock is None else _SAMPLE_CLOCK,
+    0x1344: lambda task: _clock(task).rate,
+    0x1300: lambda task: _clock(task).mode,
+    0x1310: lambda task: _clock(task).samples,
+    0x1852: lambda task: _clock(task).source,
+    0x1301: lambda task: _clock(task).edge,
+    0x22C8: lambda task: task.highest_rate,
+    0x1848: lambda task: task.profile.conversion_rate,
+}
+_CLOCK_FIELDS = {0x1344: "rate", 0x1300: "mode", 0x1310: "samples", 0x1852: "source"}
+TRIGGER: dict[int, Callable[[Task], Any]] = {
+    0x1393: lambda task: _DIGITAL_EDGE if task.trigger else _NO_TRIGGER,
+    0x1407: lambda task: task.trigger,
+    0x1404: lambda task: task.trigger_edge,
+}
+READ: dict[int, Callable[[Task], Any]] = {
+    0x1223: lambda task: task.available,
+    0x31E8: lambda task: default_count(task),
+    0x217B: lambda task: len(task.channels),
+    0x1823: lambda task: _names(task),
+    0x1221: lambda task: task.position,
+    0x192A: lambda task: task.count,
+    0x1215: lambda task: False,  # read what is there rather than all of a finite task
+    0x217A: lambda task: task.profile.bits // 8 + bool(task.profile.bits % 8),
+}
+WRITE: dict[int, Callable[[Task], Any]] = {
+    0x1453: lambda task: task.regeneration,
+    0x217E: lambda task: len(task.channels),
+    0x1458: lambda task: task.position,
+    0x1460: lambda task: task.room,
+    0x192B: lambda task: task.count,
+}
+BUFFER: dict[int, Callable[[Task], Any]] = {
+    0x186C: lambda task: task.default_buffer() if task.kind == INPUT and task.clock else 0,
+    0x186D: lambda task: task.asked_buffer or task.length,
+    0x230A: lambda task: 0,  # samples on the board: none, all are in the buffer
+    0x230B: lambda task: 0,
+}
+ANY_CHANNEL: dict[int, Callable[[Task, Channel], Any]] = {
+    0x187F: lambda task, channel: task.kind,
+    0x18F5: lambda task, channel: physical_name(task, channel),
+    0x1926: lambda task, channel: "",
+}
+INPUT_CHANNEL: dict[int, Callable[[Task, Channel], Any]] = {
+    0x0695: lambda task, channel: _VOLTAGE,
+    0x1094: lambda task, channel: _VOLTS,
+    0x17DD: lambda task, channel: channel.high,
+    0x17DE: lambda task, channel: channel.low,
+    0x1815: lambda task, channel: channel.device_range,
+    0x1816: lambda task, channel: -channel.device_range,
+    0x1764: lambda task, channel: _BITS,
+    0x1765: lambda task, channel: float(task.profile.bits),
+    0x22DA: lambda task, channel: 16,  # bits of a raw sample
+    0x1930: lambda task, channel: [0.0, channel.device_range / 2.0 ** (task.profile.bits - 1)],
+    0x17E0: lambda task, channel: "",
+}
+OUTPUT_CHANNEL: dict[int, Callable[[Task, Channel], Any]] = {
+    0x1108: lambda task, channel: _VOLTAGE,
+    0x1184: lambda task, channel: _VOLTS,
+    0x1186: lambda task, channel: channel.high,
+    0x1187: lambda task, channel: channel.low,
+    0x182E: lambda task, channel: channel.device_range,
+    0x182D: lambda task, channel: -channel.device_range,
+    0x182C: lambda task, channel: float(task.profile.bits),
+}
+OF_TASKS = {"Task": TASK, "Timing": TIMING, "Trig": TRIGGER, "Read": READ, "Write": WRITE, "Buffer": BUFFER}
+
+
+def physical_name(task: Task, channel: Channel) -> str:
+    """Return the input or output that a channel is."""
+    return f"{task.device}/{'ai' if task.kind == INPUT else 'ao'}{channel.number}"
+
+
+def _names(task: Task) -> str:
+    return ", ".join(channel.name for channel in task.channels)
+
+
+def _clock(task: Task) -> Any:
+    if task.clock is None:
+        raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"{task.name} has no sample clock")
+    return task.clock
+
+
+def default_count(task: Task) -> int:
+    """Return how many samples per channel a read takes that does not say it."""
+    if task.clock is None:
+        return 1
+    return task.clock.samples if task.clock.mode == FINITE else task.available
+
+
+def _refuse(group: str, number: int) -> Refusal:
+    return Refusal(
+        DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"attribute 0x{number:04X} of {group.lower()}"
+    )
+
+
+def of_device(board: Board, number: int) -> Any:
+    """Return an attribute of the device."""
+    if number not in DEVICE:
+        raise _refuse("device", number)
+    return DEVICE[number](board)
+
+
+def of_system(board: Board, number: int) -> Any:
+    """Return an attribute of the system."""
+    if number not in SYSTEM:
+        raise _refuse("system", number)
+    return SYSTEM[number](board)
+
+
+def of_task(group: str, task: Task, number: int) -> Any:
+    """Return an attribute of a task: of its timing, trigger, reads, writes or buffers."""
+    if group == "Task" and number == 0x230E:
+        return task.device if task.channels else ""
+    if number not in OF_TASKS[group]:
+        raise _refuse(group, number)
+    return OF_TASKS[group][number](task)
+
+
+def of_channel(task: Task, name: str, number: int) -> Any:
+    """Return an attribute of a channel; of the first where several are named, or none."""
+    first = name.split(",")[0].strip()
+    chosen = [channel for channel in task.channels if first in ("", channel.name)]
+    if not chosen:
+        raise Refusal(DAQmxErrors.CHAN_NOT_IN_TASK, first)
+    own = INPUT_CHANNEL if task.kind == INPUT else OUTPUT_CHANNEL
+    table = ANY_CHANNEL | own
+    if number not in table:
+        raise _refuse("channel", number)
+    return table[number](task, chosen[0])
+
+
+def change(group: str, task: Task, number: int, value: Any) -> None:
+    """Change an attribute of a task."""
+    if group == "Timing" and number in _CLOCK_FIELDS:
+        task.set_clock(replace(_clock(task), **{_CLOCK_FIELDS[number]: value}))
+    elif group == "Write" and number == 0x1453 and task.kind == OUTPUT:
+        task.refuse_running()
+        task.regeneration = value
+    elif group == "Buffer" and number in (0x186C, 0x186D):
+        task.refuse_running()
+        task.set_buffer(value)
+    else:
+        raise _refuse(group, number)
+
+
+def reset(group: str, task: Task, number: int) -> None:
+    """Give an attribute of a task its default again."""
+    if group == "Write" and number == 0x1453:
+        change(group, task, number, ALLOW_REGENERATION)
+    else:
+        raise _refuse(group, number)

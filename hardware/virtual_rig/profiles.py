@@ -1,0 +1,91 @@
+"""The devices that a virtual rig can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vibroimpact.hardware.daqmx import constants
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """What a device can do.
+
+    Attributes
+    ----------
+    product : str
+    category : int
+        NI's number of the kind of product.
+    bits : int
+        Of inputs and outputs.
+    inputs, outputs : int
+        Analog channels.
+    ranges : tuple of float
+        Input ranges, V, each to both sides of 0; the smallest first.
+    output_range : float
+        V, to both sides of 0.
+    conversion_rate : float
+        Samples per second: of all channels together where they are multiplexed, of each where not.
+    simultaneous : bool
+        Whether all channels are sampled at once.
+    output_rate : float
+        Samples per second and channel.
+    """
+
+    product: str
+    category: int
+    bits: int
+    inputs: int
+    outputs: int
+    ranges: tuple[float, ...]
+    output_range: float
+    conversion_rate: float
+    simultaneous: bool
+    output_rate: float
+
+    def highest_rate(self, channels: int) -> float:
+        """Return the highest sample rate of so many inputs, Hz."""
+        return self.conversion_rate if self.simultaneous else self.conversion_rate / max(channels, 1)
+
+    def skew(self) -> float:
+        """Return the time between the samples of two neighbouring inputs, s."""
+        return 0.0 if self.simultaneous else 1.0 / self.conversion_rate
+
+    def input_range(self, low: float, high: float) -> float | None:
+        """Return the smallest range that holds an interval of voltages; None where there is none.
+
+        Examples
+        --------
+        >>> PROFILES["labpc+"].input_range(-0.3, 0.2)
+        0.5
+        """
+        return next((each for each in self.ranges if -each <= low and high <= each), None)
+
+
+PROFILES = {
+    # the thesis's board: 12 us for a conversion; gains of 1 to 100
+    "labpc+": Profile(
+        product="Lab-PC+ (virtual)",
+        category=constants.ProductCategory.E_SERIES_DAQ.value,
+        bits=12,
+        inputs=8,
+        outputs=2,
+        ranges=(0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0),
+        output_range=5.0,
+        conversion_rate=83_300.0,
+        simultaneous=False,
+        output_rate=83_300.0,
+    ),
+    "xseries": Profile(
+        product="X Series (virtual)",
+        category=constants.ProductCategory.X_SERIES_DAQ.value,
+        bits=16,
+        inputs=8,
+        outputs=2,
+        ranges=(1.0, 2.0, 5.0, 10.0),
+        output_range=10.0,
+        conversion_rate=1_000_000.0,
+        simultaneous=True,
+        output_rate=900_000.0,
+    ),
+}

@@ -1,0 +1,157 @@
+"""The server of a virtual rig: NI's service and the control service, on this machine only."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent import futures
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.hardware.daqmx import CHANNEL_OPTIONS, METHODS, SERVICE, DAQmxErrors, grpc, message_class
+from vibroimpact.hardware.virtual_rig import control
+from vibroimpact.hardware.virtual_rig.board import Board
+from vibroimpact.hardware.virtual_rig.calls import Call, Calls, messages_of
+from vibroimpact.hardware.virtual_rig.refusal import Refusal
+from vibroimpact.hardware.virtual_rig.settings import RigSettings
+
+HOST = "127.0.0.1"
+THREADS = 64
+"""Each event that a program listens to holds one."""
+
+
+class RigServer:
+    """A virtual rig that is served until it is closed.
+
+    Parameters
+    ----------
+    settings : RigSettings
+    port : int
+        0: any free one.
+
+    Attributes
+    ----------
+    address : str
+        `host:port`.
+    board : Board
+
+    Raises
+    ------
+    SceneError, UsageError
+        The plant is none, or the port is taken.
+    """
+
+    def __init__(self, settings: RigSettings, port: int = 0) -> None:
+        self._server = grpc.server(
+            futures.ThreadPoolExecutor(THREADS, thread_name_prefix="rig"),
+            options=[*CHANNEL_OPTIONS, ("grpc.so_reuseport", 0)],
+        )
+        try:
+            taken = self._server.add_insecure_port(f"{HOST}:{port}")
+        except RuntimeError:
+            taken = 0
+        if not taken:
+            raise UsageError(f"--port: expected a free port, got {port}, which is taken. Use --port 0.")
+        self.address = f"{HOST}:{taken}"
+        self.board = Board(settings)
+        handlers = (_Handler(SERVICE, self._ni_handler), _Handler(control.SERVICE, self._control_handler))
+        self._calls, self._controls = Calls(self.board), control.Controls(self.board)
+        self._server.add_generic_rpc_handlers(handlers)
+        self._server.start()
+
+    def wait(self) -> None:
+        """Serve until the process is interrupted."""
+        self._server.wait_for_termination()
+
+    def close(self) -> None:
+        """End all calls, all tasks and the plant."""
+        stopped = self._server.stop(0.2)
+        self.board.close()
+        stopped.wait()
+
+    # ---- NI's service ----
+
+    def _ni_handler(self, method: str) -> Any:
+        if method not in METHODS:
+            return None
+        make = message_class(METHODS[method].input_type)
+        if method in ("RegisterEveryNSamplesEvent", "RegisterDoneEvent"):
+            return grpc.unary_stream_rpc_method_handler(
+                lambda request, context: self._listen(method, request, context),
+                make.FromString,
+                lambda message: message.SerializeToString(),
+            )
+        call = self._calls.answer(method)
+        return grpc.unary_unary_rpc_method_handler(
+            lambda request, context: _answered(method, call, request, context), make.FromString
+        )
+
+    def _listen(self, method: str, request: Any, context: Any) -> Iterator[Any]:
+        try:
+            stream, make = self._calls.listen(method, request)
+        except Refusal as refusal:
+            _abort(context, refusal)
+        context.add_callback(lambda: stream.heard.put(None))
+        context.send_initial_metadata(())  # or the client waits for ever
+        yield from messages_of(stream, make)
+
+    # ---- the control service ----
+
+    def _control_handler(self, method: str) -> Any:
+        call = self._controls.calls.get(method)
+        if call is None:
+            return None
+
+        def answered(request: bytes, context: Any) -> bytes:
+            try:
+                return control.encoded(call(control.decoded(request)))
+            except ValueError as error:
+                context.abort(grpc.StatusCode.INVALID_ARGUMENT, str(error))
+                raise
+
+        return grpc.unary_unary_rpc_method_handler(answered)
+
+
+class _Handler(grpc.GenericRpcHandler):  # type: ignore[misc]
+    """Finds what answers a method of a service by its name."""
+
+    def __init__(self, service: str, find: Callable[[str], Any]) -> None:
+        self._prefix, self._find = f"/{service}/", find
+
+    def service(self, handler_call_details: Any) -> Any:
+        """Return what answers a call; None where it is of another service."""
+        method: str = handler_call_details.method
+        return self._find(method.removeprefix(self._prefix)) if method.startswith(self._prefix) else None
+
+
+def _answered(method: str, call: Call | None, request: Any, context: Any) -> bytes:
+    response = message_class(METHODS[method].output_type)()
+    try:
+        if call is None:
+            raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"the call {method}")
+        whole = call(request, response)
+    except Refusal as refusal:
+        _abort(context, refusal)
+    return response.SerializeToString() if whole is None else whole
+
+
+def _abort(context: Any, refusal: Refusal) -> NoReturn:
+    """End a call with an error of NI's."""
+    metadata = [("ni-error", str(refusal.code))]
+    if refusal.read is not None:
+        metadata.append(("ni-samps-per-chan-read", str(refusal.read)))
+    if refusal.written is not None:
+        metadata.append(("ni-samps-per-chan-written", str(refusal.written)))
+    context.set_trailing_metadata(metadata)
+    context.abort(grpc.StatusCode.UNKNOWN, refusal.text)
+    raise refusal
+
+
+@contextmanager
+def served(settings: RigSettings, port: int = 0) -> Iterator[RigServer]:
+    """Serve a rig for as long as the block lasts."""
+    server = RigServer(settings, port)
+    try:
+        yield server
+    finally:
+        server.close()

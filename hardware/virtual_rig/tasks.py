@@ -1,0 +1,301 @@
+"""Tasks of the virtual device: channels, sample clock, buffers and states, as NI-DAQmx has them."""
+
+from __future__ import annotations
+
+import queue
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.hardware.daqmx import DAQmxErrors, constants
+from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Ticks
+from vibroimpact.hardware.virtual_rig.profiles import Profile
+from vibroimpact.hardware.virtual_rig.refusal import Refusal
+
+FINITE = constants.AcquisitionType.FINITE.value
+CONTINUOUS = constants.AcquisitionType.CONTINUOUS.value
+ALLOW_REGENERATION = constants.RegenerationMode.ALLOW_REGENERATION.value
+INPUT = constants.ChannelType.ANALOG_INPUT.value
+OUTPUT = constants.ChannelType.ANALOG_OUTPUT.value
+MOST_SAMPLES = 2**26
+"""Samples of a buffer, of all its channels."""
+
+# default input buffers of continuous tasks, samples per channel up to a rate (Hz)
+_DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1e6, 100_000), (np.inf, 1_000_000))
+
+
+class State(Enum):
+    """Where a task is."""
+
+    verified = "verified"
+    reserved = "reserved"
+    running = "running"
+
+
+@dataclass(slots=True)
+class Channel:
+    """A virtual channel: an input or output of the device with a name, V."""
+
+    name: str
+    number: int
+    low: float
+    high: float
+    device_range: float
+
+
+@dataclass(slots=True)
+class Clock:
+    """A sample clock as it was asked for."""
+
+    rate: float
+    mode: int
+    samples: int
+    source: str = ""
+    edge: int = constants.Edge.RISING.value
+
+
+@dataclass(slots=True)
+class EventStream:
+    """Who hears of an event: numbers of samples, or the status at the end; None ends the stream."""
+
+    heard: queue.SimpleQueue[int | None] = field(default_factory=queue.SimpleQueue)
+    every: int = 0
+    sent: int = 0
+
+
+class Task:
+    """What inputs and outputs have in common.
+
+    Attributes
+    ----------
+    state : State
+    kept : bool
+        Reserved by `TaskControl`, so that it stays so when it stops.
+    start : int or None
+        Tick of the first edge of its clock; None: it does not run, or waits for a trigger.
+    rate : float
+        Of the clock that runs, Hz.
+    count : int
+        Edges of the clock that are over.
+    done : bool
+        It has ended by itself.
+    failure : Refusal or None
+        Why it has ended.
+    implicit : bool
+        A read has started it, so that it stops when all of it is read.
+    """
+
+    def __init__(self, name: str, device: str, profile: Profile) -> None:
+        self.name, self.device, self.profile = name, device, profile
+        self.kind = 0
+        self.channels: list[Channel] = []
+        self.clock: Clock | None = None
+        self.trigger, self.trigger_edge = "", constants.Edge.RISING.value
+        self.state, self.kept = State.verified, False
+        self.start: int | None = None
+        self.rate = 0.0
+        self.count = 0
+        self.done = self.implicit = False
+        self.failure: Refusal | None = None
+        self.asked_buffer: int | None = None
+        self.regeneration = ALLOW_REGENERATION
+        self.buffer: NDArray[Any] = np.empty((0, 0))
+        self.position = 0  # samples per channel that the program has read or written
+        self.every: EventStream | None = None
+        self.ended: EventStream | None = None
+
+    # ---- set up ----
+
+    def refuse_running(self) -> None:
+        """Refuse a change while the task runs."""
+        if self.state is State.running:
+            raise Refusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING, self.name)
+
+    def refuse_empty(self) -> None:
+        """Refuse what needs channels."""
+        if not self.channels:
+            raise Refusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK, self.name)
+
+    def add(self, kind: int, channel: Channel) -> None:
+        """Add a channel."""
+        self.refuse_running()
+        if self.kind not in (0, kind):
+            raise Refusal(DAQmxErrors.INCONSISTENT_CHANNEL_DIRECTIONS, self.name)
+        if any(channel.name == other.name or channel.number == other.number for other in self.channels):
+            raise Refusal(DAQmxErrors.CHAN_ALREADY_IN_TASK, channel.name)
+        self.kind = kind
+        self.channels.append(channel)
+
+    def set_clock(self, clock: Clock) -> None:
+        """Give the task a sample clock."""
+        self.refuse_running()
+        self.refuse_empty()
+        highest = self.highest_rate
+        if not 0.0 < clock.rate <= highest:
+            raise Refusal(
+                DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+                f"a rate of {clock.rate:g} Hz with {len(self.channels)} channels; expected at most {highest:g} Hz",
+            )
+        if clock.mode not in (FINITE, CONTINUOUS):
+            raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"sample mode {clock.mode}")
+        if not 2 <= clock.samples <= MOST_SAMPLES // len(self.channels):
+            raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"{clock.samples} samples per channel")
+        self.clock = clock
+
+    def set_buffer(self, samples: int) -> None:
+        """Ask for a buffer of so many samples per channel."""
+        self.refuse_empty()
+        if not 0 < samples <= MOST_SAMPLES // len(self.channels):
+            raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a buffer of {samples} samples per channel")
+        self.asked_buffer = samples
+
+    @property
+    def highest_rate(self) -> float:
+        """Of its channels, Hz."""
+        if self.kind == OUTPUT:
+            return self.profile.output_rate
+        return self.profile.highest_rate(len(self.channels))
+
+    @property
+    def skew(self) -> int:
+        """Ticks between the samples of two channels."""
+        return round(self.profile.skew() / TICK) if self.kind == INPUT else 0
+
+    @property
+    def length(self) -> int:
+        """Samples per channel of the buffer."""
+        return int(self.buffer.shape[1])
+
+    @property
+    def needed(self) -> int | None:
+        """Samples per channel of a finite task; None of a continuous one."""
+        return self.clock.samples if self.clock is not None and self.clock.mode == FINITE else None
+
+    def default_buffer(self) -> int:
+        """Return the samples per channel that an input buffer has."""
+        assert self.clock is not None
+        if self.asked_buffer:
+            return self.asked_buffer
+        if self.clock.mode == FINITE:
+            return self.clock.samples
+        usual = next(size for rate, size in _DEFAULT_BUFFERS if self.clock.rate <= rate)
+        return max(usual, self.clock.samples)
+
+    # ---- run ----
+
+    def begin(self) -> None:
+        """Be running, with no edge of the clock over."""
+        self.state, self.done, self.failure = State.running, False, None
+        self.count = 0
+        if self.every is not None:
+            self.every.sent = 0
+        if self.kind == INPUT and self.clock is not None:
+            self.position = 0
+            self.buffer = np.zeros((len(self.channels), self.default_buffer()), dtype=np.int16)
+
+    def stop(self) -> None:
+        """Stop; what was reserved by itself is given back."""
+        self.state = State.reserved if self.kept else State.verified
+        self.start = None
+        if self.kind == OUTPUT:
+            self.count = self.position = 0
+            self.buffer = np.empty((0, 0))
+
+    def finish(self, failure: Refusal | None = None) -> None:
+        """End by itself."""
+        self.done, self.failure = True, failure
+        if self.ended is not None:
+            self.ended.heard.put(failure.code if failure else 0)
+
+    @property
+    def ticking(self) -> bool:
+        """Whether edges of its clock are to come."""
+        return self.start is not None and not self.done
+
+    def edge(self, number: Any) -> Any:
+        """Return the ticks of edges of the clock, by their numbers."""
+        assert self.start is not None
+        return self.start + np.rint(np.asarray(number) / (self.rate * TICK)).astype(np.int64)
+
+    def edges_until(self, tick: int) -> int:
+        """Return how many edges there are up to a tick, it included, the skew of the last channel over."""
+        assert self.start is not None
+        left = tick - self.start - self.skew * (len(self.channels) - 1)
+        if left < 0:
+            return 0
+        count = int(left * TICK * self.rate) + 2
+        while count > 0 and int(self.edge(count - 1)) > tick - self.skew * (len(self.channels) - 1):
+            count -= 1
+        return count if self.needed is None else min(count, self.needed)
+
+    def tell(self, count: int) -> None:
+        """Say to the listener that so many edges are over."""
+        self.count = count
+        stream = self.every
+        if stream is not None:
+            while stream.sent + stream.every <= count:
+                stream.sent += stream.every
+                stream.heard.put(stream.every)
+
+    # ---- outputs ----
+
+    @property
+    def room(self) -> int:
+        """Samples per channel that can be written."""
+        return min(max(self.length - (self.position - self.count), 0), self.length)
+
+    @property
+    def regenerates(self) -> bool:
+        """Whether samples go out again when there are no new ones."""
+        return bool(self.regeneration == ALLOW_REGENERATION)
+
+    def write(self, samples: Floats) -> None:
+        """Append samples, shape (channel, sample), for which there is room."""
+        places = (self.position + np.arange(samples.shape[1])) % self.length
+        self.buffer[:, places] = samples
+        self.position += samples.shape[1]
+
+    def generated(self, until: int) -> tuple[Ticks, Floats, bool]:
+        """Return ticks and values of the edges up to a tick, and whether the buffer ran empty."""
+        due = self.edges_until(until)
+        starved = not self.regenerates and due > self.position
+        due = min(due, self.position) if not self.regenerates else due
+        numbers = np.arange(self.count, due)
+        # what was written before the start and is shorter than the buffer goes round by itself
+        round_length = min(self.length, self.position) if self.position < self.length else self.length
+        return self.edge(numbers), self.buffer[:, numbers % max(round_length, 1)], starved
+
+    # ---- inputs ----
+
+    @property
+    def available(self) -> int:
+        """Samples per channel that can be read."""
+        return self.count - self.position
+
+    @property
+    def overrun(self) -> bool:
+        """Whether samples that nobody has read are lost."""
+        return self.available > self.length
+
+    def keep(self, codes: NDArray[np.int16]) -> None:
+        """Put samples into the buffer, shape (channel, sample)."""
+        count = codes.shape[1]
+        kept = codes[:, -self.length :]
+        places = (self.count + count - kept.shape[1] + np.arange(kept.shape[1])) % self.length
+        self.buffer[:, places] = kept
+
+    def take(self, count: int) -> NDArray[np.int16]:
+        """Return the next samples, shape (channel, sample), which count as read."""
+        places = (self.position + np.arange(count)) % self.length
+        self.position += count
+        taken: NDArray[np.int16] = self.buffer[:, places]
+        return taken
+
+    @property
+    def steps(self) -> Floats:
+        """V for a step of the converter, of each channel; shape (channel, 1)."""
+        ranges = np.array([[channel.device_range] for channel in self.channels])
+        return ranges / 2.0 ** (self.profile.bits - 1)

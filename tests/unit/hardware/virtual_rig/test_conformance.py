@@ -1,0 +1,374 @@
+"""The unmodified client of NI on the virtual rig: what a voltage program does, and what it must be refused."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from support.places import ROOT
+
+from vibroimpact.fmus.core import Oscillator, flow
+from vibroimpact.hardware.daqmx import DaqError, System, constants, nidaqmx, open_channel
+from vibroimpact.hardware.virtual_rig.control import RigControl
+from vibroimpact.hardware.virtual_rig.serving import RigServer, served
+from vibroimpact.hardware.virtual_rig.settings import read_rig
+
+FINITE, CONTINUOUS = constants.AcquisitionType.FINITE, constants.AcquisitionType.CONTINUOUS
+BITS_16 = 10.0 / 2**15
+
+
+class Bench:
+    """A client on a rig in lockstep."""
+
+    def __init__(self, server: RigServer, channel: Any) -> None:
+        self.server, self.channel = server, channel
+        self.control = RigControl(channel)
+
+    def options(self, name: str = "", **others: Any) -> Any:
+        return nidaqmx.GrpcSessionOptions(self.channel, name, **others)
+
+    def task(self, name: str = "") -> Any:
+        return nidaqmx.Task(name, grpc_options=self.options(name))
+
+    def inputs(self, terminals: str = "Dev1/ai0", rate: float | None = None, **timing: Any) -> Any:
+        task = self.task()
+        task.ai_channels.add_ai_voltage_chan(terminals, min_val=-10, max_val=10)
+        if rate is not None:
+            task.timing.cfg_samp_clk_timing(rate, **timing)
+        return task
+
+    def outputs(self, terminals: str = "Dev1/ao0", rate: float | None = None, **timing: Any) -> Any:
+        task = self.task()
+        task.ao_channels.add_ao_voltage_chan(terminals, min_val=-10, max_val=10)
+        if rate is not None:
+            task.timing.cfg_samp_clk_timing(rate, **timing)
+        return task
+
+
+@pytest.fixture(scope="module")
+def rig() -> Iterator[Bench]:
+    settings = read_rig(ROOT / "examples" / "rig" / "oscillator.toml")
+    with served(settings) as server, open_channel(server.address) as channel:
+        yield Bench(server, channel)
+
+
+@pytest.fixture
+def bench(rig: Bench) -> Iterator[Bench]:
+    rig.control.pace(lockstep=True)
+    yield rig
+    for task in list(rig.server.board.tasks.values()):
+        rig.server.board.remove(task)
+    rig.server.board.held[:] = 0.0
+
+
+def refused(code: int) -> Any:
+    return pytest.raises(DaqError, match=rf"Status Code: {code}\b")
+
+
+# ---- queries ----
+
+
+def test_the_system_has_one_device_with_its_channels(bench: Bench) -> None:
+    system = System.remote(bench.options())
+    assert system.devices.device_names == ["Dev1"]
+    device = system.devices["Dev1"]
+    assert device.product_type == "X Series (virtual)"
+    assert device.is_simulated
+    assert device.ai_physical_chans.channel_names == [f"Dev1/ai{k}" for k in range(8)]
+    assert device.ao_physical_chans.channel_names == ["Dev1/ao0", "Dev1/ao1"]
+    assert device.ai_voltage_rngs == [-1, 1, -2, 2, -5, 5, -10, 10]
+    assert device.ai_simultaneous_sampling_supported
+
+
+def test_a_channel_has_the_smallest_range_that_holds_what_was_asked_for(bench: Bench) -> None:
+    with bench.task() as task:
+        channel = task.ai_channels.add_ai_voltage_chan("Dev1/ai1", "tip", min_val=-1.5, max_val=0.3)
+        assert (channel.name, channel.ai_rng_high, channel.ai_max) == ("tip", 2.0, 0.3)
+        assert task.channel_names == ["tip"]
+        assert [device.name for device in task.devices] == ["Dev1"]
+
+
+def test_an_attribute_that_is_not_modelled_is_refused(bench: Bench) -> None:
+    with bench.inputs() as task:
+        with refused(-200452):
+            _ = task.ai_channels[0].ai_lowpass_enable
+        with refused(-200452):
+            task.ai_channels[0].ai_dither_enable = True
+        with refused(-200452):
+            task.ci_channels.add_ci_freq_chan("Dev1/ctr0")
+
+
+# ---- inputs and the plant ----
+
+
+def test_recorded_samples_are_those_of_the_exact_motion_to_half_a_bit(bench: Bench) -> None:
+    # reference: the exact flow of examples/rig/oscillator_scene.toml from where the plant is
+    before = bench.control.truth()
+    with bench.outputs() as drive, bench.inputs("Dev1/ai0:1", 5000.0, samps_per_chan=400) as task:
+        drive.write(1.0)
+        data = np.array(task.read(400))
+    volts = np.round(1.0 / BITS_16) * BITS_16
+    body, start = Oscillator(0.092, 0.6, 100.0), (before["displacement"], before["velocity"])
+    found = [flow(body, start, 1e-5 + k / 5000.0, held=0.1 * volts / 0.092) for k in range(400)]
+    for row, gain, values in zip(data, (1000.0, 10.0), np.transpose(found), strict=True):
+        assert np.max(np.abs(row - gain * values)) <= 0.51 * BITS_16
+
+
+def test_all_ways_to_read_give_the_same_samples(bench: Bench) -> None:
+    from nidaqmx.stream_readers import AnalogMultiChannelReader
+
+    with bench.inputs("Dev1/ai0:1", 1000.0, sample_mode=CONTINUOUS) as task:
+        task.start()
+        codes = np.zeros((2, 50), dtype=np.int16)
+        task._interpreter.read_binary_i16(task._handle, 50, 10.0, 0, codes)
+        raw = task.in_stream.read(50)
+        assert raw.dtype == np.int16
+        assert raw.size == 100
+        doubles = np.zeros((2, 50))
+        assert AnalogMultiChannelReader(task.in_stream).read_many_sample(doubles, 50) == 50
+        steps = doubles / BITS_16
+        np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+        assert np.max(np.abs(np.diff(np.concatenate([codes[0], raw[::2], steps[0]])))) < 2**12
+
+
+def test_a_read_may_be_larger_than_the_buffer(bench: Bench) -> None:
+    with bench.inputs("Dev1/ai2", 2000.0, sample_mode=CONTINUOUS) as task:
+        task.in_stream.input_buf_size = 100
+        assert len(task.read(1000)) == 1000
+
+
+def test_large_reads_come_through(bench: Bench) -> None:
+    with bench.inputs("Dev1/ai0:7", 100_000.0, sample_mode=CONTINUOUS) as task:
+        assert np.shape(task.read(80_000)) == (8, 80_000)
+
+
+def test_samples_that_are_late_are_said_with_what_is_there(bench: Bench) -> None:
+    bench.control.pace(lockstep=False)
+    with bench.inputs("Dev1/ai0", 1000.0, sample_mode=CONTINUOUS) as task:
+        task.start()
+        with refused(-200284) as caught:
+            task.read(5000, timeout=0.1)
+        assert 0 < caught.value.samps_per_chan_read < 1000
+
+
+def test_a_program_that_reads_too_late_loses_samples_and_hears_it(bench: Bench) -> None:
+    bench.control.pace(lockstep=False, speed=100.0)
+    with bench.inputs("Dev1/ai0", 10_000.0, sample_mode=CONTINUOUS) as task:
+        task.in_stream.input_buf_size = 1000
+        task.start()
+        time.sleep(0.1)
+        with refused(-200279):
+            task.read(100)
+    bench.control.pace(speed=1.0)
+
+
+def test_a_finite_task_is_done_and_has_no_more(bench: Bench) -> None:
+    with bench.inputs("Dev1/ai0", 1000.0, samps_per_chan=100) as task:
+        task.start()
+        assert not task.is_task_done()
+        task.wait_until_done()
+        assert task.is_task_done()
+        assert len(task.read(100)) == 100
+        with refused(-200278):
+            task.read(1)
+
+
+def test_a_task_without_a_clock_reads_at_once(bench: Bench) -> None:
+    with bench.inputs("Dev1/ai0:1") as task:
+        assert len(task.read()) == 2
+        assert len(task.read(3)[0]) == 3
+
+
+# ---- outputs ----
+
+
+def test_a_loop_from_output_to_input_gives_back_what_was_written(bench: Bench) -> None:
+    wave = 3.0 * np.sin(2.0 * np.pi * np.arange(200) / 200.0)
+    with (
+        bench.outputs(rate=2000.0, sample_mode=CONTINUOUS) as drive,
+        bench.inputs("Dev1/ai2", 2000.0, source="/Dev1/ao/SampleClock", samps_per_chan=500) as task,
+    ):
+        assert drive.write(wave) == 200
+        task.start()
+        drive.start()
+        seen = np.array(task.read(500))
+    # an edge samples what was put out before it
+    np.testing.assert_allclose(seen[1:], np.tile(wave, 3)[:499], atol=BITS_16)
+    assert bench.control.truth()["outputs"][0] != 0.0  # an output holds its last value
+
+
+def test_an_output_without_regeneration_streams_any_length(bench: Bench) -> None:
+    wave = np.linspace(-1.0, 1.0, 5000)
+    with bench.outputs(rate=10_000.0, sample_mode=CONTINUOUS) as drive:
+        drive.out_stream.regen_mode = constants.RegenerationMode.DONT_ALLOW_REGENERATION
+        drive.out_stream.output_buf_size = 1000
+        with bench.inputs("Dev1/ai2", 10_000.0, source="/Dev1/ao/SampleClock", samps_per_chan=4000) as task:
+            drive.write(wave[:1000])
+            task.start()
+            drive.start()
+            for begin in range(1000, 5000, 500):
+                assert drive.write(wave[begin : begin + 500]) == 500
+            seen = np.array(task.read(4000))
+    np.testing.assert_allclose(seen[1:], wave[:3999], atol=BITS_16)
+
+
+def test_an_output_that_runs_empty_says_so_when_written_to_and_when_stopped(bench: Bench) -> None:
+    bench.control.pace(lockstep=False)
+    drive = bench.outputs(rate=10_000.0, sample_mode=CONTINUOUS)
+    drive.out_stream.regen_mode = constants.RegenerationMode.DONT_ALLOW_REGENERATION
+    drive.write(np.ones(100))
+    drive.start()
+    time.sleep(0.1)
+    with refused(-200290):
+        drive.write(np.ones(100))
+    with refused(-200290):
+        drive.stop()
+    drive.close()
+    assert bench.control.truth()["outputs"][0] == pytest.approx(1.0, abs=BITS_16)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 10.5])
+def test_no_number_and_no_voltage_out_of_range_reaches_an_output(bench: Bench, value: float) -> None:
+    with bench.outputs() as drive, refused(-200561):
+        drive.write(value)
+    assert bench.control.truth()["outputs"] == [0.0, 0.0]
+
+
+# ---- triggers and events ----
+
+
+def test_an_edge_on_a_terminal_starts_a_task(bench: Bench) -> None:
+    with bench.inputs("Dev1/ai0", 1000.0, samps_per_chan=10) as task:
+        task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/PFI0")
+        task.start()
+        bench.control.advance(1.0)
+        assert task.in_stream.avail_samp_per_chan == 0
+        assert bench.control.pulse("/Dev1/PFI0") == 1
+        assert len(task.read(10)) == 10
+
+
+def test_an_input_that_waits_for_an_output_starts_with_it(bench: Bench) -> None:
+    with (
+        bench.outputs(rate=1000.0, sample_mode=CONTINUOUS) as drive,
+        bench.inputs("Dev1/ai2", 2000.0, samps_per_chan=21) as task,
+    ):
+        task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/ao/StartTrigger")
+        drive.write(np.arange(1.0, 9.0))
+        task.start()
+        bench.control.advance(0.5)
+        drive.start()
+        seen = np.array(task.read(21))
+    np.testing.assert_allclose(seen[1:5], [1.0, 1.0, 2.0, 2.0], atol=BITS_16)
+
+
+def test_events_come_every_so_many_samples_and_at_the_end(bench: Bench) -> None:
+    heard, over = [], threading.Event()
+    with bench.inputs("Dev1/ai0", 1000.0, samps_per_chan=1000) as task:
+        task.register_every_n_samples_acquired_into_buffer_event(100, lambda *said: heard.append(said) or 0)
+        task.register_done_event(lambda *said: over.set() or 0)
+        task.start()
+        task.wait_until_done()
+        assert over.wait(5.0)
+        deadline = time.monotonic() + 5.0
+        while len(heard) < 10 and time.monotonic() < deadline:
+            time.sleep(0.01)
+        task.stop()
+        task.register_done_event(None)
+        task.register_every_n_samples_acquired_into_buffer_event(100, None)
+    assert len(heard) == 10
+
+
+# ---- what is refused ----
+
+
+def test_what_the_device_does_not_have_is_refused_by_its_code(bench: Bench) -> None:
+    with bench.task() as task:
+        with refused(-200220):
+            task.ai_channels.add_ai_voltage_chan("Dev9/ai0")
+        with refused(-200170):
+            task.ai_channels.add_ai_voltage_chan("Dev1/ai8")
+        with refused(-200077):
+            task.ai_channels.add_ai_voltage_chan("Dev1/ai0", min_val=-50, max_val=50)
+        with refused(-200478):
+            task.start()
+        task.ai_channels.add_ai_voltage_chan("Dev1/ai0", min_val=-5, max_val=5)
+        with refused(-200077):
+            task.timing.cfg_samp_clk_timing(2e6)
+        with refused(-200011):
+            task.ao_channels.add_ao_voltage_chan("Dev1/ao0")
+
+
+def test_a_resource_belongs_to_one_task(bench: Bench) -> None:
+    with (
+        bench.inputs("Dev1/ai0", 1000.0, sample_mode=CONTINUOUS) as first,
+        bench.inputs("Dev1/ai1", 1000.0) as second,
+    ):
+        first.start()
+        with refused(-50103):
+            second.start()
+        first.stop()
+        second.start()
+
+
+def test_a_running_task_is_not_changed_or_started_again(bench: Bench) -> None:
+    with bench.inputs("Dev1/ai0", 1000.0, sample_mode=CONTINUOUS) as task:
+        task.start()
+        with refused(-200479):
+            task.timing.cfg_samp_clk_timing(10.0)
+        with refused(-200479):
+            task.start()
+        with refused(-200560):
+            task.wait_until_done(0.01)
+
+
+def test_another_program_attaches_to_a_named_task_and_stops_it(bench: Bench) -> None:
+    attach = constants_of("ATTACH_TO_SERVER_SESSION")
+    create = constants_of("INITIALIZE_SERVER_SESSION")
+    with bench.task("drive") as drive:
+        drive.ao_channels.add_ao_voltage_chan("Dev1/ao0")
+        drive.write(2.0)
+        with pytest.raises(DaqError, match="-200089"):
+            nidaqmx.Task("drive", grpc_options=bench.options("drive", initialization_behavior=create))
+        with open_channel(bench.server.address) as channel:
+            other = nidaqmx.GrpcSessionOptions(channel, "drive", initialization_behavior=attach)
+            with nidaqmx.Task("drive", grpc_options=other) as same:
+                same.write(0.0)
+        assert bench.control.truth()["outputs"] == [0.0, 0.0]
+        assert drive.channel_names == ["Dev1/ao0"]
+    with pytest.raises(DaqError, match="-200088"):
+        nidaqmx.Task("drive", grpc_options=bench.options("drive", initialization_behavior=attach))
+
+
+def constants_of(behaviour: str) -> Any:
+    from nidaqmx.grpc_session_options import SessionInitializationBehavior
+
+    return SessionInitializationBehavior[behaviour]
+
+
+# ---- another device, another plant ----
+
+
+def test_a_lab_pc_samples_one_input_after_the_other() -> None:
+    settings = read_rig(ROOT / "examples" / "rig" / "beam.toml")
+    with served(settings) as server, open_channel(server.address) as channel:
+        bench = Bench(server, channel)
+        bench.control.pace(lockstep=True)
+        with bench.task() as task:
+            task.ai_channels.add_ai_voltage_chan("Dev1/ai0:2", min_val=-5, max_val=5)
+            with refused(-200077):
+                task.timing.cfg_samp_clk_timing(30_000.0)
+            task.timing.cfg_samp_clk_timing(10_000.0, samps_per_chan=2000)
+            with bench.task() as drive:
+                drive.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-5, max_val=5)
+                drive.write(3.0)
+                displacement, velocity, loop = np.array(task.read(2000))
+    step = 5.0 / 2**11
+    assert np.max(np.abs(displacement)) > 50 * step
+    np.testing.assert_allclose(loop, 3.0, atol=step)
+    # 12 us for a conversion: the velocity is that much later than the displacement
+    slope = np.gradient(displacement / 500.0, 1e-4)
+    assert np.corrcoef(slope[20:-20], velocity[20:-20])[0, 1] > 0.9
