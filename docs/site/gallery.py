@@ -76,7 +76,7 @@ def kinds() -> dict[str, Picture]:
     hit = "vibroimpact import hit.csv --name base --name board --unit g -o hit.nc"
     return {
         "bifurcation": _of("bifurcation", "bifurcation"),
-        "map": _of("map", "fine", f"vibroimpact run examples/rig.toml -o fine.nc --set '{fine}'"),
+        "map": _of("map", "fine", f"vibroimpact run examples/gap_sweep.toml -o fine.nc --set '{fine}'"),
         "impacts-per-period": _of("impacts-per-period", "fine"),
         "strobe": _of("strobe", "bifurcation"),
         "run": _of("run", "chatter"),

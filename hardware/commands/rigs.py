@@ -234,7 +234,7 @@ def _recorded(rig: Rig, wanted: Sequence[_Wanted], rate: float, count: int) -> R
     return Recording(
         found,
         attrs={
-            "source_file": "",
+            "source_file": f"{rig.name} ({attrs['device']})",
             "source_format": "NI-DAQmx",
             **attrs,
             "remarks": "\n".join(remarks),

@@ -10,12 +10,14 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.hardware.daqmx import DAQmxErrors
 from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant, Ticks
 from vibroimpact.hardware.virtual_rig.profiles import PROFILES
 from vibroimpact.hardware.virtual_rig.refusal import Refusal
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
 from vibroimpact.hardware.virtual_rig.tasks import INPUT, OUTPUT, State, Task
+from vibroimpact.orchestrator.run.record import ImpactLimitReached
 
 FIRST_EDGE = 10_000
 """Ticks from the start of a task to the first edge of its clock."""
@@ -50,11 +52,14 @@ class Board:
         self.plant = Plant(settings)
         self.tasks: dict[str, Task] = {}
         self.held = np.zeros(self.profile.outputs)
-        self.changed = threading.Condition(threading.RLock())
+        lock = threading.RLock()
+        self.changed = threading.Condition(lock)
+        self._work = threading.Condition(lock)  # wakes the clock, which calls that wait do not
         self.lockstep, self.speed, self.slipped = False, settings.rig.speed, 0.0
         self._wanted = 0  # tick up to which waiting calls want time to go, in lockstep
         self._begin, self._origin = time.monotonic(), 0
         self._closed = False
+        self._lost: Refusal | None = None
         self._pump = threading.Thread(target=self._go_on, name="rig clock", daemon=True)
         self._pump.start()
 
@@ -68,7 +73,11 @@ class Board:
             self.speed = self.speed if speed is None else speed
             self._begin, self._origin = time.monotonic(), self.plant.now
             self._wanted = self.plant.now
-            self.changed.notify_all()
+            self._wake()
+
+    def _wake(self) -> None:
+        self.changed.notify_all()
+        self._work.notify_all()
 
     def _due(self) -> int:
         """Return the tick where the time of the rig should be."""
@@ -89,11 +98,12 @@ class Board:
 
     def catch_up(self) -> None:
         """Let the plant go on to where the time of the rig is."""
+        if self._lost is not None:
+            raise self._lost
         due = self._due()
         while self.plant.now < due:
-            began = self.plant.now
-            self.advance(min(due, began + self._chunk()))
-        self.changed.notify_all()
+            self.advance(min(due, self.plant.now + self._chunk()))
+            self.changed.notify_all()
 
     def let_go(self, seconds: float) -> None:
         """Let time go on in lockstep, as if a call waited for it."""
@@ -115,8 +125,9 @@ class Board:
                     return
                 busy = any(task.ticking for task in self.tasks.values())
                 if busy and not self.lockstep:
-                    self._one_chunk()
-                self.changed.wait(PERIOD if busy and not self.lockstep else None)
+                    with suppress(Refusal):  # the tasks have it
+                        self._one_chunk()
+                self._work.wait(PERIOD if busy and not self.lockstep else None)
 
     def _one_chunk(self) -> None:
         due, chunk = self._due(), self._chunk()
@@ -156,7 +167,6 @@ class Board:
                 if left <= 0.0:
                     return False
                 self.changed.wait(min(left, 0.05))
-                self.catch_up()
             return True
 
     # ---- samples ----
@@ -171,7 +181,10 @@ class Board:
         instants = instants[instants > self.plant.now].astype(np.int64)
         driven = self._driven(updates)
         befores = np.concatenate([[self.plant.now], instants[:-1]])
-        seen = self.plant.advance(instants, driven(befores))
+        try:
+            seen = self.plant.advance(instants, driven(befores))
+        except (ComponentError, ImpactLimitReached) as error:
+            raise self.lose(f"{self.name}, whose plant failed: {error}") from None
         for task in running:
             if task.kind == INPUT:
                 ticks = edges[task.name]
@@ -181,6 +194,16 @@ class Board:
         for task in running:
             if task.kind == OUTPUT:
                 self._put_out(task, *updates[task.name])
+
+    def lose(self, why: str) -> Refusal:
+        """Let the device be gone, and with it all of its tasks; return what is said of it."""
+        with self.changed:
+            self._lost = Refusal(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, why)
+            for task in self.tasks.values():
+                if task.state is State.running and not task.done:
+                    task.finish(self._lost)
+            self._wake()
+        return self._lost
 
     @staticmethod
     def _edges(task: Task, target: int) -> Ticks:
@@ -303,7 +326,7 @@ class Board:
             if task.clock is not None:
                 task.rate = task.clock.rate
                 self._arm(task)
-            self.changed.notify_all()
+            self._wake()
 
     def _arm(self, task: Task) -> None:
         """Start the clock of a task, if what it waits for is there."""
@@ -369,7 +392,7 @@ class Board:
             for task in waiting:
                 task.start = self.plant.now + FIRST_EDGE
                 self._set_off_by(task)
-            self.changed.notify_all()
+            self._wake()
             return len(waiting)
 
     def stop(self, task: Task) -> None:
@@ -407,6 +430,6 @@ class Board:
             self._closed = True
             for task in list(self.tasks.values()):
                 self.remove(task)
-            self.changed.notify_all()
+            self._wake()
         self._pump.join()
         self.plant.close()

@@ -292,7 +292,7 @@ class Calls:
                 task, piece, timeout if timeout < 0 else max(end - time.monotonic(), 0.0)
             )
             if task.failure is not None:
-                raise Refusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, task.name, read=count - left)
+                raise task.failure.after(read=count - left)
             if task.state is not State.running:
                 raise Refusal(
                     DAQmxErrors.CANNOT_PERFORM_OP_WHEN_TASK_NOT_RUNNING, task.name, read=count - left
@@ -414,9 +414,7 @@ class Calls:
         while written < whole:
             self._board.catch_up()
             if task.failure is not None:
-                raise Refusal(
-                    DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, task.name, written=written
-                )
+                raise task.failure.after(written=written)
             piece = samples[:, written : written + task.room]
             if piece.size:
                 task.write(piece)

@@ -39,13 +39,13 @@ class Controls:
             "Advance": self.advance,
             "Pulse": self.pulse,
             "Truth": self.truth,
+            "Lose": self.lose,
         }
 
     def state(self, asked: dict[str, Any]) -> dict[str, Any]:
         """Return where the time of the rig is, and which tasks there are."""
         board = self._board
         with board.changed:
-            board.catch_up()
             tasks = {task.name: task.state.value for task in board.tasks.values()}
             return {
                 "time": board.plant.now * TICK,
@@ -77,6 +77,11 @@ class Controls:
     def pulse(self, asked: dict[str, Any]) -> dict[str, Any]:
         """Put an edge on a terminal."""
         return {"started": self._board.pulse(str(asked.get("terminal", "")))}
+
+    def lose(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """Let the device be gone, as if its cable were pulled out."""
+        self._board.lose(self._board.name)
+        return {}
 
     def truth(self, asked: dict[str, Any]) -> dict[str, Any]:
         """Return the state of the plant now, SI units, and the voltages of the outputs."""
@@ -127,6 +132,10 @@ class RigControl:
     def pulse(self, terminal: str) -> int:
         """Put an edge on a terminal such as `/Dev1/PFI0`; return how many tasks it has started."""
         return int(self._call("Pulse", terminal=terminal)["started"])
+
+    def lose(self) -> None:
+        """Let the device be gone until the rig is served anew."""
+        self._call("Lose")
 
     def truth(self) -> dict[str, Any]:
         """Return displacement (m), velocity (m/s), contact force (N) of the plant and `outputs` (V) now."""

@@ -81,8 +81,8 @@ def _quantities(rows: Floats) -> dict[str, Floats]:
 def plant_scene(settings: RigSettings) -> Scene:
     """Return the scene of a rig as its plant: its forcing says where the force acts, the output what it is."""
     scene = load_scene(settings.scene)
-    body = getattr(scene.body, "kind", None)
-    if scene.general is not None or scene.replay is not None or body not in ("oscillator", "beam"):
+    other = scene.general is not None or scene.replay is not None
+    if other or scene.body.kind not in ("oscillator", "beam"):
         raise UsageError(
             f"{settings.source}: rig.scene: expected an oscillator or a beam, got a scene of another kind."
         )

@@ -61,6 +61,12 @@ class Refusal(Exception):
         self.read, self.written = read, written
         super().__init__(self.text)
 
+    def after(self, *, read: int | None = None, written: int | None = None) -> Refusal:
+        """Return the same with the samples per channel that a call has moved before."""
+        again = Refusal(DAQmxErrors(self.code), read=read, written=written)
+        again.text = self.text
+        return again
+
 
 def text_of(code: int) -> str:
     """Return the words for a code."""

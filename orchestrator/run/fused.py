@@ -140,14 +140,14 @@ class BodyDriver(RecordedBody):
             self.record(impacts=False, extrema=False, periods=False)
             self._held = tuple(outputs)
             self._read = np.array([references[name] for name in outputs], dtype=np.uint32)
-        functions = [instance.address_of(name) for name in runs.RunsFmu.FUNCTIONS]
-        fmu = runs.RunsFmu(instance.pointer, *functions, instance.log.environment)
-        variables = runs.RunsVariables(runs.address(self._read), len(self._read))
-        plan = stepping.HoldPlan(references["force"], references["force_rate"], variables)
+            functions = [instance.address_of(name) for name in runs.RunsFmu.FUNCTIONS]
+            self._functions = runs.RunsFmu(instance.pointer, *functions, instance.log.environment)
+            variables = runs.RunsVariables(runs.address(self._read), len(self._read))
+            self._plan = stepping.HoldPlan(references["force"], references["force_rate"], variables)
         samples = np.empty((len(ends), len(outputs)))
         arrays = map(runs.address, (ends, forces, samples))
         block = stepping.HoldBlock(len(ends), *arrays, 0, instance.time)
-        end = stepping.hold_samples(fmu, plan, block)
+        end = stepping.hold_samples(self._functions, self._plan, block)
         instance.time = block.time
         if end == stepping.HoldEnd.limit:
             raise ImpactLimitReached

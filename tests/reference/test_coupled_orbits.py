@@ -117,7 +117,7 @@ SHORT_FORM: dict[str, list[dict[str, float]]] = {
     "chatter.toml": [{}],
     "coupled_p11.toml": [{}],
     "free_decay.toml": [{}],
-    "rig.toml": [
+    "gap_sweep.toml": [
         {"stop[1].position": gap, "forcing.frequency": f}
         for gap, f in ((0.001, 4.9), (0.002, 5.5), (0.003, 6.1))
     ],

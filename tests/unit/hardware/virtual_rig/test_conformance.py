@@ -12,7 +12,7 @@ import pytest
 from support.places import ROOT
 
 from vibroimpact.fmus.core import Oscillator, flow
-from vibroimpact.hardware.daqmx import DaqError, System, constants, nidaqmx, open_channel
+from vibroimpact.hardware.daqmx import METHODS, DaqError, System, constants, grpc, nidaqmx, open_channel
 from vibroimpact.hardware.virtual_rig.control import RigControl
 from vibroimpact.hardware.virtual_rig.serving import RigServer, served
 from vibroimpact.hardware.virtual_rig.settings import read_rig
@@ -372,3 +372,32 @@ def test_a_lab_pc_samples_one_input_after_the_other() -> None:
     # 12 us for a conversion: the velocity is that much later than the displacement
     slope = np.gradient(displacement / 500.0, 1e-4)
     assert np.corrcoef(slope[20:-20], velocity[20:-20])[0, 1] > 0.9
+
+
+def test_a_device_that_is_gone_ends_the_read_that_waits_and_is_said_from_then_on() -> None:
+    settings = read_rig(ROOT / "examples" / "rig" / "oscillator.toml")
+    with served(settings) as server, open_channel(server.address) as channel:
+        bench = Bench(server, channel)
+        task = bench.inputs("Dev1/ai0", 1000.0, sample_mode=CONTINUOUS)
+        task.start()
+        threading.Timer(0.1, bench.control.lose).start()
+        with refused(-201003) as caught:
+            task.read(100_000, timeout=10.0)
+        assert caught.value.samps_per_chan_read < 1000
+        with refused(-201003):
+            bench.outputs().write(1.0)
+        task.close()
+
+
+def test_every_call_of_the_protocol_is_answered_or_refused_in_words(bench: Bench) -> None:
+    # no call may end in UNIMPLEMENTED (the client then speaks of an upgrade) or in an exception of the server
+    metadata = {}
+    for name, method in METHODS.items():
+        call = bench.channel.unary_stream if method.server_streaming else bench.channel.unary_unary
+        try:
+            answer = call(f"/nidaqmx_grpc.NiDAQmx/{name}")(b"", timeout=5.0)
+            list(answer) if method.server_streaming else None
+        except grpc.RpcError as error:
+            metadata[name] = dict(error.trailing_metadata() or ())
+    assert set(METHODS) - set(metadata) == {"CreateTask", "GetErrorString"}
+    assert [name for name, said in metadata.items() if int(said.get("ni-error", 0)) > -1000] == []
