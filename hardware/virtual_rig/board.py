@@ -10,7 +10,7 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.hardware.daqmx import DAQmxErrors
 from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant, Ticks
 from vibroimpact.hardware.virtual_rig.profiles import PROFILES
@@ -21,6 +21,8 @@ from vibroimpact.orchestrator.run.record import ImpactLimitReached
 
 FIRST_EDGE = 10_000
 """Ticks from the start of a task to the first edge of its clock."""
+NEVER = 2**62
+"""A tick that does not come."""
 MOST_AT_ONCE = 20_000
 """Samples of one advance, so that a call never waits for long."""
 PERIOD = 0.002
@@ -93,7 +95,7 @@ class Board:
         last = task.position + task.length if task.kind == INPUT else task.position
         bound = task.kind == INPUT or not task.regenerates
         if not bound or (whole is not None and last >= whole):
-            return 2**62
+            return NEVER
         return int(task.edge(last)) - 1
 
     def catch_up(self) -> None:
@@ -115,7 +117,7 @@ class Board:
     def _chunk(self) -> int:
         """Return ticks of one advance."""
         rate = sum(task.rate * len(task.channels) for task in self.tasks.values() if task.ticking)
-        return 10**9 if rate == 0.0 else max(int(MOST_AT_ONCE / rate / TICK), 1000)
+        return NEVER if rate == 0.0 else max(int(MOST_AT_ONCE / rate / TICK), 1000)
 
     def _go_on(self) -> None:
         """Keep time while a clock runs."""
@@ -183,7 +185,7 @@ class Board:
         befores = np.concatenate([[self.plant.now], instants[:-1]])
         try:
             seen = self.plant.advance(instants, driven(befores))
-        except (ComponentError, ImpactLimitReached) as error:
+        except (ComponentError, UsageError, ImpactLimitReached) as error:
             raise self.lose(f"{self.name}, whose plant failed: {error}") from None
         for task in running:
             if task.kind == INPUT:
@@ -300,6 +302,8 @@ class Board:
     def reserve(self, task: Task) -> None:
         """Reserve what a task needs."""
         task.refuse_empty()
+        if task.clock is not None:
+            task.refuse_rate(task.clock.rate)  # channels may have come after the clock
         mine = self._resources(task)
         for other in self.tasks.values():
             if other is not task and other.state is not State.verified and mine & self._resources(other):
@@ -430,6 +434,7 @@ class Board:
             self._closed = True
             for task in list(self.tasks.values()):
                 self.remove(task)
-            self._wake()
+            self.lose(f"{self.name} is no longer served")
         self._pump.join()
-        self.plant.close()
+        with self.changed:
+            self.plant.close()

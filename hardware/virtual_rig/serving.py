@@ -105,7 +105,7 @@ class RigServer:
         def answered(request: bytes, context: Any) -> bytes:
             try:
                 return control.encoded(call(control.decoded(request)))
-            except ValueError as error:
+            except (ValueError, Refusal) as error:
                 context.abort(grpc.StatusCode.INVALID_ARGUMENT, str(error))
                 raise
 

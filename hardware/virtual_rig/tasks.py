@@ -129,16 +129,21 @@ class Task:
         self.kind = kind
         self.channels.append(channel)
 
+    def refuse_rate(self, rate: float) -> None:
+        """Refuse a sample rate (Hz) that the device does not reach with these channels."""
+        highest, count = self.highest_rate, len(self.channels)
+        if not 0.0 < rate <= highest:
+            channels = "1 channel" if count == 1 else f"{count} channels"
+            raise Refusal(
+                DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+                f"a rate of {rate:g} Hz with {channels}; expected at most {highest:g} Hz",
+            )
+
     def set_clock(self, clock: Clock) -> None:
         """Give the task a sample clock."""
         self.refuse_running()
         self.refuse_empty()
-        highest = self.highest_rate
-        if not 0.0 < clock.rate <= highest:
-            raise Refusal(
-                DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
-                f"a rate of {clock.rate:g} Hz with {len(self.channels)} channels; expected at most {highest:g} Hz",
-            )
+        self.refuse_rate(clock.rate)
         if clock.mode not in (FINITE, CONTINUOUS):
             raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"sample mode {clock.mode}")
         if not 2 <= clock.samples <= MOST_SAMPLES // len(self.channels):

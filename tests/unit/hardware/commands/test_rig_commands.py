@@ -104,7 +104,7 @@ def test_what_is_no_rig_is_said_in_one_line(words: list[str], said: str) -> None
         (["tip=Dev1/ai0", "tip=Dev1/ai1"], ["1000", "1"], "--channel: expected NAME=TERMINAL", 2),
         (["tip=Dev1/ai0"], ["nan", "1"], "--rate, --duration: expected 2 samples or more", 2),
         (["tip=Dev1/ai9"], ["1000", "1"], "The device has no such channel: Dev1/ai9", 1),
-        (["tip=Dev1/ai0"], ["2e6", "1"], "a rate of 2e+06 Hz with 1 channels; expected at most 1e+06 Hz", 1),
+        (["tip=Dev1/ai0"], ["2e6", "1"], "a rate of 2e+06 Hz with 1 channel; expected at most 1e+06 Hz", 1),
         (["tip=Dev1/ai0,50"], ["1000", "1"], "a range of -50 to 50 V", 1),
     ],
 )

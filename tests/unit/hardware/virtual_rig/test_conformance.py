@@ -12,6 +12,7 @@ import pytest
 from support.places import ROOT
 
 from vibroimpact.fmus.core import Oscillator, flow
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.hardware.daqmx import METHODS, DaqError, System, constants, grpc, nidaqmx, open_channel
 from vibroimpact.hardware.virtual_rig.control import RigControl
 from vibroimpact.hardware.virtual_rig.serving import RigServer, served
@@ -181,6 +182,13 @@ def test_a_task_without_a_clock_reads_at_once(bench: Bench) -> None:
     with bench.inputs("Dev1/ai0:1") as task:
         assert len(task.read()) == 2
         assert len(task.read(3)[0]) == 3
+
+
+def test_a_rig_that_nobody_has_used_for_a_year_answers_at_once(bench: Bench) -> None:
+    for _ in range(32):
+        bench.control.advance(1e6)
+    with bench.inputs("Dev1/ai0", 1000.0, samps_per_chan=100) as task:
+        assert len(task.read(100)) == 100
 
 
 # ---- outputs ----
@@ -361,6 +369,12 @@ def test_a_lab_pc_samples_one_input_after_the_other() -> None:
             task.ai_channels.add_ai_voltage_chan("Dev1/ai0:2", min_val=-5, max_val=5)
             with refused(-200077):
                 task.timing.cfg_samp_clk_timing(30_000.0)
+            with bench.task() as other:
+                other.ai_channels.add_ai_voltage_chan("Dev1/ai0", min_val=-5, max_val=5)
+                other.timing.cfg_samp_clk_timing(60_000.0)
+                other.ai_channels.add_ai_voltage_chan("Dev1/ai1", min_val=-5, max_val=5)
+                with refused(-200077):
+                    other.start()
             task.timing.cfg_samp_clk_timing(10_000.0, samps_per_chan=2000)
             with bench.task() as drive:
                 drive.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-5, max_val=5)
@@ -386,6 +400,8 @@ def test_a_device_that_is_gone_ends_the_read_that_waits_and_is_said_from_then_on
         assert caught.value.samps_per_chan_read < 1000
         with refused(-201003):
             bench.outputs().write(1.0)
+        with pytest.raises(UsageError, match="The device does not answer: Dev1"):
+            bench.control.truth()
         task.close()
 
 
