@@ -25,6 +25,12 @@ THREE_WAYS = (
     "--rig virtual:RIG.toml starts a virtual rig, --rig grpc://host:port uses one that is served or NI's gRPC device "
     "server, --rig local uses the board of this machine, whose driver is NI-DAQmx"
 )
+ASKED_WRONGLY = (
+    daqmx.DAQmxErrors.INVALID_DEVICE_ID,
+    daqmx.DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST,
+    daqmx.DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+)
+"""What a rig says of a device, a channel, a range or a rate that it does not have."""
 MOST_CHANNELS = 8
 MOST_VALUES = 10**8
 BLOCK = 2**18
@@ -65,9 +71,9 @@ def opened_rig(choice: str | None) -> Iterator[Rig]:
     Raises
     ------
     UsageError
-        There is no such rig, or no driver.
+        There is no such rig, no driver, or what is asked for is not there.
     RigError
-        The rig refuses a call.
+        The rig refuses another call.
     """
     try:
         with _connected(choice) as rig:
@@ -79,7 +85,8 @@ def opened_rig(choice: str | None) -> Iterator[Rig]:
     except daqmx.RpcError as error:
         raise RigError(f"{choice}: expected a rig that answers, got none: {_one_line(error)}.") from None
     except daqmx.DaqError as error:
-        raise RigError(f"{choice or 'local'}: {_one_line(error)}") from None
+        kind = UsageError if error.error_code in ASKED_WRONGLY else RigError
+        raise kind(f"{choice or 'local'}: {_one_line(error)}") from None
 
 
 @contextmanager

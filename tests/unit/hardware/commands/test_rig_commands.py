@@ -97,19 +97,19 @@ def test_what_is_no_rig_is_said_in_one_line(words: list[str], said: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("channels", "timing", "said", "code"),
+    ("channels", "timing", "said"),
     [
-        (["tip"], ["1000", "1"], "--channel: expected NAME=TERMINAL[,RANGE]", 2),
-        (["tip=Dev1/ai0,x"], ["1000", "1"], "--channel: expected NAME=TERMINAL[,RANGE]", 2),
-        (["tip=Dev1/ai0", "tip=Dev1/ai1"], ["1000", "1"], "--channel: expected NAME=TERMINAL", 2),
-        (["tip=Dev1/ai0"], ["nan", "1"], "--rate, --duration: expected 2 samples or more", 2),
-        (["tip=Dev1/ai9"], ["1000", "1"], "The device has no such channel: Dev1/ai9", 1),
-        (["tip=Dev1/ai0"], ["2e6", "1"], "a rate of 2e+06 Hz with 1 channel; expected at most 1e+06 Hz", 1),
-        (["tip=Dev1/ai0,50"], ["1000", "1"], "a range of -50 to 50 V", 1),
+        (["tip"], ["1000", "1"], "--channel: expected NAME=TERMINAL[,RANGE]"),
+        (["tip=Dev1/ai0,x"], ["1000", "1"], "--channel: expected NAME=TERMINAL[,RANGE]"),
+        (["tip=Dev1/ai0", "tip=Dev1/ai1"], ["1000", "1"], "--channel: expected NAME=TERMINAL"),
+        (["tip=Dev1/ai0"], ["nan", "1"], "--rate, --duration: expected 2 samples or more"),
+        (["tip=Dev1/ai9"], ["1000", "1"], "The device has no such channel: Dev1/ai9"),
+        (["tip=Dev1/ai0"], ["2e6", "1"], "a rate of 2e+06 Hz with 1 channel; expected at most 1e+06 Hz"),
+        (["tip=Dev1/ai0,50"], ["1000", "1"], "a range of -50 to 50 V"),
     ],
 )
 def test_what_cannot_be_recorded_leaves_no_file(
-    address: str, tmp_path: Path, channels: list[str], timing: list[str], said: str, code: int
+    address: str, tmp_path: Path, channels: list[str], timing: list[str], said: str
 ) -> None:
     given = [word for channel in channels for word in ("--channel", channel)]
     output = tmp_path / "none.nc"
@@ -117,6 +117,6 @@ def test_what_cannot_be_recorded_leaves_no_file(
         *("rig", "record", "--rig", f"grpc://{address}", *given),
         *("--rate", timing[0], "--duration", timing[1], "-o", output),
     )
-    assert done.returncode == code
+    assert done.returncode == 2
     assert said in done.stderr
     assert not output.exists()
