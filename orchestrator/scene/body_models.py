@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -82,9 +83,10 @@ class OscillatorBody(SceneTable):
         """Damping coefficient, N s/m: as given, or 2 damping_ratio sqrt(stiffness mass)."""
         if self.damping_ratio is None:
             return self.damping_given
-        # of numpy: the points of a sweep come as arrays too
-        coefficient: float = 2.0 * self.damping_ratio * np.sqrt(self.stiffness * self.mass)
-        return coefficient
+        square = self.stiffness * self.mass
+        # the points of a sweep come as arrays, too
+        root = np.sqrt(square) if isinstance(square, np.ndarray) else math.sqrt(square)
+        return 2.0 * self.damping_ratio * root
 
     def mass_at(self, number: int | None) -> float:
         """Return the mass that a stop limits, kg."""
