@@ -213,15 +213,17 @@ main()
 # `_elementtree` reports an interrupted import of pyexpat as an ImportError, and `xml.etree` goes on without it.
 @pytest.mark.parametrize("where", ["step", "pyexpat", "xarray", "__del__"])
 def test_ctrl_c_leaves_no_file_wherever_it_is_heard(where: str, tmp_path: Path) -> None:
-    scene = tmp_path / "light.toml"
-    text = (EXAMPLES / "thesis" / "figure_7_10.toml").read_text(encoding="utf-8")
-    scene.write_text(re.sub(r"^mass_per_length = .*$", "mass_per_length = 1e-15", text, flags=re.M))
-    target = tmp_path / "light.nc"
+    scene, (name, values) = tmp_path / "long.toml", STIFF_AND_PLASTIC
+    text = (EXAMPLES / f"{name}.toml").read_text(encoding="utf-8")
+    for key, value in values.items():
+        text = re.sub(rf"^{key} = .*$", f"{key} = {value}", text, count=1, flags=re.M)
+    scene.write_text(text)
+    target = tmp_path / "long.nc"
     program = INTERRUPTED.replace("WHERE", repr(where))
     command = [sys.executable, "-c", program, "run", str(scene), "-o", str(target)]
     ended = subprocess.run(command, capture_output=True, text=True, timeout=60, env=os.environ | ENVIRONMENT)
     assert (ended.returncode, ended.stdout, ended.stderr) == (130, "", "")
-    assert os.listdir(tmp_path) == ["light.toml"]
+    assert os.listdir(tmp_path) == ["long.toml"]
 
 
 def test_every_point_of_a_campaign_whose_steps_are_long_gets_its_outcome(tmp_path: Path) -> None:
