@@ -5,9 +5,13 @@ The messages are in a private folder of nidaqmx, hence the bounds of its version
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 from vibroimpact.fmus.errors import UsageError
+
+# what gRPC logs by itself stands beside the one line that this package says of it
+os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 try:
     import grpc

@@ -206,6 +206,7 @@ def _slices(store: Store, reader: LandedReader) -> APIRouter:
     def one_slice(
         name: str,
         variable: Annotated[str | None, Query(max_length=200)] = None,
+        # FastAPI copies defaults, and takes a list from the query only where the default is one
         at: Annotated[list[str], Query(max_length=20, description="NAME:VALUE, the nearest there is")] = [],  # noqa: B006
         within: Annotated[list[str], Query(max_length=20, description="NAME:LOW:HIGH")] = [],  # noqa: B006
         most: Annotated[int, Query(ge=1, le=MOST_ROWS, description="Rows, at most")] = 5000,

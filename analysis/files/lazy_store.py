@@ -27,6 +27,7 @@ class LazyStore(NetCDF4DataStore):
         with netcdf_lock():
             self._file = take(path)
             try:
+                # these two of xarray carry no types
                 super().__init__(self._file.root)  # type: ignore[no-untyped-call]
                 self._loaded, self._encoding = super().load(), super().get_encoding()  # type: ignore[no-untyped-call]
             except BaseException:

@@ -29,8 +29,9 @@ ASKED_WRONGLY = (
     daqmx.DAQmxErrors.INVALID_DEVICE_ID,
     daqmx.DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST,
     daqmx.DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+    daqmx.DAQmxErrors.CHAN_ALREADY_IN_TASK,
 )
-"""What a rig says of a device, a channel, a range or a rate that it does not have."""
+"""What a rig says of a device, a channel, a range or a rate that it does not have, and of a channel given twice."""
 MOST_CHANNELS = 8
 MOST_VALUES = 10**8
 BLOCK = 2**18

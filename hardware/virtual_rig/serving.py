@@ -112,7 +112,7 @@ class RigServer:
         return grpc.unary_unary_rpc_method_handler(answered)
 
 
-class _Handler(grpc.GenericRpcHandler):  # type: ignore[misc]
+class _Handler(grpc.GenericRpcHandler):  # type: ignore[misc]  # grpc carries no types
     """Finds what answers a method of a service by its name."""
 
     def __init__(self, service: str, find: Callable[[str], Any]) -> None:

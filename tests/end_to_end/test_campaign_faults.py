@@ -430,10 +430,10 @@ def test_a_full_folder_for_temporary_files_is_named_and_no_defect(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*_: object, **__: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/tmp/notes")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "/full/notes")
 
     monkeypatch.setattr(engine, "open_workers", full)
-    with pytest.raises(CampaignError, match=r"/tmp/notes: .*No space left.*folder for temporary files"):
+    with pytest.raises(CampaignError, match=r"/full/notes: .*No space left.*folder for temporary files"):
         run_campaign(scene_of(frequency_text(10)), tmp_path / "campaign")
 
 

@@ -10,6 +10,7 @@ from support.dataset_examples import dataset_of, record
 
 from vibroimpact.analysis import open_dataset
 from vibroimpact.analysis.dataset import write_dataset
+from vibroimpact.analysis.files import open_files
 
 THREADS = """
 import sys, threading
@@ -57,6 +58,9 @@ def test_a_dropped_dataset_reads_on_where_something_of_it_is_left(tmp_path: Path
 
 def test_a_closed_dataset_is_closed_once(tmp_path: Path) -> None:
     write_dataset(dataset_of([record(1.0)]), tmp_path / "runs.nc")
-    opened = open_dataset(tmp_path / "runs.nc")
-    opened.close()
-    opened.close()
+    first, second = open_dataset(tmp_path / "runs.nc"), open_dataset(tmp_path / "runs.nc")
+    first.close()
+    first.close()
+    assert second.final_displacement.values == 1.0  # the file is still open for the other
+    second.close()
+    assert str(tmp_path / "runs.nc") not in [path for path, _ in open_files._open]

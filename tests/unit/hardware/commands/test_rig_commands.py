@@ -103,6 +103,7 @@ def test_what_is_no_rig_is_said_in_one_line(words: list[str], said: str) -> None
         (["tip=Dev1/ai0,x"], ["1000", "1"], "--channel: expected NAME=TERMINAL[,RANGE]"),
         (["tip=Dev1/ai0", "tip=Dev1/ai1"], ["1000", "1"], "--channel: expected NAME=TERMINAL"),
         (["tip=Dev1/ai0"], ["nan", "1"], "--rate, --duration: expected 2 samples or more"),
+        (["a=Dev1/ai0", "b=Dev1/ai0"], ["1000", "1"], "The channel is in the task already: b"),
         (["tip=Dev1/ai9"], ["1000", "1"], "The device has no such channel: Dev1/ai9"),
         (["tip=Dev1/ai0"], ["2e6", "1"], "a rate of 2e+06 Hz with 1 channel; expected at most 1e+06 Hz"),
         (["tip=Dev1/ai0,50"], ["1000", "1"], "a range of -50 to 50 V"),
