@@ -70,6 +70,6 @@ def record(
 
     Example: vibroimpact rig record --rig virtual:RIG.toml --channel tip=Dev1/ai0,5 --rate 5000 --duration 2 -o tip.nc
     """
-    from vibroimpact.hardware.commands.rigs import record_channels
+    from vibroimpact.hardware.programs.record import record_channels
 
     record_channels(rig, channel, rate, duration, output, force)

@@ -1,0 +1,1 @@
+"""Programs that measure and drive on a rig."""

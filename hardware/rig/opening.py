@@ -1,0 +1,97 @@
+"""Which rig a program runs on: the board of this machine, one that is served, or a virtual one of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from vibroimpact.fmus.errors import RigError, UsageError
+from vibroimpact.hardware import daqmx
+from vibroimpact.hardware.virtual_rig.serving import served
+from vibroimpact.hardware.virtual_rig.settings import read_rig
+
+THREE_WAYS = (
+    "--rig virtual:RIG.toml starts a virtual rig, --rig grpc://host:port uses one that is served or NI's gRPC device "
+    "server, --rig local uses the board of this machine, whose driver is NI-DAQmx"
+)
+ASKED_WRONGLY = (
+    daqmx.DAQmxErrors.INVALID_DEVICE_ID,
+    daqmx.DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST,
+    daqmx.DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
+    daqmx.DAQmxErrors.CHAN_ALREADY_IN_TASK,
+)
+"""What a rig says of a device, a channel, a range or a rate that it does not have, and of a channel given twice."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """A rig that is open.
+
+    Attributes
+    ----------
+    name : str
+        As `--rig` says it.
+    channel : grpc.Channel or None
+        None: the driver of this machine.
+    """
+
+    name: str
+    channel: Any
+
+    def options(self, session: str = "") -> Any:
+        """Return what a task of NI's client needs to be made on this rig; another program attaches to a named one."""
+        if self.channel is None:
+            return None
+        return daqmx.nidaqmx.GrpcSessionOptions(self.channel, session)
+
+    def system(self) -> Any:
+        """Return the system of NI's client."""
+        options = self.options()
+        return daqmx.System.local() if options is None else daqmx.System.remote(options)
+
+
+@contextmanager
+def opened_rig(choice: str | None) -> Iterator[Rig]:
+    """Open a rig for as long as the block lasts; what its client refuses becomes one error.
+
+    Raises
+    ------
+    UsageError
+        There is no such rig, no driver, or what is asked for is not there.
+    RigError
+        The rig refuses another call.
+    """
+    try:
+        with _connected(choice) as rig:
+            yield rig
+    except daqmx.DaqNotFoundError:
+        raise UsageError(
+            f"rig: expected the driver NI-DAQmx on this machine, got none. {THREE_WAYS}."
+        ) from None
+    except daqmx.RpcError as error:
+        raise RigError(f"{choice}: expected a rig that answers, got none: {_one_line(error)}.") from None
+    except daqmx.DaqError as error:
+        kind = UsageError if error.error_code in ASKED_WRONGLY else RigError
+        raise kind(f"{choice or 'local'}: {_one_line(error)}") from None
+
+
+@contextmanager
+def _connected(choice: str | None) -> Iterator[Rig]:
+    kind, _, rest = (choice or "local").partition(":")
+    if choice in (None, "local"):
+        yield Rig("local", None)
+    elif kind == "virtual" and rest:
+        with served(read_rig(Path(rest))) as server, daqmx.open_channel(server.address) as channel:
+            yield Rig(f"virtual:{Path(rest).name}", channel)
+    elif kind == "grpc" and rest.startswith("//") and rest[2:].rpartition(":")[2].isdigit():
+        with daqmx.open_channel(rest[2:]) as channel:
+            yield Rig(str(choice), channel)
+    else:
+        raise UsageError(f"--rig: expected a rig, got {str(choice)[:60]!r}. {THREE_WAYS}.")
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()).rstrip(".")
