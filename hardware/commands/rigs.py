@@ -19,7 +19,7 @@ def serve_rig(file: Path, port: int, speed: float | None, lockstep: bool) -> Non
         raise UsageError(f"--speed: expected a number > 0 and <= 1000, got {speed:g}.")
     with served(settings, port) as server:
         server.board.set_pace(lockstep=lockstep, speed=speed)
-        pace = "in lockstep" if lockstep else f"{server.board.speed:g} s of the rig in a second"
+        pace = "in lockstep" if lockstep else f"{server.board.pace.speed:g} s of the rig in a second"
         say(
             f"{settings.rig.name}, {server.board.profile.product}, at grpc://{server.address}, {pace}. Ctrl-C ends it."
         )

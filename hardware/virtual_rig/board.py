@@ -12,23 +12,20 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.hardware.daqmx import DAQmxErrors
+from vibroimpact.hardware.virtual_rig.pace import Pace
 from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant, Ticks
 from vibroimpact.hardware.virtual_rig.profiles import PROFILES
 from vibroimpact.hardware.virtual_rig.refusal import Refusal
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
-from vibroimpact.hardware.virtual_rig.tasks import INPUT, OUTPUT, State, Task
+from vibroimpact.hardware.virtual_rig.tasks import INPUT, NEVER, OUTPUT, State, Task
 from vibroimpact.orchestrator.run.record import ImpactLimitReached
 
 FIRST_EDGE = 10_000
 """Ticks from the start of a task to the first edge of its clock."""
-NEVER = 2**62
-"""A tick that does not come."""
 MOST_AT_ONCE = 20_000
 """Samples of one advance, so that a call never waits for long."""
 PERIOD = 0.002
 """Between two advances while a clock runs, s."""
-FAR_BEHIND = 0.1
-"""Lateness from which on the time of the rig is no longer caught up with, s."""
 
 
 class Board:
@@ -40,12 +37,8 @@ class Board:
 
     Attributes
     ----------
-    lockstep : bool
-        Time goes on only while a call waits for it, and never so far that a buffer runs empty or over.
-    speed : float
-        Seconds of the rig in a second.
-    slipped : float
-        Seconds by which the time of the rig was late and is not caught up with.
+    pace : Pace
+        Where its time should be.
     """
 
     def __init__(self, settings: RigSettings) -> None:
@@ -57,9 +50,7 @@ class Board:
         lock = threading.RLock()
         self.changed = threading.Condition(lock)
         self._work = threading.Condition(lock)  # wakes the clock, which calls that wait do not
-        self.lockstep, self.speed, self.slipped = False, settings.rig.speed, 0.0
-        self._wanted = 0  # tick up to which waiting calls want time to go, in lockstep
-        self._begin, self._origin = time.monotonic(), 0
+        self.pace = Pace(settings.rig.speed)
         self._closed = False
         self._lost: Refusal | None = None
         self._pump = threading.Thread(target=self._go_on, name="rig clock", daemon=True)
@@ -71,10 +62,9 @@ class Board:
         """Change how the time of the rig goes."""
         with self.changed:
             self.catch_up()
-            self.lockstep = self.lockstep if lockstep is None else lockstep
-            self.speed = self.speed if speed is None else speed
-            self._begin, self._origin = time.monotonic(), self.plant.now
-            self._wanted = self.plant.now
+            self.pace.lockstep = self.pace.lockstep if lockstep is None else lockstep
+            self.pace.speed = self.pace.speed if speed is None else speed
+            self.pace.go_on_from(self.plant.now)
             self._wake()
 
     def _wake(self) -> None:
@@ -83,20 +73,7 @@ class Board:
 
     def _due(self) -> int:
         """Return the tick where the time of the rig should be."""
-        if self.lockstep:
-            return min([self._wanted, *(self._limit(task) for task in self.tasks.values() if task.ticking)])
-        passed = (time.monotonic() - self._begin) * self.speed
-        return self._origin + int(passed / TICK)
-
-    @staticmethod
-    def _limit(task: Task) -> int:
-        """Return the last tick before a buffer runs empty or over; in lockstep time waits there."""
-        whole = task.needed
-        last = task.position + task.length if task.kind == INPUT else task.position
-        bound = task.kind == INPUT or not task.regenerates
-        if not bound or (whole is not None and last >= whole):
-            return NEVER
-        return int(task.edge(last)) - 1
+        return self.pace.due(self.plant.now, self.tasks.values())
 
     def catch_up(self) -> None:
         """Let the plant go on to where the time of the rig is."""
@@ -110,9 +87,9 @@ class Board:
     def let_go(self, seconds: float) -> None:
         """Let time go on in lockstep, as if a call waited for it."""
         with self.changed:
-            self._wanted = max(self._wanted, self.plant.now + round(seconds / TICK))
+            self.pace.wanted = max(self.pace.wanted, self.plant.now + round(seconds / TICK))
             self.catch_up()
-            self._wanted = self.plant.now
+            self.pace.wanted = self.plant.now
 
     def _chunk(self) -> int:
         """Return ticks of one advance."""
@@ -126,20 +103,17 @@ class Board:
                 if self._closed:
                     return
                 busy = any(task.ticking for task in self.tasks.values())
-                if busy and not self.lockstep:
+                if busy and not self.pace.lockstep:
                     with suppress(Refusal):  # the tasks have it
                         self._one_chunk()
-                self._work.wait(PERIOD if busy and not self.lockstep else None)
+                self._work.wait(PERIOD if busy and not self.pace.lockstep else None)
 
     def _one_chunk(self) -> None:
         due, chunk = self._due(), self._chunk()
         if due > self.plant.now:
             self.advance(min(due, self.plant.now + chunk))
             self.changed.notify_all()
-        late = (due - self.plant.now) * TICK / self.speed
-        if late > FAR_BEHIND:
-            self.slipped += late
-            self._begin, self._origin = time.monotonic(), self.plant.now
+        self.pace.give_up(self.plant.now, due)
 
     def wait_for(self, holds: Callable[[], bool], wanted: Callable[[], int], timeout: float) -> bool:
         """Wait until something holds, at most so long (s; < 0: for ever); return whether it does.
@@ -152,16 +126,16 @@ class Board:
         timeout : float
             Of the program; a rig slower than life gives it more.
         """
-        wall = timeout / min(self.speed, 1.0) if not self.lockstep else timeout
+        wall = timeout / min(self.pace.speed, 1.0) if not self.pace.lockstep else timeout
         end = np.inf if timeout < 0 else time.monotonic() + wall
         with self.changed:
             self.catch_up()
             while not holds():
                 if self._closed:
                     raise Refusal(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, self.name)
-                if self.lockstep:
+                if self.pace.lockstep:
                     before = self.plant.now
-                    self._wanted = max(self._wanted, wanted())
+                    self.pace.wanted = max(self.pace.wanted, wanted())
                     self.catch_up()
                     if self.plant.now > before:
                         continue
@@ -284,7 +258,7 @@ class Board:
         for number in range(count):
             if number:
                 self.advance(self.plant.now + step)
-                self._wanted = max(self._wanted, self.plant.now)
+                self.pace.wanted = max(self.pace.wanted, self.plant.now)
             now = np.full((len(task.channels), 1), self.plant.now, dtype=np.int64)
             seen = {name: np.array([value]) for name, value in self.plant.state.items()}
             level = self._driven({})
@@ -335,30 +309,34 @@ class Board:
     def _arm(self, task: Task) -> None:
         """Start the clock of a task, if what it waits for is there."""
         assert task.clock is not None
-        source = self._task_behind(task.clock.source, "SampleClock")
-        if source is not None and source is not task:
-            if source.ticking:
+        if self._is_clock_of_others(task):
+            source = self._task_behind(task.clock.source, "SampleClock")
+            if source is not None and source.ticking:
                 task.rate = source.rate
                 task.start = int(source.edge(source.count))
                 self._set_off_by(task)
             return
         if task.trigger:
-            starter = self._task_behind(task.trigger, "StartTrigger")
-            if starter is None or starter is task or starter.start is None:
-                return
-            task.start = self.plant.now + FIRST_EDGE
-        else:
-            task.start = self.plant.now + FIRST_EDGE
+            return  # an edge that is over starts nothing
+        task.start = self.plant.now + FIRST_EDGE
         self._set_off_by(task)
+
+    def _is_clock_of_others(self, task: Task) -> bool:
+        """Return whether a task has the clock of the other direction, for which it waits."""
+        assert task.clock is not None
+        other = "ao" if task.kind == INPUT else "ai"
+        return task.clock.source.strip("/").lower() == f"{self.name}/{other}/SampleClock".lower()
 
     def _set_off_by(self, task: Task) -> None:
         """Start the tasks that wait for the clock or the trigger of one that has just started."""
+        assert task.start is not None
         for other in self._followers(task, "StartTrigger"):
             if other.state is State.running and other.start is None and not other.done:
                 other.start = task.start
         for other in self._followers(task, "SampleClock"):
             if other.state is State.running and other.start is None and not other.done:
-                other.start, other.rate = task.start, task.rate
+                other.rate = task.rate
+                other.start = task.start - round(other.count / (task.rate * TICK))  # it may go on
 
     def _followers(self, task: Task, signal: str) -> list[Task]:
         word = "ai" if task.kind == INPUT else "ao"

@@ -49,9 +49,10 @@ class Controls:
             tasks = {task.name: task.state.value for task in board.tasks.values()}
             return {
                 "time": board.plant.now * TICK,
-                "lockstep": board.lockstep,
-                "speed": board.speed,
-                "slipped": board.slipped,
+                "lockstep": board.pace.lockstep,
+                "speed": board.pace.speed,
+                "slipped": board.pace.slipped,
+                "waits_for": board.pace.waits_for,
                 "tasks": tasks,
                 "rig": board.settings.source,
             }

@@ -20,6 +20,8 @@ CONTINUOUS = constants.AcquisitionType.CONTINUOUS.value
 ALLOW_REGENERATION = constants.RegenerationMode.ALLOW_REGENERATION.value
 INPUT = constants.ChannelType.ANALOG_INPUT.value
 OUTPUT = constants.ChannelType.ANALOG_OUTPUT.value
+NEVER = 2**62
+"""A tick that does not come."""
 MOST_SAMPLES = 2**26
 """Samples of a buffer, of all its channels."""
 
@@ -224,6 +226,16 @@ class Task:
         """Return the ticks of edges of the clock, by their numbers."""
         assert self.start is not None
         return self.start + np.rint(np.asarray(number) / (self.rate * TICK)).astype(np.int64)
+
+    @property
+    def limit(self) -> int:
+        """The last tick before its buffer runs empty or over."""
+        whole = self.needed
+        last = self.position + self.length if self.kind == INPUT else self.position
+        bound = self.kind == INPUT or not self.regenerates
+        if not bound or (whole is not None and last >= whole):
+            return NEVER
+        return int(self.edge(last)) - 1
 
     def edges_until(self, tick: int) -> int:
         """Return how many edges there are up to a tick, it included, the skew of the last channel over."""

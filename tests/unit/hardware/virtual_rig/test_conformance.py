@@ -10,64 +10,26 @@ from typing import Any
 import numpy as np
 import pytest
 from support.places import ROOT
+from support.rig_bench import BITS_16, CONTINUOUS, Bench, opened_bench, refused
 
 from vibroimpact.fmus.core import Oscillator, flow
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.hardware.daqmx import METHODS, DaqError, System, constants, grpc, nidaqmx, open_channel
-from vibroimpact.hardware.virtual_rig.control import RigControl
-from vibroimpact.hardware.virtual_rig.serving import RigServer, served
+from vibroimpact.hardware.virtual_rig.serving import served
 from vibroimpact.hardware.virtual_rig.settings import read_rig
-
-FINITE, CONTINUOUS = constants.AcquisitionType.FINITE, constants.AcquisitionType.CONTINUOUS
-BITS_16 = 10.0 / 2**15
-
-
-class Bench:
-    """A client on a rig in lockstep."""
-
-    def __init__(self, server: RigServer, channel: Any) -> None:
-        self.server, self.channel = server, channel
-        self.control = RigControl(channel)
-
-    def options(self, name: str = "", **others: Any) -> Any:
-        return nidaqmx.GrpcSessionOptions(self.channel, name, **others)
-
-    def task(self, name: str = "") -> Any:
-        return nidaqmx.Task(name, grpc_options=self.options(name))
-
-    def inputs(self, terminals: str = "Dev1/ai0", rate: float | None = None, **timing: Any) -> Any:
-        task = self.task()
-        task.ai_channels.add_ai_voltage_chan(terminals, min_val=-10, max_val=10)
-        if rate is not None:
-            task.timing.cfg_samp_clk_timing(rate, **timing)
-        return task
-
-    def outputs(self, terminals: str = "Dev1/ao0", rate: float | None = None, **timing: Any) -> Any:
-        task = self.task()
-        task.ao_channels.add_ao_voltage_chan(terminals, min_val=-10, max_val=10)
-        if rate is not None:
-            task.timing.cfg_samp_clk_timing(rate, **timing)
-        return task
 
 
 @pytest.fixture(scope="module")
 def rig() -> Iterator[Bench]:
-    settings = read_rig(ROOT / "examples" / "rig" / "oscillator.toml")
-    with served(settings) as server, open_channel(server.address) as channel:
-        yield Bench(server, channel)
+    with opened_bench(ROOT / "examples" / "rig" / "oscillator.toml") as opened:
+        yield opened
 
 
 @pytest.fixture
 def bench(rig: Bench) -> Iterator[Bench]:
     rig.control.pace(lockstep=True)
     yield rig
-    for task in list(rig.server.board.tasks.values()):
-        rig.server.board.remove(task)
-    rig.server.board.held[:] = 0.0
-
-
-def refused(code: int) -> Any:
-    return pytest.raises(DaqError, match=rf"Status Code: {code}\b")
+    rig.clear()
 
 
 # ---- queries ----
@@ -157,14 +119,13 @@ def test_samples_that_are_late_are_said_with_what_is_there(bench: Bench) -> None
 
 
 def test_a_program_that_reads_too_late_loses_samples_and_hears_it(bench: Bench) -> None:
-    bench.control.pace(lockstep=False, speed=100.0)
-    with bench.inputs("Dev1/ai0", 10_000.0, sample_mode=CONTINUOUS) as task:
+    bench.control.pace(lockstep=False)
+    with bench.inputs("Dev1/ai0", 100_000.0, sample_mode=CONTINUOUS) as task:
         task.in_stream.input_buf_size = 1000
         task.start()
         time.sleep(0.1)
         with refused(-200279):
             task.read(100)
-    bench.control.pace(speed=1.0)
 
 
 def test_a_finite_task_is_done_and_has_no_more(bench: Bench) -> None:
@@ -271,6 +232,36 @@ def test_an_input_that_waits_for_an_output_starts_with_it(bench: Bench) -> None:
         drive.start()
         seen = np.array(task.read(21))
     np.testing.assert_allclose(seen[1:5], [1.0, 1.0, 2.0, 2.0], atol=BITS_16)
+
+
+def test_an_input_on_the_clock_of_an_output_waits_for_it(bench: Bench) -> None:
+    with (
+        bench.outputs(rate=1000.0, sample_mode=CONTINUOUS) as drive,
+        bench.inputs("Dev1/ai2", 1000.0, source="/Dev1/ao/SampleClock", samps_per_chan=9) as task,
+    ):
+        drive.write(np.arange(1.0, 9.0))
+        task.start()
+        bench.control.advance(0.5)
+        assert task.in_stream.avail_samp_per_chan == 0
+        drive.start()
+        np.testing.assert_allclose(task.read(9)[1:], np.arange(1.0, 9.0), atol=BITS_16)
+
+
+def test_an_input_goes_on_when_the_clock_of_its_output_does(bench: Bench) -> None:
+    with (
+        bench.outputs(rate=1000.0, samps_per_chan=8) as drive,
+        bench.inputs("Dev1/ai2", 1000.0, source="/Dev1/ao/SampleClock", samps_per_chan=16) as task,
+    ):
+        drive.write(np.arange(1.0, 9.0))
+        task.start()
+        for _ in range(2):
+            drive.start()
+            drive.wait_until_done()
+            drive.stop()
+            drive.write(np.arange(1.0, 9.0))
+        seen = task.read(16)
+    np.testing.assert_allclose(seen[1:8], np.arange(1.0, 8.0), atol=BITS_16)
+    np.testing.assert_allclose(seen[9:], np.arange(1.0, 8.0), atol=BITS_16)
 
 
 def test_events_come_every_so_many_samples_and_at_the_end(bench: Bench) -> None:

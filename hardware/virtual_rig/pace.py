@@ -1,0 +1,91 @@
+"""Where the time of a rig should be: as in life, slower or faster, or in lockstep with its programs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection
+
+from vibroimpact.hardware.virtual_rig.plant import TICK
+from vibroimpact.hardware.virtual_rig.tasks import Task
+
+FAR_BEHIND = 0.1
+"""Lateness from which on the time of the rig is no longer caught up with, s."""
+PATIENCE = 5.0
+"""How long a faster rig waits for a program that does nothing, s of the wall; less than a read of NI's client waits."""
+
+
+class Pace:
+    """The time that a rig should have reached.
+
+    Parameters
+    ----------
+    speed : float
+        Seconds of the rig in a second.
+
+    Attributes
+    ----------
+    lockstep : bool
+        Time goes on only while a call waits for it, and never so far that a buffer runs empty or over.
+    speed : float
+        Above 1 time waits too before a buffer runs empty or over, at most `patience` for a program that does nothing:
+        then its buffer does.
+    patience : float
+        s of the wall.
+    slipped : float
+        Seconds by which the time of the rig was late and is not caught up with.
+    wanted : int
+        Tick up to which waiting calls want time to go, in lockstep.
+    waits_for : str
+        The task for which time waits; empty: it does not wait.
+    """
+
+    def __init__(self, speed: float) -> None:
+        self.lockstep, self.speed, self.slipped = False, speed, 0.0
+        self.patience = PATIENCE
+        self._stands: dict[str, tuple[int, float]] = {}
+        self.go_on_from(0)
+
+    def go_on_from(self, now: int) -> None:
+        """Let time go on from a tick, now."""
+        self._begin, self._origin = time.monotonic(), now
+        self.wanted, self.waits_for = now, ""
+
+    def due(self, now: int, tasks: Collection[Task]) -> int:
+        """Return the tick where time should be, which is `now` or less where it should stand."""
+        if self.lockstep:
+            return min([self.wanted, *(task.limit for task in tasks if task.ticking)])
+        due = self._origin + int((time.monotonic() - self._begin) * self.speed / TICK)
+        if self.speed <= 1.0:
+            return due
+        limit, self.waits_for = self._limit(now, due, tasks)
+        if limit is None:
+            return due
+        # what passes while time waits is not made up for
+        self._begin, self._origin = time.monotonic(), limit
+        return limit
+
+    def _limit(self, now: int, due: int, tasks: Collection[Task]) -> tuple[int | None, str]:
+        """Return the first tick before `due` where time waits, and for which task."""
+        found: tuple[int | None, str] = None, ""
+        stood, self._stands = self._stands, {}
+        wall = time.monotonic()
+        for task in (each for each in tasks if each.ticking):
+            limit = task.limit
+            if limit > due:
+                continue
+            if limit <= now:
+                position, since = stood.get(task.name, (task.position, wall))
+                since = since if position == task.position else wall
+                self._stands[task.name] = task.position, since
+                if wall - since > self.patience:
+                    continue
+            if found[0] is None or limit < found[0]:
+                found = max(limit, now), task.name
+        return found
+
+    def give_up(self, now: int, due: int) -> None:
+        """Count what the rig is late, where that is too much to be caught up with."""
+        late = (due - now) * TICK / self.speed
+        if late > FAR_BEHIND and not self.lockstep:
+            self.slipped += late
+            self.go_on_from(now)
