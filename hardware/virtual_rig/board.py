@@ -13,15 +13,15 @@ from numpy.typing import NDArray
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.hardware.daqmx import DAQmxErrors
 from vibroimpact.hardware.virtual_rig.pace import Pace
-from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant, Ticks
+from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant
 from vibroimpact.hardware.virtual_rig.profiles import PROFILES
 from vibroimpact.hardware.virtual_rig.refusal import Refusal
+from vibroimpact.hardware.virtual_rig.sampling import Sampling
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
 from vibroimpact.hardware.virtual_rig.tasks import INPUT, NEVER, OUTPUT, State, Task
+from vibroimpact.hardware.virtual_rig.terminals import Terminals
 from vibroimpact.orchestrator.run.record import ImpactLimitReached
 
-FIRST_EDGE = 10_000
-"""Ticks from the start of a task to the first edge of its clock."""
 MOST_AT_ONCE = 20_000
 """Samples of one advance, so that a call never waits for long."""
 PERIOD = 0.002
@@ -39,6 +39,10 @@ class Board:
     ----------
     pace : Pace
         Where its time should be.
+    analog : Sampling
+        Its outputs and inputs.
+    served_at : float
+        When its time was 0, s since 1970.
     """
 
     def __init__(self, settings: RigSettings) -> None:
@@ -46,10 +50,12 @@ class Board:
         self.name, self.profile = settings.rig.name, PROFILES[settings.rig.device]
         self.plant = Plant(settings)
         self.tasks: dict[str, Task] = {}
-        self.held = np.zeros(self.profile.outputs)
+        self._terminals = Terminals(self.name, self.tasks)
+        self.analog = Sampling(settings, self.profile, self.plant)
         lock = threading.RLock()
         self.changed = threading.Condition(lock)
         self._work = threading.Condition(lock)  # wakes the clock, which calls that wait do not
+        self.served_at = time.time()
         self.pace = Pace(settings.rig.speed)
         self._closed = False
         self._lost: Refusal | None = None
@@ -150,26 +156,23 @@ class Board:
     def advance(self, target: int) -> None:
         """Let tasks and plant go on to a tick."""
         running = [task for task in self.tasks.values() if task.ticking]
-        updates = {task.name: task.generated(target) for task in running if task.kind == OUTPUT}
-        edges = {task.name: self._edges(task, target) for task in running if task.kind == INPUT}
-        parts = [*(ticks for ticks, _, _ in updates.values()), *(ticks.ravel() for ticks in edges.values())]
-        instants = np.unique(np.concatenate([*parts, [target]]))
-        instants = instants[instants > self.plant.now].astype(np.int64)
-        driven = self._driven(updates)
-        befores = np.concatenate([[self.plant.now], instants[:-1]])
         try:
-            seen = self.plant.advance(instants, driven(befores))
+            starved = self.analog.advance(running, target)
         except (ComponentError, UsageError, ImpactLimitReached) as error:
             raise self.lose(f"{self.name}, whose plant failed: {error}") from None
         for task in running:
-            if task.kind == INPUT:
-                ticks = edges[task.name]
-                if ticks.size:
-                    task.keep(self._codes(task, ticks, instants, seen, driven))
-                self._told(task, task.count + ticks.shape[1])
-        for task in running:
-            if task.kind == OUTPUT:
-                self._put_out(task, *updates[task.name])
+            self._end(task, task.name in starved)
+
+    def _end(self, task: Task, starved: bool) -> None:
+        """End a task that has all of its samples, or has lost some."""
+        if task.needed is not None and task.count >= task.needed:
+            task.finish()
+        elif starved:
+            task.finish(Refusal(DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, task.name))
+        elif task.kind == INPUT and task.overrun:
+            task.finish(Refusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, task.name))
+        if task.done:
+            self._terminals.end_followers(task)
 
     def lose(self, why: str) -> Refusal:
         """Let the device be gone, and with it all of its tasks; return what is said of it."""
@@ -181,75 +184,6 @@ class Board:
             self._wake()
         return self._lost
 
-    @staticmethod
-    def _edges(task: Task, target: int) -> Ticks:
-        """Return the ticks of the samples up to a tick, shape (channel, sample)."""
-        numbers = np.arange(task.count, task.edges_until(target))
-        late = task.skew * np.arange(len(task.channels))[:, np.newaxis]
-        found: Ticks = task.edge(numbers)[np.newaxis, :] + late
-        return found
-
-    def _driven(self, updates: dict[str, tuple[Ticks, Floats, bool]]) -> Callable[[Ticks], Floats]:
-        """Return the voltage that drives the force, by tick."""
-        number = self.settings.exciter.output
-        ticks, values = np.empty(0, dtype=np.int64), np.empty(0)
-        for name, (at, samples, _) in updates.items():
-            for place, channel in enumerate(self.tasks[name].channels):
-                if channel.number == number:
-                    ticks, values = at, samples[place]
-        levels = np.concatenate([[self.held[number]], values])
-        return lambda asked: levels[np.searchsorted(ticks, asked, side="right")]
-
-    def _codes(
-        self,
-        task: Task,
-        ticks: Ticks,
-        instants: Ticks,
-        seen: dict[str, Floats],
-        driven: Callable[[Ticks], Floats],
-    ) -> NDArray[np.int16]:
-        volts = np.zeros(ticks.shape)
-        sensors = {sensor.input: sensor for sensor in self.settings.sensors}
-        for place, channel in enumerate(task.channels):
-            sensor = sensors.get(channel.number)
-            if sensor is None:
-                continue
-            if sensor.quantity == "output":
-                values = driven(ticks[place] - 1)
-            else:
-                values = seen[sensor.quantity][np.searchsorted(instants, ticks[place])]
-            volts[place] = sensor.gain * values
-        return self._converted(task, volts)
-
-    @staticmethod
-    def _converted(task: Task, volts: Floats) -> NDArray[np.int16]:
-        highest = 2 ** (task.profile.bits - 1)
-        return np.clip(np.rint(volts / task.steps), -highest, highest - 1).astype(np.int16)
-
-    def _told(self, task: Task, count: int) -> None:
-        task.tell(count)
-        if task.needed is not None and task.count >= task.needed:
-            task.finish()
-        elif task.overrun:
-            task.finish(Refusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, task.name))
-
-    def _put_out(self, task: Task, ticks: Ticks, samples: Floats, starved: bool) -> None:
-        if ticks.size:
-            for place, channel in enumerate(task.channels):
-                self.held[channel.number] = samples[place, -1]
-        task.tell(task.count + ticks.size)
-        if task.needed is not None and task.count >= task.needed:
-            task.finish()
-        elif starved:
-            task.finish(Refusal(DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, task.name))
-        if task.done:
-            self._end_followers(task)
-
-    def _end_followers(self, task: Task) -> None:
-        """End inputs whose clock was that of an output that has ended."""
-        for other in self._followers(task, "SampleClock"):
-            other.start = None
-
     def read_now(self, task: Task, count: int) -> NDArray[np.int16]:
         """Return samples of a task without a clock, one conversion after the other; shape (channel, sample)."""
         self.catch_up()
@@ -259,17 +193,60 @@ class Board:
             if number:
                 self.advance(self.plant.now + step)
                 self.pace.wanted = max(self.pace.wanted, self.plant.now)
-            now = np.full((len(task.channels), 1), self.plant.now, dtype=np.int64)
-            seen = {name: np.array([value]) for name, value in self.plant.state.items()}
-            level = self._driven({})
-            codes[:, number] = self._codes(task, now, now[0], seen, level)[:, 0]
+            codes[:, number] = self.analog.now(task.channels)
         return codes
 
     def put_now(self, task: Task, values: Floats) -> None:
         """Let outputs of a task without a clock have values from now on."""
         self.catch_up()
         for channel, value in zip(task.channels, values, strict=True):
-            self.held[channel.number] = value
+            self.analog.held[channel.number] = value
+
+    # ---- faults ----
+
+    def overrun(self) -> int:
+        """Let inputs that run have lost samples, as if they were read too late; return how many did."""
+        return self._fail(INPUT, DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE)
+
+    def starve(self) -> int:
+        """Let outputs without regeneration that run have run empty; return how many did."""
+        return self._fail(OUTPUT, DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES)
+
+    def _fail(self, kind: int, error: DAQmxErrors) -> int:
+        with self.changed:
+            self.catch_up()
+            found = [
+                task
+                for task in self.tasks.values()
+                if task.kind == kind and task.ticking and (kind == INPUT or not task.regenerates)
+            ]
+            for task in found:
+                task.finish(Refusal(error, task.name))
+                self._terminals.end_followers(task)
+            self._wake()
+            return len(found)
+
+    def set_clock_error(self, error: float) -> None:
+        """Let the input clock go wrong by so many ppm from its next edge on."""
+        with self.changed:
+            self.catch_up()
+            self.analog.inputs.clock_error = error
+            for task in self.tasks.values():
+                if task.ticking and task.kind == INPUT and not self._terminals.has_clock_of_others(task):
+                    task.retune(self._true_rate(task))
+                    self._terminals.retune_followers(task)
+
+    def mend(self) -> None:
+        """Take all faults away; a device that is gone stays so."""
+        with self.changed:
+            self.analog.inputs.mend()
+            self.set_clock_error(self.analog.inputs.clock_error)
+
+    def _true_rate(self, task: Task) -> float:
+        """Return the rate that the clock of a task has, Hz."""
+        assert task.clock is not None
+        error = self.analog.inputs.clock_error if task.kind == INPUT else 0.0
+        return task.clock.rate * (1.0 + 1e-6 * error)
 
     # ---- states of tasks ----
 
@@ -302,80 +279,16 @@ class Board:
             self.catch_up()
             task.begin()
             if task.clock is not None:
-                task.rate = task.clock.rate
-                self._arm(task)
+                self._terminals.arm(task, self.plant.now, self._true_rate(task))
             self._wake()
-
-    def _arm(self, task: Task) -> None:
-        """Start the clock of a task, if what it waits for is there."""
-        assert task.clock is not None
-        if self._is_clock_of_others(task):
-            source = self._task_behind(task.clock.source, "SampleClock")
-            if source is not None and source.ticking:
-                task.rate = source.rate
-                task.start = int(source.edge(source.count))
-                self._set_off_by(task)
-            return
-        if task.trigger:
-            return  # an edge that is over starts nothing
-        task.start = self.plant.now + FIRST_EDGE
-        self._set_off_by(task)
-
-    def _is_clock_of_others(self, task: Task) -> bool:
-        """Return whether a task has the clock of the other direction, for which it waits."""
-        assert task.clock is not None
-        other = "ao" if task.kind == INPUT else "ai"
-        return task.clock.source.strip("/").lower() == f"{self.name}/{other}/SampleClock".lower()
-
-    def _set_off_by(self, task: Task) -> None:
-        """Start the tasks that wait for the clock or the trigger of one that has just started."""
-        assert task.start is not None
-        for other in self._followers(task, "StartTrigger"):
-            if other.state is State.running and other.start is None and not other.done:
-                other.start = task.start
-        for other in self._followers(task, "SampleClock"):
-            if other.state is State.running and other.start is None and not other.done:
-                other.rate = task.rate
-                other.start = task.start - round(other.count / (task.rate * TICK))  # it may go on
-
-    def _followers(self, task: Task, signal: str) -> list[Task]:
-        word = "ai" if task.kind == INPUT else "ao"
-        wanted = f"{self.name}/{word}/{signal}".lower()
-        found = []
-        for other in self.tasks.values():
-            source = other.trigger if signal == "StartTrigger" else other.clock.source if other.clock else ""
-            if other is not task and source.strip("/").lower() == wanted:
-                found.append(other)
-        return found
-
-    def _task_behind(self, terminal: str, signal: str) -> Task | None:
-        """Return the running task whose clock or trigger a terminal is."""
-        for task in self.tasks.values():
-            word = "ai" if task.kind == INPUT else "ao"
-            if (
-                task.state is State.running
-                and terminal.strip("/").lower() == f"{self.name}/{word}/{signal}".lower()
-            ):
-                return task
-        return None
 
     def pulse(self, terminal: str) -> int:
         """Put an edge on a terminal; return how many tasks it has started."""
         with self.changed:
             self.catch_up()
-            waiting = [
-                task
-                for task in self.tasks.values()
-                if task.state is State.running
-                and task.start is None
-                and not task.done
-                and task.trigger.strip("/").lower() == terminal.strip("/").lower()
-            ]
-            for task in waiting:
-                task.start = self.plant.now + FIRST_EDGE
-                self._set_off_by(task)
+            started = self._terminals.pulse(terminal, self.plant.now)
             self._wake()
-            return len(waiting)
+            return started
 
     def stop(self, task: Task) -> None:
         """Stop a task; an output holds its last value.
@@ -388,8 +301,7 @@ class Board:
         with self.changed:
             self.catch_up()
             failure = task.failure if task.kind == OUTPUT else None
-            for other in self._followers(task, "SampleClock"):
-                other.start = None
+            self._terminals.end_followers(task)
             task.stop()
             task.failure = None
             self.changed.notify_all()

@@ -16,6 +16,7 @@ from vibroimpact.hardware.virtual_rig.board import Board
 from vibroimpact.hardware.virtual_rig.plant import Floats
 from vibroimpact.hardware.virtual_rig.refusal import Refusal, text_of
 from vibroimpact.hardware.virtual_rig.tasks import INPUT, OUTPUT, Channel, Clock, EventStream, State, Task
+from vibroimpact.hardware.virtual_rig.waveforms import put_waveforms
 
 _ATTRIBUTE = re.compile(
     r"(Get|Set|Reset)(SystemInfo|Device|Task|Chan|TimingEx|Timing|Trig|Read|Write|Buffer)Attribute(\w*)"
@@ -360,6 +361,15 @@ class Calls:
         response.status, response.samps_read, response.num_bytes_per_samp = status, count, 2
         response.read_array = np.ascontiguousarray(codes.T).tobytes()
 
+    def do_read_analog_waveforms(self, request: Any, response: Any) -> None:
+        """Read volts with their time and the names of their channels."""
+        task = self._task(request)
+        mode = request.waveform_attribute_mode_raw or request.waveform_attribute_mode
+        with self._board.changed:
+            codes, steps, count, status = self._read(request, _MOST_AT_ONCE)
+            response.status, response.samps_per_chan_read = status, count
+            put_waveforms(response, task, codes * steps, mode, self._board.served_at)
+
     # ---- writes ----
 
     def do_write_analog_f64(self, request: Any, response: Any) -> None:
@@ -371,6 +381,15 @@ class Calls:
             raise Refusal(DAQmxErrors.WRITE_NUM_CHANS_MISMATCH, f"{values.size} values", written=0)
         by_scan = (request.data_layout_raw or request.data_layout) == _BY_SCAN
         samples = values.reshape(count, channels).T if by_scan else values.reshape(channels, count)
+        response.samps_per_chan_written = self._write(task, samples, request.auto_start, request.timeout)
+
+    def do_write_analog_waveforms(self, request: Any, response: Any) -> None:
+        """Write volts of waveforms, one for each channel."""
+        task, waves = self._task(request), [each.y_data for each in request.waveforms]
+        lengths = {len(each) for each in waves}
+        if task.kind == OUTPUT and (len(waves) != len(task.channels) or len(lengths) != 1 or 0 in lengths):
+            raise Refusal(DAQmxErrors.WRITE_NUM_CHANS_MISMATCH, f"{len(waves)} waveforms", written=0)
+        samples = np.array(waves, dtype=np.float64)
         response.samps_per_chan_written = self._write(task, samples, request.auto_start, request.timeout)
 
     def do_write_analog_scalar_f64(self, request: Any, response: Any) -> None:
@@ -489,7 +508,7 @@ class Calls:
             for task in list(self._board.tasks.values()):
                 task.kept = False
                 self._board.stop(task)
-            self._board.held[:] = 0.0
+            self._board.analog.held[:] = 0.0
 
     def do_self_test_device(self, request: Any, response: Any) -> None:
         """Say that the device is there."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from concurrent import futures
 from contextlib import contextmanager
@@ -55,7 +56,7 @@ class RigServer:
         self.address = f"{HOST}:{taken}"
         self.board = Board(settings)
         handlers = (_Handler(SERVICE, self._ni_handler), _Handler(control.SERVICE, self._control_handler))
-        self._calls, self._controls = Calls(self.board), control.Controls(self.board)
+        self._calls, self._controls = Calls(self.board), control.Controls(self.board, self.vanish)
         self._server.add_generic_rpc_handlers(handlers)
         self._server.start()
 
@@ -68,6 +69,10 @@ class RigServer:
         stopped = self._server.stop(0.2)
         self.board.close()
         stopped.wait()
+
+    def vanish(self) -> None:
+        """End all calls at once, as if the machine of the server were gone."""
+        threading.Thread(target=self._server.stop, args=(None,), name="rig end").start()
 
     # ---- NI's service ----
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -62,6 +63,25 @@ class SensorTable(BaseModel):
     gain: Annotated[FiniteFloat, Rule("a finite number", "V per SI unit")]
 
 
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """What an input is wired to.
+
+    Attributes
+    ----------
+    signal : str
+        Of the plant.
+    amplification : float
+        V for a unit of the signal.
+    output : int or None
+        The output that it is wired to, instead.
+    """
+
+    signal: str
+    amplification: float = 1.0
+    output: int | None = None
+
+
 class RigSettings(BaseModel):
     """A virtual rig."""
 
@@ -71,6 +91,16 @@ class RigSettings(BaseModel):
     rig: RigTable
     exciter: ExciterTable
     sensors: tuple[SensorTable, ...]
+
+    @property
+    def wires(self) -> dict[int, Wire]:
+        """What the inputs are wired to, by their numbers."""
+        return {
+            each.input: Wire(
+                each.quantity, each.gain, self.exciter.output if each.quantity == "output" else None
+            )
+            for each in self.sensors
+        }
 
     @property
     def scene(self) -> Path:

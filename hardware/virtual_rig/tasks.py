@@ -79,9 +79,15 @@ class Task:
     start : int or None
         Tick of the first edge of its clock; None: it does not run, or waits for a trigger.
     rate : float
-        Of the clock that runs, Hz.
+        Of the clock that runs, Hz; not quite what was asked for, where the clock is in error.
+    edges_before : int
+        Edges of the clock that were over when the task began.
     count : int
-        Edges of the clock that are over.
+        Edges of the clock that are over, with the samples of all channels.
+    sampled : list of int
+        Samples of each channel of an input; of inputs one after the other the first have more.
+    triggered : bool
+        The edge that it waits for has come, or it waits for none.
     done : bool
         It has ended by itself.
     failure : Refusal or None
@@ -98,13 +104,15 @@ class Task:
         self.trigger, self.trigger_edge = "", constants.Edge.RISING.value
         self.state, self.kept = State.verified, False
         self.start: int | None = None
-        self.rate = 0.0
+        self.last_start = 0
+        self.rate, self.edges_before = 0.0, 0
         self.count = 0
-        self.done = self.implicit = False
+        self.done = self.implicit = self.triggered = False
         self.failure: Refusal | None = None
         self.asked_buffer: int | None = None
         self.regeneration = ALLOW_REGENERATION
         self.buffer: NDArray[Any] = np.empty((0, 0))
+        self.sampled: list[int] = []
         self.position = 0  # samples per channel that the program has read or written
         self.every: EventStream | None = None
         self.ended: EventStream | None = None
@@ -196,16 +204,18 @@ class Task:
     def begin(self) -> None:
         """Be running, with no edge of the clock over."""
         self.state, self.done, self.failure = State.running, False, None
-        self.count = 0
+        self.count = self.edges_before = 0
         if self.every is not None:
             self.every.sent = 0
         if self.kind == INPUT and self.clock is not None:
             self.position = 0
+            self.sampled = [0] * len(self.channels)
             self.buffer = np.zeros((len(self.channels), self.default_buffer()), dtype=np.int16)
 
     def stop(self) -> None:
         """Stop; what was reserved by itself is given back."""
         self.state = State.reserved if self.kept else State.verified
+        self.last_start = self.last_start if self.start is None else self.start
         self.start = None
         if self.kind == OUTPUT:
             self.count = self.position = 0
@@ -223,9 +233,21 @@ class Task:
         return self.start is not None and not self.done
 
     def edge(self, number: Any) -> Any:
-        """Return the ticks of edges of the clock, by their numbers."""
-        assert self.start is not None
-        return self.start + np.rint(np.asarray(number) / (self.rate * TICK)).astype(np.int64)
+        """Return the ticks of edges of the clock, by their numbers; also of one that has just stopped."""
+        start = self.last_start if self.start is None else self.start
+        place = np.asarray(number) + self.edges_before
+        return start + np.rint(place / (self.rate * TICK)).astype(np.int64)
+
+    def follow(self, other: Task) -> None:
+        """Have the clock of another task, from its next edge on."""
+        self.start, self.rate = other.start, other.rate
+        self.edges_before = other.edges_before + other.count - self.count
+
+    def retune(self, rate: float) -> None:
+        """Go on at another rate from the next edge on."""
+        following = int(self.edge(self.count))
+        self.start = following - round((self.count + self.edges_before) / (rate * TICK))
+        self.rate = rate
 
     @property
     def limit(self) -> int:
@@ -238,13 +260,12 @@ class Task:
         return int(self.edge(last)) - 1
 
     def edges_until(self, tick: int) -> int:
-        """Return how many edges there are up to a tick, it included, the skew of the last channel over."""
+        """Return how many edges there are up to a tick, it included."""
         assert self.start is not None
-        left = tick - self.start - self.skew * (len(self.channels) - 1)
-        if left < 0:
+        if tick < self.start:
             return 0
-        count = int(left * TICK * self.rate) + 2
-        while count > 0 and int(self.edge(count - 1)) > tick - self.skew * (len(self.channels) - 1):
+        count = max(int((tick - self.start) * TICK * self.rate) + 2 - self.edges_before, 0)
+        while count > 0 and int(self.edge(count - 1)) > tick:
             count -= 1
         return count if self.needed is None else min(count, self.needed)
 
@@ -297,12 +318,21 @@ class Task:
         """Whether samples that nobody has read are lost."""
         return self.available > self.length
 
-    def keep(self, codes: NDArray[np.int16]) -> None:
-        """Put samples into the buffer, shape (channel, sample)."""
-        count = codes.shape[1]
-        kept = codes[:, -self.length :]
-        places = (self.count + count - kept.shape[1] + np.arange(kept.shape[1])) % self.length
-        self.buffer[:, places] = kept
+    def samples_until(self, tick: int) -> list[Ticks]:
+        """Return for each channel the ticks of its samples up to a tick."""
+        found = []
+        for place, count in enumerate(self.sampled):
+            late = self.skew * place
+            found.append(self.edge(np.arange(count, self.edges_until(tick - late))) + late)
+        return found
+
+    def keep(self, place: int, codes: NDArray[np.int16]) -> None:
+        """Put samples of a channel into the buffer."""
+        count = codes.size
+        kept = codes[-self.length :]
+        last = self.sampled[place] + count
+        self.buffer[place, np.arange(last - kept.size, last) % self.length] = kept
+        self.sampled[place] = last
 
     def take(self, count: int) -> NDArray[np.int16]:
         """Return the next samples, shape (channel, sample), which count as read."""

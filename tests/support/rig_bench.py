@@ -49,7 +49,7 @@ class Bench:
         """Forget all tasks; outputs go to 0."""
         for task in list(self.server.board.tasks.values()):
             self.server.board.remove(task)
-        self.server.board.held[:] = 0.0
+        self.server.board.analog.held[:] = 0.0
 
 
 @contextmanager

@@ -247,6 +247,35 @@ def test_an_input_on_the_clock_of_an_output_waits_for_it(bench: Bench) -> None:
         np.testing.assert_allclose(task.read(9)[1:], np.arange(1.0, 9.0), atol=BITS_16)
 
 
+def test_an_input_may_wait_for_an_edge_and_for_the_clock_of_an_output(bench: Bench) -> None:
+    with (
+        bench.outputs(rate=1000.0, sample_mode=CONTINUOUS) as drive,
+        bench.inputs("Dev1/ai2", 1000.0, source="/Dev1/ao/SampleClock", samps_per_chan=9) as task,
+    ):
+        drive.write(np.arange(1.0, 9.0))
+        task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/PFI3")
+        task.start()
+        drive.start()
+        bench.control.advance(0.0985)
+        assert task.in_stream.avail_samp_per_chan == 0
+        bench.control.pulse("/Dev1/PFI3")
+        seen = task.read(9)
+    # 99 edges are over: the next is the fourth of its round
+    np.testing.assert_allclose(seen, [3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 1.0, 2.0, 3.0], atol=BITS_16)
+
+
+def test_an_input_that_waits_for_the_start_of_an_output_has_its_clock_too(bench: Bench) -> None:
+    with (
+        bench.outputs(rate=1000.0, sample_mode=CONTINUOUS) as drive,
+        bench.inputs("Dev1/ai2", 1000.0, source="/Dev1/ao/SampleClock", samps_per_chan=9) as task,
+    ):
+        drive.write(np.arange(1.0, 9.0))
+        task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev1/ao/StartTrigger")
+        task.start()
+        drive.start()
+        np.testing.assert_allclose(task.read(9)[1:], np.arange(1.0, 9.0), atol=BITS_16)
+
+
 def test_an_input_goes_on_when_the_clock_of_its_output_does(bench: Bench) -> None:
     with (
         bench.outputs(rate=1000.0, samps_per_chan=8) as drive,
@@ -377,6 +406,23 @@ def test_a_lab_pc_samples_one_input_after_the_other() -> None:
     # 12 us for a conversion: the velocity is that much later than the displacement
     slope = np.gradient(displacement / 500.0, 1e-4)
     assert np.corrcoef(slope[20:-20], velocity[20:-20])[0, 1] > 0.9
+
+
+def test_a_scan_of_a_lab_pc_is_the_same_when_time_stops_in_the_middle_of_it() -> None:
+    def displacements(steps: int) -> Any:
+        with opened_bench(ROOT / "examples" / "rig" / "beam.toml") as bench, bench.task() as task:
+            task.ai_channels.add_ai_voltage_chan("Dev1/ai0:1", min_val=-5, max_val=5)
+            task.timing.cfg_samp_clk_timing(10_000.0, samps_per_chan=100)
+            with bench.task() as drive:
+                drive.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-5, max_val=5)
+                drive.write(5.0)
+            task.start()
+            for _ in range(steps):
+                bench.control.advance(3e-6)
+            return task.read(100)
+
+    assert np.ptp(displacements(0)[1]) > 0.0
+    np.testing.assert_array_equal(displacements(100), displacements(0))
 
 
 def test_a_device_that_is_gone_ends_the_read_that_waits_and_is_said_from_then_on() -> None:

@@ -1,0 +1,65 @@
+"""The analog inputs of a device: voltages on their wires become codes of the converter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.hardware.virtual_rig.plant import Floats
+from vibroimpact.hardware.virtual_rig.tasks import Channel
+
+
+class Inputs:
+    """Converts voltages, and has the faults that a test gives it.
+
+    Parameters
+    ----------
+    bits : int
+        Of the converter.
+
+    Attributes
+    ----------
+    stuck : dict of int to float or None
+        V that an input keeps, by its number; None: what it converts next.
+    clipped : dict of int to float
+        V, to both sides of 0, at which an input ends.
+    clock_error : float
+        Of the input clock against true time, which the output clock keeps, ppm.
+    """
+
+    def __init__(self, bits: int, clock_error: float = 0.0) -> None:
+        self._bits = bits
+        self._usual_error = clock_error
+        self.stuck: dict[int, float | None] = {}
+        self.clipped: dict[int, float] = {}
+        self.clock_error = clock_error
+
+    def mend(self) -> None:
+        """Take all faults away."""
+        self.stuck.clear()
+        self.clipped.clear()
+        self.clock_error = self._usual_error
+
+    def codes(self, channel: Channel, volts: Floats) -> NDArray[np.int16]:
+        """Return the codes of voltages on the wire of an input, shape (sample,)."""
+        if channel.number in self.clipped and volts.size:
+            end = self.clipped[channel.number]
+            volts = np.clip(volts, -end, end)
+        if channel.number in self.stuck and volts.size:
+            kept = self.stuck[channel.number]
+            self.stuck[channel.number] = kept = float(volts[0]) if kept is None else kept
+            volts = np.full(volts.shape, kept)
+        highest = 2 ** (self._bits - 1)
+        step = channel.device_range / highest
+        found: NDArray[np.int16] = np.clip(np.rint(volts / step), -highest, highest - 1).astype(np.int16)
+        return found
+
+    def faults(self, device: str) -> Mapping[str, object]:
+        """Return the faults, as the control service says them."""
+        return {
+            "stuck": {f"{device}/ai{number}": volts for number, volts in self.stuck.items()},
+            "clipped": {f"{device}/ai{number}": volts for number, volts in self.clipped.items()},
+            "clock_error": self.clock_error,
+        }
