@@ -8,7 +8,14 @@ from pathlib import Path, PurePosixPath
 
 CORE = Path(__file__).parents[2] / "fmus" / "native" / "core"
 #: Folders from the ground up; those of one floor do not know each other.
-FLOORS = ((".",), ("motion",), ("contact", "modes"), ("body",), ("body/one_mass", "body/modal"), ("door",))
+FLOORS = (
+    (".",),
+    ("motion",),
+    ("contact", "measuring", "modes"),
+    ("body",),
+    ("body/one_mass", "body/modal"),
+    ("door",),
+)
 
 INCLUDED = re.compile(r'^#include "([^"]+)"$', re.MULTILINE)
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)

@@ -1,0 +1,379 @@
+"""Measuring chains: sensors, load cells, exciters, noise and converters, by the C functions of their FMUs."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from functools import cache
+from operator import index
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vibroimpact.fmus.core.library import core_library
+from vibroimpact.fmus.errors import UsageError
+
+Array = NDArray[np.float64]
+
+#: Sides of a body on which an exciter may be, each with its number in the FMU.
+EXCITER_SIDES = {"lower": 1, "upper": 2}
+MOST_BITS = 32
+#: Relative rounding by which an impact may lie before or after a block.
+_SAME_INSTANT = 1e-12
+
+
+class _Settings(ctypes.Structure):
+    _fields_ = [
+        (name, ctypes.c_double)
+        for name in (
+            "sensitivity",
+            "natural_frequency",
+            "damping_ratio",
+            "offset",
+            "drift",
+            "contact_duration",
+        )
+    ]
+
+
+class LoadCell:
+    """A load cell: a voltage of the force on it, with the ring of the cell.
+
+    y'' + 2 damping_ratio w y' + w^2 y = w^2 force, w = 2 pi natural_frequency; the output is
+    sensitivity y + offset + drift time. An impact on a rigid stop is a half sine that begins with it and has its
+    impulse: the peak is pi impulse / (2 contact_duration).
+
+    Parameters
+    ----------
+    sensitivity : float
+        V/N.
+    natural_frequency : float
+        Hz, >= 0; 0: the cell does not ring, y is the force.
+    damping_ratio : float
+        >= 0.
+    offset, drift : float
+        Zero of the output, V, and how it goes on from time 0, V/s.
+    contact_duration : float
+        Of an impact, s, >= 0; 0: no impacts come.
+
+    Raises
+    ------
+    UsageError
+        A number is out of its range.
+
+    Examples
+    --------
+    >>> cell = LoadCell(0.01, contact_duration=1e-3)
+    >>> cell.follow([0.0, 0.5e-3, 1e-3], [0.0, 0.0, 0.0], [0.0], [2e-3 / np.pi]).round(12).tolist()
+    [0.0, 0.01, 0.0]
+    """
+
+    def __init__(
+        self,
+        sensitivity: float,
+        natural_frequency: float = 0.0,
+        damping_ratio: float = 0.0,
+        offset: float = 0.0,
+        drift: float = 0.0,
+        contact_duration: float = 0.0,
+    ) -> None:
+        for name, value in (("sensitivity", sensitivity), ("offset", offset), ("drift", drift)):
+            _check(math.isfinite(value), f"LoadCell: {name}", "a finite number", value)
+        for name, value in (
+            ("natural_frequency", natural_frequency),
+            ("damping_ratio", damping_ratio),
+            ("contact_duration", contact_duration),
+        ):
+            _check(0.0 <= value < math.inf, f"LoadCell: {name}", "a finite number >= 0", value)
+        self._settings = _Settings(
+            sensitivity, natural_frequency, damping_ratio, offset, drift, contact_duration
+        )
+        self._cell = ctypes.create_string_buffer(_library().vi_door_cell_size())
+        self._reached: float | None = None
+
+    @property
+    def time(self) -> float | None:
+        """End of the last block, s; None before the first."""
+        return self._reached
+
+    def follow(
+        self, times: ArrayLike, forces: ArrayLike, impact_times: ArrayLike = (), impulses: ArrayLike = ()
+    ) -> Array:
+        """Return the output at instants, going on from the block before.
+
+        Exact for a force that goes straight between the instants, and from the last of the block before. The first
+        block begins at its first instant or impact, settled under its first force.
+
+        Parameters
+        ----------
+        times : array_like, shape (sample,)
+            s, ascending, not before the block before has ended.
+        forces : array_like, shape (sample,)
+            On the cell at these instants, N, without impacts.
+        impact_times, impulses : array_like, shape (impact,)
+            Instants of impacts on a rigid stop, s, ascending, between the end of the block before and that of this one;
+            what they gave, N s.
+
+        Returns
+        -------
+        ndarray, shape (sample,)
+            V.
+
+        Raises
+        ------
+        UsageError
+            Numbers that are not finite, instants out of order, an impact outside of the block, impacts where
+            contact_duration is 0, or more than 2048 within one contact_duration (the cell is then of no further use).
+        """
+        at, force = _row("LoadCell: times", times), _row("LoadCell: forces", forces)
+        hits, impulse = _row("LoadCell: impact_times", impact_times), _row("LoadCell: impulses", impulses)
+        self._check_block(at, force, hits, impulse)
+        volts = np.empty_like(at)
+        if not len(at):
+            return volts
+        library = _library()
+        if self._reached is None:
+            start = min(at[0], hits[0]) if len(hits) else at[0]
+            library.vi_door_cell_start(self._cell, self._settings, start, force[0])
+        status = library.vi_door_cell_follow(
+            self._cell, len(at), _data(at), _data(force), len(hits), _data(hits), _data(impulse), _data(volts)
+        )
+        self._reached = float(at[-1])
+        if status:
+            raise UsageError(
+                "LoadCell: impact_times: expected at most 2048 impacts within one contact_duration "
+                f"({self._settings.contact_duration:g} s), got more. Take a shorter contact_duration."
+            )
+        return volts
+
+    def _check_block(self, at: Array, force: Array, hits: Array, impulse: Array) -> None:
+        _check(len(at) == len(force), "LoadCell: forces", f"as many as times ({len(at)})", len(force))
+        _check(
+            len(hits) == len(impulse),
+            "LoadCell: impulses",
+            f"as many as impact_times ({len(hits)})",
+            len(impulse),
+        )
+        for name, row in (("times", at), ("impact_times", hits)):
+            _check(not np.any(np.diff(row) < 0.0), f"LoadCell: {name}", "ascending instants", "others")
+        begin = -math.inf if self._reached is None else self._reached
+        if len(at):
+            _check(at[0] >= begin, "LoadCell: times", f"none before {begin:.12g} s", at[0])
+        if not len(hits):
+            return
+        duration = self._settings.contact_duration
+        _check(duration > 0.0, "LoadCell: contact_duration", "a number > 0 where impacts come", duration)
+        end = at[-1] if len(at) else begin
+        room = _SAME_INSTANT * (1.0 + abs(end))
+        inside = hits[0] >= begin - room and hits[-1] <= end + room
+        outside = hits[0] if hits[0] < begin - room else hits[-1]
+        _check(inside, "LoadCell: impact_times", f"impacts from {begin:.12g} to {end:.12g} s", outside)
+
+
+def gaussian(seed: int, channel: int, first: int, count: int) -> Array:
+    """Return Gaussian numbers of mean 0 and variance 1 that depend on their place alone.
+
+    The same bits on every machine, however many are asked for at once.
+
+    Parameters
+    ----------
+    seed, channel : int
+        0 to 2^64 - 1; each pair has a sequence of its own.
+    first, count : int
+        Of the sequence, >= 0.
+
+    Returns
+    -------
+    ndarray, shape (count,)
+
+    Raises
+    ------
+    UsageError
+        A number is out of its range.
+
+    Examples
+    --------
+    >>> bool(np.array_equal(gaussian(1, 0, 0, 8)[5:], gaussian(1, 0, 5, 3)))
+    True
+    """
+    seed, channel, first, count = index(seed), index(channel), index(first), index(count)
+    for name, value in (("seed", seed), ("channel", channel), ("first", first)):
+        _check(0 <= value < 2**64, f"gaussian: {name}", "0 to 2^64 - 1", value)
+    _check(0 <= count <= 2**64 - first, "gaussian: count", ">= 0, and no number beyond 2^64", count)
+    numbers = np.empty(count)
+    _library().vi_door_gaussian(seed, channel, first, count, _data(numbers))
+    return numbers
+
+
+def digitised(volts: ArrayLike, highest: float, bits: int) -> Array:
+    """Return what an analog-to-digital converter leaves of voltages.
+
+    Parameters
+    ----------
+    volts : array_like, shape (sample,)
+        V.
+    highest : float
+        The range is +-highest, V, > 0.
+    bits : int
+        1 to 32.
+
+    Returns
+    -------
+    ndarray, shape (sample,)
+        The nearest of the 2^bits levels -highest, -highest + step, ..., highest - step; NaN stays NaN.
+
+    Raises
+    ------
+    UsageError
+        A number is out of its range.
+
+    Examples
+    --------
+    >>> digitised([-7.0, 0.3, 7.0], 4.0, 3).tolist()
+    [-4.0, 0.0, 3.0]
+    """
+    _check(0.0 < highest < math.inf, "digitised: highest", "a finite number > 0", highest)
+    bits = index(bits)
+    _check(1 <= bits <= MOST_BITS, "digitised: bits", f"1 to {MOST_BITS}", bits)
+    row = _row("digitised: volts", volts, finite=False)
+    levels = np.empty_like(row)
+    _library().vi_door_digitised(len(row), _data(row), highest, bits, _data(levels))
+    return levels
+
+
+def sensor_reading(values: ArrayLike, gain: float, offset: float = 0.0, highest: float = 0.0) -> Array:
+    """Return gain * value + offset, ended at +-highest.
+
+    Parameters
+    ----------
+    values : array_like, shape (sample,)
+        In the unit of the sensor.
+    gain, offset : float
+        V per unit, V.
+    highest : float
+        V, >= 0; 0: the reading has no end.
+
+    Returns
+    -------
+    ndarray, shape (sample,)
+        V; NaN stays NaN.
+
+    Raises
+    ------
+    UsageError
+        A number is out of its range.
+
+    Examples
+    --------
+    >>> sensor_reading([0.001, 0.02], 1e3, 0.5, 10.0).tolist()
+    [1.5, 10.0]
+    """
+    for name, value in (("gain", gain), ("offset", offset)):
+        _check(math.isfinite(value), f"sensor_reading: {name}", "a finite number", value)
+    _check(0.0 <= highest < math.inf, "sensor_reading: highest", "a finite number >= 0", highest)
+    row = _row("sensor_reading: values", values, finite=False)
+    volts = np.empty_like(row)
+    _library().vi_door_reading(len(row), _data(row), gain, offset, highest, _data(volts))
+    return volts
+
+
+def exciter_force(
+    volts: ArrayLike,
+    displacement: ArrayLike,
+    gain: float,
+    offset: float = 0.0,
+    distance: float = 0.0,
+    side: str = "lower",
+) -> Array:
+    """Return the force of an exciter: (gain volts + offset) / (1 + s displacement / distance)^2.
+
+    s is 1 for an exciter below the body, -1 for one above it.
+
+    Parameters
+    ----------
+    volts : array_like, shape (sample,)
+        V.
+    displacement : array_like, shape (sample,)
+        Of the body where the force acts, m; one number for all is enough.
+    gain, offset : float
+        N/V and N, at displacement 0.
+    distance : float
+        Between body and exciter at displacement 0, m, >= 0; 0: the force does not depend on it.
+    side : str
+        `lower`: below the body, nearer where the displacement is negative; or `upper`.
+
+    Returns
+    -------
+    ndarray, shape (sample,)
+        N.
+
+    Raises
+    ------
+    UsageError
+        A number is out of its range, or the body touches the exciter.
+
+    Examples
+    --------
+    >>> exciter_force([1.0, 1.0], [0.0, 0.01], 2.0, distance=0.01).tolist()
+    [2.0, 0.5]
+    """
+    for name, value in (("gain", gain), ("offset", offset)):
+        _check(math.isfinite(value), f"exciter_force: {name}", "a finite number", value)
+    _check(0.0 <= distance < math.inf, "exciter_force: distance", "a finite number >= 0", distance)
+    _check(side in EXCITER_SIDES, "exciter_force: side", "lower or upper", repr(side))
+    row = _row("exciter_force: volts", volts, finite=False)
+    place = _row(
+        "exciter_force: displacement", np.broadcast_to(np.asarray(displacement, dtype=np.float64), row.shape)
+    )
+    forces = np.empty_like(row)
+    done = _library().vi_door_magnet(
+        len(row), _data(row), _data(place), gain, offset, distance, EXCITER_SIDES[side], _data(forces)
+    )
+    if done < len(row):
+        raise UsageError(
+            f"exciter_force: displacement: expected a body that does not touch it ({side}, {distance:g} m away), "
+            f"got {place[done]:g} m at sample {done}."
+        )
+    return forces
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    library = core_library()
+    number, size, pointer, word = ctypes.c_double, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_uint64
+    library.vi_door_cell_size.argtypes, library.vi_door_cell_size.restype = [], size
+    library.vi_door_cell_start.argtypes = [pointer, ctypes.POINTER(_Settings), number, number]
+    library.vi_door_cell_start.restype = None
+    library.vi_door_cell_follow.argtypes = [
+        pointer, size, pointer, pointer, size, pointer, pointer, pointer,
+    ]  # fmt: skip
+    library.vi_door_gaussian.argtypes = [word, word, word, size, pointer]
+    library.vi_door_gaussian.restype = None
+    library.vi_door_digitised.argtypes = [size, pointer, number, ctypes.c_int, pointer]
+    library.vi_door_digitised.restype = None
+    library.vi_door_reading.argtypes = [size, pointer, number, number, number, pointer]
+    library.vi_door_reading.restype = None
+    library.vi_door_magnet.argtypes = [
+        size, pointer, pointer, number, number, number, ctypes.c_int, pointer,
+    ]  # fmt: skip
+    library.vi_door_magnet.restype = size
+    return library
+
+
+def _data(row: Array) -> int:
+    return row.ctypes.data
+
+
+def _row(what: str, values: ArrayLike, *, finite: bool = True) -> Array:
+    row = np.ascontiguousarray(np.atleast_1d(np.asarray(values, dtype=np.float64)))
+    if row.ndim != 1:
+        raise UsageError(f"{what}: expected a row of numbers, got an array of shape {row.shape}.")
+    if finite and not np.all(np.isfinite(row)):
+        place = int(np.argmin(np.isfinite(row)))
+        raise UsageError(f"{what}: expected finite numbers, got {row[place]} at place {place}.")
+    return row
+
+
+def _check(good: bool, what: str, expected: str, got: object) -> None:
+    if not good:
+        raise UsageError(f"{what}: expected {expected}, got {got}.")

@@ -1,0 +1,26 @@
+/* An analog-to-digital converter: when it samples, and what is left of a voltage. */
+#ifndef VIBROIMPACT_CONVERTER_H
+#define VIBROIMPACT_CONVERTER_H
+
+#include <stdint.h>
+
+enum { VI_FEWEST_BITS = 1, VI_MOST_BITS = 32 };
+
+/* The edges of a sample clock. */
+typedef struct {
+    double rate;        /* 1/s, > 0, by the clock itself */
+    double clock_error; /* ppm, > -1e6: by how much the clock is fast */
+    double skew;        /* s: how long after the edge this channel is sampled */
+} vi_sample_clock;
+
+/* The instant of edge `k`, s. */
+double vi_sample_time(const vi_sample_clock *clock, int64_t k);
+
+/* The first edge that is later than `time`, s, by more than the rounding of both. */
+int64_t vi_sample_after(const vi_sample_clock *clock, double time);
+
+/* The nearest to `volts` of the 2^bits levels -highest, -highest + step, ..., highest - step with step = 2 highest / 2^bits: what lies
+ * beyond them is clipped. What is no number stays none. */
+double vi_digitised(double volts, double highest, int bits);
+
+#endif
