@@ -3,24 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 from vibroimpact.hardware.daqmx import DAQmxErrors, constants
 from vibroimpact.hardware.virtual_rig.board import Board
+from vibroimpact.hardware.virtual_rig.checks import verify
+from vibroimpact.hardware.virtual_rig.names import expanded
 from vibroimpact.hardware.virtual_rig.refusal import Refusal
-from vibroimpact.hardware.virtual_rig.tasks import ALLOW_REGENERATION, FINITE, INPUT, OUTPUT, Channel, Task
+from vibroimpact.hardware.virtual_rig.tasks import (
+    FINITE,
+    INPUT,
+    Channel,
+    Task,
+)
 
 VERSION = (24, 5, 0)
 """Of the driver whose behaviour is modelled."""
 
 _VOLTAGE = constants.UsageTypeAI.VOLTAGE.value
 _VOLTS = constants.VoltageUnits.VOLTS.value
-_ON_DEMAND = constants.SampleTimingType.ON_DEMAND.value
-_SAMPLE_CLOCK = constants.SampleTimingType.SAMPLE_CLOCK.value
-_DIGITAL_EDGE = constants.TriggerType.DIGITAL_EDGE.value
-_NO_TRIGGER = constants.TriggerType.NONE.value
+ON_DEMAND = constants.SampleTimingType.ON_DEMAND.value
+SAMPLE_CLOCK = constants.SampleTimingType.SAMPLE_CLOCK.value
+DIGITAL_EDGE = constants.TriggerType.DIGITAL_EDGE.value
+NO_TRIGGER = constants.TriggerType.NONE.value
 _BITS = constants.ResolutionType.BITS.value
+OVERWRITE = constants.OverwriteMode.OVERWRITE_UNREAD_SAMPLES.value
+DO_NOT_OVERWRITE = constants.OverwriteMode.DO_NOT_OVERWRITE_UNREAD_SAMPLES.value
+_PHYSICAL_CHANNEL = 0x18F5
+# bits of the set of terminal configurations of an input or output
+_RSE, _NRSE, _DIFFERENTIAL = 1, 2, 4
 
 
 def terminals(board: Board, word: str) -> str:
@@ -69,18 +80,17 @@ TASK: dict[int, Callable[[Task], Any]] = {
     0x2181: lambda task: len(task.channels),
 }
 TIMING: dict[int, Callable[[Task], Any]] = {
-    0x1347: lambda task: _ON_DEMAND if task.clock is None else _SAMPLE_CLOCK,
-    0x1344: lambda task: _clock(task).rate,
-    0x1300: lambda task: _clock(task).mode,
-    0x1310: lambda task: _clock(task).samples,
-    0x1852: lambda task: _clock(task).source,
-    0x1301: lambda task: _clock(task).edge,
+    0x1347: lambda task: SAMPLE_CLOCK if task.clocked else ON_DEMAND,
+    0x1344: lambda task: task.timing.rate,
+    0x1300: lambda task: task.timing.mode,
+    0x1310: lambda task: task.timing.samples,
+    0x1852: lambda task: task.timing.source or f"/{task.device}/{_word(task)}/SampleClockTimebase",
+    0x1301: lambda task: task.timing.edge,
     0x22C8: lambda task: task.highest_rate,
     0x1848: lambda task: task.profile.conversion_rate,
 }
-_CLOCK_FIELDS = {0x1344: "rate", 0x1300: "mode", 0x1310: "samples", 0x1852: "source"}
 TRIGGER: dict[int, Callable[[Task], Any]] = {
-    0x1393: lambda task: _DIGITAL_EDGE if task.trigger else _NO_TRIGGER,
+    0x1393: lambda task: DIGITAL_EDGE if task.trigger else NO_TRIGGER,
     0x1407: lambda task: task.trigger,
     0x1404: lambda task: task.trigger_edge,
 }
@@ -92,6 +102,9 @@ READ: dict[int, Callable[[Task], Any]] = {
     0x1221: lambda task: task.position,
     0x192A: lambda task: task.count,
     0x1215: lambda task: False,  # read what is there rather than all of a finite task
+    0x190A: lambda task: task.relative,
+    0x190B: lambda task: task.offset,
+    0x1211: lambda task: OVERWRITE if task.overwrites else DO_NOT_OVERWRITE,
     0x217A: lambda task: task.profile.bits // 8 + bool(task.profile.bits % 8),
 }
 WRITE: dict[int, Callable[[Task], Any]] = {
@@ -109,14 +122,22 @@ BUFFER: dict[int, Callable[[Task], Any]] = {
 }
 ANY_CHANNEL: dict[int, Callable[[Task, Channel], Any]] = {
     0x187F: lambda task, channel: task.kind,
-    0x18F5: lambda task, channel: physical_name(task, channel),
+    _PHYSICAL_CHANNEL: lambda task, channel: physical_name(task, channel),
     0x1926: lambda task, channel: "",
+}
+PHYSICAL: dict[tuple[str, int], Callable[[Board], Any]] = {
+    ("ai", 0x2342): lambda board: _RSE | _NRSE | _DIFFERENTIAL,
+    ("ai", 0x2FD7): lambda board: [_VOLTAGE],
+    ("ao", 0x29A3): lambda board: _RSE,
+    ("ao", 0x2FD9): lambda board: [_VOLTAGE],
 }
 INPUT_CHANNEL: dict[int, Callable[[Task, Channel], Any]] = {
     0x0695: lambda task, channel: _VOLTAGE,
     0x1094: lambda task, channel: _VOLTS,
-    0x17DD: lambda task, channel: channel.high,
-    0x17DE: lambda task, channel: channel.low,
+    # what was asked for, widened to what the device measures
+    0x17DD: lambda task, channel: channel.device_range,
+    0x17DE: lambda task, channel: -channel.device_range,
+    0x1097: lambda task, channel: channel.wiring,
     0x1815: lambda task, channel: channel.device_range,
     0x1816: lambda task, channel: -channel.device_range,
     0x1764: lambda task, channel: _BITS,
@@ -132,6 +153,7 @@ OUTPUT_CHANNEL: dict[int, Callable[[Task, Channel], Any]] = {
     0x1187: lambda task, channel: channel.low,
     0x182E: lambda task, channel: channel.device_range,
     0x182D: lambda task, channel: -channel.device_range,
+    0x182B: lambda task, channel: _BITS,
     0x182C: lambda task, channel: float(task.profile.bits),
 }
 OF_TASKS = {"Task": TASK, "Timing": TIMING, "Trig": TRIGGER, "Read": READ, "Write": WRITE, "Buffer": BUFFER}
@@ -139,17 +161,17 @@ OF_TASKS = {"Task": TASK, "Timing": TIMING, "Trig": TRIGGER, "Read": READ, "Writ
 
 def physical_name(task: Task, channel: Channel) -> str:
     """Return the input or output that a channel is."""
-    return f"{task.device}/{'ai' if task.kind == INPUT else 'ao'}{channel.number}"
+    if channel.output is not None:
+        return f"{task.device}/_ao{channel.output}_vs_aognd"
+    return f"{task.device}/{_word(task)}{channel.number}"
+
+
+def _word(task: Task) -> str:
+    return "ai" if task.kind == INPUT else "ao"
 
 
 def _names(task: Task) -> str:
     return ", ".join(channel.name for channel in task.channels)
-
-
-def _clock(task: Task) -> Any:
-    if task.clock is None:
-        raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"{task.name} has no sample clock")
-    return task.clock
 
 
 def default_count(task: Task) -> int:
@@ -159,7 +181,8 @@ def default_count(task: Task) -> int:
     return task.clock.samples if task.clock.mode == FINITE else task.available
 
 
-def _refuse(group: str, number: int) -> Refusal:
+def unknown(group: str, number: int) -> Refusal:
+    """Return what refuses an attribute that is not modelled."""
     return Refusal(
         DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"attribute 0x{number:04X} of {group.lower()}"
     )
@@ -168,15 +191,27 @@ def _refuse(group: str, number: int) -> Refusal:
 def of_device(board: Board, number: int) -> Any:
     """Return an attribute of the device."""
     if number not in DEVICE:
-        raise _refuse("device", number)
+        raise unknown("device", number)
     return DEVICE[number](board)
 
 
 def of_system(board: Board, number: int) -> Any:
     """Return an attribute of the system."""
     if number not in SYSTEM:
-        raise _refuse("system", number)
+        raise unknown("system", number)
     return SYSTEM[number](board)
+
+
+def of_physical_channel(board: Board, name: str, number: int) -> Any:
+    """Return an attribute of an input or output of the device."""
+    word = next(
+        (w for w in ("ai", "ao") if name.strip().lower() in terminals(board, w).lower().split(", ")), ""
+    )
+    if not word:
+        raise Refusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, repr(name[:60]))
+    if (word, number) not in PHYSICAL:
+        raise unknown("physical channel", number)
+    return PHYSICAL[word, number](board)
 
 
 def of_task(group: str, task: Task, number: int) -> Any:
@@ -184,40 +219,31 @@ def of_task(group: str, task: Task, number: int) -> Any:
     if group == "Task" and number == 0x230E:
         return task.device if task.channels else ""
     if number not in OF_TASKS[group]:
-        raise _refuse(group, number)
+        raise unknown(group, number)
+    if group == "Timing":
+        verify(task)
     return OF_TASKS[group][number](task)
 
 
-def of_channel(task: Task, name: str, number: int) -> Any:
-    """Return an attribute of a channel; of the first where several are named, or none."""
-    first = name.split(",")[0].strip()
-    chosen = [channel for channel in task.channels if first in ("", channel.name)]
-    if not chosen:
-        raise Refusal(DAQmxErrors.CHAN_NOT_IN_TASK, first)
-    own = INPUT_CHANNEL if task.kind == INPUT else OUTPUT_CHANNEL
-    table = ANY_CHANNEL | own
+def channels_of(task: Task, names: str) -> list[Channel]:
+    """Return the channels of a list of names; all, where there is none."""
+    asked = expanded(names)
+    known = {channel.name.lower(): channel for channel in task.channels}
+    lost = [name for name in asked if name.lower() not in known]
+    if lost or not task.channels:
+        raise Refusal(DAQmxErrors.CHAN_NOT_IN_TASK, ", ".join(lost)[:60])
+    return [known[name.lower()] for name in asked] or task.channels
+
+
+def of_channel(task: Task, names: str, number: int) -> Any:
+    """Return an attribute of a channel; where several are named, or none, all of them must have the same."""
+    table = ANY_CHANNEL | (INPUT_CHANNEL if task.kind == INPUT else OUTPUT_CHANNEL)
+    chosen = channels_of(task, names)
     if number not in table:
-        raise _refuse("channel", number)
-    return table[number](task, chosen[0])
-
-
-def change(group: str, task: Task, number: int, value: Any) -> None:
-    """Change an attribute of a task."""
-    if group == "Timing" and number in _CLOCK_FIELDS:
-        task.set_clock(replace(_clock(task), **{_CLOCK_FIELDS[number]: value}))
-    elif group == "Write" and number == 0x1453 and task.kind == OUTPUT:
-        task.refuse_running()
-        task.regeneration = value
-    elif group == "Buffer" and number in (0x186C, 0x186D):
-        task.refuse_running()
-        task.set_buffer(value)
-    else:
-        raise _refuse(group, number)
-
-
-def reset(group: str, task: Task, number: int) -> None:
-    """Give an attribute of a task its default again."""
-    if group == "Write" and number == 0x1453:
-        change(group, task, number, ALLOW_REGENERATION)
-    else:
-        raise _refuse(group, number)
+        raise unknown("channel", number)
+    values = [table[number](task, channel) for channel in chosen]
+    if number == _PHYSICAL_CHANNEL:
+        return ", ".join(values)
+    if any(value != values[0] for value in values):
+        raise Refusal(DAQmxErrors.ATTRIBUTE_INCONSISTENT_ACROSS_CHANNELS_ON_DEVICE, f"0x{number:04X}")
+    return values[0]

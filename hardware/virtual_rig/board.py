@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.hardware.daqmx import DAQmxErrors
+from vibroimpact.hardware.virtual_rig.checks import refuse_outside_clock, verify
 from vibroimpact.hardware.virtual_rig.pace import Pace
 from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant
 from vibroimpact.hardware.virtual_rig.profiles import PROFILES
@@ -22,6 +23,8 @@ from vibroimpact.hardware.virtual_rig.tasks import INPUT, NEVER, OUTPUT, State, 
 from vibroimpact.hardware.virtual_rig.terminals import Terminals
 from vibroimpact.orchestrator.run.record import ImpactLimitReached
 
+MOST_ON_DEMAND = 10_000
+"""Samples per channel of a call without a sample clock: it holds the rig meanwhile."""
 MOST_AT_ONCE = 20_000
 """Samples of one advance, so that a call never waits for long."""
 PERIOD = 0.002
@@ -186,6 +189,7 @@ class Board:
 
     def read_now(self, task: Task, count: int) -> NDArray[np.int16]:
         """Return samples of a task without a clock, one conversion after the other; shape (channel, sample)."""
+        self._refuse_many(count)
         self.catch_up()
         step = round(1.0 / self.profile.conversion_rate / TICK)
         codes = np.empty((len(task.channels), count), dtype=np.int16)
@@ -196,11 +200,24 @@ class Board:
             codes[:, number] = self.analog.now(task.channels)
         return codes
 
-    def put_now(self, task: Task, values: Floats) -> None:
-        """Let outputs of a task without a clock have values from now on."""
+    def put_now(self, task: Task, samples: Floats) -> None:
+        """Let outputs of a task without a clock have values, shape (channel, sample), one after the other."""
+        self._refuse_many(samples.shape[1])
         self.catch_up()
-        for channel, value in zip(task.channels, values, strict=True):
-            self.analog.held[channel.number] = value
+        step = round(1.0 / self.profile.output_rate / TICK)
+        for number in range(samples.shape[1]):
+            if number:
+                self.advance(self.plant.now + step)
+                self.pace.wanted = max(self.pace.wanted, self.plant.now)
+            self.analog.held[[channel.number for channel in task.channels]] = samples[:, number]
+
+    @staticmethod
+    def _refuse_many(count: int) -> None:
+        if count > MOST_ON_DEMAND:
+            raise Refusal(
+                DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,
+                f"{count} samples without a sample clock; expected at most {MOST_ON_DEMAND}",
+            )
 
     # ---- faults ----
 
@@ -252,9 +269,7 @@ class Board:
 
     def reserve(self, task: Task) -> None:
         """Reserve what a task needs."""
-        task.refuse_empty()
-        if task.clock is not None:
-            task.refuse_rate(task.clock.rate)  # channels may have come after the clock
+        verify(task)  # channels may have come after the clock
         mine = self._resources(task)
         for other in self.tasks.values():
             if other is not task and other.state is not State.verified and mine & self._resources(other):
@@ -276,6 +291,7 @@ class Board:
             if task.kind == OUTPUT and task.clock is not None and task.position == 0:
                 raise Refusal(DAQmxErrors.OUTPUT_BUFFER_EMPTY, task.name)
             self.reserve(task)
+            refuse_outside_clock(task)
             self.catch_up()
             task.begin()
             if task.clock is not None:

@@ -3,37 +3,46 @@
 from __future__ import annotations
 
 import re
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from vibroimpact.hardware.daqmx import METHODS, DAQmxErrors, constants, message_class
-from vibroimpact.hardware.virtual_rig import attributes
+from vibroimpact.hardware.daqmx import DAQmxErrors, constants
+from vibroimpact.hardware.virtual_rig import attributes, changes
 from vibroimpact.hardware.virtual_rig.board import Board
-from vibroimpact.hardware.virtual_rig.plant import Floats
+from vibroimpact.hardware.virtual_rig.checks import verify
+from vibroimpact.hardware.virtual_rig.listening import Listening
+from vibroimpact.hardware.virtual_rig.names import expanded, given_names, terminal
+from vibroimpact.hardware.virtual_rig.reads import Reads
 from vibroimpact.hardware.virtual_rig.refusal import Refusal, text_of
-from vibroimpact.hardware.virtual_rig.tasks import INPUT, OUTPUT, Channel, Clock, EventStream, State, Task
-from vibroimpact.hardware.virtual_rig.waveforms import put_waveforms
+from vibroimpact.hardware.virtual_rig.tasks import INPUT, OUTPUT, Channel, Clock, State, Task
+from vibroimpact.hardware.virtual_rig.writes import Writes
 
-_ATTRIBUTE = re.compile(
-    r"(Get|Set|Reset)(SystemInfo|Device|Task|Chan|TimingEx|Timing|Trig|Read|Write|Buffer)Attribute(\w*)"
-)
-_TERMINALS = re.compile(
-    r"/?(?P<device>[\w-]+)/(?P<word>ai|ao)(?P<first>\d{1,3})(?::(?:.*\D)?(?P<last>\d{1,3}))?", re.I
+_GROUPS = "SystemInfo|Device|PhysicalChan|Persisted\\w+?|Task|Chan|TimingEx|Timing|Trig|Read|Write|Buffer"
+_ATTRIBUTE = re.compile(rf"(Get|Set|Reset)({_GROUPS})Attribute(\w*)")
+_CHANNEL = re.compile(
+    r"/?(?P<device>[\w-]+)/(?:(?P<word>ai|ao)(?P<number>\d{1,3})|_ao(?P<output>\d)_vs_aognd)", re.I
 )
 _ATTACH = 2
 _CREATE = 1
-_BY_SCAN = 1
-_MOST_AT_ONCE = 2**24
-"""Samples of one read, of all channels: 128 MiB of doubles."""
+_KINDS: dict[str, Any] = {
+    "Bool": bool,
+    "Double": (float, int),
+    "Int32": int,
+    "UInt32": int,
+    "UInt64": int,
+    "String": str,
+}
+_HIGHEST = {"Int32": 2**31, "UInt32": 2**32, "UInt64": 2**64}
+_NOTHING_SAVED = {
+    "PersistedTask": DAQmxErrors.TASK_NOT_IN_DATA_NEIGHBORHOOD,
+    "PersistedChan": DAQmxErrors.INVALID_GLOBAL_CHAN,
+    "PersistedScale": DAQmxErrors.CUSTOM_SCALE_DOES_NOT_EXIST,
+}
 
 Call = Callable[[Any, Any], bytes | None]
 
 
-class Calls:
+class Calls(Reads, Writes, Listening):
     """Answers the calls of NI's service on a board; each takes the request and fills in the response.
 
     Parameters
@@ -42,7 +51,7 @@ class Calls:
     """
 
     def __init__(self, board: Board) -> None:
-        self._board = board
+        super().__init__(board)
         self._unnamed = 0
 
     def answer(self, method: str) -> Call | None:
@@ -55,12 +64,6 @@ class Calls:
         return getattr(self, f"do_{name}", None)
 
     # ---- sessions ----
-
-    def _task(self, request: Any) -> Task:
-        name = request.task.name
-        if name not in self._board.tasks:
-            raise Refusal(DAQmxErrors.INVALID_TASK, repr(name[:60]))
-        return self._board.tasks[name]
 
     def do_create_task(self, request: Any, response: Any) -> None:
         """Make a task, or attach to one that is there."""
@@ -95,21 +98,24 @@ class Calls:
 
     def do_task_control(self, request: Any, response: Any) -> None:
         """Start, stop, reserve or give back a task."""
-        task, mode = self._task(request), constants.TaskMode(request.action_raw or request.action)
+        task, action = self._task(request), request.action_raw or request.action
+        modes = constants.TaskMode
         with self._board.changed:
-            if mode is constants.TaskMode.TASK_START:
+            if action == modes.TASK_START.value:
                 self._board.start(task)
-            elif mode in (constants.TaskMode.TASK_STOP, constants.TaskMode.TASK_ABORT):
-                task.kept = task.kept and mode is constants.TaskMode.TASK_STOP
+            elif action in (modes.TASK_STOP.value, modes.TASK_ABORT.value):
+                task.kept = task.kept and action == modes.TASK_STOP.value
                 self._board.stop(task)
-            elif mode in (constants.TaskMode.TASK_RESERVE, constants.TaskMode.TASK_COMMIT):
+            elif action in (modes.TASK_RESERVE.value, modes.TASK_COMMIT.value):
                 self._board.reserve(task)
                 task.kept = True
-            elif mode is constants.TaskMode.TASK_UNRESERVE:
+            elif action == modes.TASK_UNRESERVE.value:
                 task.kept = False
                 self._board.stop(task)
+            elif action == modes.TASK_VERIFY.value:
+                verify(task)
             else:
-                task.refuse_empty()
+                raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"action {action} of a task")
 
     def do_is_task_done(self, request: Any, response: Any) -> None:
         """Say whether a task is done."""
@@ -130,83 +136,71 @@ class Calls:
         def wanted() -> int:
             return self._board.plant.now if task.needed is None else self._tick_of(task, task.needed - 1)
 
-        if not self._board.wait_for(is_over, wanted, request.time_to_wait):
+        if not self._wait_for(is_over, wanted, self._timeout(request.time_to_wait)):
             raise Refusal(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE, task.name)
         if task.failure is not None:
             raise task.failure
 
-    def _tick_of(self, task: Task, number: int) -> int:
-        """Return the tick at which all channels have a sample; now, where nobody knows."""
-        if task.start is None:
-            return self._board.plant.now
-        return int(task.edge(number)) + task.skew * (len(task.channels) - 1)
-
     # ---- channels, clock, trigger ----
 
-    def _expanded(self, text: str, word: str, count: int) -> list[int]:
-        """Return the numbers of the channels in a list such as `Dev1/ai0, Dev1/ai2:4`."""
-        numbers: list[int] = []
-        for part in (each.strip() for each in text.split(",")):
-            found = _TERMINALS.fullmatch(part)
-            if found is None or found["word"].lower() != word:
-                raise Refusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, repr(part[:60]))
-            if found["device"].lower() != self._board.name.lower():
-                raise Refusal(DAQmxErrors.INVALID_DEVICE_ID, found["device"])
-            first = int(found["first"])
-            last = first if found["last"] is None else int(found["last"])
-            numbers += range(first, last + 1) if first <= last else range(first, last - 1, -1)
-            if max(first, last) >= count:
-                raise Refusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, part)
-        return numbers
+    def _physical(self, text: str, word: str) -> list[tuple[str, int, int | None]]:
+        """Return name, number and measured output of each channel in a list such as `Dev1/ai0, Dev1/ai2:4`."""
+        profile, found = self._board.profile, []
+        for name in expanded(text):
+            parts = _CHANNEL.fullmatch(name)
+            if parts is None:
+                raise Refusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, repr(name[:60]))
+            if parts["device"].lower() != self._board.name.lower():
+                raise Refusal(DAQmxErrors.INVALID_DEVICE_ID, parts["device"])
+            number, inside = int(parts["number"] or parts["output"]), parts["output"] is not None
+            count = profile.inputs if word == "ai" and not inside else profile.outputs
+            right = word == "ai" and profile.sees_outputs if inside else parts["word"].lower() == word
+            if not right or number >= count:
+                raise Refusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, name)
+            terminal_name = f"_ao{number}_vs_aognd" if inside else f"{word}{number}"
+            output = number if inside else None
+            found.append((f"{self._board.name}/{terminal_name}", -1 - number if inside else number, output))
+        if not found:
+            raise Refusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, repr(text[:60]))
+        return found
 
-    def _add(self, request: Any, kind: int, count: int, device_range: float | None) -> None:
-        task = self._task(request)
-        word = "ai" if kind == INPUT else "ao"
-        numbers = self._expanded(request.physical_channel, word, count)
-        low, high = request.min_val, request.max_val
-        if (
-            request.custom_scale_name
-            or (request.units_raw or request.units) != constants.VoltageUnits.VOLTS.value
-        ):
+    def _add(self, request: Any, kind: int, device_range: float, wiring: int) -> None:
+        task, low, high = self._task(request), request.min_val, request.max_val
+        physical = self._physical(request.physical_channel, "ai" if kind == INPUT else "ao")
+        units = request.units_raw or request.units
+        if request.custom_scale_name or units != constants.VoltageUnits.VOLTS.value:
             raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, "units other than V")
-        if not low < high or device_range is None:
-            raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a range of {low:g} to {high:g} V")
-        given = [name.strip() for name in request.name_to_assign_to_channel.split(",") if name.strip()]
-        if given and len(given) != len(numbers):
-            raise Refusal(
-                DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"{len(given)} names for {len(numbers)} channels"
-            )
-        names = given or [f"{self._board.name}/{word}{number}" for number in numbers]
+        named = request.name_to_assign_to_channel
+        names = given_names(named, len(physical)) if named.strip() else [name for name, _, _ in physical]
+        channels = [
+            Channel(name, number, low, high, device_range, wiring, output)
+            for name, (_, number, output) in zip(names, physical, strict=True)
+        ]
         with self._board.changed:
-            for name, number in zip(names, numbers, strict=True):
-                task.add(kind, Channel(name, number, low, high, device_range))
+            task.add(kind, channels)
 
     def do_create_ai_voltage_chan(self, request: Any, response: Any) -> None:
         """Add inputs."""
-        profile = self._board.profile
-        chosen = profile.input_range(request.min_val, request.max_val)
-        self._add(request, INPUT, profile.inputs, chosen)
+        self._physical(request.physical_channel, "ai")
+        chosen = changes.input_range(self._board, request.min_val, request.max_val)
+        self._add(
+            request, INPUT, chosen, changes.wiring(request.terminal_config_raw or request.terminal_config)
+        )
 
     def do_create_ao_voltage_chan(self, request: Any, response: Any) -> None:
         """Add outputs."""
-        profile = self._board.profile
-        widest = profile.output_range
-        fits = -widest <= request.min_val and request.max_val <= widest
-        self._add(request, OUTPUT, profile.outputs, widest if fits else None)
+        self._physical(request.physical_channel, "ao")
+        changes.refuse_output_range(self._board, request.min_val, request.max_val)
+        widest = self._board.profile.output_range
+        self._add(request, OUTPUT, widest, constants.TerminalConfiguration.RSE.value)
 
     def do_cfg_samp_clk_timing(self, request: Any, response: Any) -> None:
         """Give a task a sample clock."""
-        task, source = self._task(request), request.source
-        if source.lower() == "onboardclock":
-            source = ""
-        own = [f"{self._board.name}/{word}/SampleClock".lower() for word in ("ai", "ao")]
-        if source and source.strip("/").lower() not in own:
-            raise Refusal(
-                DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"a clock from {source[:60]!r}"
-            )
+        task = self._task(request)
         with self._board.changed:
             mode = request.sample_mode_raw or request.sample_mode
             edge = request.active_edge_raw or request.active_edge
+            source = terminal(task.device, request.source)
             task.set_clock(Clock(request.rate, mode, request.samps_per_chan, source, edge))
 
     def do_cfg_input_buffer(self, request: Any, response: Any) -> None:
@@ -220,7 +214,6 @@ class Calls:
     def _set_buffer(self, request: Any, kind: int) -> None:
         task = self._task(request)
         with self._board.changed:
-            task.refuse_running()
             if task.kind not in (0, kind):
                 raise Refusal(DAQmxErrors.INCONSISTENT_CHANNEL_DIRECTIONS, task.name)
             task.set_buffer(request.num_samps_per_chan)
@@ -231,269 +224,16 @@ class Calls:
         with self._board.changed:
             task.refuse_running()
             task.refuse_empty()
-            terminal = request.trigger_source.strip("/").lower()
-            known = [f"{self._board.name}/{word}".lower() for word in ("ai/starttrigger", "ao/starttrigger")]
-            known += [f"{self._board.name}/pfi{number}".lower() for number in range(16)]
-            if terminal not in known:
-                raise Refusal(
-                    DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a trigger from {request.trigger_source[:60]!r}"
-                )
-            task.trigger = request.trigger_source
+            task.trigger = terminal(task.device, request.trigger_source)
             task.trigger_edge = request.trigger_edge_raw or request.trigger_edge
+            if not task.trigger:
+                raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "a trigger from no terminal")
 
     def do_disable_start_trig(self, request: Any, response: Any) -> None:
         """Let a task wait for no edge."""
         task = self._task(request)
         task.refuse_running()
         task.trigger = ""
-
-    # ---- reads ----
-
-    def _read(self, request: Any, size: int) -> tuple[NDArray[np.int16], Floats, int, int]:
-        """Return codes of samples, shape (channel, sample), V of a step of them, their number, the status."""
-        task = self._task(request)
-        if task.kind != INPUT:
-            raise Refusal(DAQmxErrors.READ_NO_INPUT_CHANS_IN_TASK, task.name)
-        with self._board.changed:
-            channels = len(task.channels)
-            if task.clock is None:
-                count = max(request.num_samps_per_chan, 1)
-                self._refuse_size(count * channels, size)
-                self._board.reserve(task)
-                try:
-                    codes = self._board.read_now(task, count)
-                finally:
-                    if not task.kept and task.state is State.reserved:
-                        task.stop()
-                return codes, task.steps, count, 0
-            if task.state is not State.running:
-                self._board.start(task)
-                task.implicit = True
-            self._board.catch_up()
-            count = request.num_samps_per_chan
-            if count < 0:
-                count = task.available if task.needed is None else task.needed - task.position
-            self._refuse_size(count * channels, size)
-            codes, status = self._buffered(task, count, request.timeout)
-            steps = task.steps
-            if task.implicit and task.needed is not None and task.position >= task.needed:
-                self._board.stop(task)
-        return codes, steps, codes.shape[1], status
-
-    def _buffered(self, task: Task, count: int, timeout: float) -> tuple[NDArray[np.int16], int]:
-        if task.needed is not None and count > task.needed - task.position:
-            raise Refusal(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE, task.name, read=0)
-
-        pieces: list[NDArray[np.int16]] = [task.take(0)]
-        left, end = count, np.inf if timeout < 0 else time.monotonic() + timeout
-        while left:
-            # a read may be larger than the buffer, which it empties as it fills
-            piece = min(left, max(task.length // 2, 1))
-            there = self._wait_for_samples(
-                task, piece, timeout if timeout < 0 else max(end - time.monotonic(), 0.0)
-            )
-            if task.failure is not None:
-                raise task.failure.after(read=count - left)
-            if task.state is not State.running:
-                raise Refusal(
-                    DAQmxErrors.CANNOT_PERFORM_OP_WHEN_TASK_NOT_RUNNING, task.name, read=count - left
-                )
-            pieces.append(task.take(min(left, task.available)))
-            left -= pieces[-1].shape[1]
-            if not there:
-                break
-        status = int(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE.value) if left else 0
-        return np.concatenate(pieces, axis=1), status
-
-    def _wait_for_samples(self, task: Task, count: int, timeout: float) -> bool:
-        return self._board.wait_for(
-            lambda: task.available >= count or task.failure is not None or task.state is not State.running,
-            lambda: self._tick_of(task, task.position + count - 1),
-            timeout,
-        )
-
-    @staticmethod
-    def _refuse_size(samples: int, size: int) -> None:
-        if samples > min(size, _MOST_AT_ONCE):
-            raise Refusal(DAQmxErrors.READ_BUFFER_TOO_SMALL, f"{samples} samples into {size}", read=0)
-
-    @staticmethod
-    def _laid_out(values: NDArray[Any], request: Any) -> NDArray[Any]:
-        """Return samples in the order that was asked for; by channel each has the room that it asked for."""
-        if (request.fill_mode_raw or request.fill_mode) == _BY_SCAN:
-            return np.ascontiguousarray(values.T).ravel()
-        asked = max(request.num_samps_per_chan, values.shape[1])
-        padded = np.zeros((len(values), asked), dtype=values.dtype)
-        padded[:, : values.shape[1]] = values
-        return padded.ravel()
-
-    def do_read_analog_f64(self, request: Any, response: Any) -> bytes:
-        """Read volts; the numbers go onto the wire as they are, which is what makes it fast."""
-        codes, steps, count, status = self._read(request, request.array_size_in_samps)
-        response.status, response.samps_per_chan_read = status, count
-        data = self._laid_out(codes * steps, request).tobytes()
-        whole: bytes = response.SerializeToString() + b"\x12" + _varint(len(data)) + data
-        return whole
-
-    def do_read_analog_scalar_f64(self, request: Any, response: Any) -> None:
-        """Read a sample of one channel."""
-        task = self._task(request)
-        if len(task.channels) > 1:
-            raise Refusal(DAQmxErrors.READ_BUFFER_TOO_SMALL, f"{len(task.channels)} channels into one number")
-        one = message_class(METHODS["ReadAnalogF64"].input_type)(
-            num_samps_per_chan=1, timeout=request.timeout
-        )
-        one.task.CopyFrom(request.task)
-        codes, steps, count, status = self._read(one, 1)
-        if status:
-            raise Refusal(DAQmxErrors.SAMPLES_NOT_YET_AVAILABLE, read=count)
-        response.value = float(codes[0, 0] * steps[0, 0])
-
-    def do_read_binary_i16(self, request: Any, response: Any) -> None:
-        """Read the codes of the converter."""
-        codes, _, count, status = self._read(request, request.array_size_in_samps)
-        response.status, response.samps_per_chan_read = status, count
-        response.read_array.extend(self._laid_out(codes, request).tolist())
-
-    def do_read_raw(self, request: Any, response: Any) -> None:
-        """Read the codes of the converter as bytes, scan by scan."""
-        codes, _, count, status = self._read(request, request.array_size_in_bytes // 2)
-        response.status, response.samps_read, response.num_bytes_per_samp = status, count, 2
-        response.read_array = np.ascontiguousarray(codes.T).tobytes()
-
-    def do_read_analog_waveforms(self, request: Any, response: Any) -> None:
-        """Read volts with their time and the names of their channels."""
-        task = self._task(request)
-        mode = request.waveform_attribute_mode_raw or request.waveform_attribute_mode
-        with self._board.changed:
-            codes, steps, count, status = self._read(request, _MOST_AT_ONCE)
-            response.status, response.samps_per_chan_read = status, count
-            put_waveforms(response, task, codes * steps, mode, self._board.served_at)
-
-    # ---- writes ----
-
-    def do_write_analog_f64(self, request: Any, response: Any) -> None:
-        """Write volts."""
-        task, count = self._task(request), request.num_samps_per_chan
-        values = np.array(request.write_array, dtype=np.float64)
-        channels = len(task.channels)
-        if task.kind == OUTPUT and (count < 1 or values.size != count * channels):
-            raise Refusal(DAQmxErrors.WRITE_NUM_CHANS_MISMATCH, f"{values.size} values", written=0)
-        by_scan = (request.data_layout_raw or request.data_layout) == _BY_SCAN
-        samples = values.reshape(count, channels).T if by_scan else values.reshape(channels, count)
-        response.samps_per_chan_written = self._write(task, samples, request.auto_start, request.timeout)
-
-    def do_write_analog_waveforms(self, request: Any, response: Any) -> None:
-        """Write volts of waveforms, one for each channel."""
-        task, waves = self._task(request), [each.y_data for each in request.waveforms]
-        lengths = {len(each) for each in waves}
-        if task.kind == OUTPUT and (len(waves) != len(task.channels) or len(lengths) != 1 or 0 in lengths):
-            raise Refusal(DAQmxErrors.WRITE_NUM_CHANS_MISMATCH, f"{len(waves)} waveforms", written=0)
-        samples = np.array(waves, dtype=np.float64)
-        response.samps_per_chan_written = self._write(task, samples, request.auto_start, request.timeout)
-
-    def do_write_analog_scalar_f64(self, request: Any, response: Any) -> None:
-        """Write a value of one channel."""
-        task = self._task(request)
-        if task.kind == OUTPUT and len(task.channels) != 1:
-            raise Refusal(DAQmxErrors.WRITE_NUM_CHANS_MISMATCH, f"1 value for {len(task.channels)} channels")
-        self._write(task, np.array([[request.value]]), request.auto_start, request.timeout)
-
-    def _write(self, task: Task, samples: Floats, auto_start: bool, timeout: float) -> int:
-        if task.kind != OUTPUT:
-            raise Refusal(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK, task.name)
-        low = np.array([[channel.low] for channel in task.channels])
-        high = np.array([[channel.high] for channel in task.channels])
-        if not ((low <= samples) & (samples <= high)).all():
-            raise Refusal(DAQmxErrors.INVALID_AO_DATA_WRITE, task.name, written=0)
-        step = self._board.profile.output_range / 2.0 ** (self._board.profile.bits - 1)
-        rounded = np.rint(samples / step) * step
-        with self._board.changed:
-            if task.clock is None:
-                return self._write_now(task, rounded, auto_start)
-            return self._write_buffer(task, rounded, auto_start, timeout)
-
-    def _write_now(self, task: Task, samples: Floats, auto_start: bool) -> int:
-        if samples.shape[1] != 1:
-            raise Refusal(DAQmxErrors.ANALOG_MULTI_SAMP_WRITE_NOT_SUPPORTED, task.name, written=0)
-        if task.state is not State.running:
-            if not auto_start:
-                raise Refusal(
-                    DAQmxErrors.CANNOT_WRITE_WHEN_AUTO_START_FALSE_AND_TASK_NOT_RUNNING, task.name, written=0
-                )
-            self._board.start(task)
-        self._board.put_now(task, samples[:, 0])
-        return 1
-
-    def _write_buffer(self, task: Task, samples: Floats, auto_start: bool, timeout: float) -> int:
-        """Write piece by piece, as there is room."""
-        if task.length == 0:
-            task.buffer = np.zeros((len(task.channels), task.asked_buffer or samples.shape[1]))
-        written, whole = 0, samples.shape[1]
-        while written < whole:
-            self._board.catch_up()
-            if task.failure is not None:
-                raise task.failure.after(written=written)
-            piece = samples[:, written : written + task.room]
-            if piece.size:
-                task.write(piece)
-                written += piece.shape[1]
-                continue
-            if task.state is not State.running and auto_start:
-                self._board.start(task)
-            if not self._wait_for_room(task, whole - written, timeout):
-                raise Refusal(DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN, task.name, written=written)
-        if task.state is not State.running and auto_start:
-            self._board.start(task)
-        self._board.changed.notify_all()
-        return written
-
-    def _wait_for_room(self, task: Task, count: int, timeout: float) -> bool:
-        needed = task.position - task.length + min(count, max(task.length // 2, 1)) - 1
-        return task.ticking and self._board.wait_for(
-            lambda: task.room > 0 or task.failure is not None, lambda: self._tick_of(task, needed), timeout
-        )
-
-    # ---- events ----
-
-    def listen(self, method: str, request: Any) -> tuple[EventStream, Callable[[int], Any]]:
-        """Register a listener; return its stream, and what makes a message of what it hears."""
-        task = self._task(request)
-        make = message_class(METHODS[method].output_type)
-        with self._board.changed:
-            task.refuse_running()
-            if method == "RegisterDoneEvent":
-                if task.ended is not None:
-                    raise Refusal(DAQmxErrors.EVERY_N_SAMPS_EVENT_ALREADY_REGISTERED, task.name)
-                task.ended = EventStream()
-                return task.ended, lambda status: make(status=status)
-            if task.clock is None:
-                raise Refusal(
-                    DAQmxErrors.EVERY_N_SAMPLES_EVENT_NOT_SUPPORTED_FOR_NON_BUFFERED_TASKS, task.name
-                )
-            kind = request.every_n_samples_event_type_raw or request.every_n_samples_event_type
-            if kind != (1 if task.kind == INPUT else 2):
-                raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "an event of the other direction")
-            if request.n_samples < 1:
-                raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, "an event every 0 samples")
-            if task.every is not None:
-                raise Refusal(DAQmxErrors.EVERY_N_SAMPS_EVENT_ALREADY_REGISTERED, task.name)
-            task.every = EventStream(every=request.n_samples)
-            return task.every, lambda count: make(every_n_samples_event_type_raw=kind, n_samples=count)
-
-    def do_unregister_every_n_samples_event(self, request: Any, response: Any) -> None:
-        """End a listener."""
-        task = self._task(request)
-        if task.every is not None:
-            task.every.heard.put(None)
-            task.every = None
-
-    def do_unregister_done_event(self, request: Any, response: Any) -> None:
-        """End a listener."""
-        task = self._task(request)
-        if task.ended is not None:
-            task.ended.heard.put(None)
-            task.ended = None
 
     # ---- the device ----
 
@@ -515,64 +255,80 @@ class Calls:
         self._refuse_other_device(request.device_name)
 
     def do_get_error_string(self, request: Any, response: Any) -> None:
-        """Say what a code means."""
-        response.error_string = text_of(request.error_code)
+        """Say what a code means; nothing, where there is no such code: the client then says so."""
+        text = text_of(request.error_code)
+        response.error_string = text and f"{text}."
+
+    def do_load_task(self, request: Any, response: Any) -> None:
+        """Refuse to load a task: none is saved."""
+        raise Refusal(DAQmxErrors.TASK_NOT_IN_DATA_NEIGHBORHOOD, repr(request.session_name[:60]))
+
+    def do_add_global_chans_to_task(self, request: Any, response: Any) -> None:
+        """Refuse to add saved channels: there are none."""
+        raise Refusal(DAQmxErrors.INVALID_GLOBAL_CHAN, repr(request.channel_names[:60]))
 
     def _attribute(self, verb: str, group: str, kind: str, request: Any, response: Any) -> None:
         number = request.attribute_raw or request.attribute
+        if group == "TimingEx" and request.device_names:
+            raise Refusal(
+                DAQmxErrors.M_STUDIO_OPERATION_DOES_NOT_SUPPORT_DEVICE_CONTEXT, request.device_names[:60]
+            )
         group = group.removesuffix("Ex")
         with self._board.changed:
             if verb == "Get":
                 _put(response, self._value(group, request, number), kind)
                 return
-            if group not in attributes.OF_TASKS:
-                raise Refusal(
-                    DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,
-                    f"a change of attribute 0x{number:04X} of {group.lower()}",
-                )
+            value = None
             if verb == "Set":
                 value = request.value_raw or request.value if kind == "Int32" else request.value
-                attributes.change(group, self._task(request), number, value)
-            else:
-                attributes.reset(group, self._task(request), number)
+                if not isinstance(value, _KINDS.get(kind, ())):
+                    raise Refusal(DAQmxErrors.SPECIFIED_ATTR_NOT_VALID, f"0x{number:04X} as {kind}")
+            self._change(verb, group, request, number, value)
+
+    def _change(self, verb: str, group: str, request: Any, number: int, value: Any) -> None:
+        if group == "Chan" and verb == "Set":
+            changes.change_channel(self._board, self._task(request), request.channel, number, value)
+        elif group not in attributes.OF_TASKS:
+            raise Refusal(
+                DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT,
+                f"a change of attribute 0x{number:04X} of {group.lower()}",
+            )
+        elif verb == "Set":
+            changes.change(group, self._task(request), number, value)
+        else:
+            changes.reset(group, self._task(request), number)
 
     def _value(self, group: str, request: Any, number: int) -> Any:
         self._board.catch_up()
+        if group.startswith("Persisted"):
+            raise Refusal(_NOTHING_SAVED[group], "nothing is saved")
         if group == "SystemInfo":
             return attributes.of_system(self._board, number)
         if group == "Device":
             self._refuse_other_device(request.device_name)
             return attributes.of_device(self._board, number)
+        if group == "PhysicalChan":
+            return attributes.of_physical_channel(self._board, request.physical_channel, number)
         if group == "Chan":
             return attributes.of_channel(self._task(request), request.channel, number)
         return attributes.of_task(group, self._task(request), number)
 
 
 def _put(response: Any, value: Any, kind: str) -> None:
+    listed, one = kind.endswith("Array"), kind.removesuffix("Array")
+    each = value if isinstance(value, list) else [value]
+    if listed != isinstance(value, list) or not all(_is_of(one, v) for v in each):
+        raise Refusal(DAQmxErrors.SPECIFIED_ATTR_NOT_VALID, f"an attribute as {kind}")
     if kind == "Int32":
         response.value_raw = value
     elif kind == "Int32Array":
         response.value_raw.extend(value)
-    elif kind.endswith("Array"):
+    elif listed:
         response.value.extend(value)
     else:
         response.value = value
 
 
-def _varint(number: int) -> bytes:
-    """Return a length as protocol buffers write it.
-
-    >>> _varint(300)
-    b'\\xac\\x02'
-    """
-    parts = bytearray()
-    while number > 127:
-        parts.append(number & 127 | 128)
-        number >>= 7
-    return bytes([*parts, number])
-
-
-def messages_of(stream: EventStream, make: Callable[[int], Any]) -> Iterator[Any]:
-    """Yield the messages of a stream until it ends."""
-    while (heard := stream.heard.get()) is not None:
-        yield make(heard)
+def _is_of(kind: str, value: Any) -> bool:
+    """Say whether a value goes into a message of a kind, as the protocol calls them."""
+    return isinstance(value, _KINDS.get(kind, ())) and (kind not in _HIGHEST or value < _HIGHEST[kind])

@@ -30,6 +30,8 @@ class Profile:
         Whether all channels are sampled at once.
     output_rate : float
         Samples per second and channel.
+    sees_outputs : bool
+        Whether inputs inside the device measure its outputs, as `Dev1/_ao0_vs_aognd`.
     """
 
     product: str
@@ -42,6 +44,7 @@ class Profile:
     conversion_rate: float
     simultaneous: bool
     output_rate: float
+    sees_outputs: bool
 
     def highest_rate(self, channels: int) -> float:
         """Return the highest sample rate of so many inputs, Hz."""
@@ -75,6 +78,7 @@ PROFILES = {
         conversion_rate=83_300.0,
         simultaneous=False,
         output_rate=83_300.0,
+        sees_outputs=False,
     ),
     "xseries": Profile(
         product="X Series (virtual)",
@@ -87,5 +91,6 @@ PROFILES = {
         conversion_rate=1_000_000.0,
         simultaneous=True,
         output_rate=900_000.0,
+        sees_outputs=True,
     ),
 }

@@ -88,7 +88,9 @@ class Sampling:
 
     def _codes(self, channel: Channel, ticks: Ticks, levels: Levels, seen: Seen) -> NDArray[np.int16]:
         wire = self._settings.wires.get(channel.number)
-        if wire is None:
+        if channel.output is not None:
+            volts = levels(channel.output, ticks - 1)
+        elif wire is None:
             volts = np.zeros(ticks.shape)
         elif wire.output is not None:
             # an edge of a shared clock samples what was put out before it

@@ -12,7 +12,8 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.hardware.daqmx import CHANNEL_OPTIONS, METHODS, SERVICE, DAQmxErrors, grpc, message_class
 from vibroimpact.hardware.virtual_rig import control
 from vibroimpact.hardware.virtual_rig.board import Board
-from vibroimpact.hardware.virtual_rig.calls import Call, Calls, messages_of
+from vibroimpact.hardware.virtual_rig.calls import Call, Calls
+from vibroimpact.hardware.virtual_rig.listening import messages_of
 from vibroimpact.hardware.virtual_rig.refusal import Refusal
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
 
@@ -88,8 +89,19 @@ class RigServer:
             )
         call = self._calls.answer(method)
         return grpc.unary_unary_rpc_method_handler(
-            lambda request, context: _answered(method, call, request, context), make.FromString
+            lambda request, context: self._answered(method, call, request, context), make.FromString
         )
+
+    def _answered(self, method: str, call: Call | None, request: Any, context: Any) -> bytes:
+        response = message_class(METHODS[method].output_type)()
+        self._calls.caller.active = context.is_active
+        try:
+            if call is None:
+                raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"the call {method}")
+            whole = call(request, response)
+        except Refusal as refusal:
+            _abort(context, refusal)
+        return response.SerializeToString() if whole is None else whole
 
     def _listen(self, method: str, request: Any, context: Any) -> Iterator[Any]:
         try:
@@ -127,17 +139,6 @@ class _Handler(grpc.GenericRpcHandler):  # type: ignore[misc]  # grpc carries no
         """Return what answers a call; None where it is of another service."""
         method: str = handler_call_details.method
         return self._find(method.removeprefix(self._prefix)) if method.startswith(self._prefix) else None
-
-
-def _answered(method: str, call: Call | None, request: Any, context: Any) -> bytes:
-    response = message_class(METHODS[method].output_type)()
-    try:
-        if call is None:
-            raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"the call {method}")
-        whole = call(request, response)
-    except Refusal as refusal:
-        _abort(context, refusal)
-    return response.SerializeToString() if whole is None else whole
 
 
 def _abort(context: Any, refusal: Refusal) -> NoReturn:

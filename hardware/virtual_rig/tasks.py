@@ -24,6 +24,10 @@ NEVER = 2**62
 """A tick that does not come."""
 MOST_SAMPLES = 2**26
 """Samples of a buffer, of all its channels."""
+FROM_FIRST = constants.ReadRelativeTo.FIRST_SAMPLE.value
+FROM_POSITION = constants.ReadRelativeTo.CURRENT_READ_POSITION.value
+FROM_NEWEST = constants.ReadRelativeTo.MOST_RECENT_SAMPLE.value
+"""Where a read begins."""
 
 # default input buffers of continuous tasks, samples per channel up to a rate (Hz)
 _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1e6, 100_000), (np.inf, 1_000_000))
@@ -39,13 +43,21 @@ class State(Enum):
 
 @dataclass(slots=True)
 class Channel:
-    """A virtual channel: an input or output of the device with a name, V."""
+    """A virtual channel: an input or output of the device with a name, V.
+
+    Attributes
+    ----------
+    output : int or None
+        Of an input inside the device: the output that it measures.
+    """
 
     name: str
     number: int
     low: float
     high: float
     device_range: float
+    wiring: int = constants.TerminalConfiguration.DIFF.value
+    output: int | None = None
 
 
 @dataclass(slots=True)
@@ -57,6 +69,10 @@ class Clock:
     samples: int
     source: str = ""
     edge: int = constants.Edge.RISING.value
+
+
+UNSET_CLOCK = Clock(1000.0, CONTINUOUS, 1000)
+"""What the properties of a clock say before a program sets them."""
 
 
 @dataclass(slots=True)
@@ -94,13 +110,18 @@ class Task:
         Why it has ended.
     implicit : bool
         A read has started it, so that it stops when all of it is read.
+    timing, clocked : Clock, bool
+        The properties of its sample clock, and whether it has one.
+    relative, offset, overwrites : int, int, bool
+        Where a read begins, and whether unread samples may be written over.
     """
 
     def __init__(self, name: str, device: str, profile: Profile) -> None:
         self.name, self.device, self.profile = name, device, profile
         self.kind = 0
         self.channels: list[Channel] = []
-        self.clock: Clock | None = None
+        self.timing, self.clocked = UNSET_CLOCK, False
+        self.relative, self.offset, self.overwrites = FROM_POSITION, 0, False
         self.trigger, self.trigger_edge = "", constants.Edge.RISING.value
         self.state, self.kept = State.verified, False
         self.start: int | None = None
@@ -129,43 +150,40 @@ class Task:
         if not self.channels:
             raise Refusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK, self.name)
 
-    def add(self, kind: int, channel: Channel) -> None:
-        """Add a channel."""
+    def add(self, kind: int, channels: list[Channel]) -> None:
+        """Add channels, or none of them."""
         self.refuse_running()
         if self.kind not in (0, kind):
             raise Refusal(DAQmxErrors.INCONSISTENT_CHANNEL_DIRECTIONS, self.name)
-        if any(channel.name == other.name or channel.number == other.number for other in self.channels):
-            raise Refusal(DAQmxErrors.CHAN_ALREADY_IN_TASK, channel.name)
-        self.kind = kind
-        self.channels.append(channel)
+        both = [*self.channels, *channels]
+        for place, channel in enumerate(both):
+            if any(channel.name == other.name or channel.number == other.number for other in both[:place]):
+                raise Refusal(DAQmxErrors.CHAN_ALREADY_IN_TASK, channel.name)
+        self.kind, self.channels = kind, both
 
-    def refuse_rate(self, rate: float) -> None:
-        """Refuse a sample rate (Hz) that the device does not reach with these channels."""
-        highest, count = self.highest_rate, len(self.channels)
-        if not 0.0 < rate <= highest:
-            channels = "1 channel" if count == 1 else f"{count} channels"
-            raise Refusal(
-                DAQmxErrors.INVALID_ATTRIBUTE_VALUE,
-                f"a rate of {rate:g} Hz with {channels}; expected at most {highest:g} Hz",
-            )
+    @property
+    def clock(self) -> Clock | None:
+        """Its sample clock; None: it reads and writes on demand."""
+        return self.timing if self.clocked else None
 
     def set_clock(self, clock: Clock) -> None:
-        """Give the task a sample clock."""
+        """Give the task a sample clock; `checks.verify` refuses what the device does not have of it."""
         self.refuse_running()
         self.refuse_empty()
-        self.refuse_rate(clock.rate)
-        if clock.mode not in (FINITE, CONTINUOUS):
-            raise Refusal(DAQmxErrors.ATTRIBUTE_NOT_SUPPORTED_IN_TASK_CONTEXT, f"sample mode {clock.mode}")
-        if not 2 <= clock.samples <= MOST_SAMPLES // len(self.channels):
-            raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"{clock.samples} samples per channel")
-        self.clock = clock
+        self.timing, self.clocked = clock, True
 
-    def set_buffer(self, samples: int) -> None:
-        """Ask for a buffer of so many samples per channel."""
+    def set_buffer(self, samples: int | None) -> None:
+        """Ask for a buffer of so many samples per channel; None: the size that NI's driver takes."""
+        self.refuse_running()
         self.refuse_empty()
-        if not 0 < samples <= MOST_SAMPLES // len(self.channels):
+        if samples is not None and samples < 1:
             raise Refusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a buffer of {samples} samples per channel")
         self.asked_buffer = samples
+
+    def refuse_large_buffer(self, samples: int) -> None:
+        """Refuse a buffer that has no room."""
+        if samples > MOST_SAMPLES // len(self.channels):
+            raise Refusal(DAQmxErrors.PAL_MEMORY_FULL, f"{samples} samples of {len(self.channels)} channels")
 
     @property
     def highest_rate(self) -> float:
@@ -203,6 +221,10 @@ class Task:
 
     def begin(self) -> None:
         """Be running, with no edge of the clock over."""
+        if self.kind == INPUT and self.clock is not None:
+            self.refuse_large_buffer(self.default_buffer())
+        if self.every is not None and self.clock is None:
+            raise Refusal(DAQmxErrors.EVERY_N_SAMPLES_EVENT_NOT_SUPPORTED_FOR_NON_BUFFERED_TASKS, self.name)
         self.state, self.done, self.failure = State.running, False, None
         self.count = self.edges_before = 0
         if self.every is not None:
@@ -315,8 +337,24 @@ class Task:
 
     @property
     def overrun(self) -> bool:
-        """Whether samples that nobody has read are lost."""
-        return self.available > self.length
+        """Whether samples that nobody has read are lost, which ends the task."""
+        return self.available > self.length and not self.overwrites
+
+    def seek(self) -> None:
+        """Let the next read begin where the program wants it to."""
+        if self.relative != FROM_POSITION or self.offset:
+            origin = {FROM_FIRST: 0, FROM_POSITION: self.position, FROM_NEWEST: self.count}[self.relative]
+            if origin + self.offset < 0:
+                raise Refusal(
+                    DAQmxErrors.INVALID_ATTRIBUTE_VALUE, f"a read from sample {origin + self.offset}", read=0
+                )
+            self.position = origin + self.offset
+        self.refuse_overwritten()
+
+    def refuse_overwritten(self) -> None:
+        """Refuse to read samples that newer ones have taken the place of."""
+        if self.available > self.length:
+            raise Refusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, self.name, read=0)
 
     def samples_until(self, tick: int) -> list[Ticks]:
         """Return for each channel the ticks of its samples up to a tick."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,13 @@ class Bench:
         if rate is not None:
             task.timing.cfg_samp_clk_timing(rate, **timing)
         return task
+
+    def wait_until(self, holds: Callable[[], bool]) -> None:
+        """Wait until something holds; a rig that goes on by itself gets there."""
+        end = time.monotonic() + 10.0
+        while not holds():
+            assert time.monotonic() < end
+            time.sleep(0.01)
 
     def clear(self) -> None:
         """Forget all tasks; outputs go to 0."""

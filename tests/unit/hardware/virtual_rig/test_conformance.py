@@ -50,7 +50,11 @@ def test_the_system_has_one_device_with_its_channels(bench: Bench) -> None:
 def test_a_channel_has_the_smallest_range_that_holds_what_was_asked_for(bench: Bench) -> None:
     with bench.task() as task:
         channel = task.ai_channels.add_ai_voltage_chan("Dev1/ai1", "tip", min_val=-1.5, max_val=0.3)
-        assert (channel.name, channel.ai_rng_high, channel.ai_max) == ("tip", 2.0, 0.3)
+        assert (channel.name, channel.ai_rng_high, channel.ai_max) == ("tip", 2.0, 2.0)
+        channel.ai_rng_high = 10.0
+        assert channel.ai_rng_low == -10.0
+        with refused(-200077):
+            channel.ai_rng_high = 3.0
         assert task.channel_names == ["tip"]
         assert [device.name for device in task.devices] == ["Dev1"]
 
@@ -168,6 +172,17 @@ def test_a_loop_from_output_to_input_gives_back_what_was_written(bench: Bench) -
     # an edge samples what was put out before it
     np.testing.assert_allclose(seen[1:], np.tile(wave, 3)[:499], atol=BITS_16)
     assert bench.control.truth()["outputs"][0] != 0.0  # an output holds its last value
+
+
+def test_an_input_inside_the_device_measures_an_output(bench: Bench) -> None:
+    with bench.outputs("Dev1/ao1") as drive, bench.inputs("Dev1/_ao1_vs_aognd") as task:
+        drive.write([1.0, 2.0, 3.0], auto_start=True)
+        assert task.read() == pytest.approx(3.0, abs=BITS_16)
+        assert task.ai_channels[0].physical_channel.name == "Dev1/_ao1_vs_aognd"
+        with refused(-200170):
+            task.ai_channels.add_ai_voltage_chan("Dev1/_ao2_vs_aognd")
+        with refused(-200170):
+            bench.outputs("Dev1/_ao0_vs_aognd")
 
 
 def test_an_output_without_regeneration_streams_any_length(bench: Bench) -> None:
@@ -324,10 +339,123 @@ def test_what_the_device_does_not_have_is_refused_by_its_code(bench: Bench) -> N
         with refused(-200478):
             task.start()
         task.ai_channels.add_ai_voltage_chan("Dev1/ai0", min_val=-5, max_val=5)
-        with refused(-200077):
-            task.timing.cfg_samp_clk_timing(2e6)
         with refused(-200011):
             task.ao_channels.add_ao_voltage_chan("Dev1/ao0")
+
+
+@pytest.mark.parametrize(
+    ("code", "timing"),
+    [
+        (-200077, {"rate": 2e6}),
+        (-200077, {"rate": 0.0}),
+        (-200077, {"rate": 1000.0, "samps_per_chan": 1}),
+        (-89120, {"rate": 1000.0, "source": "/Dev1/PFI99"}),
+    ],
+)
+def test_a_clock_that_the_device_lacks_is_refused_when_the_task_is_verified(
+    bench: Bench, code: int, timing: dict[str, Any]
+) -> None:
+    # NI's driver takes any clock, and says at the first look at it what is wrong
+    with bench.inputs() as task:
+        task.timing.cfg_samp_clk_timing(**timing)
+        with refused(code):
+            _ = task.timing.samp_clk_rate
+        with refused(code):
+            task.control(constants.TaskMode.TASK_VERIFY)
+        with refused(code):
+            task.start()
+        task.timing.cfg_samp_clk_timing(1000.0, samps_per_chan=2)
+        assert len(task.read(2)) == 2
+
+
+def test_a_trigger_needs_a_clock_and_a_terminal_of_the_device(bench: Bench) -> None:
+    with bench.inputs() as task:
+        task.triggers.start_trigger.cfg_dig_edge_start_trig("PFI0")
+        assert task.triggers.start_trigger.dig_edge_src == "/Dev1/PFI0"
+        with refused(-200262):
+            task.start()
+        task.timing.cfg_samp_clk_timing(1000.0)
+        task.triggers.start_trigger.cfg_dig_edge_start_trig("/Dev2/PFI0")
+        with refused(-89120):
+            task.start()
+
+
+def test_one_name_for_several_channels_is_numbered(bench: Bench) -> None:
+    with bench.task() as task:
+        task.ai_channels.add_ai_voltage_chan("Dev1/ai0:2", "tip", min_val=-5, max_val=5)
+        assert task.channel_names == ["tip0", "tip1", "tip2"]
+        assert task.ai_channels["tip0:1"].ai_rng_high == 5.0
+        with refused(-200461):
+            task.ai_channels.add_ai_voltage_chan("Dev1/ai3:5", "a, b")
+        with refused(-200489):
+            task.ai_channels.add_ai_voltage_chan("Dev1/ai3:4", "new, tip0")
+        assert len(task.channel_names) == 3  # all of a list or none
+
+
+def test_a_read_of_more_than_a_finite_task_has_returns_what_is_left(bench: Bench) -> None:
+    with bench.inputs("Dev1/ai0", 1000.0, samps_per_chan=100) as task:
+        task.start()
+        assert len(task.read(60)) == 60
+        assert len(task.read(60)) == 40
+
+
+def test_a_read_may_begin_at_the_newest_sample(bench: Bench) -> None:
+    wave = np.arange(1.0, 9.0)
+    with (
+        bench.outputs(rate=1000.0, sample_mode=CONTINUOUS) as drive,
+        bench.inputs("Dev1/ai2", 1000.0, source="/Dev1/ao/SampleClock", samps_per_chan=101) as task,
+    ):
+        drive.write(wave)
+        task.start()
+        drive.start()
+        task.wait_until_done()
+        task.in_stream.relative_to = constants.ReadRelativeTo.MOST_RECENT_SAMPLE
+        task.in_stream.offset = -3
+        np.testing.assert_allclose(task.read(3), [2.0, 3.0, 4.0], atol=BITS_16)
+        task.in_stream.relative_to = constants.ReadRelativeTo.FIRST_SAMPLE
+        task.in_stream.offset = 1
+        np.testing.assert_allclose(task.read(3), [1.0, 2.0, 3.0], atol=BITS_16)
+
+
+def test_a_program_may_let_unread_samples_be_written_over(bench: Bench) -> None:
+    bench.control.pace(lockstep=False, speed=100.0)
+    with bench.inputs("Dev1/ai0", 10_000.0, sample_mode=CONTINUOUS) as task:
+        task.in_stream.input_buf_size = 1000
+        task.in_stream.overwrite = constants.OverwriteMode.OVERWRITE_UNREAD_SAMPLES
+        task.start()
+        bench.wait_until(lambda: task.in_stream.total_samp_per_chan_acquired > 5000)
+        with refused(-200279):
+            task.read(100)
+        task.in_stream.relative_to = constants.ReadRelativeTo.MOST_RECENT_SAMPLE
+        task.in_stream.offset = -100
+        assert len(task.read(100)) == 100
+
+
+def test_codes_are_read_and_written_as_numbers_of_any_width(bench: Bench) -> None:
+    from nidaqmx.stream_readers import AnalogUnscaledReader
+    from nidaqmx.stream_writers import AnalogUnscaledWriter
+
+    code = 2**13
+    for width in (np.int16, np.uint16, np.int32, np.uint32):
+        with bench.outputs() as drive, bench.inputs("Dev1/ai2") as task:
+            writer = AnalogUnscaledWriter(drive.out_stream, auto_start=True)
+            name = np.dtype(width).name
+            if hasattr(writer, f"write_{name}"):
+                getattr(writer, f"write_{name}")(np.full((1, 1), code, dtype=width))
+            else:
+                drive.write(code * BITS_16)
+            seen = np.zeros((1, 2), dtype=width)
+            getattr(AnalogUnscaledReader(task.in_stream), f"read_{name}")(seen, 2)
+        assert seen.tolist() == [[code, code]]
+
+
+def test_what_is_not_saved_cannot_be_loaded(bench: Bench) -> None:
+    from nidaqmx.system.storage import PersistedChannel, PersistedTask
+
+    with bench.task() as task, refused(-200882):
+        task.add_global_channels([PersistedChannel("tip", grpc_options=bench.options())])
+    with refused(-200485):
+        PersistedTask("sweep", grpc_options=bench.options()).load()
 
 
 def test_a_resource_belongs_to_one_task(bench: Bench) -> None:
@@ -387,8 +515,9 @@ def test_a_lab_pc_samples_one_input_after_the_other() -> None:
         bench.control.pace(lockstep=True)
         with bench.task() as task:
             task.ai_channels.add_ai_voltage_chan("Dev1/ai0:2", min_val=-5, max_val=5)
+            task.timing.cfg_samp_clk_timing(30_000.0)
             with refused(-200077):
-                task.timing.cfg_samp_clk_timing(30_000.0)
+                task.start()
             with bench.task() as other:
                 other.ai_channels.add_ai_voltage_chan("Dev1/ai0", min_val=-5, max_val=5)
                 other.timing.cfg_samp_clk_timing(60_000.0)

@@ -37,7 +37,7 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
 def endless_input(name: str = "a", buffer: int = 10) -> Task:
     """Return an input at 10 Hz that runs, whose program has read nothing."""
     task = Task(name, "Dev1", PROFILES["xseries"])
-    task.add(INPUT, Channel("Dev1/ai0", 0, -1.0, 1.0, 1.0))
+    task.add(INPUT, [Channel("Dev1/ai0", 0, -1.0, 1.0, 1.0)])
     task.set_clock(Clock(10.0, CONTINUOUS.value, 2))
     task.set_buffer(buffer)
     task.begin()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support.places import ROOT
 
@@ -40,6 +41,18 @@ def test_what_is_wrong_is_said(tmp_path: Path, old: str, new: str, said: str) ->
     file.write_text(WHOLE.replace(old, new), encoding="utf-8")
     with pytest.raises(UsageError, match=said):
         read_rig(file)
+
+
+def test_ticks_that_round_to_one_time_are_one_instant() -> None:
+    # after a year a nanosecond is below the rounding of a double
+    plant = Plant(read_rig(ROOT / "examples" / "rig" / "oscillator.toml"))
+    year, ones = 31_536_000 * 10**9, np.ones(4)
+    plant.advance(np.array([year]), np.zeros(1))
+    close = plant.advance(year + np.array([1, 2, 3, 1_000_000]), ones)["displacement"]
+    assert close[0] == close[1] == 0.0
+    assert close[3] > 0.0
+    assert plant.now == year + 1_000_000
+    plant.close()
 
 
 @pytest.mark.parametrize("scene", ["two_oscillators.toml", "newtons_cradle.toml"])
