@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ctypes import POINTER, Structure, c_double, c_int64, c_uint32, c_void_p
+from ctypes import POINTER, Structure, c_double, c_int32, c_int64, c_uint32, c_void_p
 from enum import IntEnum
 from functools import cache
 from typing import Any
@@ -17,12 +17,27 @@ class HoldEnd(IntEnum):
     done = 0
     refused = 1
     limit = 2
+    again = 3
+    touches = 4
+
+
+class Magnet(Structure):
+    """An exciter that makes a force of a voltage; `measuring/magnet.h` says what each field is."""
+
+    _fields_ = [*((name, c_double) for name in ("gain", "offset", "distance")), ("side", c_int32)]
 
 
 class HoldPlan(Structure):
     """What all blocks have in common; `door/stepping.h` says what each field is."""
 
-    _fields_ = [("force", c_uint32), ("force_rate", c_uint32), ("outputs", RunsVariables)]
+    _fields_ = [
+        ("force", c_uint32),
+        ("force_rate", c_uint32),
+        ("outputs", RunsVariables),
+        ("magnet", POINTER(Magnet)),
+        *((name, c_uint32) for name in ("displacement", "record_count", "record_taken", "record_rows")),
+        ("row_capacity", c_int32),
+    ]
 
 
 class HoldBlock(Structure):
@@ -30,9 +45,12 @@ class HoldBlock(Structure):
 
     _fields_ = [
         ("count", c_int64),
-        *((name, c_void_p) for name in ("ends", "forces", "samples")),
+        *((name, c_void_p) for name in ("ends", "forces", "renewed", "samples")),
         ("at", c_int64),
         ("time", c_double),
+        ("begun", c_int32),
+        ("rows", c_void_p),
+        *((name, c_int64) for name in ("rows_room", "rows_used")),
     ]
 
 
@@ -49,7 +67,7 @@ def hold_samples(fmu: RunsFmu, plan: HoldPlan, block: HoldBlock) -> HoldEnd:
     Parameters
     ----------
     fmu : RunsFmu
-        The instance; it does not record.
+        The instance; it does not record, or the plan says where.
     plan : HoldPlan
     block : HoldBlock
         It is filled as far as the body came.
@@ -57,6 +75,8 @@ def hold_samples(fmu: RunsFmu, plan: HoldPlan, block: HoldBlock) -> HoldEnd:
     Returns
     -------
     HoldEnd
-        `refused`: the body failed in the step to the sample `at`; `limit`: it met its limit of impacts there.
+        `refused`: the body failed in the step to the sample `at`; `limit`: it met its limit of impacts there;
+        `touches`: it touches its exciter; `again`: take the rows of the block, set `rows_used` to 0, and call again to
+        go on.
     """
     return HoldEnd(_function()(fmu, plan, block))

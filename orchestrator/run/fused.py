@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.fmus import fmu_path
 from vibroimpact.fmus.core import runs, stepping
+from vibroimpact.fmus.errors import ComponentError
 from vibroimpact.fmus.packaging.archive import unpack
 from vibroimpact.orchestrator.fmi.instance import DISCARD, WrapOf
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import description_of
-from vibroimpact.orchestrator.run.record import ImpactLimitReached, RecordedBody
+from vibroimpact.orchestrator.run.record import ROW_CAPACITY, ROW_WIDTH, ImpactLimitReached, RecordedBody
+
+
+@dataclass(frozen=True, slots=True)
+class HeldExciter:
+    """What makes a force of a voltage where a step begins: its numbers, and the body's displacement there by name."""
+
+    magnet: stepping.Magnet
+    displacement: str
 
 
 class BodyDriver(RecordedBody):
@@ -56,7 +68,7 @@ class BodyDriver(RecordedBody):
         super().__init__(self._group)
         self._floats = self._group("Float64", tuple(floats))
         self.float_names = tuple(floats)
-        self._held: tuple[str, ...] | None = None  # what a block of samples reads
+        self._held: tuple[str, ...] | None = None  # what a block of samples reads that is not recorded
         self.integers = []
         for kind, is_boolean in (("Int64", False), ("Boolean", True)):
             values = {name: v for name, v in integers.items() if isinstance(v, bool) is is_boolean}
@@ -111,18 +123,31 @@ class BodyDriver(RecordedBody):
                 instance.time = end
 
     def hold(
-        self, ends: NDArray[np.float64], forces: NDArray[np.float64], outputs: Sequence[str]
+        self,
+        ends: NDArray[np.float64],
+        forces: NDArray[np.float64],
+        outputs: Sequence[str],
+        *,
+        renewed: NDArray[np.uint8] | None = None,
+        exciter: HeldExciter | None = None,
+        recording: bool = False,
     ) -> NDArray[np.float64]:
-        """Advance from sample to sample by one call, a force held before each; nothing is recorded meanwhile.
+        """Advance from sample to sample by one call, a force held before each.
 
         Parameters
         ----------
         ends : ndarray, shape (sample,)
             s, ascending, after the time reached.
         forces : ndarray, shape (sample,)
-            N, each held until the sample at its place.
+            N, each held until the sample at its place; V of an exciter.
         outputs : sequence of str
             Variables of the body that are read at each sample.
+        renewed : ndarray of uint8, shape (sample,), optional
+            Whether the force is made anew where the step to a sample begins; left out, before each.
+        exciter : HeldExciter or None
+            Makes the forces of voltages.
+        recording : bool
+            Whether the body records as `record` says; else it records nothing from the first call on.
 
         Returns
         -------
@@ -131,29 +156,73 @@ class BodyDriver(RecordedBody):
         Raises
         ------
         ImpactLimitReached
-            At the limit of impacts of the run.
+            At the limit of impacts of the run; it has the samples before.
+        DeadlineReached
+            After the deadline of the run.
         ComponentError
-            The body fails.
+            The body fails, or touches the exciter.
         """
-        instance, references = self.instance, self.references
-        if self._held != tuple(outputs):
+        if recording:
+            self._held = None  # the next block that does not record says so
+        elif self._held != tuple(outputs):
             self.record(impacts=False, extrema=False, periods=False)
             self._held = tuple(outputs)
-            self._read = np.array([references[name] for name in outputs], dtype=np.uint32)
-            functions = [instance.address_of(name) for name in runs.RunsFmu.FUNCTIONS]
-            self._functions = runs.RunsFmu(instance.pointer, *functions, instance.log.environment)
-            variables = runs.RunsVariables(runs.address(self._read), len(self._read))
-            self._plan = stepping.HoldPlan(references["force"], references["force_rate"], variables)
+        read = np.array([self.references[name] for name in outputs], dtype=np.uint32)
+        plan = self._hold_plan(read, exciter, recording=recording)
         samples = np.empty((len(ends), len(outputs)))
-        arrays = map(runs.address, (ends, forces, samples))
-        block = stepping.HoldBlock(len(ends), *arrays, 0, instance.time)
-        end = stepping.hold_samples(self._functions, self._plan, block)
-        instance.time = block.time
+        rows = np.empty((ROW_CAPACITY if recording else 0, ROW_WIDTH))
+        block = stepping.HoldBlock(
+            count=len(ends),
+            ends=runs.address(ends),
+            forces=runs.address(forces),
+            renewed=None if renewed is None else runs.address(renewed),
+            samples=runs.address(samples),
+            time=self.instance.time,
+            rows=runs.address(rows),
+            rows_room=len(rows),
+        )
+        end = stepping.HoldEnd.again
+        while end == stepping.HoldEnd.again:
+            self._deadline.refuse_late()
+            end = stepping.hold_samples(self._functions, plan, block)
+            self.instance.time = block.time
+            if block.rows_used:
+                self.rows.blocks.append(rows[: block.rows_used].copy())
+                block.rows_used = 0
         if end == stepping.HoldEnd.limit:
-            raise ImpactLimitReached
+            raise ImpactLimitReached(samples[: block.at])
+        if end == stepping.HoldEnd.touches:
+            raise ComponentError(
+                f"exciter.distance: expected a body that stays away from its exciter, got one that touches it at time "
+                f"{block.time:.17g}. Drive less, or give a larger distance.",
+                instance="body",
+            )
         if end == stepping.HoldEnd.refused:
-            instance.fail("DoStep", f"refused the step to the sample at time {ends[block.at]:.17g}")
+            self.instance.fail("DoStep", f"refused the step to the sample at time {ends[block.at]:.17g}")
         return samples
+
+    def _hold_plan(
+        self, read: NDArray[np.uint32], exciter: HeldExciter | None, *, recording: bool
+    ) -> stepping.HoldPlan:
+        references = self.references
+        plan = stepping.HoldPlan(
+            force=references["force"],
+            force_rate=references["force_rate"],
+            outputs=runs.RunsVariables(runs.address(read), len(read)),
+        )
+        if exciter is not None:
+            plan.magnet = ctypes.pointer(exciter.magnet)
+            plan.displacement = references[exciter.displacement]
+        if recording:
+            plan.record_count, plan.record_taken = references["record.count"], references["record.taken"]
+            plan.record_rows, plan.row_capacity = references["record.rows"], ROW_CAPACITY
+        return plan
+
+    @cached_property
+    def _functions(self) -> runs.RunsFmu:
+        instance = self.instance
+        functions = [instance.address_of(name) for name in runs.RunsFmu.FUNCTIONS]
+        return runs.RunsFmu(instance.pointer, *functions, instance.log.environment)
 
     def close(self) -> None:
         """Free the instance."""

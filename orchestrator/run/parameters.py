@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
@@ -15,6 +15,7 @@ from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.fields import fmu_variables_of
 from vibroimpact.orchestrator.scene.keys import MODES
+from vibroimpact.orchestrator.scene.measuring_models import Exciter
 from vibroimpact.orchestrator.scene.models import Forcing, RestitutionStop
 from vibroimpact.orchestrator.scene.places import (
     forcing_location,
@@ -51,6 +52,8 @@ def float_parameters(scene: Scene, start: tuple[float, ...] | None) -> dict[str,
     parameters = _own_floats(scene) | contact_floats(scene)
     if scene.forcing is not None:
         parameters |= named_numbers(scene.forcing)
+    if scene.exciter is not None:
+        parameters |= _exciter_floats(scene, scene.exciter, parameters)
     parameters |= named_numbers(scene.execution)
     if start is not None:
         parameters |= _carried(scene, start)
@@ -77,6 +80,20 @@ def named_numbers(table: BaseModel, size: int = 0) -> dict[str, float]:
         own = numbered(variable.name, each(value, size)) if variable.is_array else {variable.name: value}
         parameters |= own
     return parameters
+
+
+def _exciter_floats(scene: Scene, exciter: Exciter, forced: Mapping[str, float]) -> dict[str, float]:
+    """Return the force of an exciter: its amplitude is in V, its offset an input of the body, for a run to change.
+
+    A force that falls with the distance is not known before: it is all input, see `measuring.held_exciter`.
+    """
+    if scene.falling_force:
+        parameters = dict.fromkeys(forced.keys() & {"forcing.amplitude"}, 0.0)
+        if isinstance(scene.body, BeamBody):
+            parameters["sensor[1].location"] = forced["forcing_location"]
+        return parameters | {"force": 0.0}
+    amplitude = {key: exciter.gain * forced[key] for key in forced.keys() & {"forcing.amplitude"}}
+    return amplitude | {"force": exciter.offset}
 
 
 def _own_floats(scene: Scene) -> dict[str, float]:

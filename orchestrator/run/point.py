@@ -242,12 +242,12 @@ class _Run:
     # ---- time series ----
 
     def _advance_sampling(self) -> None:
-        series = self.scene.record.time_series
-        if series is None:
+        rate = self.scene.sampling_rate
+        if not rate:
             return
-        count = math.floor((self.end_time - self.begin_time) * series.rate * (1.0 + 1e-12)) + 1
+        count = math.floor((self.end_time - self.begin_time) * rate * (1.0 + 1e-12)) + 1
         for i in range(count):
-            self.driver.advance(min(self.begin_time + i / series.rate, self.end_time))
+            self.driver.advance(min(self.begin_time + i / rate, self.end_time))
             time = self.driver.time
             row = self.plan.row(self.driver.sampled(), self.scene.forcing, self.parameters, time)
             self.samples.extend((time, *row))

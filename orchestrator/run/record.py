@@ -26,7 +26,17 @@ OBSERVED = ("displacement", "velocity")
 
 
 class ImpactLimitReached(Exception):
-    """A run met `impact_limit` impacts, touch-downs and rests; it ends here with what it has."""
+    """A run met `impact_limit` impacts, touch-downs and rests; it ends here with what it has.
+
+    Attributes
+    ----------
+    samples : ndarray, shape (sample, output)
+        The samples of a block before the limit.
+    """
+
+    def __init__(self, samples: NDArray[np.float64] | None = None) -> None:
+        self.samples = np.empty((0, 0)) if samples is None else samples
+        super().__init__()
 
 
 class DeadlineReached(Exception):

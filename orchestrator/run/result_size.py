@@ -21,16 +21,10 @@ def bytes_of_a_run(scene: Scene) -> int:
     """Return the size of what one run records, but for impacts, whose number nobody knows before."""
     record, general = scene.record, scene.general
     periods = record.recorded_periods if (record.extrema or record.strobe) and general is None else 0
-    samples = round(_sampling_rate(scene) * _recorded_seconds(scene))
+    samples = round(scene.sampling_rate * _recorded_seconds(scene))
     periods = periods if record.each_period else min(periods, 1)
     numbers = periods * len(PERIOD_COLUMNS) + samples * (1 + len(sample_variables(scene)))
     return _RUN_BYTES + _NUMBER_BYTES * (numbers + 2 * most_elements(scene))
-
-
-def _sampling_rate(scene: Scene) -> float:
-    if scene.general is not None:
-        return (scene.general.rate or 0.0) if scene.general.variables else 0.0
-    return scene.record.time_series.rate if scene.record.time_series is not None else 0.0
 
 
 def _recorded_seconds(scene: Scene) -> float:

@@ -11,13 +11,13 @@ from typing import Any
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS, BeamBody, Body, ChainBody
 from vibroimpact.orchestrator.scene.fields import known_keys, listed
 from vibroimpact.orchestrator.scene.keys import MODES, number_of, numeric_key
+from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor, channels_in
 from vibroimpact.orchestrator.scene.models import (
     STOP_MODELS,
     Execution,
     Forcing,
     Record,
     SceneHeader,
-    Sensor,
     Stop,
 )
 from vibroimpact.orchestrator.scene.problems import (
@@ -107,6 +107,10 @@ class Draft(DraftTables):
         self.record = self.table(Record, "record", {})
         self.execution = self.table(Execution, "execution", {})
         self.sensor = self.table(Sensor, "sensor")
+        self.load_cell = self.table(LoadCell, "load_cell")
+        self.exciter = self.table(Exciter, "exciter")
+        self.noise = self.table(Noise, "noise")
+        self.daq = self.table(Daq, "daq")
         self.replay = self.table(Replay, "replay")
 
     def _body(self) -> Body | None:
@@ -140,6 +144,24 @@ class Draft(DraftTables):
         owner = self.stops[key.place] if key.place is not None else getattr(self, key.table)
         number = number_of(owner, key)
         return None if number is None else (number, number)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels of the measuring chain that the time series names."""
+        series = self.record.time_series if self.record else None
+        return () if series is None else channels_in(series.variables)
+
+    @property
+    def samples_channels(self) -> bool:
+        """Whether the clock of `[daq]` is that of the time series."""
+        return "daq" in self.document and bool(self.channels)
+
+    def sampling_span(self) -> tuple[float, float] | None:
+        """Return the lowest and highest rate of the time series, 1/s; None without one, or where it is not valid."""
+        series = self.record.time_series if self.record else None
+        if self.samples_channels:
+            return self.span("daq.rate")
+        return None if series is None or series.rate is None else (series.rate, series.rate)
 
     def angular_frequency_span(self) -> tuple[float, float] | None:
         """Return the lowest and highest angular frequency: 0 unforced, None where it is not valid."""

@@ -12,15 +12,24 @@ from pydantic import BaseModel
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene.body_models import BODY_MODELS
 from vibroimpact.orchestrator.scene.fields import field_name, field_of, is_whole, known_keys, numeric_keys
-from vibroimpact.orchestrator.scene.models import STOP_MODELS, Execution, Forcing, Sensor
+from vibroimpact.orchestrator.scene.measuring_models import Daq, Exciter, LoadCell, Noise, Sensor
+from vibroimpact.orchestrator.scene.models import STOP_MODELS, Execution, Forcing
 
 _MODELS: dict[str, tuple[type[BaseModel], ...]] = {
     "body": tuple(BODY_MODELS.values()),
     "forcing": (Forcing,),
     "sensor": (Sensor,),
+    "load_cell": (LoadCell,),
+    "exciter": (Exciter,),
+    "noise": (Noise,),
+    "daq": (Daq,),
     "stop": tuple(STOP_MODELS.values()),
     "execution": (Execution,),
 }
+CHAIN_TABLES = ("load_cell", "exciter", "noise", "daq")
+"""Tables of a measuring chain; `sensor` is in scenes without one too."""
+SINGLE_TABLES = ("body", "forcing", "sensor", *CHAIN_TABLES)
+"""Tables with numbers that a scene has once or not at all."""
 SWEEPABLE: dict[str, tuple[str, ...]] = {
     table: tuple(dict.fromkeys(key for model in models for key in numeric_keys(model)))
     for table, models in _MODELS.items()
@@ -34,7 +43,7 @@ OVERRIDDEN_BY = {"damping": "damping_ratio", "angular_frequency": "frequency"}
 ALTERNATIVES = OVERRIDDEN_BY | {second: first for first, second in OVERRIDDEN_BY.items()}
 """Keys of one table that say the same thing, of which a scene gives one."""
 _NUMBER = r"\[([1-9][0-9]{0,8})\]"
-_KEY = re.compile(rf"(?:(body|forcing|sensor|execution)|(stop){_NUMBER})\.([a-z_]+)(?:{_NUMBER})?")
+_KEY = re.compile(rf"(?:({'|'.join(SINGLE_TABLES)}|execution)|(stop){_NUMBER})\.([a-z_]+)(?:{_NUMBER})?")
 
 
 class Key(NamedTuple):
@@ -80,6 +89,11 @@ def parse_key(text: str) -> Key | None:
     return Key(
         table or stop, int(number) - 1 if number else None, name, int(element) - 1 if element else None
     )
+
+
+def model_of(table: str) -> type[BaseModel]:
+    """Return the model of a table that has no kinds."""
+    return _MODELS[table][0]
 
 
 def numeric_key(text: str) -> Key:

@@ -3,8 +3,8 @@
 A field says everything about itself in one place: its constraints, its default, and its `Rule`, from which messages,
 keys of sweeps, units of datasets, parameters of FMUs and the tables of docs/scene.md come (`fields`). Rules between
 fields or tables are in `rules`. Another contact law becomes one more model here and one more entry in `STOP_MODELS`;
-another kind of body likewise in `body_models`, the tables of a replay are in `replay_models`, those of a sweep in
-`sweep_models`.
+another kind of body likewise in `body_models`, the tables of a measuring chain are in `measuring_models`, those of a
+replay in `replay_models`, those of a sweep in `sweep_models`.
 """
 
 from __future__ import annotations
@@ -87,37 +87,10 @@ AMPLITUDE = "motion that depends on its amplitude"
 FEEDS_ENERGY = "Negative damping feeds energy into the body."
 
 
-def _location(doc: str, default: str) -> Rule:
+def location_rule(doc: str, default: str) -> Rule:
+    """Return the rule of a point of a beam."""
     hint = "It is a fraction of the length: 0 is the clamped end, 1 the far end."
     return Rule(hint=hint, doc=doc, default=default)
-
-
-class Sensor(SceneTable):
-    """`[sensor]`: the observed point of a beam, and what a reading there is: gain * value + offset."""
-
-    location: Annotated[
-        Fraction | None,
-        _location(
-            "beams only; a point that moves",
-            "left out: the tip of a clamped-free beam, else the point of `stop[1]`, or the middle",
-        ),
-    ] = None
-    gain: Annotated[
-        Finite,
-        Rule(
-            hint="A reading is gain * value + offset, in the unit of its channel.",
-            doc="replays only: reading per value, both in the unit of the channel; where these are of different "
-            "kinds, in its unit per SI unit",
-        ),
-    ] = 1.0
-    offset: Annotated[
-        Finite,
-        Rule(
-            hint="It has the unit of the reading.",
-            doc="replays only, in the unit of the reading: left out, the level of the channel before its event is "
-            "taken off instead",
-        ),
-    ] = 0.0
 
 
 _CONSTANT = "Use 0 for a constant force."
@@ -138,7 +111,7 @@ class Forcing(SceneTable):
         FiniteNumbers,
         Rule(
             "a finite number, or an array of them for a chain",
-            unit="N (m/s^2 for base_acceleration, N/m for uniform)",
+            unit="N (m/s^2 for base_acceleration, N/m for uniform, V beside `[exciter]`)",
             doc='of a chain under `"force"` one for each mass; a number is enough for a single mass',
         ),
     ]
@@ -168,7 +141,9 @@ class Forcing(SceneTable):
     ] = 0.0
     location: Annotated[
         Fraction | None,
-        _location('point of a beam that a `"force"` acts on; one that moves', "the free tip, or the middle"),
+        location_rule(
+            'point of a beam that a `"force"` acts on; one that moves', "the free tip, or the middle"
+        ),
     ] = None
     mode: Annotated[
         ModeNumber | None,
@@ -213,7 +188,7 @@ class StopTable(SceneTable):
     ] = None
     location: Annotated[
         Fraction | None,
-        _location(
+        location_rule(
             "beams: the point that the stop limits; one that moves",
             "the tip; required where the far end is supported",
         ),
@@ -278,7 +253,14 @@ class HuntCrossleyStop(StopTable):
 class TimeSeries(SceneTable):
     """`record.time_series`: variables sampled at a constant rate; `sampled_names` knows which there are."""
 
-    rate: Annotated[Positive, Rule(unit="samples per s", doc="at most 10^8 samples per run")]
+    rate: Annotated[
+        Positive | None,
+        Rule(
+            unit="samples per s",
+            doc="at most 10^8 samples per run",
+            default="required; beside `[daq]` its rate",
+        ),
+    ] = None
     variables: Annotated[
         tuple[Annotated[str, Field(min_length=1, max_length=60)], ...],
         Field(strict=False, min_length=1),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vibroimpact.orchestrator.scene.body_models import BeamBody, ChainBody
-from vibroimpact.orchestrator.scene.models import Forcing, Sensor, Stop
+from vibroimpact.orchestrator.scene.measuring_models import Sensor
+from vibroimpact.orchestrator.scene.models import Forcing, Stop
 
 TIP, MIDDLE = 1.0, 0.5
 """Fractions of the length of a beam."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from difflib import get_close_matches
 
 from vibroimpact.orchestrator.scene.body_models import BeamBody, Body, ChainBody
+from vibroimpact.orchestrator.scene.measuring_models import CHANNELS, DRIVE
 from vibroimpact.orchestrator.scene.models import Forcing
 from vibroimpact.orchestrator.scene.problems import nearest
 
@@ -22,8 +23,22 @@ _ELEMENT = re.compile(r"([a-z_]+)\[([1-9][0-9]*)\]")
 _FOLLOWED = ("modal_energy[", "energy.")
 
 
+def channel_names(tables: Container[str]) -> tuple[str, ...]:
+    """Return the channels, in V, that a scene with these tables can sample.
+
+    >>> channel_names({"body", "load_cell", "exciter"})
+    ('load_cell', 'drive')
+    """
+    return tuple(name for name in CHANNELS if table_of(name) in tables)
+
+
+def table_of(channel: str) -> str:
+    """Return the table that a channel of the measuring chain needs."""
+    return "exciter" if channel == DRIVE else channel.partition(".")[0]
+
+
 def sampled_names(body: Body, stops: int, forcing: Forcing | None) -> tuple[str, ...]:
-    """Return the names that a time series of this scene can have.
+    """Return the names that a time series of this scene can have, beside `channel_names`.
 
     Parameters
     ----------

@@ -30,6 +30,7 @@ from vibroimpact.orchestrator.scene.file import (
 )
 from vibroimpact.orchestrator.scene.general.scene import GeneralScene
 from vibroimpact.orchestrator.scene.keys import (
+    SINGLE_TABLES,
     Key,
     coordinate_name,
     number_of,
@@ -37,7 +38,15 @@ from vibroimpact.orchestrator.scene.keys import (
     numeric_key,
     replacement,
 )
-from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, SceneTable, Sensor, Stop
+from vibroimpact.orchestrator.scene.measuring_models import (
+    Daq,
+    Exciter,
+    LoadCell,
+    Noise,
+    Sensor,
+    channels_in,
+)
+from vibroimpact.orchestrator.scene.models import Execution, Forcing, Record, SceneTable, Stop
 from vibroimpact.orchestrator.scene.problems import lines_of
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY, Replay
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
@@ -68,7 +77,9 @@ class Scene(SceneTable):
     stops : tuple of RestitutionStop, KelvinVoigtStop, HertzStop or HuntCrossleyStop
         The stops in the order of the file.
     sensor : Sensor or None
-        Where a beam is observed; None without a `[sensor]` table.
+        Where a beam is observed, and what a sensor there reads; None without a `[sensor]` table.
+    load_cell, exciter, noise, daq : LoadCell, Exciter, Noise, Daq, or None
+        The measuring chain beside `[sensor]`; None without their tables.
     replay : Replay or None
         Recorded channels that drive the body and that its motion is compared with; None without `[replay]`.
     record : Record
@@ -91,6 +102,10 @@ class Scene(SceneTable):
     forcing: Forcing | None = None
     stops: tuple[Stop, ...] = ()
     sensor: Sensor | None = None
+    load_cell: LoadCell | None = None
+    exciter: Exciter | None = None
+    noise: Noise | None = None
+    daq: Daq | None = None
     record: Record
     sweep: tuple[SweepAxis, ...]
     execution: Execution
@@ -133,6 +148,28 @@ class Scene(SceneTable):
         if self.forcing is None or self.forcing.angular_frequency == 0.0:
             return None
         return 2.0 * math.pi / self.forcing.angular_frequency
+
+    @property
+    def sampling_rate(self) -> float:
+        """Nominal rate of the time series, 1/s: that of `[daq]` where it samples channels; 0 without a time series."""
+        if self.general is not None:
+            return (self.general.rate or 0.0) if self.general.variables else 0.0
+        series = self.record.time_series
+        if series is None:
+            return 0.0
+        return self.daq.rate if self.daq is not None and self.channels else series.rate or 0.0
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels of the measuring chain that the time series samples, in its order."""
+        series = self.record.time_series
+        return () if series is None else channels_in(series.variables)
+
+    @property
+    def falling_force(self) -> bool:
+        """Whether the force of the exciter falls with the distance: at one point of the sweep, then held at all."""
+        swept = [axis.values for axis in self.sweep if axis.key == "exciter.distance"]
+        return self.exciter is not None and (self.exciter.distance > 0.0 or any(map(any, swept)))
 
     @property
     def runs(self) -> int:
@@ -201,12 +238,8 @@ class Scene(SceneTable):
             if parts.element is not None:
                 self._number(key, parts, owner)
             tables[parts.owner] = owner.model_copy(update=replacement(owner, parts, value))
-        others = {
-            "body_given": tables.pop("body"),
-            "forcing": tables.pop("forcing"),
-            "sensor": tables.pop("sensor"),
-            "execution": tables.pop("execution"),
-        }
+        others = {name: tables.pop(name) for name in (*SINGLE_TABLES, "execution")}
+        others["body_given"] = others.pop("body")
         return self.model_copy(update={**others, "stops": tuple(tables.values())})
 
     @classmethod
@@ -343,7 +376,7 @@ class Scene(SceneTable):
     def _numbered_tables(self) -> dict[str, BaseModel | None]:
         """Return the tables that hold numbers, as keys name them."""
         stops = {f"stop[{number}]": stop for number, stop in enumerate(self.stops, start=1)}
-        tables = {"body": self.body_given, "forcing": self.forcing, "sensor": self.sensor}
+        tables = {name: self.body_given if name == "body" else getattr(self, name) for name in SINGLE_TABLES}
         return {**stops, **tables, "execution": self.execution}
 
 

@@ -18,8 +18,8 @@ from vibroimpact.orchestrator.scene.fields import (
     known_keys,
     rule_of,
 )
-from vibroimpact.orchestrator.scene.keys import SWEEPABLE, numeric_key, parse_key
-from vibroimpact.orchestrator.scene.models import STOP_MODELS, Execution, Forcing, Sensor
+from vibroimpact.orchestrator.scene.keys import SINGLE_TABLES, SWEEPABLE, model_of, numeric_key, parse_key
+from vibroimpact.orchestrator.scene.models import STOP_MODELS
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     key_path,
@@ -104,7 +104,7 @@ def _sweepable_keys(document: Mapping[str, Any]) -> list[str]:
 
 def _tables(document: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Yield the tables with numbers, an array `stop` as `stop[1]`, `stop[2]`, ..."""
-    for name in ("body", "forcing", "sensor"):
+    for name in SINGLE_TABLES:
         if name in document:
             yield name, document[name]
     yield "execution", document.get("execution", {})
@@ -131,9 +131,7 @@ def _model_of(name: str, table: Any) -> type[BaseModel] | None:
         return BODY_MODELS.get(str(written.get("kind", "oscillator")))
     if name.startswith("stop"):
         return STOP_MODELS.get(str(written.get("law", "restitution")))
-    if name == "execution":
-        return Execution
-    return Forcing if name == "forcing" else Sensor
+    return model_of(name)
 
 
 def _stop_count(document: Mapping[str, Any]) -> int:
@@ -184,7 +182,9 @@ def _value_problems(axis: SweepAxis, document: Mapping[str, Any]) -> list[Proble
     All rules of sweepable fields are intervals, so the lowest and the highest value speak for the rest.
     """
     key = numeric_key(axis.key)
-    model = Execution if key.table == "execution" else _model_of(key.owner, key.owner_in(document))
+    model = (
+        model_of("execution") if key.table == "execution" else _model_of(key.owner, key.owner_in(document))
+    )
     if model is None:
         return []
     field = field_of(model, key.name)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vibroimpact.orchestrator.scene.draft import Draft
+from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
 from vibroimpact.orchestrator.scene.models import Record
 from vibroimpact.orchestrator.scene.problems import Problem, quoted, unknown_key
 from vibroimpact.orchestrator.scene.rules.scene import rule_problems
@@ -15,7 +16,6 @@ from vibroimpact.orchestrator.scene.sweep_table import read_short_sweep
 _SHORT_TABLES = ("body", "forcing", "stop", "sensor", "replay")
 _GENERAL_TABLES = ("component", "connection", "contact", "event")
 _COMMON_TABLES = ("record", "sweep", "execution")
-_OPTIONAL_TABLES = ("load_cell", "exciter", "noise", "daq")
 
 
 def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], list[Problem]]:
@@ -39,7 +39,7 @@ def read_tables(document: Mapping[str, Any], folder: Path) -> tuple[dict[str, An
     short = [name for name in _SHORT_TABLES if name in document]
     if general and short:
         return {}, [_mixed_problem(general, short)]
-    own = _GENERAL_TABLES if general else _SHORT_TABLES
+    own = _GENERAL_TABLES if general else (*_SHORT_TABLES, *CHAIN_TABLES)
     unknown = list(_table_problems(document, ("scene", *own, *_COMMON_TABLES)))
     if general:
         # What reads model descriptions takes time to load, and the short form does not need it.
@@ -74,6 +74,7 @@ def _read_short(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Probl
         "forcing": draft.forcing,
         "stops": draft.stops,
         "sensor": draft.sensor,
+        **{name: getattr(draft, name) for name in CHAIN_TABLES},
         "record": _applicable(draft.record),
         "sweep": axes + (draft.replay.axes if draft.replay else ()),
         "execution": draft.execution,
@@ -83,9 +84,9 @@ def _read_short(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Probl
 
 def _table_problems(document: Mapping[str, Any], known: tuple[str, ...]) -> Iterator[Problem]:
     for name, value in document.items():
-        if name in _OPTIONAL_TABLES:
-            hint = f"[{name}] is not available in this version: remove it."
-            yield Problem(name, f"a scene without [{name}]", "one", hint)
+        if name in CHAIN_TABLES and name not in known:
+            hint = "In a scene of components the measuring chain is made of components too."
+            yield Problem(name, f"[{name}] in a scene with [body]", "one beside [component.NAME]", hint)
         elif name not in known:
             problem = unknown_key((name,), known)
             what = "table" if isinstance(value, dict | list) else "key outside any table"

@@ -185,8 +185,7 @@ def _typical_speed(reference: Reference) -> float:
 
 def _rate_of(scene: Scene) -> float:
     """Return the rate of the time series that a scene asks for, samples per s; NaN without one."""
-    series = scene.record.time_series
-    return math.nan if series is None else series.rate
+    return scene.sampling_rate or math.nan
 
 
 def _refuse_misuse(tolerance: float | None, quantity: str) -> None:

@@ -8,10 +8,16 @@ from collections.abc import Iterator
 from vibroimpact.orchestrator.scene.body_models import BeamBody, Body, ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.fields import field_of, fmu_variables_of, is_array_only
+from vibroimpact.orchestrator.scene.measuring_models import CHANNELS
 from vibroimpact.orchestrator.scene.models import Forcing
 from vibroimpact.orchestrator.scene.places import moves
 from vibroimpact.orchestrator.scene.problems import Problem, quoted
-from vibroimpact.orchestrator.scene.sampled_names import sampled_names, variable_hint
+from vibroimpact.orchestrator.scene.sampled_names import (
+    channel_names,
+    sampled_names,
+    table_of,
+    variable_hint,
+)
 
 SECTION_KEYS = ("width", "thickness", "youngs_modulus", "density")
 RIGIDITY_KEYS = ("flexural_rigidity", "mass_per_length")
@@ -165,9 +171,16 @@ def sampled_variables_are_known(draft: Draft) -> Iterator[Problem]:
     series = draft.record.time_series if draft.record else None
     if series is None or draft.body is None:
         return
-    known = sampled_names(draft.body, len(draft.stops), draft.forcing)
+    known = (
+        *sampled_names(draft.body, len(draft.stops), draft.forcing),
+        *channel_names(draft.document),
+    )
     for place, name in enumerate(series.variables, start=1):
-        if name not in known:
+        if name in CHANNELS and name not in known:
+            hint = f"Add [{table_of(name)}], or leave it out."
+            where = f"record.time_series.variables[{place}]"
+            yield Problem(where, f"[{table_of(name)}] beside {quoted(name)}", "a scene without it", hint)
+        elif name not in known:
             hint = variable_hint(name, known)
             yield Problem(f"record.time_series.variables[{place}]", "a variable name", quoted(name), hint)
     for name, times in Counter(series.variables).items():

@@ -16,6 +16,7 @@ from vibroimpact.orchestrator.scene.keys import MODES, START_STATE
 from vibroimpact.orchestrator.scene.models import MOST_SAMPLES_PER_RUN
 from vibroimpact.orchestrator.scene.problems import Problem, key_path, quoted
 from vibroimpact.orchestrator.scene.rules.body import BODY_RULES
+from vibroimpact.orchestrator.scene.rules.measuring import MEASURING_RULES
 from vibroimpact.orchestrator.scene.rules.replay import REPLAY_RULES
 from vibroimpact.orchestrator.scene.rules.stop import STOP_RULES
 from vibroimpact.orchestrator.scene.sweep import SweepAxis, run_count
@@ -35,6 +36,7 @@ def rule_problems(draft: Draft) -> list[Problem]:
         _units_agree,
         *BODY_RULES,
         *STOP_RULES,
+        *MEASURING_RULES,
         *REPLAY_RULES,
         _record_counts_what_there_is,
         _samples_fit,
@@ -136,14 +138,15 @@ def _wrong_durations(
 
 def _samples_fit(draft: Draft) -> Iterator[Problem]:
     span = draft.angular_frequency_span()
-    if span is None or draft.record is None or draft.record.time_series is None:
+    rate = draft.sampling_span()
+    if span is None or draft.record is None or rate is None:
         return
     forced = span[0] > 0.0
     duration = (
         draft.record.recorded_periods * 2.0 * math.pi / span[0] if forced else draft.record.recorded_time
     )
-    samples = draft.record.time_series.rate * duration
-    yield from sample_problems("record.time_series.rate", samples, "periods" if forced else "time")
+    key = "daq.rate" if draft.samples_channels else "record.time_series.rate"
+    yield from sample_problems(key, rate[1] * duration, "periods" if forced else "time")
 
 
 def _adaptive_axes_can_tell_motions(draft: Draft) -> Iterator[Problem]:

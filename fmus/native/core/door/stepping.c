@@ -1,5 +1,7 @@
 #include "door/stepping.h"
 
+#include "body/record.h"
+
 enum { STATUS_WARNING = 1, STATUS_DISCARD = 2 };
 
 static bool went_well(int status)
@@ -7,9 +9,57 @@ static bool went_well(int status)
     return status >= 0 && status <= STATUS_WARNING;
 }
 
-/* Advance to `end`; a body that has worked for long ends its step before, and is asked again. */
-static int advance(const vi_runs_fmu *f, vi_hold_block *b, double end)
+/* Take the rows that the body has recorded. */
+static int take_rows(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_block *b)
 {
+    if (plan->row_capacity == 0) {
+        return VI_HOLD_DONE;
+    }
+    if (b->rows_room - b->rows_used < plan->row_capacity) {
+        return VI_HOLD_AGAIN;
+    }
+    int64_t count = 0;
+    if (!went_well(f->get_int64(f->instance, &plan->record_count, 1, &count, 1))) {
+        return VI_HOLD_REFUSED;
+    }
+    if (count == 0) {
+        return VI_HOLD_DONE;
+    }
+    double *rows = b->rows + b->rows_used * VI_RECORD_WIDTH;
+    const size_t size = (size_t)plan->row_capacity * VI_RECORD_WIDTH;
+    if (!went_well(f->get_float64(f->instance, &plan->record_rows, 1, rows, size))
+        || !went_well(f->set_int64(f->instance, &plan->record_taken, 1, &count, 1))) {
+        return VI_HOLD_REFUSED;
+    }
+    b->rows_used += count;
+    return VI_HOLD_DONE;
+}
+
+/* Set the force of the step to sample `at`, which begins here. */
+static int set_force(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_hold_block *b)
+{
+    if (b->renewed != NULL && !b->renewed[b->at]) {
+        return VI_HOLD_DONE;
+    }
+    const uint32_t inputs[] = {plan->force, plan->force_rate};
+    double values[] = {b->forces[b->at], 0.0};
+    if (plan->magnet != NULL) {
+        double displacement = 0.0;
+        if (!went_well(f->get_float64(f->instance, &plan->displacement, 1, &displacement, 1))) {
+            return VI_HOLD_REFUSED;
+        }
+        if (!(vi_magnet_gap(plan->magnet, displacement) > 0.0)) {
+            return VI_HOLD_TOUCHES;
+        }
+        values[0] = vi_magnet_force(plan->magnet, values[0], displacement);
+    }
+    return went_well(f->set_float64(f->instance, inputs, 2, values, 2)) ? VI_HOLD_DONE : VI_HOLD_REFUSED;
+}
+
+/* Advance to sample `at`; a body that has worked for long, or whose record is full, ends its step before. */
+static int advance(const vi_runs_fmu *f, const vi_hold_plan *plan, vi_hold_block *b)
+{
+    const double end = b->ends[b->at];
     while (b->time < end) {
         bool needs_event = false, ends = false, early = false;
         double reached = b->time;
@@ -22,27 +72,38 @@ static int advance(const vi_runs_fmu *f, vi_hold_block *b, double end)
             return VI_HOLD_REFUSED;
         }
         b->time = early ? reached : end;
+        if (early) {
+            const int took = take_rows(f, plan, b);
+            return took == VI_HOLD_DONE ? VI_HOLD_AGAIN : took;
+        }
     }
     return VI_HOLD_DONE;
 }
 
+static int read_sample(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_hold_block *b)
+{
+    const size_t count = plan->outputs.count;
+    double *sample = b->samples + (size_t)b->at * count;
+    const bool good = count == 0 || went_well(f->get_float64(f->instance, plan->outputs.references, count, sample, count));
+    return good ? VI_HOLD_DONE : VI_HOLD_REFUSED;
+}
+
 VI_DOOR int vi_door_hold(const vi_runs_fmu *fmu, const vi_hold_plan *plan, vi_hold_block *block)
 {
-    const uint32_t inputs[] = {plan->force, plan->force_rate};
-    for (; block->at < block->count; ++block->at) {
-        const double values[] = {block->forces[block->at], 0.0};
-        if (!went_well(fmu->set_float64(fmu->instance, inputs, 2, values, 2))) {
-            return VI_HOLD_REFUSED;
+    while (block->at < block->count) {
+        int came_to = block->begun ? VI_HOLD_DONE : set_force(fmu, plan, block);
+        if (came_to == VI_HOLD_DONE) {
+            block->begun = 1;
+            came_to = advance(fmu, plan, block);
         }
-        const int came_to = advance(fmu, block, block->ends[block->at]);
+        if (came_to == VI_HOLD_DONE) {
+            came_to = read_sample(fmu, plan, block);
+        }
         if (came_to != VI_HOLD_DONE) {
             return came_to;
         }
-        double *sample = block->samples + (size_t)block->at * plan->outputs.count;
-        if (!went_well(fmu->get_float64(fmu->instance, plan->outputs.references, plan->outputs.count, sample,
-                                        plan->outputs.count))) {
-            return VI_HOLD_REFUSED;
-        }
+        block->begun = 0;
+        block->at += 1;
     }
-    return VI_HOLD_DONE;
+    return take_rows(fmu, plan, block);
 }

@@ -15,6 +15,7 @@ from vibroimpact.fmus.units import agree, si_unit
 from vibroimpact.orchestrator.scene import (
     Scene,
     body_models,
+    measuring_models,
     models,
     parse_scene,
     replay_models,
@@ -28,7 +29,7 @@ from vibroimpact.orchestrator.scene.general.component_facts import component_fac
 REFERENCE = ROOT / "docs" / "scene.md"
 MODELS = {
     found
-    for module in (models, body_models, replay_models, sweep_models, general_models)
+    for module in (models, body_models, measuring_models, replay_models, sweep_models, general_models)
     for found in vars(module).values()
     if isinstance(found, type) and issubclass(found, BaseModel) and found.model_fields
 }

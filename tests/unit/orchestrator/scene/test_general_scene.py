@@ -455,7 +455,7 @@ def test_tables_of_the_wrong_shape_say_how_to_write_them() -> None:
     starts = [problem.split(", got ")[0] for problem in problems_of(text)]
     assert starts == [
         "extra: expected a known table",
-        "daq: expected a scene without [daq]",
+        "daq: expected [daq] in a scene with [body]",
         "component: expected one [component.NAME] table for each FMU",
         "connection: expected [[connection]] tables",
         "event: expected [[event]] tables",

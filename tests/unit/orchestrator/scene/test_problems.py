@@ -97,14 +97,6 @@ def test_an_execution_of_a_later_version_is_refused_by_name() -> None:
     )
 
 
-@pytest.mark.parametrize("table", ["load_cell", "exciter", "noise", "daq"])
-def test_a_table_of_a_later_version_is_refused_not_ignored(table: str) -> None:
-    (problem,) = problems_of(FORCED + f"[{table}]\nlevel = 1\n")
-    assert problem.startswith(
-        f"{table}: expected a scene without [{table}], got one. [{table}] is not available"
-    )
-
-
 @pytest.mark.parametrize("text", ["", '[scene]\ntitle = "empty"\n'])
 def test_a_scene_without_a_body_says_so(text: str) -> None:
     assert problems_of(text) == [

@@ -1,0 +1,207 @@
+"""The tables of the measuring chain: what turns a motion into voltages, and the voltage that drives into a force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from vibroimpact.orchestrator.scene.fields import Rule
+from vibroimpact.orchestrator.scene.models import (
+    Finite,
+    Fraction,
+    NotNegative,
+    Positive,
+    SceneTable,
+    location_rule,
+)
+
+MOST_PPM = 1e5
+"""Largest error of a clock, parts per million."""
+MOST_SEED = 10**9
+
+RING_INSTANTS = 12
+"""Instants in a period of a load cell's ring, at least: between them the force on it is taken to be linear."""
+MOST_INSTANTS = 1000
+"""Instants at which a sample follows a force, at most."""
+
+MEASURED_SENSOR = {f"sensor.{name}": name for name in ("displacement", "velocity", "acceleration")}
+"""Channels of the sensor, and what of the observed point each reads."""
+LOAD_CELL, DRIVE = "load_cell", "drive"
+CHANNELS = (*MEASURED_SENSOR, LOAD_CELL, DRIVE)
+"""All channels of a measuring chain, in V; also the tables that have their noise: see `Noise.of`."""
+
+
+def channels_in(names: Iterable[str]) -> tuple[str, ...]:
+    """Return those of some variables that are channels of a measuring chain.
+
+    >>> channels_in(["velocity", "drive", "sensor.velocity"])
+    ('drive', 'sensor.velocity')
+    """
+    return tuple(name for name in names if name in CHANNELS)
+
+
+FALLING_FORCE = "force that falls with distance"
+"""Effect that an exciter with a distance calls for."""
+
+
+class Sensor(SceneTable):
+    """`[sensor]`: the observed point of a beam, and what a reading there is: gain * value + offset, up to its range."""
+
+    location: Annotated[
+        Fraction | None,
+        location_rule(
+            "beams only; a point that moves",
+            "left out: the tip of a clamped-free beam, else the point of `stop[1]`, or the middle",
+        ),
+    ] = None
+    gain: Annotated[
+        Finite,
+        Rule(
+            hint="A reading is gain * value + offset, in the unit of its channel.",
+            doc="reading per value: of `sensor.displacement` in V/m, of `sensor.velocity` in V s/m, of "
+            "`sensor.acceleration` in V s^2/m; in replays both in the unit of the channel, or, where these are of "
+            "different kinds, in its unit per SI unit",
+        ),
+    ] = 1.0
+    offset: Annotated[
+        Finite,
+        Rule(
+            hint="It has the unit of the reading.",
+            doc="in V; in replays in the unit of the reading: left out, the level of the channel before its event is "
+            "taken off instead",
+        ),
+    ] = 0.0
+    range: Annotated[
+        NotNegative | None,
+        Rule(
+            hint="Use 0 for a sensor without an end.",
+            doc="in V: readings end at +- this; not in replays",
+            default="0: they do not end",
+        ),
+    ] = None
+
+
+class LoadCell(SceneTable):
+    """`[load_cell]`: the voltage of a cell behind a stop: a second-order system that the contact force drives."""
+
+    stop: Annotated[
+        int,
+        Field(ge=1, le=8),
+        Rule(hint="Stops count from 1.", doc="the stop whose force it measures"),
+    ] = 1
+    sensitivity: Annotated[Finite, Rule(unit="V/N", doc="volts per newton; negative where it is inverted")]
+    natural_frequency: Annotated[
+        NotNegative,
+        Rule(
+            unit="Hz",
+            hint="Use 0 for a cell that follows the force at once.",
+            doc="of the cell's ring; 0: it follows the force at once",
+        ),
+    ] = 0.0
+    damping_ratio: Annotated[
+        NotNegative, Rule(unit="1", hint="A cell does not feed energy.", doc="of the ring")
+    ] = 0.0
+    offset: Annotated[Finite, Rule(unit="V", doc="voltage without a force, at time 0")] = 0.0
+    drift: Annotated[Finite, Rule(unit="V/s", doc="change of that voltage")] = 0.0
+    contact_duration: Annotated[
+        Positive | None,
+        Rule(
+            unit="s",
+            hint="An impact on a rigid stop is seen as a half sine of this duration.",
+            doc="an impact on a rigid stop is seen as a half sine of this duration and the same impulse, which begins "
+            "at the impact; a stop that yields has a force of its own",
+            default="required of a rigid stop, of no other",
+        ),
+    ] = None
+
+
+class Exciter(SceneTable):
+    """`[exciter]`: force = (gain volts + offset) / (1 +- displacement / distance)^2."""
+
+    gain: Annotated[
+        Finite, Rule(unit="N/V", doc="newtons per volt; the amplitude of `[forcing]` is in V beside it")
+    ]
+    offset: Annotated[Finite, Rule(unit="N", doc="constant force, at displacement 0")] = 0.0
+    distance: Annotated[
+        NotNegative,
+        Rule(
+            unit="m",
+            hint="Use 0 for a force that does not depend on the displacement.",
+            effect=FALLING_FORCE,
+            doc="of the exciter from the body at displacement 0: the force falls with the square of the distance, and "
+            "is held from sample to sample of `[daq]`; 0: it does not depend on the displacement",
+        ),
+    ] = 0.0
+    side: Annotated[
+        Literal["lower", "upper"],
+        Rule(
+            hint="lower: a positive displacement leads away from the exciter.",
+            doc='`"lower"`: a positive displacement leads away from the exciter; `"upper"`: towards it',
+        ),
+    ] = "lower"
+
+
+def _noise(of: str) -> Rule:
+    return Rule(unit="V", hint="Use 0 for none.", doc=f"rms of the noise of {of}")
+
+
+class Noise(SceneTable):
+    """`[noise]`: what is added to each sample of a channel, before its conversion; white and Gaussian."""
+
+    seed: Annotated[
+        int,
+        Field(ge=0, le=MOST_SEED),
+        Rule(doc="another one draws other noise; each run of a campaign has noise of its own"),
+    ] = 0
+    sensor: Annotated[
+        NotNegative, _noise("`sensor.displacement`, `sensor.velocity`, `sensor.acceleration`")
+    ] = 0.0
+    load_cell: Annotated[NotNegative, _noise("`load_cell`")] = 0.0
+    drive: Annotated[NotNegative, _noise("`drive`, where it is read back")] = 0.0
+
+    def of(self, channel: str) -> float:
+        """Return the rms of the noise of a channel, V.
+
+        >>> Noise(sensor=0.1).of("sensor.velocity"), Noise(sensor=0.1).of("drive")
+        (0.1, 0.0)
+        """
+        rms: float = getattr(self, channel.partition(".")[0])
+        return rms
+
+
+class Daq(SceneTable):
+    """`[daq]`: the clock that samples the channels, and how they become numbers."""
+
+    rate: Annotated[
+        Positive, Rule(unit="Hz", doc="nominal samples per second, in place of `record.time_series.rate`")
+    ]
+    bits: Annotated[
+        int, Field(ge=2, le=32), Rule(doc="a sample is one of 2^bits steps from -range to +range")
+    ]
+    range: Annotated[Positive, Rule(unit="V", doc="samples end at +- this")]
+    skew: Annotated[
+        NotNegative,
+        Rule(
+            unit="s",
+            hint="Use 0 for channels that are sampled at once.",
+            doc="time from one channel to the next, in the order of `record.time_series.variables`; all of them "
+            "within one sample",
+        ),
+    ] = 0.0
+    clock_error: Annotated[
+        Finite,
+        Field(ge=-MOST_PPM, le=MOST_PPM),
+        Rule(
+            "parts per million from -1e5 to 1e5",
+            unit="ppm",
+            doc="the clock is so much faster than it says: sample k is taken k / (rate (1 + clock_error / 10^6)) after "
+            "the first, and has the time k / rate",
+        ),
+    ] = 0.0
+
+    @property
+    def true_rate(self) -> float:
+        """Samples in a second, of which the clock says that they are `rate`."""
+        return self.rate * (1.0 + 1e-6 * self.clock_error)
