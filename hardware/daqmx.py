@@ -16,7 +16,7 @@ os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 try:
     import grpc
     import nidaqmx
-    from nidaqmx import constants
+    from nidaqmx import constants, stream_readers
     from nidaqmx._stubs import nidaqmx_pb2
     from nidaqmx.error_codes import DAQmxErrors
     from nidaqmx.errors import DaqError, DaqNotFoundError, RpcError
@@ -53,6 +53,7 @@ __all__ = [
     "message_class",
     "nidaqmx",
     "open_channel",
+    "stream_readers",
 ]
 
 
