@@ -16,7 +16,7 @@ os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 try:
     import grpc
     import nidaqmx
-    from nidaqmx import constants, stream_readers
+    from nidaqmx import constants, stream_readers, stream_writers
     from nidaqmx._stubs import nidaqmx_pb2
     from nidaqmx.error_codes import DAQmxErrors
     from nidaqmx.errors import DaqError, DaqNotFoundError, RpcError
@@ -54,6 +54,8 @@ __all__ = [
     "nidaqmx",
     "open_channel",
     "stream_readers",
+    "stream_writers",
+    "with_deadline",
 ]
 
 
@@ -65,3 +67,24 @@ def message_class(descriptor: Any) -> Any:
 def open_channel(address: str) -> Any:
     """Return a gRPC channel to `host:port`, for large reads."""
     return grpc.insecure_channel(address, options=CHANNEL_OPTIONS)
+
+
+class _Deadline(grpc.UnaryUnaryClientInterceptor):  # type: ignore[misc]  # grpc carries no types
+    def __init__(self, seconds: float) -> None:
+        self._seconds = seconds
+
+    def intercept_unary_unary(self, continuation: Any, details: Any, request: Any) -> Any:
+        """Give a call a deadline."""
+        return continuation(_Details(details, self._seconds), request)
+
+
+class _Details(grpc.ClientCallDetails):  # type: ignore[misc]  # grpc carries no types
+    def __init__(self, details: Any, seconds: float) -> None:
+        self.method, self.metadata, self.credentials = details.method, details.metadata, details.credentials
+        self.wait_for_ready, self.compression = details.wait_for_ready, details.compression
+        self.timeout = seconds
+
+
+def with_deadline(channel: Any, seconds: float) -> Any:
+    """Return a channel whose calls fail when a server takes longer (s) to answer; NI's client waits for ever."""
+    return grpc.intercept_channel(channel, _Deadline(seconds))

@@ -36,10 +36,13 @@ class Rig:
         As `--rig` says it.
     channel : grpc.Channel or None
         None: the driver of this machine.
+    address : str
+        `host:port` of its server, for other processes; empty: the driver of this machine.
     """
 
     name: str
     channel: Any
+    address: str = ""
 
     def options(self, session: str = "") -> Any:
         """Return what a task of NI's client needs to be made on this rig; another program attaches to a named one."""
@@ -85,10 +88,10 @@ def _connected(choice: str | None) -> Iterator[Rig]:
         yield Rig("local", None)
     elif kind == "virtual" and rest:
         with served(read_rig(Path(rest))) as server, daqmx.open_channel(server.address) as channel:
-            yield Rig(f"virtual:{Path(rest).name}", channel)
+            yield Rig(f"virtual:{Path(rest).name}", channel, server.address)
     elif kind == "grpc" and rest.startswith("//") and rest[2:].rpartition(":")[2].isdigit():
         with daqmx.open_channel(rest[2:]) as channel:
-            yield Rig(str(choice), channel)
+            yield Rig(str(choice), channel, rest[2:])
     else:
         raise UsageError(f"--rig: expected a rig, got {str(choice)[:60]!r}. {THREE_WAYS}.")
 

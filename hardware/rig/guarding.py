@@ -1,0 +1,146 @@
+"""The guardian of an output, as the program that drives sees it: another process, which outlives this one."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import subprocess
+import time
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+
+from vibroimpact.fmus.errors import RigError
+from vibroimpact.fmus.python_child import ending, python_command
+
+MODULE = "vibroimpact.hardware.rig.guardian"
+READY_SECONDS = 30.0
+"""Time in which a guardian has to be there; it imports NI's client."""
+LEAVE_SECONDS = 5.0
+
+READY, REST, TAKE_OVER = "ready", "rest", "take over"
+"""What the two say to each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """What a guardian guards.
+
+    Attributes
+    ----------
+    terminal : str
+    rate, amplitude, slew : float
+        Of the output and its limits: Hz, V, V/s.
+    session : str
+        Name of the task.
+    address : str
+        `host:port` of the server; empty: the driver of this machine.
+    attach : bool
+        Whether the task of another process can be attached to.
+    program : int
+        Process that drives.
+    descriptor, capacity : int
+        Of the memory that is shared.
+    """
+
+    terminal: str
+    rate: float
+    amplitude: float
+    slew: float
+    session: str
+    address: str
+    attach: bool
+    program: int
+    descriptor: int
+    capacity: int
+
+
+class Guardian:
+    """A guardian that was started; it is there when `await_ready` has returned.
+
+    Parameters
+    ----------
+    order : Order
+
+    Raises
+    ------
+    RigError
+        It cannot be started.
+    """
+
+    def __init__(self, order: Order) -> None:
+        try:
+            self._process = subprocess.Popen(
+                python_command("-m", MODULE),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                start_new_session=True,  # Ctrl-C and the end of a terminal are not for it
+                pass_fds=[order.descriptor],
+            )
+        except OSError as error:
+            raise RigError(f"guardian: cannot be started ({error.strerror}). Nothing was driven.") from None
+        self._heard = b""
+        self._tell(json.dumps(asdict(order)))
+
+    def await_ready(self) -> None:
+        """Wait until it guards.
+
+        Raises
+        ------
+        RigError
+            It does not.
+        """
+        said = self._line(READY_SECONDS)
+        if said != READY:
+            raise RigError(
+                f"guardian: expected one that is ready, got {said or self._end()}. Nothing was driven."
+            )
+
+    @property
+    def is_gone(self) -> bool:
+        """Whether its process has ended."""
+        return self._process.poll() is not None
+
+    def take_over(self, seconds: float) -> str:
+        """Let it bring the output to rest; return an empty text, or why it cannot."""
+        self._tell(TAKE_OVER)
+        said = self._line(seconds)
+        return "" if said == REST else said or f"the guardian did not answer ({self._end()})"
+
+    def leave(self) -> None:
+        """Let it end, since the output is at rest; no process remains."""
+        self._tell(REST)
+        with suppress(OSError):
+            assert self._process.stdin is not None
+            self._process.stdin.close()
+        try:
+            self._process.wait(LEAVE_SECONDS)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        assert self._process.stdout is not None
+        self._process.stdout.close()
+
+    def _end(self) -> str:
+        code = self._process.poll()
+        return "no answer" if code is None else f"a process that {ending(code)}"
+
+    def _tell(self, text: str) -> None:
+        assert self._process.stdin is not None
+        with suppress(OSError):  # it has gone, which is seen elsewhere
+            self._process.stdin.write(f"{text}\n".encode())
+            self._process.stdin.flush()
+
+    def _line(self, seconds: float) -> str:
+        """Return the next line that it says; empty: none came."""
+        assert self._process.stdout is not None
+        descriptor, end = self._process.stdout.fileno(), time.monotonic() + seconds
+        while b"\n" not in self._heard:
+            if not select.select([descriptor], [], [], max(end - time.monotonic(), 0.0))[0]:
+                return ""
+            part = os.read(descriptor, 4096)
+            if not part:
+                return ""
+            self._heard += part
+        line, _, self._heard = self._heard.partition(b"\n")
+        return line.decode(errors="replace").strip()
