@@ -55,6 +55,10 @@ def plot(
         float | None,
         typer.Option(help="Length of the window in forcing periods, after --from or before --to."),
     ] = None,
+    over: Annotated[
+        Path | None,
+        typer.Option(help="Another sweep, drawn below: the simulated one of a measured one.", metavar="FILE"),
+    ] = None,
     title: Annotated[str | None, typer.Option(help='Title above the figure; "" for none.')] = None,
     width: Annotated[float | None, typer.Option(help="Width of the figure, mm; else one column, 85.")] = None,
     height: Annotated[float | None, typer.Option(help="Height of the figure, mm.")] = None,
@@ -62,12 +66,14 @@ def plot(
     """Draw a dataset: a bifurcation diagram, maps over two parameters, one run, a recording, a replay, estimates.
 
     Example: vibroimpact plot campaign/dataset.nc -o bifurcation.png
+
+    A measured sweep over the simulated one: vibroimpact plot sweep --over campaign -o both.png
     """
     from vibroimpact.analysis.commands.plot import draw_file
 
     options: dict[str, Any] = {"recording": recording, "start": start, "stop": stop, "periods": periods}
     options |= {"title": title, "width": width, "height": height}
-    draw_file(file, output, kind, run, options)
+    draw_file(file, output, kind, run, options, over)
 
 
 def spikes(

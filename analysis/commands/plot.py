@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +13,21 @@ from vibroimpact.analysis import figures
 from vibroimpact.analysis.commands.opened_file import opened_file
 from vibroimpact.analysis.dataset import dataset_file
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, writing
+from vibroimpact.analysis.recording import Recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.terminal import say
 
 
-def draw_file(file: Path, output: Path, kind: str, run: int | None, options: Mapping[str, Any]) -> None:
-    """Draw a file that this package wrote; the options are those of `figures.draw`."""
+def draw_file(
+    file: Path, output: Path, kind: str, run: int | None, options: Mapping[str, Any], over: Path | None = None
+) -> None:
+    """Draw a file that this package wrote, over another one; the options are those of `figures.draw`."""
     file = dataset_file(file)
-    refuse_outputs([file], None, output)
-    with opened_file(file) as data:
+    below = None if over is None else dataset_file(over)
+    refuse_outputs([file, *([] if below is None else [below])], None, output)
+    with opened_file(file) as data, nullcontext() if below is None else opened_file(below) as other:
+        if isinstance(other, Recording):
+            raise UsageError(f"{below}: expected a dataset of runs, got a recording.")
         results = data.attrs.get("results_kind")
         if isinstance(data, xr.Dataset) and results == "spikes" and "interval" not in data:
             raise UsageError(
@@ -28,7 +35,7 @@ def draw_file(file: Path, output: Path, kind: str, run: int | None, options: Map
                 "`vibroimpact spikes --figure` draws them beside the signal."
             )
         try:
-            figure = figures.draw(data, kind, run, **options)
+            figure = figures.draw(data, kind, run, **options, over=other)
         except (LookupError, ValueError, TypeError, AttributeError) as problem:
             # results may lack what their figure shows, or be another's
             if results is None:

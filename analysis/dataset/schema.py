@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import IntEnum
+from enum import IntEnum, IntFlag
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -44,6 +44,15 @@ class Direction(IntEnum):
     independent = 0
     up = 1
     down = 2
+
+
+class MeasurementFlag(IntFlag):
+    """What is wrong with a measured run; several may be."""
+
+    clipped = 1
+    gap = 2
+    drift = 4
+    starved = 8
 
 
 @dataclass(slots=True)
@@ -122,6 +131,14 @@ def _flags(kind: type[IntEnum]) -> dict[str, Any]:
     }
 
 
+def _masks(kind: type[IntFlag]) -> dict[str, Any]:
+    """Return the CF attributes that name the bits of an enumeration."""
+    return {
+        "flag_masks": np.array([int(member) for member in kind], dtype=np.int8),
+        "flag_meanings": " ".join(str(member.name) for member in kind),
+    }
+
+
 def _count(dimension: str, words: str) -> VariableRule:
     """Return the rule of the number of rows that a run has in a ragged dimension."""
     extra = {"sample_dimension": dimension}
@@ -190,6 +207,17 @@ _RULES = (
         "dominant frequency of the simulation less that of the measurement",
     ),
     VariableRule("loop_residual", ("run",), "1", "largest relative residual of algebraic loops"),
+    VariableRule(
+        "measurement_flags",
+        ("run",),
+        "1",
+        "what is wrong with the measured run",
+        np.int8,
+        _masks(MeasurementFlag),
+    ),
+    VariableRule("drive_amplitude", ("run",), "V", "amplitude of the drive as an input saw it"),
+    VariableRule("drive_lag", ("run",), "s", "drive as an input saw it, less the planned one"),
+    VariableRule("drive_clock_error", ("run",), "1e-6", "relative error of the clock of the inputs"),
 )
 RULES: Mapping[str, VariableRule] = {rule.name: rule for rule in _RULES}
 
@@ -206,9 +234,12 @@ NEEDED_IMPACT_COLUMNS = IMPACT_COLUMNS[:5]
 STICK_COLUMNS = _columns(("stick",))
 EVENT_COLUMNS = _columns(("event",))
 SCORE_COLUMNS = _columns(("run", "comparison"))
+MEASURED_COLUMNS = ("measurement_flags", "drive_amplitude", "drive_lag", "drive_clock_error")
+"""Columns of runs that a rig has measured; the last three where an input was wired to the drive."""
 RAGGED = {rule.extra["sample_dimension"]: rule.name for rule in _RULES if "sample_dimension" in rule.extra}
 # What every file has; the other per-run variables are there where they were recorded.
-RUN_COLUMNS = tuple(name for name in _columns(("run",)) if name not in (*RAGGED.values(), "loop_residual"))
+_NOT_IN_ALL = (*RAGGED.values(), "loop_residual", *MEASURED_COLUMNS)
+RUN_COLUMNS = tuple(name for name in _columns(("run",)) if name not in _NOT_IN_ALL)
 RESERVED_NAMES = frozenset(
     {*RULES, *(dim for rule in _RULES for dim in rule.dims), *(f"{dim}_run" for dim in RAGGED)}
     | {"run_id", "displacement_range"}
@@ -334,7 +365,7 @@ def unit_in(system: UnitSystem, unit: str) -> str:
     >>> unit_in("nondimensional", "m s-1"), unit_in("nondimensional", "rad"), unit_in("SI", "m s-1")
     ('1', 'rad', 'm s-1')
     """
-    return unit if system == "SI" or unit in ("rad", "%") else "1"
+    return unit if system == "SI" or unit in ("rad", "%", "1e-6") else "1"
 
 
 def quantity_unit(name: str, system: UnitSystem) -> str:

@@ -73,6 +73,7 @@ def build_dataset(
     event_components: Sequence[str] = (),
     connections: Sequence[str] = (),
     compared: Sequence[str] = (),
+    measured: Mapping[str, NDArray[Any]] | None = None,
 ) -> xr.Dataset:
     """Build the one-dimensional dataset of some runs, as it is written to a file.
 
@@ -107,6 +108,8 @@ def build_dataset(
         `RunRecord.energy_residual`. A run without residuals has NaN.
     compared : sequence of str, optional
         Compared pairs of a replay, in the order of `RunRecord.scores`. A run without scores has NaN.
+    measured : mapping of str to ndarray, shape (run,), optional
+        What is known of runs that a rig has measured: some of `schema.MEASURED_COLUMNS`.
 
     Returns
     -------
@@ -138,6 +141,7 @@ def build_dataset(
     variables |= _event_variables(records, event_components, units)
     variables |= _coupling_variables(records, connections, units)
     variables |= _score_variables(records, compared, units)
+    variables |= _described(measured or {}, units)
     swept: _Variables = {
         name: (
             ("run",),

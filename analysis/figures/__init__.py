@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from vibroimpact.analysis.figures.kinds import KINDS, draw_view
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
 from vibroimpact.analysis.figures.page import COLUMN_WIDTH, drawing_into, label, laid_out, save
+from vibroimpact.analysis.figures.planned_drive import draw_planned_drive
 from vibroimpact.analysis.figures.sweeps import largest_impact_velocity
 from vibroimpact.analysis.figures.window import View, Window
 from vibroimpact.analysis.recording import Recording
@@ -32,6 +33,7 @@ __all__ = [
     "convergence",
     "draw",
     "draw_into",
+    "draw_planned_drive",
     "label",
     "largest_impact_velocity",
     "save",
@@ -48,6 +50,7 @@ def draw(
     start: float | None = None,
     stop: float | None = None,
     periods: float | None = None,
+    over: xr.Dataset | None = None,
     title: str | None = None,
     width: float | None = None,
     height: float | None = None,
@@ -71,6 +74,8 @@ def draw(
         Window of time, s (`--from`, `--to`).
     periods : float, optional
         Length of the window in forcing periods, from `start` on or up to `stop`.
+    over : xarray.Dataset, optional
+        Another sweep of the same parameter, drawn below this one: a measured sweep over the simulated one.
     title : str, optional
         Above the figure. Default: none, as journals want it; of a ladder that of its dataset. "" is none.
     width, height : float, optional
@@ -92,7 +97,7 @@ def draw(
     >>> dataset = open_dataset("campaign")                                             # doctest: +SKIP
     >>> save(draw(dataset, "strobe", run=3, width=120.0), "section.pdf")               # doctest: +SKIP
     """
-    view = View(run, recording, Window(start, stop, periods))
+    view = View(run, recording, Window(start, stop, periods), over)
     with page_style():
         return laid_out(draw_view(data, kind, view), title, width, height)
 
@@ -110,6 +115,7 @@ def draw_into(
     start: float | None = None,
     stop: float | None = None,
     periods: float | None = None,
+    over: xr.Dataset | None = None,
 ) -> T:
     """Draw into axes that there are already, in the style that they have, and return them.
 
@@ -117,7 +123,7 @@ def draw_into(
     ----------
     axes : Axes, or sequence or array of Axes
         As many as the figure has panels, row by row.
-    data, kind, run, recording, start, stop, periods
+    data, kind, run, recording, start, stop, periods, over
         See `draw`.
 
     Raises
@@ -138,5 +144,5 @@ def draw_into(
             f"figure: axes: expected axes of matplotlib, got {type(axes).__name__}. Make some: plt.subplots()."
         )
     with drawing_into(given):
-        draw_view(data, kind, View(run, recording, Window(start, stop, periods)))
+        draw_view(data, kind, View(run, recording, Window(start, stop, periods), over))
     return axes

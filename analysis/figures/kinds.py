@@ -16,6 +16,7 @@ from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.hard_cases import draw_hard_cases
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
+from vibroimpact.analysis.figures.measured_sweep import draw_measured_sweep
 from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
 from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait, draw_return_map
 from vibroimpact.analysis.figures.recordings import draw_recording
@@ -83,7 +84,7 @@ class FigureKind:
     fits : callable
         Whether a dataset of runs holds what the figure shows.
     takes : tuple of str
-        Options: `run`, `recording`, `window`.
+        Options: `run`, `recording`, `window`, `over`.
     """
 
     families: dict[Family, Callable[[Any, View], Figure]]
@@ -104,11 +105,18 @@ def _has_phases(dataset: xr.Dataset) -> bool:
     return "impact_phase" in dataset and bool(np.isfinite(dataset["impact_phase"].values).any())
 
 
+def _draw_sweep(dataset: xr.Dataset, over: xr.Dataset | None) -> Figure:
+    if over is None and "measurement_flags" not in dataset:
+        return draw_bifurcation(dataset)
+    return draw_measured_sweep(dataset, over)
+
+
 _SINGLE = ("run", "window")
 KINDS: dict[str, FigureKind] = {
     "bifurcation": FigureKind(
-        {"runs": lambda data, view: draw_bifurcation(data)},
+        {"runs": lambda data, view: _draw_sweep(data, view.over)},
         lambda data: _swept(data, 1, "displacement_range", "impact_velocity"),
+        ("over",),
     ),
     "map": FigureKind(
         {"runs": lambda data, view: draw_map(data)},
@@ -259,6 +267,7 @@ def _refuse_options(data: Any, kind: str, family: Family, view: View) -> None:
         ("run", view.run is not None, family != "runs"),
         ("recording", view.recording is not None, family != "replay"),
         ("window", view.window.given, False),
+        ("over", view.over is not None, family != "runs"),
     ):
         if not is_given or (name in KINDS[kind].takes and not is_foreign):
             continue

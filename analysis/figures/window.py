@@ -6,6 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import xarray as xr
+
 from vibroimpact.analysis.figures.page import Floats
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.wording import typed_or_called
@@ -96,8 +98,9 @@ ANY = Window()
 
 
 class View(NamedTuple):
-    """What of the data is drawn: a run by its `run_index`, a recording of a replay, a window of time."""
+    """What of the data is drawn: a run by its `run_index`, a recording of a replay, a window of time; over what."""
 
     run: int | None
     recording: str | None
     window: Window
+    over: xr.Dataset | None = None

@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset, with_constants
+from vibroimpact.analysis.dataset.schema import MEASURED_COLUMNS
 
 PERIODS = 3
 
@@ -161,6 +162,10 @@ def everything(**changes: Any) -> xr.Dataset:
         event_components=COMPONENTS,
         connections=CONNECTIONS,
         compared=COMPARED,
+        measured={
+            "measurement_flags": np.array([0, 5, 8]),
+            **{name: np.ones(3) for name in MEASURED_COLUMNS[1:]},
+        },
         **changes,
     )
     return with_constants(dataset, {"restitution": 0.7, "stop_position": 1e-3}, unit_of=UNITS)

@@ -1,0 +1,224 @@
+"""The dataset of a sweep in its folder: written anew, whole, after each step, and read again when the sweep goes on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import (
+    MeasurementFlag,
+    Outcome,
+    RunRecord,
+    build_dataset,
+    read_flat,
+    write_dataset,
+)
+from vibroimpact.analysis.dataset.schema import MEASURED_COLUMNS, PERIOD_COLUMNS
+from vibroimpact.analysis.files.opening import file_attributes
+from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.fmus.wording import typed_or_called
+from vibroimpact.hardware.programs.sweep.analysis import MeasuredStep
+from vibroimpact.hardware.programs.sweep.drive import Drive
+from vibroimpact.hardware.programs.sweep.settings import SweepSettings
+
+Floats = NDArray[np.float64]
+
+DATASET = "dataset.nc"
+_MADE_BY = "measured by vibroimpact"
+_MOST_DIFFERENCES = 3
+_STROBED = ("displacement", "velocity")
+
+
+@dataclass(slots=True)
+class SweepRows:
+    """What is measured of a sweep so far.
+
+    Attributes
+    ----------
+    settings : SweepSettings
+    calibration : str
+        TOML.
+    steps : list of MeasuredStep
+        The first ones of the path, in its order.
+    made_by : dict
+        `rig`, `device` and `measured_at`, a line for each time that it was begun or went on.
+    """
+
+    settings: SweepSettings
+    calibration: str
+    steps: list[MeasuredStep] = field(default_factory=list)
+    made_by: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing is left to measure."""
+        return len(self.steps) == len(self.settings.steps)
+
+
+def dataset_of(rows: SweepRows) -> xr.Dataset:
+    """Return the one-dimensional dataset of what is measured so far, a run for each step."""
+    settings, steps = rows.settings, rows.steps
+    asked = settings.steps[: len(steps)]
+    measured: dict[str, Any] = {"measurement_flags": [int(step.flags) for step in steps]}
+    if settings.place_of("drive") is not None:
+        drives = [step.drive for step in steps]
+        measured["drive_amplitude"] = [drive.amplitude for drive in drives]
+        measured["drive_lag"] = [drive.lag for drive in drives]
+        measured["drive_clock_error"] = [drive.clock_error for drive in drives]
+    omitted = ["impacts_per_period"] if settings.place_of("load_cell") is None else []
+    return build_dataset(
+        [_record(step, settings) for step in steps],
+        coordinates={"frequency": np.array([frequency for _, frequency in asked], dtype=np.float64)},
+        direction=[direction for direction, _ in asked],
+        run_index=range(len(steps)),
+        unit_of={"frequency": "Hz"},
+        omit=omitted,
+        measured={name: np.asarray(values) for name, values in measured.items()},
+        attrs=_attributes(rows, measured),
+    )
+
+
+def _record(step: MeasuredStep, settings: SweepSettings) -> RunRecord:
+    periods = np.full((len(step.highest), len(PERIOD_COLUMNS)), np.nan)
+    columns = {
+        "displacement_max": step.highest,
+        "displacement_min": step.lowest,
+        "strobe_displacement": step.strobe[:, 0],
+        "strobe_velocity": step.strobe[:, 1],
+        "impacts_per_period": step.impacts,
+    }
+    for name, values in columns.items():
+        if values is not None:
+            periods[:, PERIOD_COLUMNS.index(name)] = values
+    words = [member.name for member in MeasurementFlag if member in step.flags]
+    return RunRecord(
+        Outcome.ok,
+        f"{', '.join(map(str, words))}: {step.message}" if words else "",
+        periods,
+        final_displacement=step.final_displacement,
+        final_velocity=np.nan,
+        final_phase=0.0,
+        seconds=settings.step_periods / settings.steps[step.place][1],
+    )
+
+
+def _attributes(rows: SweepRows, measured: Mapping[str, Any]) -> dict[str, Any]:
+    settings = rows.settings
+    attributes = {
+        "history": _MADE_BY,
+        "title": Path(settings.source).stem,
+        "sweep": settings.text,
+        "sweep_content": json.dumps(settings.content),
+        "calibration": rows.calibration,
+        "steps_planned": len(settings.steps),
+        **rows.made_by,
+    }
+    errors = np.asarray(measured.get("drive_clock_error", ()), dtype=np.float64)
+    errors = errors[np.isfinite(errors)]
+    if errors.size > 1:
+        attributes["clock_error_ppm"] = float(errors.mean())
+        attributes["clock_error_standard_error_ppm"] = float(errors.std(ddof=1) / np.sqrt(errors.size))
+    return attributes
+
+
+def store(rows: SweepRows, folder: Path) -> None:
+    """Write what is measured so far; what was there before stays until the new file is complete."""
+    write_dataset(dataset_of(rows), folder / DATASET)
+
+
+def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows:
+    """Return what a folder has of a sweep; nothing where it is new.
+
+    Raises
+    ------
+    UsageError
+        The folder is that of another sweep, of a campaign, or its dataset is damaged.
+    """
+    path = folder / DATASET
+    rows = SweepRows(settings, calibration)
+    if (folder / "campaign.json").exists():
+        raise _refused(folder, "that of a campaign")
+    if not path.exists():
+        return rows
+    try:
+        attributes = file_attributes(path)
+        if attributes.get("history") != _MADE_BY:
+            raise _refused(folder, "one with another dataset")
+        different = _differences(json.loads(str(attributes.get("sweep_content"))), settings.content)
+        if str(attributes.get("calibration")) != calibration:
+            different.append("the calibration")
+        if different:
+            more = len(different) - _MOST_DIFFERENCES
+            shown = "; ".join(different[:_MOST_DIFFERENCES]) + (f"; and {more} more" if more > 0 else "")
+            raise _refused(folder, f"that of another one: {shown}")
+        flat = read_flat(path)
+    except (DatasetError, ValueError) as error:
+        raise UsageError(
+            f"{path}: expected the dataset of this sweep, got a damaged one ({error}). Move it away, or choose another "
+            f"folder{typed_or_called(' with -o')}."
+        ) from error
+    rows.steps = _steps_of(flat)
+    rows.made_by = {name: str(flat.attrs[name]) for name in ("rig", "device", "measured_at")}
+    return rows
+
+
+def _refused(folder: Path, got: str) -> UsageError:
+    return UsageError(
+        f"{folder}: expected a new folder, or that of this sweep, got {got}. "
+        f"Choose another folder{typed_or_called(' with -o')}."
+    )
+
+
+def _differences(was: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """Return in words in what a stored sweep differs from this one."""
+    found = []
+    now = json.loads(json.dumps(now))
+    for key in sorted(was.keys() | now.keys()):
+        if was.get(key) != now.get(key):
+            old, new = (_shown(one.get(key)) for one in (was, now))
+            found.append(f"{key} was {old}, is {new}")
+    return found
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list) and value:
+        return f"{len(value)} values from {value[0]:g} to {value[-1]:g}"
+    return "absent" if value is None else json.dumps(value)[:60]
+
+
+def _steps_of(flat: xr.Dataset) -> list[MeasuredStep]:
+    """Return the steps that a stored dataset holds."""
+
+    def column(name: str) -> Floats | None:
+        return flat.variables[name].values if name in flat.variables else None
+
+    drives = [column(name) for name in MEASURED_COLUMNS[1:]]
+    impacts = column("impacts_per_period")
+    found = []
+    for place in range(flat.sizes["run"]):
+        drive = Drive()
+        if all(values is not None for values in drives):
+            amplitude, lag, error = (float(values[place]) for values in drives if values is not None)
+            drive = Drive(amplitude, lag, error)
+        words = str(flat.variables["message"].values[place]).partition(": ")[2]
+        found.append(
+            MeasuredStep(
+                place,
+                flat.variables["displacement_max"].values[place],
+                flat.variables["displacement_min"].values[place],
+                np.stack([flat.variables[f"strobe_{what}"].values[place] for what in _STROBED], axis=1),
+                None if impacts is None else impacts[place],
+                MeasurementFlag(int(flat.variables["measurement_flags"].values[place])),
+                words,
+                drive,
+                float(flat.variables["final_displacement"].values[place]),
+            )
+        )
+    return found

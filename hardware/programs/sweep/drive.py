@@ -1,0 +1,85 @@
+"""What an input that the output is wired to says of the drive: its amplitude, its lag, the error of the clock."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.hardware.programs.sweep.plan import CYCLE, Segment
+
+Floats = NDArray[np.float64]
+
+_PARTS = 12
+"""Parts of a step whose phases are compared."""
+_FEWEST_PERIODS = 2
+
+
+class Drive(NamedTuple):
+    """The drive of a step as an input saw it.
+
+    Attributes
+    ----------
+    amplitude : float
+        V.
+    lag : float
+        Seen less planned, s, within half a period.
+    clock_error : float
+        Of the inputs' clock, 1e-6: it is fast where this is positive.
+    residual : float
+        RMS of what is no sine of the planned frequency, over the amplitude.
+    """
+
+    amplitude: float = np.nan
+    lag: float = np.nan
+    clock_error: float = np.nan
+    residual: float = np.nan
+
+
+def seen_drive(volts: Floats, segment: Segment, rate: float) -> Drive:
+    """Return what an input saw of the drive of a step.
+
+    The step is cut into parts; each is fitted by the planned sine with an amplitude, a phase and an offset of its own.
+    Where the clock of the inputs is fast by e the phase falls behind by 2 pi f e in a second.
+
+    Parameters
+    ----------
+    volts : ndarray of float, shape (sample,)
+        All samples of the step, NaN where missing.
+    segment : Segment
+    rate : float
+        Samples per second.
+    """
+    periods = segment.count * segment.increment / CYCLE
+    parts = int(min(_PARTS, periods // _FEWEST_PERIODS))
+    cycles = np.arange(segment.count) * (segment.increment / CYCLE) + segment.phase / CYCLE
+    angles = np.asarray(2.0 * np.pi * (cycles % 1.0), dtype=np.float64)
+    ends = np.linspace(0, segment.count, parts + 1).astype(np.int64)
+    fits = [_fitted(volts[low:high], angles[low:high]) for low, high in pairwise(ends)]
+    good = [(k, fit) for k, fit in enumerate(fits) if fit is not None]
+    if not good:
+        return Drive()
+    middles = np.array([0.5 * (ends[k] + ends[k + 1]) for k, _ in good]) / rate
+    waves = np.array([fit[0] for _, fit in good])
+    angular = 2.0 * np.pi * rate * segment.increment / CYCLE
+    phases = np.unwrap(np.angle(waves))
+    amplitude = float(np.abs(waves).mean())
+    slope = np.polyfit(middles, phases, 1)[0] if len(good) > 1 else np.nan
+    residual = float(np.sqrt(np.mean([fit[1] for _, fit in good])))
+    lag = -float(np.angle(waves[-1])) / angular
+    return Drive(
+        amplitude, lag, float(-1e6 * slope / angular), residual / amplitude if amplitude > 0.0 else np.inf
+    )
+
+
+def _fitted(volts: Floats, angle: Floats) -> tuple[complex, float] | None:
+    """Return the complex amplitude of a part, and the mean square of what is left; None of too few samples."""
+    there = np.isfinite(volts)
+    if there.sum() < 8:
+        return None
+    basis = np.stack([np.sin(angle), np.cos(angle), np.ones_like(angle)], axis=1)[there]
+    (sine, cosine, offset), *_ = np.linalg.lstsq(basis, volts[there], rcond=None)
+    left = volts[there] - basis @ np.array([sine, cosine, offset])
+    return complex(sine, cosine), float(np.mean(left**2))

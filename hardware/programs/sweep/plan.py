@@ -1,0 +1,170 @@
+"""The output of a sweep, planned sample by sample: one phase that goes on through all changes of frequency.
+
+The phase is a whole number of 2^-64 cycles, and so is its increment of a sample. It is the same wherever a block of
+the output begins, and the samples at which periods begin are exact. A frequency is met within rate / 2^65.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.hardware.programs.sweep.settings import SweepSettings
+
+Floats = NDArray[np.float64]
+CYCLE = 2**64
+"""Units of phase in a cycle."""
+_MANTISSA = 53
+"""Bits of a phase that a sine can tell apart."""
+Kind = Literal["rise", "pass", "repeat", "step", "fall"]
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A stretch of the output at one frequency.
+
+    Attributes
+    ----------
+    kind : str
+        "rise" and "fall" of the amplitude, "step", "pass" through a finished step, "repeat" of the last finished one.
+    place : int
+        Number of the step along the path, from 0; -1 of rise and fall.
+    first, count : int
+        Its samples.
+    increment, phase : int
+        Phase that a sample adds, and phase at the first sample, in units of 1 / `CYCLE`.
+    """
+
+    kind: Kind
+    place: int
+    first: int
+    count: int
+    increment: int
+    phase: int
+
+    @property
+    def stop(self) -> int:
+        """The first sample after it."""
+        return self.first + self.count
+
+    def begin_of(self, period: int) -> int:
+        """Return the first sample of a forcing period: the first one at or after its phase is whole."""
+        return self.first + _samples_to(period, self.phase, self.increment)
+
+
+def _samples_to(cycles: int, phase: int, increment: int) -> int:
+    """Return after how many samples a phase has come so many cycles further than the beginning of its own."""
+    return max(0, -((phase - cycles * CYCLE) // increment))
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """The whole output of a sweep; a waveform that `Output` takes.
+
+    Attributes
+    ----------
+    rate : float
+        Samples per second.
+    amplitude : float
+        V.
+    segments : tuple of Segment
+        Each begins at the sample where the one before has ended.
+    """
+
+    rate: float
+    amplitude: float
+    segments: tuple[Segment, ...]
+    _firsts: tuple[int, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Note where the segments begin."""
+        object.__setattr__(self, "_firsts", tuple(segment.first for segment in self.segments))
+
+    @property
+    def samples(self) -> int:
+        """Samples of the whole output; the last one is 0 V."""
+        return self.segments[-1].stop
+
+    @property
+    def duration(self) -> float:
+        """Of the whole output, s."""
+        return self.samples / self.rate
+
+    def volts(self, first: int, count: int) -> Floats:
+        """Return samples of the output, V; 0 before it begins and after it has ended.
+
+        Parameters
+        ----------
+        first, count : int
+
+        Returns
+        -------
+        ndarray of float, shape (count,)
+        """
+        found = np.zeros(count)
+        place = max(0, bisect_right(self._firsts, first) - 1)
+        for segment in self.segments[place:]:
+            if segment.first >= first + count:
+                break
+            low, high = max(first, segment.first), min(first + count, segment.stop)
+            if low < high:
+                found[low - first : high - first] = self._of(segment, low - segment.first, high - low)
+        return found
+
+    def _of(self, segment: Segment, offset: int, count: int) -> Floats:
+        numbers = np.arange(offset, offset + count, dtype=np.uint64)
+        # wraps at a whole cycle
+        phase = np.uint64(segment.phase) + numbers * np.uint64(segment.increment)
+        angle = (phase >> np.uint64(64 - _MANTISSA)) * (2.0 * np.pi / 2**_MANTISSA)
+        wave: Floats = self.amplitude * np.sin(angle)
+        if segment.kind == "rise":
+            wave *= 0.5 * (1.0 - np.cos(np.pi * numbers / segment.count))
+        elif segment.kind == "fall":
+            wave *= 0.5 * (1.0 + np.cos(np.pi * (numbers + 1.0) / segment.count))
+        return wave
+
+
+def planned(settings: SweepSettings, finished: int = 0) -> Plan:
+    """Return the output of a sweep of which so many steps are finished.
+
+    The amplitude rises at the first frequency of the path. Finished steps are passed through in the order of the path,
+    so that the motion is on the branch that it was on; the last of them is repeated in full, so that this can be seen.
+
+    Parameters
+    ----------
+    settings : SweepSettings
+    finished : int
+        Less than there are steps.
+    """
+    steps, sweep = settings.steps, settings.sweep
+    asked: list[tuple[Kind, int, float, int]] = [("rise", -1, steps[0][1], settings.output.ramp_periods)]
+    for place, (_, frequency) in enumerate(steps):
+        kind: Kind = "step" if place >= finished else "repeat" if place == finished - 1 else "pass"
+        periods = sweep.resume_periods if kind == "pass" else settings.step_periods
+        asked.append((kind, place, frequency, periods))
+    asked.append(("fall", -1, steps[-1][1], settings.output.ramp_periods))
+    segments: list[Segment] = []
+    first = phase = 0
+    for kind, place, frequency, periods in asked:
+        increment = round(Fraction(frequency) / Fraction(settings.output.rate) * CYCLE)
+        count = _samples_to(periods, phase, increment)
+        segments.append(Segment(kind, place, first, count, increment, phase))
+        first, phase = first + count, (phase + count * increment) % CYCLE
+    return Plan(settings.output.rate, settings.output.amplitude, tuple(segments))
+
+
+def recorded_periods(settings: SweepSettings, segment: Segment) -> NDArray[np.int64]:
+    """Return where the recorded periods of a step begin, and where the last one ends, as sample numbers.
+
+    Returns
+    -------
+    ndarray of int, shape (periods + 1,)
+        A period has as many samples as lie in it: its number differs by one from period to period.
+    """
+    whole = range(settings.sweep.transient_periods, settings.step_periods + 1)
+    return np.array([segment.begin_of(period) for period in whole], dtype=np.int64)
