@@ -1,6 +1,6 @@
 # Everything sets itself up: a virtual environment in .venv, the packages, the FMUs.
 .DEFAULT_GOAL := help
-.PHONY: help demo fast test soak coverage exchange wheel oldest sanitize bench peers lint docs clean
+.PHONY: help demo fast test soak coverage exchange conformance wheel oldest sanitize bench peers lint docs clean
 
 OLDEST := $(or $(PYTHON),python3.11)
 ifneq ($(PYTHON),)
@@ -56,6 +56,9 @@ coverage: $(VENV)/test.stamp $(VENV)/fmus.stamp ## ask 300 records whether the i
 exchange: $(VENV)/exchange.stamp $(VENV)/fmus.stamp ## try the exports in every tool that is here, compile them for other machines
 	PYTHONPATH=tests $(BIN)/python -m exchange
 	$(BIN)/python -m pytest -q tests/unit/fmus/packaging/test_cross.py -rs
+
+conformance: $(VENV)/test.stamp $(VENV)/fmus.stamp ## run NI's tests of its client on the virtual rig; NI_TESTS= a checkout of ni/nidaqmx-python
+	PYTHONPATH=tests $(BIN)/python -m conformance $(NI_TESTS)
 
 wheel: $(VENV)/exchange.stamp ## make a wheel with the libraries of all platforms, into dist
 	VIBROIMPACT_RELEASE=1 $(BIN)/python -m hatchling build -t wheel -d dist

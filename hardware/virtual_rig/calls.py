@@ -14,7 +14,7 @@ from vibroimpact.hardware.virtual_rig.listening import Listening
 from vibroimpact.hardware.virtual_rig.names import expanded, given_names, terminal
 from vibroimpact.hardware.virtual_rig.reads import Reads
 from vibroimpact.hardware.virtual_rig.refusal import Refusal, text_of
-from vibroimpact.hardware.virtual_rig.tasks import INPUT, OUTPUT, Channel, Clock, State, Task
+from vibroimpact.hardware.virtual_rig.tasks import INPUT, OUTPUT, Channel, Clock, Task
 from vibroimpact.hardware.virtual_rig.writes import Writes
 
 _GROUPS = "SystemInfo|Device|PhysicalChan|Persisted\\w+?|Task|Chan|TimingEx|Timing|Trig|Read|Write|Buffer"
@@ -124,19 +124,16 @@ class Calls(Reads, Writes, Listening):
             self._board.catch_up()
             if task.failure is not None:
                 raise task.failure
-            response.is_task_done = task.done or task.state is not State.running
+            response.is_task_done = task.is_over
 
     def do_wait_until_task_done(self, request: Any, response: Any) -> None:
         """Wait until a task is done."""
         task = self._task(request)
 
-        def is_over() -> bool:
-            return task.done or task.state is not State.running
-
         def wanted() -> int:
             return self._board.plant.now if task.needed is None else self._tick_of(task, task.needed - 1)
 
-        if not self._wait_for(is_over, wanted, self._timeout(request.time_to_wait)):
+        if not self._wait_for(lambda: task.is_over, wanted, self._timeout(request.time_to_wait)):
             raise Refusal(DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE, task.name)
         if task.failure is not None:
             raise task.failure

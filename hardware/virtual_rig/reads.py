@@ -156,7 +156,10 @@ class Reads(Answers):
         """Read the codes of the converter as bytes, scan by scan."""
         codes, _, count, status = self._read(request, request.array_size_in_bytes // 2)
         response.status, response.samps_read, response.num_bytes_per_samp = status, count, 2
-        response.read_array = np.ascontiguousarray(codes.T).tobytes()
+        data = np.ascontiguousarray(codes.T).tobytes()
+        rest = request.array_size_in_bytes - len(data)
+        # what is left of an array that no scan fits into any more is cleared
+        response.read_array = data + bytes(rest if 0 < rest < 2 * len(codes) else 0)
 
     def do_read_analog_waveforms(self, request: Any, response: Any) -> None:
         """Read volts with their time and the names of their channels."""

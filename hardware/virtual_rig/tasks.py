@@ -250,6 +250,11 @@ class Task:
             self.ended.heard.put(failure.code if failure else 0)
 
     @property
+    def is_over(self) -> bool:
+        """Whether nothing of it is to come: without a clock, nothing ever is."""
+        return self.done or self.state is not State.running or self.clock is None
+
+    @property
     def ticking(self) -> bool:
         """Whether edges of its clock are to come."""
         return self.start is not None and not self.done

@@ -147,6 +147,8 @@ def test_a_task_without_a_clock_reads_at_once(bench: Bench) -> None:
     with bench.inputs("Dev1/ai0:1") as task:
         assert len(task.read()) == 2
         assert len(task.read(3)[0]) == 3
+        task.start()
+        task.wait_until_done(0.0)
 
 
 def test_a_rig_that_nobody_has_used_for_a_year_answers_at_once(bench: Bench) -> None:

@@ -1,0 +1,1 @@
+"""NI's own tests of its client, run against the virtual rig (`make conformance`)."""

@@ -1,0 +1,43 @@
+"""What of NI's tests does not apply to the virtual rig, and why."""
+
+from __future__ import annotations
+
+from fnmatch import fnmatchcase
+
+NOT_RUN = {
+    "*digital*": "digital lines: the rig has none",
+    "*_di.py": "digital lines: the rig has none",
+    "*_do.py": "digital lines: the rig has none",
+    "*test_d[io]_channel.py": "digital lines: the rig has none",
+    "*_c[io].py": "counters: the rig has none",
+    "*test_c[io]_channel.py": "counters: the rig has none",
+    "*power_readers*": "power modules: the rig has none",
+    "*watchdog*": "watchdog timers: the rig has none",
+    "*test_scale*.py": "custom scales: the rig has none",
+    "*test_export_signals_properties.py": "exported signals: the rig has no terminals that drive a wire",
+}
+"""Files that are not run, by a pattern of their paths."""
+
+NOT_MET = {
+    "*test_in_stream.py::*[[]3-*": "a simulated device of NI follows the range of a channel, the rig its plant: 3 V",
+    "*reuse_waveform_in_place*": "a simulated device of NI follows the range of a channel, the rig its plant: 1 V",
+    "*test_physical_channel.py::*teds*": "sensors with a data sheet (TEDS): the rig has none",
+    "*test_device_properties.py::*cal_*": "calibration of the device: the rig has none",
+    "*::test___constructed_*": "a device, task, channel or scale by its name in NI's configuration",
+    "*get_bool_property___returns_value*": "digital lines: the rig has none",
+    "*test_channel_properties.py::*string_property*": "counters: the rig has none",
+    "*power_up_states*": "states of outputs at power-up: the rig has none",
+    "*hardcoded_error_message*": "the words of an error are the rig's",
+    "*add_global_channels*": "asks the driver of this machine whatever the client is told",
+}
+"""Tests that fail on the rig and may, by a pattern of their names."""
+
+
+def reason_not_run(path: str) -> str | None:
+    """Return why a file of tests is not run; None where it is."""
+    return next((why for pattern, why in NOT_RUN.items() if fnmatchcase(path, pattern)), None)
+
+
+def reason_not_met(test: str) -> str | None:
+    """Return why a test may fail on the rig; None where it may not."""
+    return next((why for pattern, why in NOT_MET.items() if fnmatchcase(test, pattern)), None)
