@@ -80,7 +80,7 @@ class MeasuredRun:
         self._chain = MeasuringChain(scene, scene.channels)
         self._exciter = held_exciter(scene) if scene.falling_force else None
         self._rate = scene.sampling_rate if scene.daq is None else scene.daq.true_rate
-        self._pieces = self._chain.instants_in(1.0 / self._rate)
+        self._pieces = int(self._chain.instants_in(np.array([1.0 / self._rate]))[0])
         self._skew = 0.0 if scene.daq is None else scene.daq.skew
         self._last = self._whole(self._end - self._begin)
         self._variables = tuple(dict.fromkeys((*plan.variables, *self._chain.variables)))

@@ -21,6 +21,9 @@ from vibroimpact.orchestrator.run.record import ROW_IMPACT, in_time_order
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.measuring_models import DRIVE, LOAD_CELL, MEASURED_SENSOR
 
+INSTANTS_AT_ONCE = 2**16
+"""Instants of a block that are in memory at once."""
+
 
 class MeasuredSession:
     """A scene with a measuring chain that is driven by voltages: the plant of a rig.
@@ -137,18 +140,32 @@ class MeasuredSession:
         _refuse_wrong_block(times, volts, self.time)
         if not len(volts):
             return {name: np.empty(0) for name in self._channels}
-        pieces = self._chain.instants_in(float(np.max(np.diff(times))))
+        pieces = self._chain.instants_in(np.diff(times))
         ends, held, renewed = _cut(times, volts, pieces)
+        found: dict[str, list[Floats]] = {name: [] for name in self._channels if name != DRIVE}
+        impacts = []
+        for first in range(0, len(ends), INSTANTS_AT_ONCE):
+            part = slice(first, first + INSTANTS_AT_ONCE)
+            block, hits = self._hold(ends[part], held[part], renewed[part])
+            impacts.append(hits)
+            for name, values in block.items():
+                found[name].append(values)
+        self.impacts_of_block = np.concatenate(impacts)
+        at_samples = np.cumsum(pieces) - 1
+        channels = {name: np.concatenate(parts)[at_samples] for name, parts in found.items()}
+        return {name: volts.copy() if name == DRIVE else channels[name] for name in self._channels}
+
+    def _hold(
+        self, ends: Floats, held: Floats, renewed: NDArray[np.uint8]
+    ) -> tuple[dict[str, Floats], Floats]:
         rows = self._driver.hold(
             ends, held, self._variables, renewed=renewed, exciter=self._exciter, recording=True
         )
-        self.impacts_of_block = in_time_order(self._driver.rows.of_kind(ROW_IMPACT))
+        impacts = in_time_order(self._driver.rows.of_kind(ROW_IMPACT))
         self._driver.rows.blocks = []
         values = {name: np.ascontiguousarray(rows[:, place]) for place, name in enumerate(self._variables)}
-        found = self._chain.volts(ends, values, self.impacts_of_block)
         self._tell({name: float(column[-1]) for name, column in values.items()})
-        at_samples = {name: found[name][pieces - 1 :: pieces] for name in found}
-        return {name: volts.copy() if name == DRIVE else at_samples[name] for name in self._channels}
+        return self._chain.volts(ends, values, impacts), impacts
 
     def _tell(self, values: Mapping[str, float]) -> None:
         force = math.fsum(value for name, value in values.items() if name.startswith("contact["))
@@ -198,14 +215,12 @@ def _refuse_wrong_block(times: Floats, volts: Floats, now: float) -> None:
         raise UsageError("volts: expected finite voltages, got one that is no number.")
 
 
-def _cut(times: Floats, volts: Floats, pieces: int) -> tuple[Floats, Floats, NDArray[np.uint8]]:
+def _cut(times: Floats, volts: Floats, pieces: NDArray[np.int64]) -> tuple[Floats, Floats, NDArray[np.uint8]]:
     """Cut each step into pieces of one length; return their ends, the voltage of each, and which begin a step."""
-    if pieces == 1:
-        ends = np.ascontiguousarray(times[1:], dtype=np.float64)
-        return ends, np.ascontiguousarray(volts, dtype=np.float64), np.ones(len(volts), dtype=np.uint8)
-    parts = np.arange(1, pieces + 1) / pieces
-    table = times[:-1, np.newaxis] + np.diff(times)[:, np.newaxis] * parts
-    table[:, -1] = times[1:]
-    renewed = np.zeros((len(volts), pieces), dtype=np.uint8)
-    renewed[:, 0] = 1
-    return table.ravel(), np.repeat(np.asarray(volts, dtype=np.float64), pieces), renewed.ravel()
+    last = np.cumsum(pieces) - 1
+    place = np.arange(1, last[-1] + 2) - np.repeat(last + 1 - pieces, pieces)
+    ends = np.repeat(times[:-1], pieces) + np.repeat(np.diff(times), pieces) * (
+        place / np.repeat(pieces, pieces)
+    )
+    ends[last] = times[1:]
+    return ends, np.repeat(np.asarray(volts, dtype=np.float64), pieces), (place == 1).astype(np.uint8)

@@ -49,11 +49,11 @@ class MeasuringChain:
         self.needs_impacts = cell is not None and isinstance(scene.stops[cell.stop - 1], RestitutionStop)
         self._cell = None if cell is None else _opened(cell)
 
-    def instants_in(self, interval: float) -> int:
-        """Return into how many steps a sample interval (s) is cut, so that the ring of the load cell is followed."""
+    def instants_in(self, interval: Floats) -> NDArray[np.int64]:
+        """Return into how many steps each sample interval (s) is cut, so that the ring of the load cell is followed."""
         cell = self._scene.load_cell
         ring = cell.natural_frequency if cell is not None and self._cell is not None else 0.0
-        return max(1, math.ceil(RING_INSTANTS * ring * interval * (1.0 - 1e-9)))
+        return np.maximum(1, np.ceil(RING_INSTANTS * ring * interval * (1.0 - 1e-9))).astype(np.int64)
 
     @property
     def lead(self) -> float:
