@@ -17,6 +17,7 @@ from vibroimpact.analysis.files.atomic import write_atomically
 from vibroimpact.analysis.files.fingerprints import sealed
 from vibroimpact.analysis.files.open_files import netcdf_lock
 from vibroimpact.analysis.files.opening import one_error, opened_netcdf
+from vibroimpact.analysis.recording.chain import chain_of
 from vibroimpact.analysis.recording.channels import (
     QUALITY_FLAGS,
     RECORDING_SCHEMA,
@@ -332,14 +333,17 @@ def _run_signals(flat: Any, row: int, title: str) -> Recording:
     nondimensional = flat.attrs.get("units_system") == "nondimensional"
     if "sample_count" in flat:
         part = flat.isel(sample=rows("sample"))
-        axis = TimeAxis.through(part.time.values, "simulated")
+        axes = {0.0: TimeAxis.through(part.time.values, "simulated")}
         for name, variable in part.data_vars.items():
             if variable.dims == ("sample",) and name != "time":
                 unit = "1" if nondimensional else str(variable.attrs["units"])
-                quality = np.zeros(len(axis.time), np.uint8)
-                label = str(variable.attrs["long_name"])
+                chain = chain_of(variable.attrs, flat, row)
+                if chain.skew not in axes:
+                    axes[chain.skew] = TimeAxis.through(part.time.values + chain.skew, "simulated")
+                values, label = variable.values, str(variable.attrs["long_name"])
+                attrs = {"role": "simulated", **chain.attrs}
                 channels[str(name)] = Channel(
-                    str(name), variable.values, unit, axis, quality, label, {"role": "simulated"}
+                    str(name), values, unit, axes[chain.skew], chain.quality(values), label, attrs
                 )
     if "impact_count" in flat:
         part = flat.isel(impact=rows("impact"))

@@ -19,6 +19,8 @@ QUIET_PARTS = 20
 MOST_STEPS = 10**7
 #: SI units of what can be driven.
 DRIVEN_UNITS = {"base_acceleration": "m s-2", "force": "N"}
+VOLTS = "V"
+"""Unit of what drives through an exciter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,7 @@ class DriveSignal:
     time : ndarray, shape (sample,)
         s, on the clock of its channel.
     values : ndarray, shape (sample,)
-        m/s^2 or N; offset taken off, gaps bridged by straight lines.
+        m/s^2 or N, V of an exciter; offset taken off, gaps bridged by straight lines.
     bridged : ndarray of bool, shape (sample,)
         Where a gap was bridged: what follows from it is a guess.
     offset : float
@@ -46,7 +48,7 @@ class DriveSignal:
     remarks: tuple[str, ...]
 
 
-def drive_of(channel: Channel, drive: str, offset: float | None = None) -> DriveSignal:
+def drive_of(channel: Channel, drive: str, offset: float | None = None, expected: str = "") -> DriveSignal:
     """Return what a channel drives a body with.
 
     Parameters
@@ -56,13 +58,15 @@ def drive_of(channel: Channel, drive: str, offset: float | None = None) -> Drive
         `base_acceleration` or `force`.
     offset : float or None
         Taken off every sample, in the unit of the channel; None for `quiet_level`.
+    expected : str
+        SI unit that the channel must have; that of the drive where it is empty.
 
     Raises
     ------
     DatasetError
         The channel measures something else, or has less than two samples.
     """
-    expected, unit = DRIVEN_UNITS[drive], measured_unit(channel.unit)
+    expected, unit = expected or DRIVEN_UNITS[drive], measured_unit(channel.unit)
     if unit.si not in (expected, "1"):
         raise DatasetError(
             f"{channel.name}: expected a channel in {expected} to drive {drive}, got {channel.unit}. "

@@ -24,7 +24,7 @@ from vibroimpact.fmus.errors import ComponentError, DatasetError, SceneError, Us
 from vibroimpact.fmus.packaging.replay_fmu import ReplaySignal, build_replay
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec
 from vibroimpact.orchestrator.replay.covariance import drawn_noise, quiet_noise
-from vibroimpact.orchestrator.replay.drive import DriveSignal, drive_of, step_instants
+from vibroimpact.orchestrator.replay.drive import VOLTS, DriveSignal, drive_of, step_instants
 from vibroimpact.orchestrator.run import Session
 from vibroimpact.orchestrator.run.record import DeadlineReached, ImpactLimitReached
 from vibroimpact.orchestrator.scene import Scene
@@ -131,7 +131,9 @@ class Replayer:
         replay = self.replay
         if replay.drive is None:
             return None
-        return drive_of(self.recording.channel(replay.channel), replay.drive, replay.drive_offset)
+        channel = self.recording.channel(replay.channel)
+        unit = "" if self.scene.exciter is None else VOLTS
+        return drive_of(channel, replay.drive, replay.drive_offset, unit)
 
     def _instants(self) -> tuple[Floats, Floats | None]:
         """Return the instants of the simulation, and the drive there."""
@@ -150,6 +152,10 @@ class Replayer:
 
     def _open(self) -> Session:
         names = [reading.variable for reading in self.readings] or ["displacement"]
+        if self.execution == "coupled" and self.scene.exciter is not None:
+            raise UsageError(
+                f"{self.scene.source}: exciter: expected a fused replay beside it, got a coupled one. Leave it fused."
+            )
         if self.execution != "coupled" or self.drive is None:
             return Session(self.scene, names, execution=self.execution)
         self._folder = ScratchFolder("replay")
@@ -206,7 +212,7 @@ class Replayer:
         session = self._session
         session.begin(values)
         try:
-            rows = self._follow(session, noise)
+            rows = self._follow(session, scene, noise)
         except (ImpactLimitReached, DeadlineReached) as ended:
             limit = "impact_limit" if isinstance(ended, ImpactLimitReached) else "deadline"
             raise ComponentError(
@@ -221,7 +227,7 @@ class Replayer:
         readings = tuple(reading.of(rows[:, column], scene) for column, reading in enumerate(self.readings))
         return Motion(self.time, readings, impacts, sticks, session.warnings)
 
-    def _follow(self, session: Session, noise: np.random.Generator | None) -> Floats:
+    def _follow(self, session: Session, scene: Scene, noise: np.random.Generator | None) -> Floats:
         relative = self.time - self.time[0]
         if self._folder is not None or self._values is None:
             return session.follow(relative)  # a Replay drives the body, or nothing does
@@ -229,6 +235,8 @@ class Replayer:
         if noise is not None and drive is not None and self.drive_noise is not None:
             drawn = drawn_noise(self.drive_noise, len(drive.time), noise)
             values = values + np.interp(self.time, drive.time, drawn, left=0.0, right=0.0)
+        if scene.exciter is not None:
+            values = scene.exciter.gain * values + scene.exciter.offset
         return session.follow(relative, self.replay.drive, values)
 
     def final_state(self) -> tuple[float, float, Floats | None]:

@@ -22,6 +22,7 @@ from vibroimpact.analysis.dataset.columns import RunColumns
 from vibroimpact.analysis.dataset.schema import SWEPT_ALONG
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.units import si_unit
+from vibroimpact.orchestrator.run.conversion import channel_attributes, converted_records
 from vibroimpact.orchestrator.run.empty_record import sample_variables
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.fields import rule_of
@@ -58,6 +59,8 @@ def dataset_of_runs(
         Attributes of the file.
     """
     names = coordinate_names(scene)
+    if scene.channels and not isinstance(records, RunColumns):
+        records = converted_records(scene, values, directions, records)
     dataset = build_dataset(
         records,
         coordinates={name: values[key] for key, name in names.items()},
@@ -73,6 +76,10 @@ def dataset_of_runs(
         connections=_energy_connections(scene),
         compared=compared_names(scene),
     )
+    for name, attributes in channel_attributes(scene).items():
+        dataset[
+            dict(zip(sample_variables(scene), stored_samples(scene), strict=True))[name]
+        ].attrs |= attributes
     return _described(dataset, scene, names)
 
 
@@ -127,6 +134,7 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
         stored = {file: units[key] for key, file in names.items() if key in units}
         return units | stored if scene.units == "SI" else stored
     forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
+    forcing |= dict.fromkeys(scene.channels, "V")
     return forcing | {file: _cf_unit(scene, key) or "1" for key, file in names.items()}
 
 
@@ -135,7 +143,7 @@ def _cf_unit(scene: Scene, key: str) -> str | None:
     if key == RECORDING_KEY:
         return "1"
     if key.startswith("forcing.amplitude") and scene.forcing is not None:
-        return FORCING_UNITS[scene.forcing.kind]
+        return "V" if scene.exciter is not None else FORCING_UNITS[scene.forcing.kind]
     try:
         return si_unit(_unit(scene, key).replace("^", "")).cf
     except UsageError:  # UDUNITS has no broken exponents, and a wrong unit would be worse than none

@@ -57,6 +57,11 @@ def export_scene(
             f"{scene.source}: replay: expected a scene that drives its body by [forcing], got a recording, "
             "which an FMU of a body does not hold. Leave [replay] out, and give the signal to the input force."
         )
+    if scene.falling_force:
+        raise UsageError(
+            f"{scene.source}: exciter.distance: expected a force that does not depend on the displacement, as an FMU "
+            "of a body has it, got one that falls with the distance. Leave it out, or connect an Exciter to the FMU."
+        )
     return export_fmu(
         FMU_NAMES[body.kind],
         output,

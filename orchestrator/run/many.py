@@ -82,6 +82,7 @@ def loop_of(scene: Scene, runner: Runner) -> PointLoop | None:
     if (
         not isinstance(driver, BodyDriver)
         or scene.record.time_series is not None
+        or scene.is_measured
         or any(axis.key in NOT_IN_THE_LOOP for axis in scene.sweep)
         or (deadline is not None and deadline < SHORTEST_DEADLINE)
         or (chained and not isinstance(scene.body, OscillatorBody))

@@ -219,8 +219,9 @@ class _Loop:
         contact = arrays["stuck"].argmax(axis=1)
         for k, stop in enumerate(scene.stops):
             sign = 1.0 if stop.side == "upper" else -1.0
-            spring = -sign * columns["stiffness"][:count] * columns[f"contact[{k + 1}].position"][:count]
-            pressed |= (contact == k) & (spring > lifting if points.forced else True)
+            spring = columns["stiffness"][:count] * columns[f"contact[{k + 1}].position"][:count]
+            press = sign * (columns.get("force", np.zeros(count))[:count] - spring)
+            pressed |= (contact == k) & (press > lifting if points.forced else True)
         return resting & pressed
 
     def _final_phase(self, outcome: NDArray[np.int8], reached: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""The measuring chain of a scene: from voltages that drive to voltages that sensors and load cell give, block by block.
+"""A scene with a measuring chain as the plant of a rig: voltages in, voltages out, block by block.
 
 What comes out is analog: noise and conversion, which each input of a rig has for itself, are in `conversion`.
 """
@@ -12,155 +12,17 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from vibroimpact.fmus.core.measuring import EXCITER_SIDES, LoadCell, sensor_reading
-from vibroimpact.fmus.core.stepping import Magnet
 from vibroimpact.fmus.errors import UsageError
-from vibroimpact.orchestrator.run.fused import BodyDriver, HeldExciter
+from vibroimpact.orchestrator.run.fused import BodyDriver
+from vibroimpact.orchestrator.run.measuring_chain import NO_IMPACTS, Floats, MeasuringChain, held_exciter
 from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
 from vibroimpact.orchestrator.run.point import driver_of
 from vibroimpact.orchestrator.run.record import ROW_IMPACT, in_time_order
 from vibroimpact.orchestrator.scene import Scene
-from vibroimpact.orchestrator.scene.measuring_models import (
-    DRIVE,
-    LOAD_CELL,
-    MEASURED_SENSOR,
-    RING_INSTANTS,
-)
-from vibroimpact.orchestrator.scene.measuring_models import LoadCell as CellTable
-from vibroimpact.orchestrator.scene.models import RestitutionStop
+from vibroimpact.orchestrator.scene.measuring_models import DRIVE, LOAD_CELL, MEASURED_SENSOR
 
-Floats = NDArray[np.float64]
-IMPACT_TIME, IMPACT_IMPULSE, IMPACT_CONTACT = 0, 3, 4
-"""Columns of impacts."""
-NO_IMPACTS: Floats = np.empty((0, 7))
-
-
-class MeasuringChain:
-    """What a scene's sensor and load cell make of the motion of its body.
-
-    Parameters
-    ----------
-    scene : Scene
-        At a point of its sweep.
-    channels : sequence of str
-        Of `CHANNELS`; `drive` is a voltage that the caller knows.
-
-    Attributes
-    ----------
-    variables : tuple of str
-        Variables of the body's FMU that it takes, each once.
-    needs_impacts : bool
-        Whether the load cell is behind a rigid stop, so that the body has to record its impacts.
-    """
-
-    def __init__(self, scene: Scene, channels: Sequence[str]) -> None:
-        self._scene, self.channels = scene, tuple(channels)
-        cell = scene.load_cell if LOAD_CELL in channels else None
-        self._readings = {name: MEASURED_SENSOR[name] for name in channels if name in MEASURED_SENSOR}
-        self._force = f"contact[{cell.stop}].force" if cell else ""
-        self.variables = tuple(dict.fromkeys((*self._readings.values(), *([self._force] if cell else []))))
-        self.needs_impacts = cell is not None and isinstance(scene.stops[cell.stop - 1], RestitutionStop)
-        self._cell = None if cell is None else _opened(cell)
-
-    def instants_in(self, interval: float) -> int:
-        """Return into how many steps a sample interval (s) is cut, so that the ring of the load cell is followed."""
-        cell = self._scene.load_cell
-        ring = cell.natural_frequency if cell is not None and self._cell is not None else 0.0
-        return max(1, math.ceil(RING_INSTANTS * ring * interval * (1.0 - 1e-9)))
-
-    @property
-    def lead(self) -> float:
-        """Time after which the load cell has forgotten how it began, s; infinite where its ring does not decay."""
-        cell = self._scene.load_cell
-        if cell is None or self._cell is None:
-            return 0.0
-        after = cell.contact_duration or 0.0
-        if cell.natural_frequency == 0.0:
-            return after
-        ring, ratio = 2.0 * math.pi * cell.natural_frequency, cell.damping_ratio
-        # of an overdamped cell the slower of two rates
-        rate = ring * (ratio if ratio <= 1.0 else 1.0 / (ratio + math.sqrt(ratio * ratio - 1.0)))
-        return after + (_FORGOTTEN / rate if rate > 0.0 else math.inf)
-
-    def begin(self, time: float, values: Mapping[str, float]) -> None:
-        """Begin at a time (s), the load cell settled under the force then; `values` are of the variables."""
-        if self._cell is not None:
-            self._cell.follow([time], [values[self._force]])
-
-    def volts(self, times: Floats, values: Mapping[str, Floats], impacts: Floats) -> dict[str, Floats]:
-        """Return what the chain gives at instants, going on from those before; `drive` is not among it.
-
-        Parameters
-        ----------
-        times : ndarray, shape (instant,)
-            s, ascending.
-        values : mapping of str to ndarray, shape (instant,)
-            Of each of the variables, SI; `acceleration` absolute.
-        impacts : ndarray, shape (impact, 7)
-            Those since the last of the instants before, columns `IMPACT_COLUMNS`.
-        """
-        sensor, found = self._scene.sensor, {}
-        for name, variable in self._readings.items():
-            assert sensor is not None  # the scene's rules see to it
-            found[name] = sensor_reading(values[variable], sensor.gain, sensor.offset, sensor.range or 0.0)
-        if self._cell is not None:
-            hits, impulses = self._hits(impacts)
-            found[LOAD_CELL] = self._cell.follow(times, values[self._force], hits, impulses)
-        return found
-
-    def _hits(self, impacts: Floats) -> tuple[Floats, Floats]:
-        """Return instants and impulses of what hits the load cell as half sines."""
-        cell = self._scene.load_cell
-        if cell is None or not self.needs_impacts:
-            return np.empty(0), np.empty(0)
-        own = impacts[impacts[:, IMPACT_CONTACT] == cell.stop]
-        return thinned(own[:, IMPACT_TIME], own[:, IMPACT_IMPULSE], cell.contact_duration or 0.0)
-
-
-def _opened(cell: CellTable) -> LoadCell:
-    numbers = (cell.sensitivity, cell.natural_frequency, cell.damping_ratio, cell.offset, cell.drift)
-    return LoadCell(*numbers, cell.contact_duration or 0.0)
-
-
-_FORGOTTEN = 37.0
-"""Time constants after which a ring is below the rounding of doubles: exp(-37) = 1e-16."""
-
-
-_OVERLAPPING = 1000
-"""Half sines that may be under way at once before neighbours are joined; the cell has room for twice as many."""
-
-
-def thinned(times: Floats, impulses: Floats, duration: float) -> tuple[Floats, Floats]:
-    """Return impacts of which no more than `_OVERLAPPING` are within a duration, as the end of a chatter has them.
-
-    Where there are more, those within a `_OVERLAPPING`th of the duration become one, with their impulse at their
-    centre.
-
-    Examples
-    --------
-    >>> times, impulses = thinned(np.linspace(0.0, 1.0, 5001), np.full(5001, 0.1), 1.0)
-    >>> len(times), round(float(impulses.sum()), 9)
-    (1001, 500.1)
-    """
-    if len(times) <= _OVERLAPPING or (times[_OVERLAPPING:] - times[:-_OVERLAPPING] >= duration).all():
-        return times, impulses
-    slot = np.floor((times - times[0]) * (_OVERLAPPING / duration))
-    first = np.flatnonzero(np.diff(slot, prepend=-1.0))
-    weights = impulses + np.finfo(np.float64).tiny
-    sums = np.add.reduceat(weights, first)
-    centres = np.add.reduceat((times - times[0]) * weights, first) / sums
-    return np.clip(times[0] + centres, times[first], times[np.append(first[1:], len(times)) - 1]), sums
-
-
-def held_exciter(scene: Scene) -> HeldExciter | None:
-    """Return what makes forces of voltages within the loop over samples; None without an exciter."""
-    exciter = scene.exciter
-    if exciter is None:
-        return None
-    magnet = Magnet(exciter.gain, exciter.offset, exciter.distance, EXCITER_SIDES[exciter.side])
-    # a beam has a sensor of its own where the force acts, see `parameters.beam_floats`
-    place = "sensor[1].displacement" if scene.body.kind == "beam" else "displacement"
-    return HeldExciter(magnet, place)
+INSTANTS_AT_ONCE = 2**16
+"""Instants of a block that are in memory at once."""
 
 
 class MeasuredSession:
@@ -244,9 +106,11 @@ class MeasuredSession:
         self._driver.begin(float_parameters(self._scene, None), self._scene.execution.deadline)
         self._driver.record(impacts=True, extrema=False, periods=False)
         self._chain = MeasuringChain(self._scene, self._channels)
-        values = dict(zip(self._variables, self._driver.sampled().tolist(), strict=True))
-        self._chain.begin(0.0, values)
-        self._tell(values)
+        row = self._driver.sampled().tolist()
+        self._chain.begin(
+            0.0, {name: np.array([now]) for name, now in zip(self._variables, row, strict=True)}
+        )
+        self._tell(dict(zip(self._variables, row, strict=True)))
         self.impacts_of_block = NO_IMPACTS
 
     def advance(self, times: Floats, volts: Floats) -> dict[str, Floats]:
@@ -276,18 +140,32 @@ class MeasuredSession:
         _refuse_wrong_block(times, volts, self.time)
         if not len(volts):
             return {name: np.empty(0) for name in self._channels}
-        pieces = self._chain.instants_in(float(np.max(np.diff(times))))
+        pieces = self._chain.instants_in(np.diff(times))
         ends, held, renewed = _cut(times, volts, pieces)
+        found: dict[str, list[Floats]] = {name: [] for name in self._channels if name != DRIVE}
+        impacts = []
+        for first in range(0, len(ends), INSTANTS_AT_ONCE):
+            part = slice(first, first + INSTANTS_AT_ONCE)
+            block, hits = self._hold(ends[part], held[part], renewed[part])
+            impacts.append(hits)
+            for name, values in block.items():
+                found[name].append(values)
+        self.impacts_of_block = np.concatenate(impacts)
+        at_samples = np.cumsum(pieces) - 1
+        channels = {name: np.concatenate(parts)[at_samples] for name, parts in found.items()}
+        return {name: volts.copy() if name == DRIVE else channels[name] for name in self._channels}
+
+    def _hold(
+        self, ends: Floats, held: Floats, renewed: NDArray[np.uint8]
+    ) -> tuple[dict[str, Floats], Floats]:
         rows = self._driver.hold(
             ends, held, self._variables, renewed=renewed, exciter=self._exciter, recording=True
         )
-        self.impacts_of_block = in_time_order(self._driver.rows.of_kind(ROW_IMPACT))
+        impacts = in_time_order(self._driver.rows.of_kind(ROW_IMPACT))
         self._driver.rows.blocks = []
         values = {name: np.ascontiguousarray(rows[:, place]) for place, name in enumerate(self._variables)}
-        found = self._chain.volts(ends, values, self.impacts_of_block)
         self._tell({name: float(column[-1]) for name, column in values.items()})
-        at_samples = {name: found[name][pieces - 1 :: pieces] for name in found}
-        return {name: volts.copy() if name == DRIVE else at_samples[name] for name in self._channels}
+        return self._chain.volts(ends, values, impacts), impacts
 
     def _tell(self, values: Mapping[str, float]) -> None:
         force = math.fsum(value for name, value in values.items() if name.startswith("contact["))
@@ -337,14 +215,12 @@ def _refuse_wrong_block(times: Floats, volts: Floats, now: float) -> None:
         raise UsageError("volts: expected finite voltages, got one that is no number.")
 
 
-def _cut(times: Floats, volts: Floats, pieces: int) -> tuple[Floats, Floats, NDArray[np.uint8]]:
+def _cut(times: Floats, volts: Floats, pieces: NDArray[np.int64]) -> tuple[Floats, Floats, NDArray[np.uint8]]:
     """Cut each step into pieces of one length; return their ends, the voltage of each, and which begin a step."""
-    if pieces == 1:
-        ends = np.ascontiguousarray(times[1:], dtype=np.float64)
-        return ends, np.ascontiguousarray(volts, dtype=np.float64), np.ones(len(volts), dtype=np.uint8)
-    parts = np.arange(1, pieces + 1) / pieces
-    table = times[:-1, np.newaxis] + np.diff(times)[:, np.newaxis] * parts
-    table[:, -1] = times[1:]
-    renewed = np.zeros((len(volts), pieces), dtype=np.uint8)
-    renewed[:, 0] = 1
-    return table.ravel(), np.repeat(np.asarray(volts, dtype=np.float64), pieces), renewed.ravel()
+    last = np.cumsum(pieces) - 1
+    place = np.arange(1, last[-1] + 2) - np.repeat(last + 1 - pieces, pieces)
+    ends = np.repeat(times[:-1], pieces) + np.repeat(np.diff(times), pieces) * (
+        place / np.repeat(pieces, pieces)
+    )
+    ends[last] = times[1:]
+    return ends, np.repeat(np.asarray(volts, dtype=np.float64), pieces), (place == 1).astype(np.uint8)

@@ -12,7 +12,7 @@ import time
 from array import array
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,9 @@ from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.body_models import OscillatorBody
 from vibroimpact.orchestrator.scene.models import Record
+
+if TYPE_CHECKING:
+    from vibroimpact.orchestrator.run.measured_run import MeasuredRun
 
 TWO_PI = 2.0 * math.pi
 Numbers = TypeVar("Numbers", float, NDArray[np.float64])
@@ -215,15 +218,19 @@ class _Run:
         self.parameters = float_parameters(scene, start)
         self.samples = array("d")
         self.begin_time, self.end_time = recorded_window(scene, self.parameters)
+        self.measured: MeasuredRun | None = None
 
     def run(self) -> tuple[Outcome, str]:
         """Run to the end; returns how that went."""
         execution, driver = self.scene.execution, self.driver
         driver.begin(self.parameters, execution.deadline)
         try:
-            driver.advance(self.begin_time)
-            self._begin_recording()
-            self._advance_sampling()
+            if self.scene.is_measured:
+                self._go_measured()
+            else:
+                driver.advance(self.begin_time)
+                self._begin_recording()
+                self._advance_sampling()
             driver.advance(self.end_time)
         except ImpactLimitReached:
             return Outcome.impact_limit, limit_message(execution.impact_limit, driver.time)
@@ -231,9 +238,19 @@ class _Run:
             return Outcome.timeout, late_message(execution.deadline, driver.time)
         return (Outcome.stuck, "") if self._rests_for_ever() else (Outcome.ok, "")
 
+    def _go_measured(self) -> None:
+        # only a scene with a measuring chain needs what follows it
+        from vibroimpact.orchestrator.run.measured_run import MeasuredRun
+
+        assert isinstance(self.driver, BodyDriver)  # the rules of scenes see to it
+        window = self.begin_time, self.end_time
+        self.measured = MeasuredRun(self.scene, self.driver, self.plan, self.parameters, window)
+        self.measured.go(self._begin_recording)
+
     def _begin_recording(self) -> None:
         record = self.scene.record
-        self.driver.record(impacts=record.impacts, extrema=record.extrema, periods=self._has_periods())
+        impacts = record.impacts or (self.measured is not None and self.measured.needs_impacts)
+        self.driver.record(impacts=impacts, extrema=record.extrema, periods=self._has_periods())
 
     def _has_periods(self) -> bool:
         record = self.scene.record
@@ -273,8 +290,10 @@ class _Run:
     def _is_pressed(self, body: OscillatorBody, contact: int) -> bool:
         stop = self.scene.stops[contact - 1]
         sign = 1.0 if stop.side == "upper" else -1.0
-        spring = -sign * body.stiffness * stop.position
-        return self.scene.period is None or spring > abs(self.parameters.get("forcing.amplitude", 0.0))
+        press = sign * (self.parameters.get("force", 0.0) - body.stiffness * stop.position)
+        if self.scene.falling_force:
+            return self.scene.period is None  # what the force is elsewhere nobody knows before
+        return self.scene.period is None or press > abs(self.parameters.get("forcing.amplitude", 0.0))
 
     def record(self, outcome: Outcome, message: str, seconds: float) -> RunRecord:
         """Return the record of the run."""
@@ -313,4 +332,6 @@ class _Run:
         series = self.scene.record.time_series
         if series is None:
             return None
+        if self.measured is not None:
+            return self.measured.samples()
         return np.array(self.samples).reshape(-1, 1 + len(series.variables))

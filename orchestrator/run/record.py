@@ -227,6 +227,10 @@ class RecordedBody(ABC):
         """Return the present values of the sampled variables; the buffer is used again at the next call."""
         return _NOTHING if self._sampled is None else self._sampled.get()
 
+    def values_of(self, names: Sequence[str]) -> NDArray[np.float64]:
+        """Return the present values of real variables of the body."""
+        return self._group_of("Float64", names, None).get().copy() if names else _NOTHING
+
     def whole_state(self) -> NDArray[np.float64] | None:
         """Return the whole state; None where the observed point is all of it."""
         return None if self._state is None else self._state.get().copy()

@@ -62,6 +62,11 @@ class Session:
     ) -> None:
         self._scene = scene
         self._plan = TimeSeriesPlan(scene, outputs)
+        if self._plan.names != self._plan.all_names:
+            channels = ", ".join(name for name in outputs if name not in self._plan.names)
+            raise UsageError(
+                f"outputs: expected variables of the body, got {channels}. A MeasuredSession has them."
+            )
         self.outputs = self._plan.names
         wanted = "fused" if execution == "auto" and not others else execution
         self.execution = "coupled" if others else wanted

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.measuring_models import CHANNELS
 from vibroimpact.orchestrator.scene.models import Forcing
 from vibroimpact.orchestrator.scene.sampled_names import fmu_variables, follow_energies, forced_mass
 
@@ -25,8 +26,10 @@ class TimeSeriesPlan:
 
     Attributes
     ----------
-    names : tuple of str
+    all_names : tuple of str
         The sampled variables, as the scene names them; empty without a time series.
+    names : tuple of str
+        Those that are no channels of a measuring chain.
     variables : tuple of str
         The variables of the body's FMU that they are made of, each once.
     energies : bool
@@ -36,7 +39,8 @@ class TimeSeriesPlan:
     def __init__(self, scene: Scene, names: Sequence[str] | None = None) -> None:
         series = scene.record.time_series
         asked = series.variables if series is not None else ()
-        self.names: tuple[str, ...] = asked if names is None else tuple(names)
+        self.all_names: tuple[str, ...] = asked if names is None else tuple(names)
+        self.names = tuple(name for name in self.all_names if name not in CHANNELS)
         parts = [fmu_variables(name, len(scene.stops)) for name in self.names]
         self.variables = tuple(dict.fromkeys(variable for part in parts for variable in part))
         self.energies = scene.body.kind != "oscillator" and follow_energies(self.names)
@@ -72,8 +76,7 @@ class TimeSeriesPlan:
         cosine = 0.0
         if forcing is not None:
             cosine = math.cos(forcing.angular_frequency * time + parameters["forcing.phase"])
-        driven = forcing is not None and forcing.kind == "base_acceleration"
-        base = forcing.scalar_amplitude * cosine if forcing and driven and self._relative else 0.0
+        base = forcing.scalar_amplitude * cosine if forcing and self._is_relative(forcing) else 0.0
         row = []
         for name, columns in zip(self.names, self._columns, strict=True):
             value = math.fsum(values[column] for column in columns)
@@ -83,6 +86,56 @@ class TimeSeriesPlan:
                 value += base
             row.append(value)
         return row
+
+    def _is_relative(self, forcing: Forcing) -> bool:
+        """Whether the base moves and the body does not know it, so that its accelerations are relative to the base."""
+        return forcing.kind == "base_acceleration" and self._relative
+
+    def base(
+        self, forcing: Forcing | None, parameters: Mapping[str, float], times: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return what is added to an acceleration of the body's FMU at instants, m/s^2, shape (instant,)."""
+        if forcing is None or not self._is_relative(forcing):
+            return np.zeros(len(times))
+        angle = forcing.angular_frequency * times + parameters["forcing.phase"]
+        return np.asarray(forcing.scalar_amplitude * np.cos(angle), dtype=np.float64)
+
+    def rows(
+        self,
+        values: NDArray[np.float64],
+        variables: Sequence[str],
+        forcing: Forcing | None,
+        parameters: Mapping[str, float],
+        times: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Return the sampled variables at many instants, those of `names`: as `row`, to rounding.
+
+        Parameters
+        ----------
+        values : ndarray, shape (instant, variable)
+            What the FMU says.
+        variables : sequence of str
+            What its columns are, those of `variables` among them.
+        forcing, parameters, times
+            As of `row`; times have the shape (instant,).
+
+        Returns
+        -------
+        ndarray, shape (instant, name)
+        """
+        place = {name: column for column, name in enumerate(variables)}
+        own = [place[name] for name in self.variables]
+        found = np.zeros((len(times), len(self.names)))
+        base = self.base(forcing, parameters, times)
+        for column, (name, parts) in enumerate(zip(self.names, self._columns, strict=True)):
+            if name.startswith("forcing") and forcing is not None:
+                angle = forcing.angular_frequency * times + parameters["forcing.phase"]
+                found[:, column] = _amplitude(forcing, name) * np.cos(angle)
+                continue
+            found[:, column] = values[:, [own[part] for part in parts]].sum(axis=1)
+            if name.startswith("acceleration"):
+                found[:, column] += base
+        return found
 
 
 def _amplitude(forcing: Forcing | None, name: str) -> float:

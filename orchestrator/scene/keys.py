@@ -168,10 +168,14 @@ def coordinate_name(key: str, swept: Sequence[str]) -> str:
     'stop_1_position'
     >>> coordinate_name("body.masses[2]", ["body.masses[2]"])
     'masses_2'
+    >>> coordinate_name("noise.load_cell", ["noise.load_cell"])
+    'noise_load_cell'
     >>> coordinate_name("chain.mass[2]", ["chain.mass[2]", "connection[1].gain"])
     'mass_2'
     """
     last = _last_part(key)
+    if key.startswith("noise."):  # its keys are named as the channels are
+        return dataset_name(key)
     if any(other != key and _last_part(other) == last for other in swept):
         return dataset_name(key)
     return last or dataset_name(key)

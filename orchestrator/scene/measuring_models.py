@@ -33,6 +33,11 @@ CHANNELS = (*MEASURED_SENSOR, LOAD_CELL, DRIVE)
 """All channels of a measuring chain, in V; also the tables that have their noise: see `Noise.of`."""
 
 
+def channel_number(channel: str) -> int:
+    """Return the number of a channel, which tells its noise from that of others under one seed."""
+    return CHANNELS.index(channel)
+
+
 def channels_in(names: Iterable[str]) -> tuple[str, ...]:
     """Return those of some variables that are channels of a measuring chain.
 

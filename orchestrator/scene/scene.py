@@ -172,6 +172,11 @@ class Scene(SceneTable):
         return self.exciter is not None and (self.exciter.distance > 0.0 or any(map(any, swept)))
 
     @property
+    def is_measured(self) -> bool:
+        """Whether its runs go by blocks of samples; no other run pays for a measuring chain."""
+        return bool(self.channels) or self.falling_force
+
+    @property
     def runs(self) -> int:
         """How many runs the sweep has; 1 without one."""
         return run_count(self.sweep)

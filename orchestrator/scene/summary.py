@@ -6,6 +6,7 @@ from vibroimpact.orchestrator.importer.specification import PairSpec
 from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
 from vibroimpact.orchestrator.scene.fields import rule_of
 from vibroimpact.orchestrator.scene.keys import MODES
+from vibroimpact.orchestrator.scene.measuring_models import FALLING_FORCE, MEASURED_SENSOR
 from vibroimpact.orchestrator.scene.models import AMPLITUDE, DAMPING, FALLING_RESTITUTION, RestitutionStop
 from vibroimpact.orchestrator.scene.replay_models import RECORDING_KEY
 from vibroimpact.orchestrator.scene.sampled_names import follow_energies
@@ -92,7 +93,25 @@ def effects(scene: Scene) -> dict[str, bool]:
         FALLING_RESTITUTION: FALLING_RESTITUTION in called,
         AMPLITUDE: AMPLITUDE in called,
         "energies": followed and series is not None and follow_energies(series.variables),
+        **{name: bool(keys) for name, keys in chain_effects(scene).items()},
         **common,
+    }
+
+
+def chain_effects(scene: Scene) -> dict[str, list[str]]:
+    """Return by its name which tables or numbers of a scene of the short form ask for a part of the measuring chain."""
+    series, sensor, exciter = scene.record.time_series, scene.sensor, scene.exciter
+    sampled = () if series is None else series.variables
+    readings = sensor is not None and (
+        scene.replay is not None or any(name in MEASURED_SENSOR for name in sampled)
+    )
+    return {
+        "sensor": ["sensor"] if readings else [],
+        "load cell": ["load_cell"] if scene.load_cell is not None else [],
+        "exciter": ["exciter"] if exciter is not None else [],
+        FALLING_FORCE: ["exciter.distance"] if scene.falling_force else [],
+        "noise": ["noise"] if scene.noise is not None else [],
+        "AD conversion": ["daq"] if scene.daq is not None else [],
     }
 
 

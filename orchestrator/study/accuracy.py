@@ -23,6 +23,7 @@ from vibroimpact.orchestrator.study.balance import balance_of
 from vibroimpact.orchestrator.study.choice import advice, cheapest, error_of_reference, pareto_front
 from vibroimpact.orchestrator.study.errors import FIRST_IMPACTS, QUANTITIES, errors_of, no_errors
 from vibroimpact.orchestrator.study.measured import Measured, Study
+from vibroimpact.orchestrator.study.measuring_effects import motion_alone
 from vibroimpact.orchestrator.study.memory import UNKNOWN, memory_of_ways
 from vibroimpact.orchestrator.study.models import told_by
 from vibroimpact.orchestrator.study.orbits import orbit_of
@@ -130,12 +131,18 @@ def studied_scene(scene: Scene) -> Scene:
     """Return a scene as it is studied: one point, impacts and extremes recorded.
 
     A time series is left out where impacts tell more, since it costs more than the motion; a general scene and a free
-    motion have nothing else to be compared by.
+    motion have nothing else to be compared by. A measuring chain is left out: no other way has one.
+
+    Raises
+    ------
+    UsageError
+        The scene has an exciter whose force is not its forcing alone.
     """
     alone = scene.with_sweep({}) if scene.sweep else scene
     if scene.general is not None or scene.replay is not None:
         return alone
-    if scene.record.time_series is not None:
+    alone = motion_alone(alone)
+    if alone.record.time_series is not None:
         document = parse_toml(alone.text)
         del document["record"]["time_series"]
         alone = Scene.from_dict(document, scene.source)

@@ -25,6 +25,7 @@ from vibroimpact.orchestrator.scene.models import DAMPING
 from vibroimpact.orchestrator.scene.summary import effects as called_effects
 from vibroimpact.orchestrator.scene.summary import laws
 from vibroimpact.orchestrator.study.errors import Scales, errors_of
+from vibroimpact.orchestrator.study.measuring_effects import measuring_changes
 from vibroimpact.orchestrator.study.references import scales_of
 from vibroimpact.orchestrator.study.replays import ReplayTrial
 from vibroimpact.orchestrator.study.way import SceneTrial, opened_trial
@@ -126,6 +127,8 @@ def _found(scene: Scene) -> Iterator[Effect | None]:
         if scene.record.time_series is not None:
             change = _sets("record", "time_series", None)
             yield _without(scene, "time series", SERIES, change, keeps=True)
+        for name, key, change in measuring_changes(scene):
+            yield _without(scene, name, key, change, keeps=True, series=True)
         if scene.execution.how == "coupled":
             change = _only_fused
             yield _without(scene, "stops as FMUs of their own", "execution.how", change, keeps=True)
@@ -217,11 +220,13 @@ def _of_numbers(scene: Scene) -> Iterator[Effect | None]:
         yield _without(scene, name, ", ".join(keys), _zeros(keys))
 
 
-def _without(scene: Scene, name: str, key: str, change: Change, *, keeps: bool = False) -> Effect | None:
-    """Return an effect; None where the scene is none without it."""
+def _without(
+    scene: Scene, name: str, key: str, change: Change, *, keeps: bool = False, series: bool = False
+) -> Effect | None:
+    """Return an effect, compared with or without a time series; None where the scene is none without it."""
     document = parse_toml(scene.text)
     document.pop("sweep", None)
-    if key != SERIES and scene.general is None:
+    if key != SERIES and not series and scene.general is None:
         document.get("record", {}).pop("time_series", None)
     base = Scene.from_dict(document, scene.source)
     change(document)

@@ -1,0 +1,77 @@
+"""What a simulated channel went through, as its dataset says it: where it is clipped, and when it was sampled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.recording.channels import Quality
+
+Floats = NDArray[np.float64]
+NUMBERS = ("sensor_range", "noise_rms", "range", "bits", "clock_error_ppm", "skew")
+"""Attributes of a channel that are numbers, or the name of the coordinate that has one for each run."""
+_DEVIATIONS = 4.0
+"""Noise that hides the end of a sensor's range, in its standard deviations."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelChain:
+    """The measuring chain of a channel.
+
+    Attributes
+    ----------
+    skew : float
+        s after the time of the dataset; 0 of what is no channel.
+    low, high : float
+        V; a sample that is not between them is at the end of a range.
+    attrs : dict
+        What the dataset says, in numbers.
+    """
+
+    skew: float = 0.0
+    low: float = -np.inf
+    high: float = np.inf
+    attrs: Mapping[str, Any] = field(default_factory=dict)
+
+    def quality(self, values: Floats) -> NDArray[np.uint8]:
+        """Return the quality of samples, see `Quality`."""
+        clipped = (values <= self.low) | (values >= self.high)
+        return np.where(clipped, np.uint8(Quality.clipped), np.uint8(0))
+
+
+def chain_of(attributes: Mapping[Any, Any], runs: Any, row: int) -> ChannelChain:
+    """Return the measuring chain of a sampled variable.
+
+    Parameters
+    ----------
+    attributes : mapping
+        Of the variable.
+    runs : xarray.Dataset
+        One-dimensional; it has the coordinates of swept numbers.
+    row : int
+        Of the run.
+    """
+    if "channel" not in attributes:
+        return ChannelChain()
+
+    def number(name: str) -> float:
+        told = attributes[name]
+        return float(runs[told].values[row] if isinstance(told, str) else told)
+
+    known = {name: number(name) for name in NUMBERS if name in attributes}
+    if isinstance(attributes.get("skew"), str):  # from one channel to the next
+        known["skew"] *= float(attributes["place"])
+    low, high = -np.inf, np.inf
+    if "range" in known:
+        step = 2.0 * known["range"] / 2.0 ** known["bits"]
+        low, high = -known["range"], known["range"] - step
+    if known.get("sensor_range", 0.0) > 0.0:
+        most = known["sensor_range"] - _DEVIATIONS * known.get("noise_rms", 0.0)
+        step = 0.5 * (2.0 * known["range"] / 2.0 ** known["bits"]) if "range" in known else 0.0
+        low, high = max(low, step - most), min(high, most - step)
+    seed = {"noise_seed": int(attributes["noise_seed"])} if "noise_seed" in attributes else {}
+    return ChannelChain(known.get("skew", 0.0), low, high, known | seed)

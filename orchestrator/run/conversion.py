@@ -1,0 +1,126 @@
+"""From analog voltages to the samples of a dataset: noise is added, a converter rounds and clips.
+
+Noise is a function of the seed, the run, the channel and the number of the sample alone, so that no worker and no cut
+of a campaign into chunks changes it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset import Direction, RunRecord
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.keys import coordinate_name
+from vibroimpact.orchestrator.scene.measuring_models import channel_number
+
+Floats = NDArray[np.float64]
+
+
+def run_seed(seed: int, values: Mapping[str, float], direction: Direction) -> int:
+    """Return the seed of the noise of a run, 0 to 2^64 - 1: that of the scene where it sweeps nothing.
+
+    It is made of the point and not of its number, which another sweep of the same campaign changes.
+
+    Parameters
+    ----------
+    seed : int
+        `noise.seed`.
+    values : mapping of str to float
+        Values of the swept keys.
+    direction : Direction
+        In which the branch of the point goes.
+
+    Examples
+    --------
+    >>> run_seed(7, {}, Direction.independent)
+    7
+    >>> run_seed(7, {"body.mass": 1.0}, Direction.up) == run_seed(7, {"body.mass": 1.0}, Direction.down)
+    False
+    """
+    if not values:
+        return seed
+    point = ",".join(f"{key}={float(value).hex()}" for key, value in sorted(values.items()))
+    content = f"{seed};{direction.name};{point}".encode()
+    return int.from_bytes(hashlib.blake2b(content, digest_size=8).digest(), "big")
+
+
+def converted(scene: Scene, analog: Floats, names: Sequence[str], seed: int) -> Floats:
+    """Return samples with the noise of their channels, as the converter gives them.
+
+    Parameters
+    ----------
+    scene : Scene
+        At its point.
+    analog : ndarray, shape (sample, 1 + variable)
+        Time and variables.
+    names : sequence of str
+        Of the variables.
+    seed : int
+        See `run_seed`.
+    """
+    # only a scene with such tables needs the core here
+    from vibroimpact.fmus.core.measuring import digitised, gaussian
+
+    samples = analog.copy()
+    for column, name in enumerate(names, start=1):
+        if name not in scene.channels:
+            continue
+        rms = scene.noise.of(name) if scene.noise is not None else 0.0
+        if rms > 0.0:
+            samples[:, column] += rms * gaussian(seed, channel_number(name), 0, len(samples))
+        if scene.daq is not None:
+            samples[:, column] = digitised(samples[:, column], scene.daq.range, scene.daq.bits)
+    return samples
+
+
+def converted_records(
+    scene: Scene,
+    values: Mapping[str, NDArray[np.float64]],
+    directions: Sequence[Direction] | NDArray[np.int8],
+    records: Sequence[RunRecord],
+) -> list[RunRecord]:
+    """Return the records of runs with their samples converted."""
+    found, seed = [], scene.noise.seed if scene.noise is not None else 0
+    for place, record in enumerate(records):
+        if record.samples is not None and len(record.samples):
+            point = {key: float(column[place]) for key, column in values.items()}
+            own = run_seed(seed, point, Direction(int(directions[place])))
+            names = scene.record.time_series.variables if scene.record.time_series else ()
+            record = replace(record, samples=converted(scene.at(point), record.samples, names, own))
+        found.append(record)
+    return found
+
+
+def channel_attributes(scene: Scene) -> dict[str, dict[str, Any]]:
+    """Return what a dataset says of each channel: what it went through. A swept number is named by its coordinate."""
+    swept = [axis.key for axis in scene.sweep]
+
+    def told(key: str) -> float | str:
+        return coordinate_name(key, swept) if key in swept else scene.value(key)
+
+    found: dict[str, dict[str, Any]] = {}
+    for place, name in enumerate(scene.channels):
+        own: dict[str, Any] = {"channel": name}
+        if name.startswith("sensor.") and scene.sensor is not None and scene.sensor.range:
+            own["sensor_range"] = told("sensor.range")
+        if scene.noise is not None:
+            own |= {
+                "noise_rms": told(f"noise.{name.partition('.')[0]}"),
+                "noise_seed": scene.noise.seed,
+            }
+        if scene.daq is not None:
+            own |= {
+                "range": told("daq.range"),
+                "bits": scene.daq.bits,
+                "clock_error_ppm": told("daq.clock_error"),
+            }
+            own["skew"] = told("daq.skew") if "daq.skew" in swept else place * scene.daq.skew
+            own["place"] = place
+        found[name] = own
+    return found

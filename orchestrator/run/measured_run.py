@@ -1,0 +1,274 @@
+"""A run that samples the channels of a measuring chain, or whose force is held from sample to sample: by blocks, in C.
+
+Sample k of the clock is taken at begin + k / rate, that of the channel at place c of the scene c skews later. The same
+clock holds a force that falls with the distance, from the start of the run on. Before the recording begins, the load
+cell is followed for as long as it remembers.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.orchestrator.run.fused import BodyDriver
+from vibroimpact.orchestrator.run.measuring_chain import MeasuringChain, held_exciter
+from vibroimpact.orchestrator.run.record import ROW_IMPACT, ImpactLimitReached, Rows, in_time_order
+from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.measuring_models import CHANNELS, DRIVE
+
+Floats = NDArray[np.float64]
+INSTANTS_OF_A_BLOCK = 2048
+_ROUNDING = 1e-12
+"""Relative rounding by which a last sample may lie beyond the end of the recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Seen:
+    """What is known at the instants of a block, the first of which is where the block before ended.
+
+    Attributes
+    ----------
+    times : ndarray, shape (instant,)
+        s.
+    rows : ndarray, shape (instant, variable)
+    volts : dict of str to ndarray, shape (instant,)
+        By channel.
+    """
+
+    times: Floats
+    rows: Floats
+    volts: Mapping[str, Floats]
+
+    def last(self) -> _Seen:
+        """Return what is known at the last instant."""
+        volts = {name: values[-1:] for name, values in self.volts.items()}
+        return _Seen(self.times[-1:], self.rows[-1:], volts)
+
+
+class MeasuredRun:
+    """The way of one run through its samples.
+
+    Parameters
+    ----------
+    scene : Scene
+        At its point.
+    driver : BodyDriver
+        Begun, at time 0.
+    plan : TimeSeriesPlan
+    parameters : mapping of str to float
+        Of the body.
+    window : tuple of float
+        Begin and end of the recording, s.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        driver: BodyDriver,
+        plan: TimeSeriesPlan,
+        parameters: Mapping[str, float],
+        window: tuple[float, float],
+    ) -> None:
+        self._scene, self._driver, self._plan, self._parameters = scene, driver, plan, parameters
+        self._begin, self._end = window
+        self._chain = MeasuringChain(scene, scene.channels)
+        self._exciter = held_exciter(scene) if scene.falling_force else None
+        self._rate = scene.sampling_rate if scene.daq is None else scene.daq.true_rate
+        self._pieces = int(self._chain.instants_in(np.array([1.0 / self._rate]))[0])
+        self._skew = 0.0 if scene.daq is None else scene.daq.skew
+        self._last = self._whole(self._end - self._begin)
+        self._variables = tuple(dict.fromkeys((*plan.variables, *self._chain.variables)))
+        self._sampled: list[Floats] = []
+
+    def _whole(self, span: float) -> int:
+        """Return how many whole samples are in a span of time, s."""
+        return math.floor(span * self._rate * (1.0 + _ROUNDING))
+
+    @property
+    def needs_impacts(self) -> bool:
+        """Whether the load cell needs the impacts of the body, recorded or not."""
+        return self._chain.needs_impacts
+
+    def samples(self) -> Floats:
+        """Return what was sampled, shape (sample, 1 + variable): nominal time, then the variables of the scene."""
+        width = 1 + len(self._plan.all_names)
+        return np.concatenate(self._sampled) if self._sampled else np.empty((0, width))
+
+    # ---- the clock ----
+
+    def _edge(self, number: int) -> float:
+        """Return when sample `number` is taken, s; the end of the recording for those after it."""
+        time = self._begin + number / self._rate
+        return min(time, self._end) if number <= self._last else self._end
+
+    def _edges(self, numbers: NDArray[np.int64]) -> Floats:
+        times = self._begin + numbers / self._rate
+        return np.where(numbers <= self._last, np.minimum(times, self._end), self._end)
+
+    def _instants(self, first: int, stop: int) -> Floats:
+        """Return all instants of some samples, from the first of them to the one that is no longer among them."""
+        numbers = np.arange(first, stop)
+        edges, end = self._edges(numbers)[:, np.newaxis], self._edge(stop)
+        ring = edges + np.arange(self._pieces) / (self._pieces * self._rate)
+        skewed = edges + self._skew * np.arange(max(1, len(self._chain.channels)))
+        found = np.unique(np.concatenate([ring.ravel(), skewed.ravel(), self._own(first, stop), [end]]))
+        return found[found <= end]
+
+    def _own(self, first: int, stop: int) -> Floats:
+        """Return the instants of a time series that keeps its own rate, since it names no channel."""
+        rate = self._scene.sampling_rate
+        if self._chain.channels or not rate or stop <= 0:
+            return np.empty(0)
+        begin, end = self._edge(max(first, 0)), self._edge(stop)
+        number = np.arange(
+            math.floor((begin - self._begin) * rate), math.ceil((end - self._begin) * rate) + 1
+        )
+        times = np.minimum(self._begin + number / rate, self._end)
+        inside = (times >= begin) & ((times < end) | (stop > self._last)) & (number >= 0)
+        return np.unique(times[inside & (times <= end)])
+
+    def _volts_at(self, times: Floats) -> Floats:
+        """Return the voltage that the scene puts out at instants; 0 without a forcing."""
+        forcing = self._scene.forcing
+        if forcing is None:
+            return np.zeros(len(times))
+        angle = forcing.angular_frequency * times + self._parameters["forcing.phase"]
+        return np.asarray(forcing.scalar_amplitude * np.cos(angle), dtype=np.float64)
+
+    # ---- the way ----
+
+    def go(self, begin_recording: Callable[[], None]) -> None:
+        """Go to the end of the recording; `begin_recording` is called where it begins.
+
+        Raises
+        ------
+        ImpactLimitReached, DeadlineReached
+            The run ends before; what was sampled is there.
+        """
+        seen = self._start()
+        if self._first == 0:
+            begin_recording()
+        for first, stop in self._blocks():
+            seen = self._block(first, stop, seen).last()
+            if stop == 0:
+                self._driver.rows.blocks = []
+                begin_recording()
+
+    @property
+    def _first(self) -> int:
+        """The sample with which the blocks begin: 0, or one before the recording."""
+        before = self._whole(self._begin)
+        if self._exciter is None:
+            lead = self._chain.lead * self._rate
+            before = math.ceil(lead) if lead < before else before
+        return next(number for number in itertools.count(-before) if self._edge(number) >= 0.0)
+
+    def _blocks(self) -> Iterator[tuple[int, int]]:
+        """Yield the samples of each block, [first, stop); one begins where the recording does."""
+        size = max(1, INSTANTS_OF_A_BLOCK // (self._pieces + len(self._chain.channels)))
+        for begin, end in ((self._first, 0), (0, self._last + 1)):
+            for first in range(begin, end, size):
+                yield first, min(first + size, end)
+
+    def _start(self) -> _Seen:
+        """Go to where the blocks begin."""
+        driver, time = self._driver, self._edge(self._first)
+        volts = self._volts_at(np.zeros(1))
+        if self._exciter is not None and time > 0.0:
+            driver.hold(np.array([time]), volts, (), exciter=self._exciter, recording=True)
+        driver.advance(time)
+        driver.record(impacts=self._chain.needs_impacts, extrema=False, periods=False)
+        row = driver.values_of(self._variables)
+        now = np.array([time])
+        values = dict(zip(self._variables, row[:, np.newaxis], strict=True))
+        found = self._chain.begin(time, self._absolute(values, now))
+        if DRIVE in self._chain.channels:
+            found[DRIVE] = volts if self._exciter is not None else self._volts_at(now)
+        return _Seen(now, row[np.newaxis], found)
+
+    def _block(self, first: int, stop: int, before: _Seen) -> _Seen:
+        """Go through a block and take its samples."""
+        times = self._instants(first, stop)
+        ends, steps = times[1:], len(times) - 1
+        edges = self._edges(np.arange(first, stop))
+        if self._exciter is not None:
+            held = self._volts_at(edges)[np.searchsorted(edges, times[:-1], side="right") - 1]
+            renewed = np.isin(times[:-1], edges).astype(np.uint8)
+        else:
+            held = np.full(steps, self._parameters.get("force", 0.0))
+            renewed = np.zeros(steps, dtype=np.uint8)  # it is a parameter of the run
+        known = len(self._driver.rows.blocks)
+        limit = None
+        try:
+            rows = self._driver.hold(
+                ends, held, self._variables, renewed=renewed, exciter=self._exciter, recording=True
+            )
+        except ImpactLimitReached as reached:
+            rows, limit = reached.samples, reached
+        ends, held = ends[: len(rows)], held[: len(rows)]
+        impacts = in_time_order(Rows(self._driver.rows.blocks[known:]).of_kind(ROW_IMPACT))
+        seen = self._joined(before, ends, rows, held, impacts)
+        self._take_samples(first, stop, seen)
+        if limit is not None:
+            raise limit
+        return seen
+
+    def _joined(self, before: _Seen, ends: Floats, rows: Floats, held: Floats, impacts: Floats) -> _Seen:
+        values = {name: np.ascontiguousarray(rows[:, place]) for place, name in enumerate(self._variables)}
+        within = impacts[impacts[:, 0] <= ends[-1]] if len(ends) else impacts[:0]
+        found = self._chain.volts(ends, self._absolute(values, ends), within)
+        if DRIVE in self._chain.channels:
+            found[DRIVE] = held if self._exciter is not None else self._volts_at(ends)
+        volts = {name: np.append(before.volts[name], found[name]) for name in found}
+        return _Seen(np.append(before.times, ends), np.concatenate([before.rows, rows]), volts)
+
+    def _absolute(self, values: Mapping[str, Floats], times: Floats) -> dict[str, Floats]:
+        """Return values of variables with that of the base added to accelerations that are relative to it."""
+        found = dict(values)
+        if "acceleration" in found:
+            found["acceleration"] = found["acceleration"] + self._plan.base(
+                self._scene.forcing, self._parameters, times
+            )
+        return found
+
+    # ---- what is sampled ----
+
+    def _take_samples(self, first: int, stop: int, seen: _Seen) -> None:
+        if stop <= 0:
+            return
+        if not self._chain.channels:
+            times = self._own(first, stop)
+            times = times[times <= seen.times[-1]]
+            self._sampled.append(self._row_table(times, times, seen))
+            return
+        numbers = np.arange(first, min(stop, self._channel_samples()))
+        edges = self._edges(numbers)
+        last = edges + self._skew * (len(self._chain.channels) - 1)
+        numbers, edges = numbers[last <= seen.times[-1]], edges[last <= seen.times[-1]]
+        nominal = self._begin + numbers / self._scene.sampling_rate
+        self._sampled.append(self._row_table(nominal, edges, seen))
+
+    def _channel_samples(self) -> int:
+        """Return how many samples are taken of all channels before the recording ends."""
+        behind = self._skew * (len(self._chain.channels) - 1)
+        return max(0, self._whole(self._end - self._begin - behind) + 1)
+
+    def _row_table(self, nominal: Floats, edges: Floats, seen: _Seen) -> Floats:
+        """Return the samples that are taken at edges of the clock, each channel with its skew."""
+        at = np.searchsorted(seen.times, edges)
+        plain = self._plan.rows(seen.rows[at], self._variables, self._scene.forcing, self._parameters, edges)
+        columns, place = [nominal], 0
+        for name in self._plan.all_names:
+            if name in CHANNELS:
+                skewed = edges + self._skew * self._chain.channels.index(name)
+                columns.append(seen.volts[name][np.searchsorted(seen.times, skewed)])
+            else:
+                columns.append(plain[:, place])
+                place += 1
+        return np.column_stack(columns)

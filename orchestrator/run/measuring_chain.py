@@ -1,0 +1,149 @@
+"""What sensor and load cell make of a motion, going on from block to block, and what makes a force of a voltage."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.core.measuring import EXCITER_SIDES, LoadCell, sensor_reading
+from vibroimpact.fmus.core.stepping import Magnet
+from vibroimpact.orchestrator.run.fused import HeldExciter
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.measuring_models import LOAD_CELL, MEASURED_SENSOR, RING_INSTANTS
+from vibroimpact.orchestrator.scene.measuring_models import LoadCell as CellTable
+from vibroimpact.orchestrator.scene.models import RestitutionStop
+
+Floats = NDArray[np.float64]
+IMPACT_TIME, IMPACT_IMPULSE, IMPACT_CONTACT = 0, 3, 4
+"""Columns of impacts."""
+NO_IMPACTS: Floats = np.empty((0, 7))
+
+
+class MeasuringChain:
+    """What a scene's sensor and load cell make of the motion of its body.
+
+    Parameters
+    ----------
+    scene : Scene
+        At a point of its sweep.
+    channels : sequence of str
+        Of `CHANNELS`; `drive` is a voltage that the caller knows.
+
+    Attributes
+    ----------
+    variables : tuple of str
+        Variables of the body's FMU that it takes, each once.
+    needs_impacts : bool
+        Whether the load cell is behind a rigid stop, so that the body has to record its impacts.
+    """
+
+    def __init__(self, scene: Scene, channels: Sequence[str]) -> None:
+        self._scene, self.channels = scene, tuple(channels)
+        cell = scene.load_cell if LOAD_CELL in channels else None
+        self._readings = {name: MEASURED_SENSOR[name] for name in channels if name in MEASURED_SENSOR}
+        self._force = f"contact[{cell.stop}].force" if cell else ""
+        self.variables = tuple(dict.fromkeys((*self._readings.values(), *([self._force] if cell else []))))
+        self.needs_impacts = cell is not None and isinstance(scene.stops[cell.stop - 1], RestitutionStop)
+        self._cell = None if cell is None else _opened(cell)
+
+    def instants_in(self, interval: Floats) -> NDArray[np.int64]:
+        """Return into how many steps each sample interval (s) is cut, so that the ring of the load cell is followed."""
+        cell = self._scene.load_cell
+        ring = cell.natural_frequency if cell is not None and self._cell is not None else 0.0
+        return np.maximum(1, np.ceil(RING_INSTANTS * ring * interval * (1.0 - 1e-9))).astype(np.int64)
+
+    @property
+    def lead(self) -> float:
+        """Time after which the load cell has forgotten how it began, s; infinite where its ring does not decay."""
+        cell = self._scene.load_cell
+        if cell is None or self._cell is None:
+            return 0.0
+        after = cell.contact_duration or 0.0
+        if cell.natural_frequency == 0.0:
+            return after
+        ring, ratio = 2.0 * math.pi * cell.natural_frequency, cell.damping_ratio
+        # of an overdamped cell the slower of two rates
+        rate = ring * (ratio if ratio <= 1.0 else 1.0 / (ratio + math.sqrt(ratio * ratio - 1.0)))
+        return after + (_FORGOTTEN / rate if rate > 0.0 else math.inf)
+
+    def begin(self, time: float, values: Mapping[str, Floats]) -> dict[str, Floats]:
+        """Begin at a time (s), the load cell settled under the force then; values and volts have the shape (1,)."""
+        return self.volts(np.array([time]), values, NO_IMPACTS)
+
+    def volts(self, times: Floats, values: Mapping[str, Floats], impacts: Floats) -> dict[str, Floats]:
+        """Return what the chain gives at instants, going on from those before; `drive` is not among it.
+
+        Parameters
+        ----------
+        times : ndarray, shape (instant,)
+            s, ascending.
+        values : mapping of str to ndarray, shape (instant,)
+            Of each of the variables, SI; `acceleration` absolute.
+        impacts : ndarray, shape (impact, 7)
+            Those since the last of the instants before, columns `IMPACT_COLUMNS`.
+        """
+        sensor, found = self._scene.sensor, {}
+        for name, variable in self._readings.items():
+            assert sensor is not None  # the scene's rules see to it
+            found[name] = sensor_reading(values[variable], sensor.gain, sensor.offset, sensor.range or 0.0)
+        if self._cell is not None:
+            hits, impulses = self._hits(impacts)
+            found[LOAD_CELL] = self._cell.follow(times, values[self._force], hits, impulses)
+        return found
+
+    def _hits(self, impacts: Floats) -> tuple[Floats, Floats]:
+        """Return instants and impulses of what hits the load cell as half sines."""
+        cell = self._scene.load_cell
+        if cell is None or not self.needs_impacts:
+            return np.empty(0), np.empty(0)
+        own = impacts[impacts[:, IMPACT_CONTACT] == cell.stop]
+        return thinned(own[:, IMPACT_TIME], own[:, IMPACT_IMPULSE], cell.contact_duration or 0.0)
+
+
+def _opened(cell: CellTable) -> LoadCell:
+    numbers = (cell.sensitivity, cell.natural_frequency, cell.damping_ratio, cell.offset, cell.drift)
+    return LoadCell(*numbers, cell.contact_duration or 0.0)
+
+
+_FORGOTTEN = 37.0
+"""Time constants after which a ring is below the rounding of doubles: exp(-37) = 1e-16."""
+
+
+_OVERLAPPING = 1000
+"""Half sines that may be under way at once before neighbours are joined; the cell has room for twice as many."""
+
+
+def thinned(times: Floats, impulses: Floats, duration: float) -> tuple[Floats, Floats]:
+    """Return impacts of which no more than `_OVERLAPPING` are within a duration, as the end of a chatter has them.
+
+    Where there are more, those within a `_OVERLAPPING`th of the duration become one, with their impulse at their
+    centre.
+
+    Examples
+    --------
+    >>> times, impulses = thinned(np.linspace(0.0, 1.0, 5001), np.full(5001, 0.1), 1.0)
+    >>> len(times), round(float(impulses.sum()), 9)
+    (1001, 500.1)
+    """
+    if len(times) <= _OVERLAPPING or (times[_OVERLAPPING:] - times[:-_OVERLAPPING] >= duration).all():
+        return times, impulses
+    slot = np.floor((times - times[0]) * (_OVERLAPPING / duration))
+    first = np.flatnonzero(np.diff(slot, prepend=-1.0))
+    weights = impulses + np.finfo(np.float64).tiny
+    sums = np.add.reduceat(weights, first)
+    centres = np.add.reduceat((times - times[0]) * weights, first) / sums
+    return np.clip(times[0] + centres, times[first], times[np.append(first[1:], len(times)) - 1]), sums
+
+
+def held_exciter(scene: Scene) -> HeldExciter | None:
+    """Return what makes forces of voltages within the loop over samples; None without an exciter."""
+    exciter = scene.exciter
+    if exciter is None:
+        return None
+    magnet = Magnet(exciter.gain, exciter.offset, exciter.distance, EXCITER_SIDES[exciter.side])
+    # a beam has a sensor of its own where the force acts, see `parameters.beam_floats`
+    place = "sensor[1].displacement" if scene.body.kind == "beam" else "displacement"
+    return HeldExciter(magnet, place)
