@@ -9,7 +9,12 @@ from pathlib import Path
 
 import xarray as xr
 
-from vibroimpact.analysis.commands.estimate_scene import ImpactOptions, cut, forcing_and_known
+from vibroimpact.analysis.commands.estimate_scene import (
+    ImpactOptions,
+    cut,
+    force_amplitude,
+    forcing_and_known,
+)
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.dataset.reading import read_flat
 from vibroimpact.analysis.dataset.results import write_results
@@ -58,8 +63,9 @@ def impacts_of(asked: Estimation, options: ImpactOptions) -> None:
     """Estimate motion against a stop, with or without a force that oscillates."""
     with _estimating(asked) as console:
         recording = open_signals(asked.data, asked.run)
-        forcing, known = forcing_and_known(asked.data, asked.run, recording, options)
-        part = cut(_channel(recording, asked.channel), asked.start, asked.stop)
+        channel = _channel(recording, asked.channel)
+        forcing, known = forcing_and_known(asked.data, asked.run, recording, channel, options)
+        part = cut(channel, asked.start, asked.stop)
         found = (
             estimate_bounces(part, side=known.side)
             if forcing is None
@@ -123,10 +129,9 @@ def _estimating(asked: Estimation) -> Iterator[Terminal]:
 
 def _swept(console: Terminal, data: Path, band: tuple[float, float] | None) -> xr.Dataset:
     attrs = read_flat(data).attrs
-    forcing = scene_of(attrs).get("forcing", {})
-    amplitude = forcing.get("amplitude")
-    known = isinstance(amplitude, int | float) and amplitude > 0
-    curve, remarks = swept_response(data, float(amplitude) if known else 1.0, "N" if known else "1", band)
+    amplitude = force_amplitude(scene_of(attrs))
+    known = amplitude is not None and amplitude > 0.0
+    curve, remarks = swept_response(data, amplitude or 1.0 if known else 1.0, "N" if known else "1", band)
     remarks += (
         () if known else ("the amplitude of the drive is not one number: the modal constant contains it.",)
     )

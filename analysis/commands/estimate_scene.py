@@ -103,8 +103,55 @@ def _table_of(scene: dict[str, Any], owner: str) -> dict[str, Any] | None:
     return table if isinstance(table, dict) else None
 
 
+@dataclass(frozen=True, slots=True)
+class _Reading:
+    """What a channel reads of a displacement in m: gain * displacement + zero; a plain displacement reads itself."""
+
+    gain: float = 1.0
+    zero: float = 0.0
+
+    @property
+    def turn(self) -> float:
+        """Phase by which a channel that is inverted sees the force, rad."""
+        return math.pi if self.gain < 0.0 else 0.0
+
+    def side(self, side: str) -> str:
+        """Return the side of a stop as the channel sees it."""
+        return side if self.gain > 0.0 else {"upper": "lower", "lower": "upper"}[side]
+
+
+def _reading_of(channel: Channel, scene: Mapping[str, Any]) -> _Reading:
+    if channel.attrs.get("channel") != "sensor.displacement":
+        return _Reading()
+    sensor = scene.get("sensor", {})
+    return _Reading(float(sensor.get("gain", 1.0)), float(sensor.get("offset", 0.0)))
+
+
+def _falls(scene: Mapping[str, Any]) -> bool:
+    """Whether the force of an exciter depends on the displacement."""
+    return bool(scene.get("exciter", {}).get("distance", 0.0))
+
+
+def force_amplitude(scene: Mapping[str, Any]) -> float | None:
+    """Return the amplitude of the forcing of a scene, N; in another unit for other kinds; None where it is not one."""
+    amplitude = scene.get("forcing", {}).get("amplitude")
+    if _falls(scene) or not isinstance(amplitude, int | float):
+        return None
+    return float(amplitude * scene.get("exciter", {}).get("gain", 1.0))
+
+
+def _rest(scene: Mapping[str, Any], reading: _Reading) -> float | None:
+    """Return what a channel reads of a simulated body at rest; None where it is not known how far a force bends it."""
+    force, stiffness = scene.get("exciter", {}).get("offset", 0.0), scene.get("body", {}).get("stiffness")
+    if force == 0.0:
+        return reading.zero
+    if _falls(scene) or not isinstance(stiffness, int | float) or not stiffness > 0:
+        return None
+    return float(reading.gain * force / stiffness + reading.zero)
+
+
 def forcing_and_known(
-    data: Path, run: int | None, recording: Recording, options: ImpactOptions
+    data: Path, run: int | None, recording: Recording, channel: Channel, options: ImpactOptions
 ) -> tuple[Forcing | None, Known]:
     """Return the force, and what is known of oscillator and stop: from the options, else from the scene.
 
@@ -118,25 +165,28 @@ def forcing_and_known(
         The forcing frequency is not known, or options contradict each other.
     """
     scene = run_scene(data, run, recording)
+    reading = _reading_of(channel, scene)
     natural = None if options.natural_frequency is None else 2.0 * math.pi * options.natural_frequency
     frequency = _angular_frequency(scene, options)
     forcing = Forcing(
         frequency,
-        _static_deflection(scene, options, natural),
-        options.phase if options.phase is not None else _scene_phase(scene),
+        _static_deflection(scene, options, natural, reading),
+        options.phase if options.phase is not None else _scene_phase(scene, reading),
         options.clock_drifts,
     )
     stops = scene.get("stop", [])
     stop = stops[0] if isinstance(stops, list) and len(stops) == 1 else {}
-    position = options.stop if options.stop is not None else stop.get("position")
+    position = options.stop
+    if position is None and "position" in stop:
+        position = reading.gain * stop["position"] + reading.zero
     known = Known(
         damping_ratio=options.damping_ratio,
         natural_frequency=natural,
         stop_position=None if position is None else float(position),
-        # A simulated body rests at 0; an instrument may read anything there.
-        offset=0.0 if options.offset is None and scene else options.offset,
+        # A simulated body rests where its scene says; an instrument may read anything there.
+        offset=_rest(scene, reading) if options.offset is None and scene else options.offset,
         # An option about another stop leaves the side to the signal.
-        side=str(stop.get("side", "upper")) if stop and options.stop is None else None,
+        side=reading.side(str(stop.get("side", "upper"))) if stop and options.stop is None else None,
     )
     return forcing if frequency > 0.0 else None, known
 
@@ -164,16 +214,17 @@ def _angular_frequency(scene: Mapping[str, Any], options: ImpactOptions) -> floa
     )
 
 
-def _scene_phase(scene: Mapping[str, Any]) -> float | None:
+def _scene_phase(scene: Mapping[str, Any], reading: _Reading) -> float | None:
     if "forcing" not in scene:
         return None
     # relative to a base that accelerates forward, the body is pushed backward
     turned = math.pi if scene["forcing"].get("kind") == "base_acceleration" else 0.0
+    turned += reading.turn + (math.pi if scene.get("exciter", {}).get("gain", 1.0) < 0.0 else 0.0)
     return float(scene["forcing"].get("phase", 0.0)) + turned
 
 
 def _static_deflection(
-    scene: Mapping[str, Any], options: ImpactOptions, natural: float | None
+    scene: Mapping[str, Any], options: ImpactOptions, natural: float | None, reading: _Reading
 ) -> float | None:
     if options.static_deflection is not None:
         return options.static_deflection
@@ -184,12 +235,16 @@ def _static_deflection(
                 "Give them, or --static-deflection."
             )
         return options.amplitude / (options.mass * natural**2)
-    forcing, body = scene.get("forcing", {}), scene.get("body", {})
-    per_amplitude = {"force": 1.0, "base_acceleration": body.get("mass")}.get(forcing.get("kind", "force"))
-    numbers = (forcing.get("amplitude"), per_amplitude, body.get("stiffness"))
-    if not all(isinstance(number, int | float) for number in numbers) or not body["stiffness"] > 0:
+    amplitude, body = force_amplitude(scene), scene.get("body", {})
+    moves_base = scene.get("forcing", {}).get("kind", "force") == "base_acceleration"
+    numbers = [amplitude, body.get("stiffness"), *([body.get("mass")] if moves_base else [])]
+    known = [float(number) for number in numbers if isinstance(number, int | float)]
+    if len(known) < len(numbers) or not known[1] > 0.0:
         return None
-    return float(forcing["amplitude"] * per_amplitude / body["stiffness"])
+    force = known[0] * (known[2] if moves_base else 1.0)
+    # what turns with a gain below 0 is the phase
+    sign = -1.0 if scene.get("exciter", {}).get("gain", 1.0) < 0.0 else 1.0
+    return sign * force / known[1] * abs(reading.gain)
 
 
 def cut(channel: Channel, start: float | None, stop: float | None) -> Channel:

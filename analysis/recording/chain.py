@@ -29,7 +29,7 @@ class ChannelChain:
     low, high : float
         V; a sample that is not between them is at the end of a range.
     attrs : dict
-        What the dataset says, in numbers.
+        What the dataset says: `channel`, the name in the scene, and numbers.
     """
 
     skew: float = 0.0
@@ -74,4 +74,5 @@ def chain_of(attributes: Mapping[Any, Any], runs: Any, row: int) -> ChannelChain
         step = 0.5 * (2.0 * known["range"] / 2.0 ** known["bits"]) if "range" in known else 0.0
         low, high = max(low, step - most), min(high, most - step)
     seed = {"noise_seed": int(attributes["noise_seed"])} if "noise_seed" in attributes else {}
-    return ChannelChain(known.get("skew", 0.0), low, high, known | seed)
+    attrs = {"channel": str(attributes["channel"]), **known, **seed}
+    return ChannelChain(known.get("skew", 0.0), low, high, attrs)

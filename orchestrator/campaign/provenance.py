@@ -27,12 +27,19 @@ def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
         "versions": json.dumps(versions()),
         "fmu_hashes": json.dumps(dict(identity.fmu_hashes), sort_keys=True),
         "git_commit": git_commit(),
-        "seed": "none: nothing in the scene is random",
+        "seed": _seed(scene),
         "execution": identity.execution,
         "engine": in_one_line(scene),
         "instruction_set": identity.instruction_set,
         **scene.found,
     }
+
+
+def _seed(scene: Scene) -> str:
+    """Return what is random in a dataset: noise where channels are sampled that have some."""
+    if scene.noise is None or not scene.channels:
+        return "none: nothing in the scene is random"
+    return f"{scene.noise.seed}: noise of {', '.join(scene.channels)}"
 
 
 def versions() -> dict[str, str]:
