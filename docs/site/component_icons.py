@@ -5,6 +5,7 @@ A tool shows them on the blocks of a diagram: some thick lines on white, that ar
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import matplotlib
@@ -103,7 +104,57 @@ def gain(axes: Axes) -> None:
     )
 
 
-ICONS = (oscillator, chain, beam, impact_stop, replay, gain)
+def sensor(axes: Axes) -> None:
+    """A probe before a body that moves."""
+    axes.add_patch(Rectangle((0.9, 3.9), 4.0, 2.2, facecolor=GREY, edgecolor=DARK, lw=LINE * 0.75))
+    axes.add_patch(Rectangle((7.6, 2.0), 1.4, 6.0, facecolor=BLUE, edgecolor=DARK, lw=LINE * 0.75))
+    arrow = {"arrowstyle": "<|-|>", "color": DARK, "lw": LINE / 2.0, "mutation_scale": 10}
+    axes.annotate("", (7.7, 5.0), (4.8, 5.0), arrowprops=arrow)
+
+
+def load_cell(axes: Axes) -> None:
+    """The pulse of an impact, and the ring after it."""
+    axes.plot([1.0, 1.0, 9.2], [8.8, 3.6, 3.6], color=DARK, lw=LINE * 0.75)
+    x = np.linspace(0.0, 1.0, 40)
+    axes.plot(1.6 + 2.2 * x, 3.6 + 4.6 * np.sin(np.pi * x), color=RED, lw=LINE)
+    axes.plot(
+        3.8 + 5.2 * x, 3.6 - 1.8 * np.sin(6.0 * np.pi * x) * np.exp(-2.2 * x), color=BLUE, lw=LINE * 0.75
+    )
+
+
+def exciter(axes: Axes) -> None:
+    """A coil on a core that pulls at a body."""
+    axes.add_patch(Rectangle((1.6, 1.0), 6.8, 1.4, facecolor=GREY, edgecolor=DARK, lw=LINE * 0.75))
+    axes.add_patch(Rectangle((4.2, 2.4), 1.6, 3.0, facecolor=GREY, edgecolor=DARK, lw=LINE * 0.75))
+    for y in np.linspace(2.9, 4.9, 4):
+        axes.plot([3.4, 6.6], [y - 0.2, y + 0.2], color=RED, lw=LINE, solid_capstyle="round")
+    axes.add_patch(Rectangle((1.2, 7.4), 7.6, 1.3, facecolor=BLUE, edgecolor=DARK, lw=LINE * 0.75))
+    arrow = {"arrowstyle": "-|>", "color": DARK, "lw": LINE * 0.75, "mutation_scale": 12}
+    axes.annotate("", (5.0, 5.6), (5.0, 7.5), arrowprops=arrow)
+
+
+def noise(axes: Axes) -> None:
+    """A line, and what is left of it."""
+    x = np.linspace(0.8, 9.2, 40)
+    rough = np.array([math.fmod(7919.0 * (k + 1) ** 2, 104729.0) / 104729.0 - 0.5 for k in range(40)])
+    axes.plot(x, 5.0 + 4.5 * rough, color=BLUE, lw=LINE / 2.0, solid_joinstyle="round")
+    axes.plot([0.8, 9.2], [5.0, 5.0], color=DARK, lw=LINE * 0.75)
+
+
+def analog_input(axes: Axes) -> None:
+    """A curve and its steps."""
+    x = np.linspace(0.0, 1.0, 60)
+    axes.plot([1.0, 1.0, 9.2], [8.6, 1.4, 1.4], color=DARK, lw=LINE * 0.75)
+    axes.plot(1.2 + 7.6 * x, 5.0 - 2.6 * np.cos(1.5 * np.pi * x), color=GREY, lw=LINE * 0.75)
+    places = np.linspace(0.0, 1.0, 9)
+    levels = 5.0 - np.round(2.6 * np.cos(1.5 * np.pi * places) / 0.9) * 0.9
+    axes.step(1.2 + 7.6 * places, levels, where="post", color=BLUE, lw=LINE)
+
+
+ICONS = (
+    *(oscillator, chain, beam, impact_stop, replay, gain),
+    *(sensor, load_cell, exciter, noise, analog_input),
+)
 
 
 def main() -> None:

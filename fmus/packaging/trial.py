@@ -95,7 +95,8 @@ def tried(
             "library": str(path),
             "token": component.token,
             "resources": str(folder / "resources"),
-            "event_mode": component.event_mode,
+            # only a contact law of another FMU needs it, which nobody answers here
+            "event_mode": component.event_mode and "contact" in component.repeats,
             "start": experiment.start_time,
             "stop": experiment.stop_time,
             "intervals": min(MOST_INTERVALS, max(LEAST_INTERVALS, MOST_NUMBERS // (len(chosen) or 1))),

@@ -2,20 +2,13 @@
 
 #include <math.h>
 #include <stdbool.h>
-#include <stdio.h>
 
-#include "component.h"
+#include "plain.h"
 #include "gain_variables.h"
 
 static void defaults(void *self)
 {
     ((gain *)self)->factor = 1.0;
-}
-
-static void was_set(void *self, uint32_t value_reference)
-{
-    (void)self;
-    (void)value_reference;
 }
 
 static void update_outputs(void *self)
@@ -41,27 +34,12 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
     gain *known = self;
-    if (!(request->size > 0.0) || !isfinite(request->time + request->size)) {
-        (void)snprintf(message, VI_MESSAGE_LENGTH, "communicationStepSize: expected a finite number > 0, got %.17g",
-                       request->size);
+    if (!vi_plain_step_is_good(request, message)) {
         return VI_STEP_ERROR;
     }
     known->time = request->time + request->size;
     update_outputs(known);
     return VI_STEP_DONE;
-}
-
-static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
-{
-    (void)self;
-    message[0] = '\0';
-    return true;
-}
-
-static bool never(const void *self)
-{
-    (void)self;
-    return false;
 }
 
 static double present_time(const void *self)
@@ -83,12 +61,12 @@ const vi_component vi_this_component = {
     .struct_size = sizeof(gain),
     .defaults = defaults,
     .initialize = initialize,
-    .was_set = was_set,
+    .was_set = vi_plain_was_set,
     .update_outputs = update_outputs,
     .step = step,
-    .resolve = resolve,
-    .event_pending = never,
-    .needs_events = never,
+    .resolve = vi_plain_resolve,
+    .event_pending = vi_plain_never,
+    .needs_events = vi_plain_never,
     .time = present_time,
     .used_size = used_size,
 };

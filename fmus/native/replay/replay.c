@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "component.h"
+#include "plain.h"
 #include "player.h"
 #include "replay_variables.h"
 
@@ -38,12 +38,6 @@ static void sized(void *self, const char *block, int count)
     if (strcmp(block, "channels") == 0) {
         ((replay *)self)->described = count;
     }
-}
-
-static void was_set(void *self, uint32_t value_reference)
-{
-    (void)self;
-    (void)value_reference;
 }
 
 static int channel_count(const replay *it)
@@ -113,27 +107,12 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
     replay *it = self;
-    if (!(request->size > 0.0) || !isfinite(request->time + request->size)) {
-        (void)snprintf(message, VI_MESSAGE_LENGTH, "communicationStepSize: expected a finite number > 0, got %.17g",
-                       request->size);
+    if (!vi_plain_step_is_good(request, message)) {
         return VI_STEP_ERROR;
     }
     it->time = request->time + request->size;
     update_outputs(it);
     return VI_STEP_DONE;
-}
-
-static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
-{
-    (void)self;
-    message[0] = '\0';
-    return true;
-}
-
-static bool never(const void *self)
-{
-    (void)self;
-    return false;
 }
 
 static double present_time(const void *self)
@@ -155,12 +134,12 @@ const vi_component vi_this_component = {
     .struct_size = sizeof(replay),
     .defaults = defaults,
     .initialize = initialize,
-    .was_set = was_set,
+    .was_set = vi_plain_was_set,
     .update_outputs = update_outputs,
     .step = step,
-    .resolve = resolve,
-    .event_pending = never,
-    .needs_events = never,
+    .resolve = vi_plain_resolve,
+    .event_pending = vi_plain_never,
+    .needs_events = vi_plain_never,
     .time = present_time,
     .used_size = used_size,
     .sized = sized,

@@ -36,7 +36,8 @@ class ComponentTable(SceneTable):
             "a path of an FMU file, or the name of a shipped component",
             hint='For example "ball.fmu".',
             doc="a file name that ends in `.fmu`, from the folder of the scene file; or a shipped component: "
-            '`"Oscillator"`, `"Chain"`, `"Beam"`, `"ImpactStop"`, `"Gain"`',
+            '`"Oscillator"`, `"Chain"`, `"Beam"`, `"ImpactStop"`, `"Gain"`, `"Sensor"`, `"LoadCell"`, `"Exciter"`, '
+            '`"Noise"`, `"AnalogInput"`',
         ),
     ]
     fmi: Annotated[

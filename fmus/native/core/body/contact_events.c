@@ -10,6 +10,7 @@ void vi_contact_hit(vi_contact *contact, vi_record *record, const vi_clock *cloc
     contact->last_phase = vi_clock_phase(clock, now);
     contact->last_velocity = approach;
     contact->impulse = impulse;
+    contact->total_impulse += impulse;
     vi_record_impact(record, contact->last_time, contact->last_phase, approach, impulse, number, restitution);
 }
 

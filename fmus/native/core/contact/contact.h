@@ -21,6 +21,7 @@ typedef struct {
     /* outputs */
     int32_t stuck;
     double displacement, velocity, mass, force, impulse;
+    double total_impulse; /* of impacts and summed chatter since the start, N s; forces are no part of it */
     double indicator; /* of model exchange; 0 in co-simulation */
     int64_t count, graze_count;
     double last_time, last_phase, last_velocity, stick_start, stick_end, event_time;
@@ -32,6 +33,7 @@ static inline void vi_contact_struck(vi_contact *contact, double time)
     contact->count += 1;
     contact->last_time = time;
     contact->impulse = fabs(contact->applied_impulse);
+    contact->total_impulse += contact->impulse;
     contact->applied_impulse = 0.0;
 }
 
@@ -40,7 +42,7 @@ static inline void vi_contact_clear(vi_contact *contact)
 {
     contact->stuck = contact->answered = 0;
     contact->count = contact->graze_count = 0;
-    contact->force = contact->impulse = contact->last_velocity = 0.0;
+    contact->force = contact->impulse = contact->total_impulse = contact->last_velocity = 0.0;
     contact->last_time = contact->last_phase = contact->stick_start = contact->stick_end = NAN;
     contact->event_time = NAN;
 }

@@ -31,6 +31,12 @@ from vibroimpact.fmus.packaging.fmu_zip import write_fmu
 BODIES = ("Oscillator", "Chain", "Beam")
 SIGNALS = ("Replay", "Gain")
 """Components without a mass, a stop or a bound."""
+POINTS = {
+    **dict.fromkeys(("Gain", "Sensor", "Noise", "AnalogInput"), ("input", "output")),
+    "LoadCell": ("force", "impulse", "impact_time", "load", "output"),
+    "Exciter": ("input", "displacement", "force"),
+}
+"""Components of one plug, and what is in it."""
 
 
 def description(path: Path) -> ElementTree.Element:
@@ -211,8 +217,8 @@ def test_terminals_obey_the_schema_and_have_the_variables_that_are_described(
     if name == "Replay":
         assert plugs["base"] == {"value": "base", "rate": "base_rate"}
         return
-    if name == "Gain":
-        assert plugs["point"] == {"input": "input", "output": "output"}
+    if name in POINTS:
+        assert plugs == {"point": {member: member for member in POINTS[name]}}
         return
     assert "displacement" in plugs["point"]
     if name != "ImpactStop":

@@ -24,6 +24,7 @@ void vi_structure_rest(const vi_structure *s, int k, double delay, double tail_i
     state->series = 0;
     state->leaving[k] = 0;
     state->tail_impulse[k] = tail_impulse;
+    s->contacts[k].total_impulse += tail_impulse;
     state->fastest_impact[k] = 0.0;
     state->low_impacts[k] = 0;
     vi_contact_stick(&s->contacts[k], &s->model->clock, state->now, delay);

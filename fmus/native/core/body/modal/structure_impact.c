@@ -226,6 +226,7 @@ static void collide_once(const vi_structure *s, const int hit[VI_PORTS])
     give_impulses(s, impulse, impulse_low);
     state->energies.contact_loss += state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
     for (int k = 0; k < n; ++k) {
+        s->contacts[k].total_impulse += in_play[k] && !hit[k] ? impulse[k] : 0.0;
         if (in_play[k] && !hit[k] && state->leaving[k] > 1) {
             state->leaving[k] = 1; /* its acceleration may be another now */
         }
@@ -259,6 +260,7 @@ static void wedge(const vi_structure *s)
     vi_solve_active(s->model->contacts, g, approach, touches, impulse);
     for (int k = 0; k < s->model->contacts; ++k) {
         vi_structure_push(s, k, impulse[k], s->state->p);
+        s->contacts[k].total_impulse += impulse[k];
     }
     s->state->energies.contact_loss += s->state->follow_energies ? before - vi_structure_kinetic(s) : 0.0;
 }

@@ -38,6 +38,7 @@ void vi_body_stick(vi_body *body, int k, double delay, double tail_impulse)
     body->stuck = k + 1;
     body->velocity = 0.0;
     body->tail_impulse = tail_impulse;
+    body->contacts[k].total_impulse += tail_impulse;
     body->fastest_impact = 0.0;
     body->low_impacts = 0;
     vi_contact_stick(&body->contacts[k], &body->clock, body->now, delay);

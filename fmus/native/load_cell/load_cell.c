@@ -1,0 +1,124 @@
+#include "load_cell.h"
+
+#include <math.h>
+#include <stdio.h>
+
+#include "load_cell_variables.h"
+#include "plain.h"
+
+static void defaults(void *self)
+{
+    ((load_cell *)self)->cell.settings.sensitivity = 1.0;
+}
+
+/* A new force is on the cell at once; what rings needs time. */
+static void update_outputs(void *self)
+{
+    load_cell *it = self;
+    const double before = it->cell.force;
+    it->cell.force = it->force;
+    it->load = vi_cell_load(&it->cell);
+    it->output = vi_cell_volts(&it->cell);
+    it->cell.force = before;
+}
+
+static void check_parameters(const vi_cell_settings *given, char *message)
+{
+    vi_check_finite(message, "sensitivity", given->sensitivity);
+    vi_check_not_negative(message, "natural_frequency", given->natural_frequency);
+    vi_check_not_negative(message, "damping_ratio", given->damping_ratio);
+    vi_check_finite(message, "offset", given->offset);
+    vi_check_finite(message, "drift", given->drift);
+    vi_check_not_negative(message, "contact_duration", given->contact_duration);
+}
+
+static void check_inputs(const load_cell *it, char *message)
+{
+    vi_check_finite(message, "force", it->force);
+    vi_check_finite(message, "impulse", it->impulse);
+    if (it->impulse - it->counted != 0.0 && !(it->cell.settings.contact_duration > 0.0)) {
+        vi_complain(message, "contact_duration: expected a number > 0 where impacts come, got 0. A compliant stop gives a "
+                             "force and needs none");
+    }
+}
+
+static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LENGTH])
+{
+    load_cell *it = self;
+    message[0] = '\0';
+    it->counted = it->impulse; /* before the start */
+    check_parameters(&it->cell.settings, message);
+    check_inputs(it, message);
+    vi_check_finite(message, "start time", start_time);
+    if (message[0] != '\0') {
+        return false;
+    }
+    vi_cell_start(&it->cell, start_time, it->force);
+    update_outputs(it);
+    return true;
+}
+
+/* Impacts of a step are one half sine, begun with the last of them. */
+static bool take_impacts(load_cell *it, double end, double slope)
+{
+    const double impulse = it->impulse - it->counted;
+    it->counted = it->impulse;
+    if (!(impulse > 0.0 || impulse < 0.0)) {
+        return true;
+    }
+    vi_cell_advance(&it->cell, fmin(fmax(it->impact_time, it->cell.time), end), slope);
+    return vi_cell_hit(&it->cell, impulse);
+}
+
+static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
+{
+    load_cell *it = self;
+    message[0] = '\0';
+    if (!vi_plain_step_is_good(request, message)) {
+        return VI_STEP_ERROR;
+    }
+    check_inputs(it, message);
+    if (message[0] != '\0') {
+        return VI_STEP_ERROR;
+    }
+    const double end = request->time + request->size;
+    const double slope = (it->force - it->cell.force) / request->size;
+    it->cell.time = request->time;
+    if (!take_impacts(it, end, slope)) {
+        (void)snprintf(message, VI_MESSAGE_LENGTH, "impulse: expected at most %d impacts within one contact_duration (%.17g s),"
+                       " got more. Take a shorter contact_duration", VI_CELL_PULSES, it->cell.settings.contact_duration);
+        return VI_STEP_ERROR;
+    }
+    vi_cell_advance(&it->cell, end, slope);
+    it->cell.force = it->force;
+    update_outputs(it);
+    return VI_STEP_DONE;
+}
+
+static double present_time(const void *self)
+{
+    return ((const load_cell *)self)->cell.time;
+}
+
+static size_t used_size(const void *self)
+{
+    return sizeof(load_cell) - vi_cell_unused(&((const load_cell *)self)->cell);
+}
+
+const vi_component vi_this_component = {
+    .name = LOAD_CELL_NAME,
+    .token = LOAD_CELL_TOKEN,
+    .variables = load_cell_variables,
+    .variable_count = LOAD_CELL_VARIABLE_COUNT,
+    .struct_size = sizeof(load_cell),
+    .defaults = defaults,
+    .initialize = initialize,
+    .was_set = vi_plain_was_set,
+    .update_outputs = update_outputs,
+    .step = step,
+    .resolve = vi_plain_resolve,
+    .event_pending = vi_plain_never,
+    .needs_events = vi_plain_never,
+    .time = present_time,
+    .used_size = used_size,
+};

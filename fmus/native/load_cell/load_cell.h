@@ -1,0 +1,15 @@
+/* The LoadCell component: the voltage of the force on it. */
+#ifndef VIBROIMPACT_LOAD_CELL_H
+#define VIBROIMPACT_LOAD_CELL_H
+
+#include "measuring/cell.h"
+
+/* All of a LoadCell's variables (variables.toml says what each is). */
+typedef struct {
+    double force, impulse, impact_time; /* inputs */
+    double load, output;
+    double counted; /* impulse up to the start of the step, N s */
+    vi_cell cell;   /* last: only the used part is saved with a state */
+} load_cell;
+
+#endif

@@ -1,0 +1,16 @@
+/* The Noise component: a signal with Gaussian noise. */
+#ifndef VIBROIMPACT_NOISE_H
+#define VIBROIMPACT_NOISE_H
+
+#include <stdint.h>
+
+/* All of a Noise's variables (variables.toml says what each is). */
+typedef struct {
+    double time;
+    double rms, rate;
+    int64_t seed, channel;
+    double input;
+    double output;
+} noise;
+
+#endif
