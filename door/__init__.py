@@ -50,6 +50,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.analysis.spikes import SpikeSettings as SpikeSettings
     from vibroimpact.analysis.spikes import spike_report as spike_report
     from vibroimpact.fmus.errors import VibroimpactError as VibroimpactError
+    from vibroimpact.hardware.programs.sweep import measure_sweep as measure_sweep
     from vibroimpact.hardware.recordings import ImportSettings as ImportSettings
     from vibroimpact.hardware.recordings import import_recording as import_recording
     from vibroimpact.orchestrator.scene import Scene as Scene
@@ -86,6 +87,7 @@ _NAMES = {
     ),
     "analysis.spikes": ("Mechanics", "SpikeSettings", "spike_report"),
     "fmus.errors": ("VibroimpactError",),
+    "hardware.programs.sweep": ("measure_sweep",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
     "orchestrator.scene": ("Scene",),
     "service.client": ("Service",),

@@ -75,6 +75,8 @@ def _notes(attrs: Mapping[str, Any]) -> Iterator[str]:
     source = attrs.get("source", attrs.get("source_file", "data without a name"))
     if kind == "estimates":
         yield f"made by: vibroimpact estimate {attrs.get('estimates', '')} of {source}"
+    elif "rig" in attrs and "sweep" in attrs:
+        yield f"made by: vibroimpact rig sweep of {source}, on {attrs['rig']} ({attrs.get('device', '')})"
     elif "rig" in attrs:
         yield f"made by: vibroimpact rig record of {source}"
     elif kind == "spikes" or "recording_schema" in attrs:

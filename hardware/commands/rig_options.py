@@ -20,6 +20,7 @@ def register(app: typer.Typer) -> None:
     group.command("serve")(serve)
     group.command("devices")(devices)
     group.command("record")(record)
+    group.command("sweep")(sweep)
     app.add_typer(group, name="rig")
 
 
@@ -73,3 +74,22 @@ def record(
     from vibroimpact.hardware.programs.record import record_channels
 
     record_channels(rig, channel, rate, duration, output, force)
+
+
+def sweep(
+    file: Annotated[Path, typer.Argument(help="File of a sweep (TOML).", metavar="SWEEP.toml")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of its dataset.", metavar="FOLDER")],
+    rig: RigChoice = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Draw the planned output, say how long it takes, drive nothing.")
+    ] = False,
+) -> None:
+    """Measure a frequency sweep, up and down, as a dataset like that of a campaign; the same command goes on with it.
+
+    Ctrl-C brings the output to rest; what is measured is kept.
+
+    Example: vibroimpact rig sweep examples/rig/sweep.toml -o sweep
+    """
+    from vibroimpact.hardware.programs.sweep.command import sweep_rig
+
+    sweep_rig(file, output, rig, dry_run)

@@ -181,12 +181,12 @@ def analysed(
     if wrong := _wrong_drive(drive, settings):
         flags |= MeasurementFlag.starved
         said.append(wrong)
-    lag = drive.lag if np.isfinite(drive.lag) else 0.0
+    late = drive.late((0.5 * (edges[0] + edges[-1]) - 0.5 * segment.count) / rate)
     return MeasuredStep(
         segment.place,
         highest,
         lowest,
-        _strobe(displacement, segment, settings, lag * rate),
+        _strobe(displacement, segment, settings, late * rate),
         _impacts(step, settings, edges),
         flags,
         "; ".join(said),

@@ -25,7 +25,8 @@ from vibroimpact.analysis.files.opening import file_attributes
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.fmus.wording import typed_or_called
 from vibroimpact.hardware.programs.sweep.analysis import MeasuredStep
-from vibroimpact.hardware.programs.sweep.drive import Drive
+from vibroimpact.hardware.programs.sweep.drive import Drive, SeenLags, clock_error_of
+from vibroimpact.hardware.programs.sweep.plan import planned
 from vibroimpact.hardware.programs.sweep.settings import SweepSettings
 
 Floats = NDArray[np.float64]
@@ -49,12 +50,15 @@ class SweepRows:
         The first ones of the path, in its order.
     made_by : dict
         `rig`, `device` and `measured_at`, a line for each time that it was begun or went on.
+    begun_with : list of int
+        Steps that were there then.
     """
 
     settings: SweepSettings
     calibration: str
     steps: list[MeasuredStep] = field(default_factory=list)
     made_by: dict[str, str] = field(default_factory=dict)
+    begun_with: list[int] = field(default_factory=list)
 
     @property
     def complete(self) -> bool:
@@ -81,7 +85,7 @@ def dataset_of(rows: SweepRows) -> xr.Dataset:
         unit_of={"frequency": "Hz"},
         omit=omitted,
         measured={name: np.asarray(values) for name, values in measured.items()},
-        attrs=_attributes(rows, measured),
+        attrs=_attributes(rows),
     )
 
 
@@ -109,23 +113,41 @@ def _record(step: MeasuredStep, settings: SweepSettings) -> RunRecord:
     )
 
 
-def _attributes(rows: SweepRows, measured: Mapping[str, Any]) -> dict[str, Any]:
+def _attributes(rows: SweepRows) -> dict[str, Any]:
     settings = rows.settings
     attributes = {
         "history": _MADE_BY,
         "title": Path(settings.source).stem,
+        "source": Path(settings.source).name,
         "sweep": settings.text,
         "sweep_content": json.dumps(settings.content),
         "calibration": rows.calibration,
         "steps_planned": len(settings.steps),
+        "begun_with_steps": json.dumps(rows.begun_with),
         **rows.made_by,
     }
-    errors = np.asarray(measured.get("drive_clock_error", ()), dtype=np.float64)
-    errors = errors[np.isfinite(errors)]
-    if errors.size > 1:
-        attributes["clock_error_ppm"] = float(errors.mean())
-        attributes["clock_error_standard_error_ppm"] = float(errors.std(ddof=1) / np.sqrt(errors.size))
+    error, doubt = clock_error_of(_seen_lags(rows))
+    if np.isfinite(error):
+        attributes |= {"clock_error_ppm": error, "clock_error_standard_error_ppm": doubt}
     return attributes
+
+
+def _seen_lags(rows: SweepRows) -> list[SeenLags]:
+    """Return the lags that each acquisition has seen; its plan says when."""
+    found = []
+    ends = [*rows.begun_with[1:], len(rows.steps)]
+    for begin, end in zip(rows.begun_with, ends, strict=True):
+        plan = planned(rows.settings, begin)
+        middles = {s.place: (s.first + 0.5 * s.count) / plan.rate for s in plan.segments if s.kind == "step"}
+        some = rows.steps[begin:end]
+        columns = (
+            [middles[step.place] for step in some],
+            [step.drive.lag for step in some],
+            [step.drive.clock_error for step in some],
+            [1.0 / rows.settings.steps[step.place][1] for step in some],
+        )
+        found.append(SeenLags(*(np.array(column, dtype=np.float64) for column in columns)))
+    return found
 
 
 def store(rows: SweepRows, folder: Path) -> None:
@@ -166,6 +188,7 @@ def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows
         ) from error
     rows.steps = _steps_of(flat)
     rows.made_by = {name: str(flat.attrs[name]) for name in ("rig", "device", "measured_at")}
+    rows.begun_with = [int(steps) for steps in json.loads(str(flat.attrs["begun_with_steps"]))]
     return rows
 
 

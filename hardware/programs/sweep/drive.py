@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -25,9 +26,9 @@ class Drive(NamedTuple):
     amplitude : float
         V.
     lag : float
-        Seen less planned, s, within half a period.
+        Seen less planned in the middle of the step, s, within half a period.
     clock_error : float
-        Of the inputs' clock, 1e-6: it is fast where this is positive.
+        Of the inputs' clock, 1e-6, from this step alone: it is fast where this is positive.
     residual : float
         RMS of what is no sine of the planned frequency, over the amplitude.
     """
@@ -36,6 +37,11 @@ class Drive(NamedTuple):
     lag: float = np.nan
     clock_error: float = np.nan
     residual: float = np.nan
+
+    def late(self, after: float) -> float:
+        """Return the lag (s) at a time (s) after the middle of the step; 0 where nobody has seen it."""
+        lag = self.lag + 1e-6 * self.clock_error * after
+        return lag if np.isfinite(lag) else 0.0
 
 
 def seen_drive(volts: Floats, segment: Segment, rate: float) -> Drive:
@@ -66,9 +72,10 @@ def seen_drive(volts: Floats, segment: Segment, rate: float) -> Drive:
     angular = 2.0 * np.pi * rate * segment.increment / CYCLE
     phases = np.unwrap(np.angle(waves))
     amplitude = float(np.abs(waves).mean())
-    slope = np.polyfit(middles, phases, 1)[0] if len(good) > 1 else np.nan
+    centre = 0.5 * segment.count / rate
+    slope, phase = np.polyfit(middles - centre, phases, 1) if len(good) > 1 else (np.nan, phases[0])
     residual = float(np.sqrt(np.mean([fit[1] for _, fit in good])))
-    lag = -float(np.angle(waves[-1])) / angular
+    lag = -float((phase + np.pi) % (2.0 * np.pi) - np.pi) / angular
     return Drive(
         amplitude, lag, float(-1e6 * slope / angular), residual / amplitude if amplitude > 0.0 else np.inf
     )
@@ -83,3 +90,61 @@ def _fitted(volts: Floats, angle: Floats) -> tuple[complex, float] | None:
     (sine, cosine, offset), *_ = np.linalg.lstsq(basis, volts[there], rcond=None)
     left = volts[there] - basis @ np.array([sine, cosine, offset])
     return complex(sine, cosine), float(np.mean(left**2))
+
+
+class SeenLags(NamedTuple):
+    """The lags of the steps that one acquisition has seen, in their order.
+
+    Attributes
+    ----------
+    time : ndarray of float, shape (step,)
+        Middle of each step, s.
+    lag, clock_error : ndarray of float, shape (step,)
+        Of `Drive`.
+    period : ndarray of float, shape (step,)
+        Forcing period, s.
+    """
+
+    time: Floats
+    lag: Floats
+    clock_error: Floats
+    period: Floats
+
+
+def clock_error_of(seen: Sequence[SeenLags]) -> tuple[float, float]:
+    """Return the error of the inputs' clock and its standard error, 1e-6: the slope of the lag over all steps.
+
+    An input sees the steps of a converter, so that the lag grows by whole samples: what one step shows of its slope is
+    coarse, and serves to tell how many periods the lag has grown by from step to step.
+
+    Parameters
+    ----------
+    seen : sequence of SeenLags
+        Of each acquisition, whose clocks have begun anew.
+    """
+    time, lag = [], []
+    for each in seen:
+        good = np.isfinite(each.lag) & np.isfinite(each.clock_error)
+        if good.sum() > 1:
+            one = SeenLags(*(column[good] for column in each))
+            time.append(one.time - one.time.mean())
+            unwrapped = _unwrapped(one)
+            lag.append(unwrapped - unwrapped.mean())
+    free = sum(map(len, time)) - len(time) - 1
+    if free < 1:
+        return np.nan, np.nan
+    t, y = np.concatenate(time), np.concatenate(lag)
+    slope = float(t @ y / (t @ t))
+    left = y - slope * t
+    return 1e6 * slope, 1e6 * float(np.sqrt(left @ left / free / (t @ t)))
+
+
+def _unwrapped(seen: SeenLags) -> Floats:
+    """Return the lags with the whole periods that they have grown by."""
+    found = [float(seen.lag[0])]
+    usual = 1e-6 * float(np.median(seen.clock_error))
+    for k in range(1, len(seen.lag)):
+        expected = found[-1] + usual * float(seen.time[k] - seen.time[k - 1])
+        turns = np.rint((expected - seen.lag[k]) / seen.period[k])
+        found.append(float(seen.lag[k] + turns * seen.period[k]))
+    return np.array(found)

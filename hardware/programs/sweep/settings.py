@@ -33,6 +33,8 @@ _STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
 MOST_STEPS = 10_000
 LONGEST = 7 * 86_400.0
 """Of a sweep, s."""
+MOST_VALUES = 5 * 10**7
+"""Samples of a step, of all inputs, which are kept until it is over; and recorded values of a sweep."""
 FEWEST_SAMPLES = 20
 """Of a forcing period: with fewer its extrema lie between samples."""
 
@@ -275,6 +277,17 @@ def _misfits(settings: SweepSettings) -> Sequence[Problem]:
                 f"{FEWEST_SAMPLES} samples of a period at least, {FEWEST_SAMPLES * fastest:g} Hz",
                 f"{output.rate:g}",
             )
+        )
+    samples = settings.step_periods / slowest * output.rate * len(settings.inputs)
+    if samples > MOST_VALUES:
+        problems.append(
+            Problem("sweep", f"at most {MOST_VALUES:g} samples of a step, of all inputs", f"{samples:.3g}")
+        )
+    values = len(settings.steps) * settings.sweep.recorded_periods
+    if values > MOST_VALUES:
+        hint = "average_periods makes one value of several periods."
+        problems.append(
+            Problem("sweep.recorded_periods", f"at most {MOST_VALUES:g} values", f"{values:g}", hint)
         )
     duration = len(settings.steps) * settings.step_periods / slowest
     if duration > LONGEST:

@@ -20,7 +20,7 @@ from vibroimpact.hardware.programs.sweep.analysis import (
     StepSamples,
     analysed,
 )
-from vibroimpact.hardware.programs.sweep.drive import seen_drive
+from vibroimpact.hardware.programs.sweep.drive import SeenLags, clock_error_of, seen_drive
 from vibroimpact.hardware.programs.sweep.extrema import extrema_of
 from vibroimpact.hardware.programs.sweep.plan import CYCLE, Plan, planned, recorded_periods
 from vibroimpact.hardware.programs.sweep.settings import SweepSettings
@@ -219,3 +219,20 @@ def test_a_lost_part_of_the_drive_does_not_spoil_the_rest() -> None:
 def test_a_load_cell_that_clips_is_said_by_its_name() -> None:
     step = step_of(sine, cell=np.full(planned(SETTINGS).segments[1].count, 5.0))
     assert shown(replace(step)).message.startswith("cell at the end of the range")
+
+
+@given(st.floats(-300.0, 300.0), st.integers(3, 40), st.booleans())
+def test_the_slope_of_lags_that_have_gone_round_is_the_clock_error(
+    error: float, steps: int, anew: bool
+) -> None:
+    time = 5.0 + 6.0 * np.arange(steps)
+    period = 1.0 / np.linspace(18.0, 27.0, steps)
+    # the lag grows by whole samples, and each step has a coarse slope of its own
+    true = np.rint(5000.0 * 1e-6 * error * time) / 5000.0
+    seen = (true + period / 2.0) % period - period / 2.0
+    coarse = np.full(steps, error + 4.0) + np.where(np.arange(steps) % 2, 3.0, -3.0)
+    lags = [SeenLags(time, seen, coarse, period)]
+    found, doubt = clock_error_of(lags * 2 if anew else lags)
+    assert found == pytest.approx(error, abs=1e6 / 5000.0 / (6.0 * (steps - 1)))
+    assert doubt < 1e6 / 5000.0 / 6.0
+    assert np.isnan(clock_error_of([])[0])

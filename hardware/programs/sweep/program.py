@@ -1,0 +1,209 @@
+"""Measure a sweep: one output drives, inputs follow it sample by sample, each step is kept when it is sure.
+
+A step is sure once the output has gone on well past its end: an output that ran empty, or that was stopped, never
+leaves a step that was driven otherwise than planned.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+
+from vibroimpact.analysis import figures
+from vibroimpact.analysis.dataset import open_dataset
+from vibroimpact.analysis.dataset.outputs import writing
+from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.hardware.programs.sweep.analysis import (
+    Converter,
+    MeasuredStep,
+    Scale,
+    StepCollector,
+    StepSamples,
+    analysed,
+)
+from vibroimpact.hardware.programs.sweep.branch import refuse_other_branch
+from vibroimpact.hardware.programs.sweep.calibrating import (
+    calibration_text,
+    calibrations_of,
+    displacement_scale,
+)
+from vibroimpact.hardware.programs.sweep.dataset import DATASET, SweepRows, store, stored
+from vibroimpact.hardware.programs.sweep.plan import planned
+from vibroimpact.hardware.programs.sweep.settings import SweepSettings
+from vibroimpact.hardware.rig.acquisition import Acquisition, Facts
+from vibroimpact.hardware.rig.limits import Limits
+from vibroimpact.hardware.rig.opening import opened_rig
+from vibroimpact.hardware.rig.output import Output
+from vibroimpact.hardware.rig.stopping import stopped_by_signals
+from vibroimpact.orchestrator.campaign.progress import Progress
+
+LIVE = "live.png"
+LIVE_SECONDS = 3.0
+"""Time between two drawings of the live figure, s."""
+_SURE_SECONDS = 1.0
+"""Time, besides that of a fall from the highest voltage, after which a step is sure, s."""
+_RATE_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class SweepReport:
+    """What a command did.
+
+    Attributes
+    ----------
+    dataset : Path
+    steps, before, planned : int
+        Steps in the dataset; those that were there before; those of the whole sweep.
+    stopped : bool
+        Whether it was stopped before its end.
+    """
+
+    dataset: Path
+    steps: int
+    before: int
+    planned: int
+    stopped: bool
+
+
+def measure(
+    settings: SweepSettings, folder: Path, rig: str | None = None, progress: Progress | None = None
+) -> SweepReport:
+    """Measure a sweep into a folder, or go on with it.
+
+    Parameters
+    ----------
+    settings : SweepSettings
+    folder : Path
+        Made when absent.
+    rig : str, optional
+        As `--rig` takes it; else as the file of the sweep says, else the board of this machine.
+    progress : Progress, optional
+
+    Raises
+    ------
+    UsageError
+        The folder is of something else, there is no such rig, or it lacks what is asked for: nothing was driven.
+    RigError
+        The rig failed, or the motion is on another branch than before. What was measured is in the folder.
+    """
+    limits = Limits(settings.output.highest, settings.output.slew)
+    calibrations = calibrations_of(settings)
+    folder = folder.absolute()
+    make_folder(folder)
+    with locked_folder(folder, "sweep"):
+        rows = stored(settings, calibration_text(calibrations), folder)
+        before = len(rows.steps)
+        stopped = False
+        if not rows.complete:
+            sweep = _Sweep(rows, folder, limits, displacement_scale(settings, calibrations), progress)
+            stopped = sweep.run(rig or settings.rig)
+        return SweepReport(folder / DATASET, len(rows.steps), before, len(settings.steps), stopped)
+
+
+class _Sweep:
+    """A sweep that is under way."""
+
+    def __init__(
+        self, rows: SweepRows, folder: Path, limits: Limits, scale: Scale, progress: Progress | None
+    ) -> None:
+        self._rows, self._folder, self._scale = rows, folder, scale
+        self._settings, self._limits = rows.settings, limits
+        self._plan = planned(rows.settings, len(rows.steps))
+        self._progress = progress or Progress()
+        self._waiting: deque[tuple[int, MeasuredStep]] = deque()
+        self._stopped_at: int | None = None
+        self._drawn = time.monotonic()
+        self._converters: list[Converter] = []
+
+    def run(self, choice: str | None) -> bool:
+        """Measure until the end, or until it is stopped; return whether it was."""
+        settings, plan = self._settings, self._plan
+        rate = settings.output.rate
+        with opened_rig(choice) as rig:
+            output = Output(rig, settings.output.terminal, rate, plan, self._limits)
+            inputs = Acquisition(rig, settings.measured, rate, count=plan.samples, trigger=output.trigger)
+
+            def stop() -> None:
+                # steps that have ended by now were driven as planned
+                self._stopped_at = output.generated if self._stopped_at is None else self._stopped_at
+                output.stop()
+                inputs.stop()
+
+            with inputs, output, stopped_by_signals(stop):
+                self._take_note(inputs.facts, rig.name)
+                inputs.start()
+                self._note_start(inputs.facts)
+                output.start()
+                self._progress.begin(len(settings.steps), len(self._rows.steps))
+                self._follow(inputs, output)
+                output.wait()
+            self._keep(plan.samples if self._stopped_at is None else self._stopped_at)
+        return self._stopped_at is not None
+
+    def _take_note(self, facts: Facts, rig: str) -> None:
+        """Note what measures; refuse another rig than that which began, and a rate that it does not have."""
+        rate = self._settings.output.rate
+        if abs(facts.rate - rate) > _RATE_ROUNDING * rate:
+            raise UsageError(
+                f"{self._settings.source}: output.rate: expected a rate that the inputs of {facts.device} have, got "
+                f"{rate!r}. Use {facts.rate!r}."
+            )
+        made_by = {"rig": rig, "device": f"{facts.device}, {facts.product}"}
+        for name, value in made_by.items():
+            was = self._rows.made_by.get(name, value)
+            if was != value:
+                raise UsageError(
+                    f"{self._folder}: expected the {name} that began this sweep, {was}, got {value}. "
+                    "Choose another folder, or go on with what it was begun with."
+                )
+        self._rows.made_by |= made_by
+        self._converters = [Converter(*step) for step in facts.steps]
+
+    def _note_start(self, facts: Facts) -> None:
+        earlier = self._rows.made_by.get("measured_at", "")
+        self._rows.made_by["measured_at"] = "\n".join(filter(None, (earlier, facts.started_at)))
+        self._rows.begun_with.append(len(self._rows.steps))
+
+    def _follow(self, inputs: Acquisition, output: Output) -> None:
+        """Take what the inputs give, and keep the steps that are sure."""
+        collector = StepCollector(self._plan, len(self._settings.inputs))
+        fall = self._limits.fall(self._limits.amplitude, self._settings.output.rate)
+        margin = fall.samples + round(_SURE_SECONDS * self._settings.output.rate)
+        for block in inputs.blocks():
+            for step in collector.take(block.first, block.volts):
+                self._analyse(step)
+            if self._stopped_at is None:
+                self._keep(output.generated - margin)
+            if output.poll(0.0):
+                output.wait()  # raises why, where it is over before its end
+
+    def _analyse(self, step: StepSamples) -> None:
+        found = analysed(step, self._settings, self._scale, self._converters)
+        if step.segment.kind == "repeat":
+            refuse_other_branch(self._rows.steps[-1], found, self._settings, self._folder)
+        else:
+            self._waiting.append((step.segment.stop, found))
+
+    def _keep(self, sure: int) -> None:
+        """Store the steps that have ended by a sample."""
+        while self._waiting and self._waiting[0][0] <= sure:
+            _, step = self._waiting.popleft()
+            self._rows.steps.append(step)
+            with writing(self._folder / DATASET):
+                store(self._rows, self._folder)
+            self._progress.advance(1)
+            if step.flags:
+                direction, frequency = self._settings.steps[step.place]
+                self._progress.note(f"{direction.name} {frequency:g} Hz: {step.message}")
+            if time.monotonic() - self._drawn >= LIVE_SECONDS or self._rows.complete:
+                self._draw()
+
+    def _draw(self) -> None:
+        """Draw what is measured so far."""
+        if len(self._rows.steps) > 1:
+            with open_dataset(self._folder) as dataset, writing(self._folder / LIVE):
+                figures.save(figures.draw(dataset, "bifurcation"), self._folder / LIVE)
+        self._drawn = time.monotonic()
