@@ -14,10 +14,11 @@ from vibroimpact.fmus.errors import ComponentError, UsageError
 from vibroimpact.hardware.daqmx import DAQmxErrors
 from vibroimpact.hardware.virtual_rig.checks import refuse_outside_clock, verify
 from vibroimpact.hardware.virtual_rig.pace import Pace
-from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant
+from vibroimpact.hardware.virtual_rig.plant import TICK, Floats
 from vibroimpact.hardware.virtual_rig.profiles import PROFILES
 from vibroimpact.hardware.virtual_rig.refusal import Refusal
 from vibroimpact.hardware.virtual_rig.sampling import Sampling
+from vibroimpact.hardware.virtual_rig.scene_plant import opened_plant
 from vibroimpact.hardware.virtual_rig.settings import RigSettings
 from vibroimpact.hardware.virtual_rig.tasks import INPUT, NEVER, OUTPUT, State, Task
 from vibroimpact.hardware.virtual_rig.terminals import Terminals
@@ -51,7 +52,7 @@ class Board:
     def __init__(self, settings: RigSettings) -> None:
         self.settings = settings
         self.name, self.profile = settings.rig.name, PROFILES[settings.rig.device]
-        self.plant = Plant(settings)
+        self.plant = opened_plant(settings)
         self.tasks: dict[str, Task] = {}
         self._terminals = Terminals(self.name, self.tasks)
         self.analog = Sampling(settings, self.profile, self.plant)
@@ -103,7 +104,8 @@ class Board:
     def _chunk(self) -> int:
         """Return ticks of one advance."""
         rate = sum(task.rate * len(task.channels) for task in self.tasks.values() if task.ticking)
-        return NEVER if rate == 0.0 else max(int(MOST_AT_ONCE / rate / TICK), 1000)
+        steps = rate + self.plant.fineness / 10.0
+        return NEVER if rate == 0.0 else max(int(MOST_AT_ONCE / steps / TICK), 1000)
 
     def _go_on(self) -> None:
         """Keep time while a clock runs."""

@@ -11,11 +11,10 @@ from vibroimpact.fmus.errors import UsageError
 from vibroimpact.hardware.daqmx import grpc
 from vibroimpact.hardware.virtual_rig.board import Board
 from vibroimpact.hardware.virtual_rig.plant import TICK
+from vibroimpact.hardware.virtual_rig.settings import WORST_CLOCK
 
 SERVICE = "vibroimpact.rig.Control"
 FASTEST = 1000.0
-WORST_CLOCK = 1e4
-"""ppm."""
 
 
 def encoded(values: dict[str, Any]) -> bytes:
@@ -165,7 +164,7 @@ class Controls:
             board.catch_up()
             return {
                 "time": board.plant.now * TICK,
-                **board.plant.state,
+                **board.plant.truth,
                 "outputs": board.analog.held.tolist(),
             }
 

@@ -7,17 +7,24 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.fmus.core.measuring import gaussian
 from vibroimpact.hardware.virtual_rig.plant import Floats
 from vibroimpact.hardware.virtual_rig.tasks import Channel
 
 
 class Inputs:
-    """Converts voltages, and has the faults that a test gives it.
+    """Converts voltages with the noise on their wires, and has the faults that a test gives it.
 
     Parameters
     ----------
     bits : int
         Of the converter.
+    noise : dict of int to float
+        Its rms at an input, V; an input that is not there has none.
+    seed : int
+        Of the noise, which depends on it, on the number of the input and on how many samples that has taken before.
+    clock_error : float
+        At first, ppm.
 
     Attributes
     ----------
@@ -29,8 +36,11 @@ class Inputs:
         Of the input clock against true time, which the output clock keeps, ppm.
     """
 
-    def __init__(self, bits: int, clock_error: float = 0.0) -> None:
-        self._bits = bits
+    def __init__(
+        self, bits: int, noise: Mapping[int, float] | None = None, seed: int = 0, clock_error: float = 0.0
+    ) -> None:
+        self._bits, self._noise, self._seed = bits, dict(noise or {}), seed
+        self._taken: dict[int, int] = {}
         self._usual_error = clock_error
         self.stuck: dict[int, float | None] = {}
         self.clipped: dict[int, float] = {}
@@ -44,6 +54,7 @@ class Inputs:
 
     def codes(self, channel: Channel, volts: Floats) -> NDArray[np.int16]:
         """Return the codes of voltages on the wire of an input, shape (sample,)."""
+        volts = self._noisy(channel.number, volts)
         if channel.number in self.clipped and volts.size:
             end = self.clipped[channel.number]
             volts = np.clip(volts, -end, end)
@@ -55,6 +66,14 @@ class Inputs:
         step = channel.device_range / highest
         found: NDArray[np.int16] = np.clip(np.rint(volts / step), -highest, highest - 1).astype(np.int16)
         return found
+
+    def _noisy(self, number: int, volts: Floats) -> Floats:
+        rms = self._noise.get(number, 0.0)
+        if rms == 0.0:
+            return volts
+        first = self._taken.get(number, 0)
+        self._taken[number] = first + volts.size
+        return volts + rms * gaussian(self._seed, number, first, volts.size)
 
     def faults(self, device: str) -> Mapping[str, object]:
         """Return the faults, as the control service says them."""

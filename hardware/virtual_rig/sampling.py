@@ -36,9 +36,10 @@ class Sampling:
     """
 
     def __init__(self, settings: RigSettings, profile: Profile, plant: Plant) -> None:
-        self._settings, self._plant = settings, plant
+        self._wiring, self._plant = settings.wiring, plant
         self.held = np.zeros(profile.outputs)
-        self.inputs = Inputs(profile.bits)
+        noise = {number: plant.noise_of(wire.signal) for number, wire in settings.wiring.inputs.items()}
+        self.inputs = Inputs(profile.bits, noise, plant.seed, settings.rig.clock_error)
 
     def advance(self, running: Sequence[Task], target: int) -> set[str]:
         """Let tasks and plant go on to a tick; return the names of the outputs that ran empty."""
@@ -50,7 +51,12 @@ class Sampling:
         instants = instants[instants > self._plant.now].astype(np.int64)
         levels = self._levels(running, updates)
         befores = np.concatenate([[self._plant.now], instants[:-1]])
-        found = self._plant.advance(instants, levels(self._settings.exciter.output, befores))
+        driver = self._wiring.driver
+        volts = np.zeros(len(befores)) if driver is None else levels(driver, befores)
+        for task in running:
+            if task.kind == INPUT and task.count == 0 and edges[task.name][0].size:
+                self._plant.begin_anew(int(task.edge(0)))
+        found = self._plant.advance(instants, volts)
         for task in running:
             if task.kind == INPUT:
                 self._take_in(
@@ -87,16 +93,15 @@ class Sampling:
         task.tell(task.sampled[-1])
 
     def _codes(self, channel: Channel, ticks: Ticks, levels: Levels, seen: Seen) -> NDArray[np.int16]:
-        wire = self._settings.wires.get(channel.number)
+        wire = self._wiring.inputs.get(channel.number)
         if channel.output is not None:
             volts = levels(channel.output, ticks - 1)
         elif wire is None:
             volts = np.zeros(ticks.shape)
-        elif wire.output is not None:
-            # an edge of a shared clock samples what was put out before it
-            volts = wire.amplification * levels(wire.output, ticks - 1)
         else:
-            volts = wire.amplification * seen(wire.signal, ticks)
+            # an edge of a shared clock samples what was put out before it
+            seen_there = seen(wire.signal, ticks) if wire.output is None else levels(wire.output, ticks - 1)
+            volts = seen_there if wire.amplification is None else wire.amplification * seen_there
         return self.inputs.codes(channel, volts)
 
     def _put_out(self, task: Task, ticks: Ticks, samples: Floats) -> None:

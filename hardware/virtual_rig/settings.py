@@ -1,8 +1,7 @@
-"""The file of a virtual rig: which scene is its plant, which device measures it, what is wired to what."""
+"""The file of a virtual rig: what is its plant, which device measures it, what is wired to what."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -10,31 +9,37 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.safe_toml import parse_toml
-from vibroimpact.hardware.virtual_rig.profiles import PROFILES
+from vibroimpact.hardware.virtual_rig.wiring import Wiring, wiring_of
 from vibroimpact.orchestrator.scene.fields import Rule
 from vibroimpact.orchestrator.scene.problems import (
     Problem,
     lines_of,
+    quoted,
     read_table,
     syntax_problem,
     unknown_key,
 )
 
 _LARGEST = 2**16
-_STRICT = ConfigDict(extra="forbid", frozen=True, strict=True)
-SENSED = ("displacement", "velocity", "contact_force", "output")
-"""What an input can see: the plant in SI units; `output`: the voltage of the output that drives it."""
-
-Quantity = Literal["displacement", "velocity", "contact_force", "output"]
-_NUMBER = Field(ge=0, le=31)
+TABLES = ("rig", "wiring")
+WORST_CLOCK = 1e4
+"""Error of an input clock, ppm."""
 
 
 class RigTable(BaseModel):
     """`[rig]`: plant and device."""
 
-    model_config = _STRICT
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
-    scene: Annotated[str, Rule("the file of a scene, beside this file", hint='Write "../beam.toml".')]
+    scene: Annotated[
+        str | None, Rule("the file of a scene, beside this file", hint='Write "../beam.toml".')
+    ] = None
+    recording: Annotated[
+        str | None, Rule("the file of a recording, beside this file", hint='Write "../tip.nc".')
+    ] = None
+    run: Annotated[
+        int | None, Field(ge=0), Rule("a run_index of the file", hint="Leave it out where there is one run.")
+    ] = None
     device: Annotated[Literal["labpc+", "xseries"], Rule('"labpc+" or "xseries"')]
     name: Annotated[
         str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]{0,31}$"), Rule("a letter, then letters and digits")
@@ -42,70 +47,33 @@ class RigTable(BaseModel):
     speed: Annotated[
         FiniteFloat, Field(gt=0.0, le=1000.0), Rule("seconds of the rig in a second, > 0 and <= 1000")
     ] = 1.0
-
-
-class ExciterTable(BaseModel):
-    """`[exciter]`: the output that drives the force."""
-
-    model_config = _STRICT
-
-    output: Annotated[int, _NUMBER, Rule("the number of an analog output, from 0")]
-    gain: Annotated[FiniteFloat, Rule("a finite number", "N/V")]
-
-
-class SensorTable(BaseModel):
-    """`[[sensor]]`: what an input sees."""
-
-    model_config = _STRICT
-
-    input: Annotated[int, _NUMBER, Rule("the number of an analog input, from 0")]
-    quantity: Annotated[Quantity, Rule(", ".join(SENSED))]
-    gain: Annotated[FiniteFloat, Rule("a finite number", "V per SI unit")]
-
-
-@dataclass(frozen=True, slots=True)
-class Wire:
-    """What an input is wired to.
-
-    Attributes
-    ----------
-    signal : str
-        Of the plant.
-    amplification : float
-        V for a unit of the signal.
-    output : int or None
-        The output that it is wired to, instead.
-    """
-
-    signal: str
-    amplification: float = 1.0
-    output: int | None = None
+    clock_error: Annotated[
+        FiniteFloat,
+        Field(ge=-WORST_CLOCK, le=WORST_CLOCK),
+        Rule("ppm by which the input clock is too fast, from -1e4 to 1e4"),
+    ] = 0.0
 
 
 class RigSettings(BaseModel):
-    """A virtual rig."""
+    """A virtual rig.
+
+    Attributes
+    ----------
+    source : str
+        Its file.
+    rig : RigTable
+    wiring : Wiring
+    """
 
     model_config = ConfigDict(frozen=True)
 
     source: str
     rig: RigTable
-    exciter: ExciterTable
-    sensors: tuple[SensorTable, ...]
+    wiring: Wiring
 
-    @property
-    def wires(self) -> dict[int, Wire]:
-        """What the inputs are wired to, by their numbers."""
-        return {
-            each.input: Wire(
-                each.quantity, each.gain, self.exciter.output if each.quantity == "output" else None
-            )
-            for each in self.sensors
-        }
-
-    @property
-    def scene(self) -> Path:
-        """The file of the plant."""
-        return Path(self.source).parent / self.rig.scene
+    def beside(self, name: str) -> Path:
+        """Return a file that is given from where the file of the rig is."""
+        return Path(self.source).parent / name
 
 
 def read_rig(path: Path) -> RigSettings:
@@ -118,58 +86,48 @@ def read_rig(path: Path) -> RigSettings:
     """
     try:
         with path.open("rb") as file:
-            text = file.read(_LARGEST).decode("utf-8-sig")
+            content = file.read(_LARGEST + 1)
+        text = content.decode("utf-8-sig")
     except (OSError, ValueError) as problem:
         reason = getattr(problem, "strerror", None) or "it is no UTF-8 text"
         raise UsageError(f"{path}: expected the file of a rig (TOML), got none: {reason}.") from problem
+    if len(content) > _LARGEST:
+        raise UsageError(f"{path}: expected the file of a rig (TOML), got one of more than {_LARGEST} bytes.")
     try:
         document = parse_toml(text)
     except ValueError as problem:
         raise UsageError(syntax_problem(problem, text).line(str(path))) from None
     problems: list[Problem] = []
-    found = _tables(document, problems)
-    if problems or found is None:
+    rig, wiring = _tables(document, problems)
+    if problems or rig is None or wiring is None:
         raise UsageError("\n".join(lines_of(problems, str(path))))
-    rig, exciter, sensors = found
-    return RigSettings(source=str(path), rig=rig, exciter=exciter, sensors=sensors)
+    return RigSettings(source=str(path), rig=rig, wiring=wiring)
 
 
-def _tables(
-    document: dict[str, Any], problems: list[Problem]
-) -> tuple[RigTable, ExciterTable, tuple[SensorTable, ...]] | None:
-    known = ("rig", "exciter", "sensor")
-    problems += [unknown_key((key,), known) for key in document if key not in known]
+def _tables(document: dict[str, Any], problems: list[Problem]) -> tuple[RigTable | None, Wiring | None]:
+    problems += [_unknown_table(key) for key in document if key not in TABLES]
     rig = read_table(RigTable, document.get("rig"), ("rig",), problems)
-    exciter = read_table(ExciterTable, document.get("exciter"), ("exciter",), problems)
-    listed = document.get("sensor", [])
-    if not isinstance(listed, list) or not listed:
-        problems.append(Problem("sensor", "at least one sensor", "none", "Write [[sensor]]."))
-        return None
-    read = [read_table(SensorTable, each, ("sensor", place), problems) for place, each in enumerate(listed)]
-    sensors = tuple(each for each in read if each is not None)
-    if rig is not None and exciter is not None and len(sensors) == len(read):
-        problems += _wiring_problems(rig, exciter, sensors)
-        return rig, exciter, sensors
-    return None
+    if rig is None:
+        return None, None
+    problems += _plant_problems(rig)
+    return rig, wiring_of(document.get("wiring", {}), rig.device, rig.recording is not None, problems)
 
 
-def _wiring_problems(rig: RigTable, exciter: ExciterTable, sensors: tuple[SensorTable, ...]) -> list[Problem]:
-    profile = PROFILES[rig.device]
-    found = []
-    if exciter.output >= profile.outputs:
-        found.append(
-            Problem(
-                "exciter.output", f"0 to {profile.outputs - 1}, those of {rig.device}", str(exciter.output)
-            )
+def _unknown_table(key: str) -> Problem:
+    if key in ("exciter", "sensor"):
+        hint = (
+            f'What is wired says [wiring]; [{key}] belongs into the scene. Write ai0 = "sensor.displacement".'
         )
-    taken: set[int] = set()
-    for place, sensor in enumerate(sensors):
-        where = f"sensor[{place + 1}].input"
-        if sensor.input >= profile.inputs:
-            found.append(
-                Problem(where, f"0 to {profile.inputs - 1}, those of {rig.device}", str(sensor.input))
-            )
-        if sensor.input in taken:
-            found.append(Problem(where, "an input of its own", f"{sensor.input} again"))
-        taken.add(sensor.input)
-    return found
+        return Problem(key, "[rig] and [wiring]", f"[{key}]", hint)
+    return unknown_key((key,), TABLES)
+
+
+def _plant_problems(rig: RigTable) -> list[Problem]:
+    if (rig.scene is None) == (rig.recording is None):
+        got = "neither" if rig.scene is None else "both"
+        return [
+            Problem("rig", "scene or recording", got, 'Write scene = "beam.toml", or recording = "tip.nc".')
+        ]
+    if rig.run is not None and rig.recording is None:
+        return [Problem("rig.run", "none beside scene", quoted(rig.run), "It is a run of a recording.")]
+    return []

@@ -80,7 +80,8 @@ class MeasuredRun:
         self._chain = MeasuringChain(scene, scene.channels)
         self._exciter = held_exciter(scene) if scene.falling_force else None
         self._rate = scene.sampling_rate if scene.daq is None else scene.daq.true_rate
-        self._pieces = int(self._chain.instants_in(np.array([1.0 / self._rate]))[0])
+        finest = self._chain.finest
+        self._pieces = max(1, math.ceil((1.0 - _ROUNDING) / self._rate / finest)) if finest else 1
         self._skew = 0.0 if scene.daq is None else scene.daq.skew
         self._last = self._whole(self._end - self._begin)
         self._variables = tuple(dict.fromkeys((*plan.variables, *self._chain.variables)))

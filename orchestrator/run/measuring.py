@@ -18,6 +18,7 @@ from vibroimpact.orchestrator.run.measuring_chain import NO_IMPACTS, Floats, Mea
 from vibroimpact.orchestrator.run.parameters import float_parameters, state_variables
 from vibroimpact.orchestrator.run.point import driver_of
 from vibroimpact.orchestrator.run.record import ROW_IMPACT, in_time_order
+from vibroimpact.orchestrator.run.steps import Counts, cut, pieces_of
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.measuring_models import DRIVE, LOAD_CELL, MEASURED_SENSOR
 
@@ -51,8 +52,8 @@ class MeasuredSession:
 
     Notes
     -----
-    A block is cut into steps of which `RING_INSTANTS` are in a period of the load cell's ring: between them the force
-    on the cell is taken to be linear. How samples are cut into blocks makes no difference, unless more than 1000
+    Steps are cut so that `RING_INSTANTS` are in a period of the load cell's ring: between them the force on the cell is
+    taken to be linear. Of a long step only as much is cut as the cell remembers, 5000 pieces at most. How samples are cut into blocks makes no difference, unless more than 1000
     impacts are within a contact_duration.
 
     The last bounces of a chatter, which the body sums, are not in the voltage of the load cell: they are slower than
@@ -140,8 +141,7 @@ class MeasuredSession:
         _refuse_wrong_block(times, volts, self.time)
         if not len(volts):
             return {name: np.empty(0) for name in self._channels}
-        pieces = self._chain.instants_in(np.diff(times))
-        ends, held, renewed = _cut(times, volts, pieces)
+        ends, held, renewed, last = cut(times, volts, self._chain.finest, self._chain.lead)
         found: dict[str, list[Floats]] = {name: [] for name in self._channels if name != DRIVE}
         impacts = []
         for first in range(0, len(ends), INSTANTS_AT_ONCE):
@@ -151,8 +151,7 @@ class MeasuredSession:
             for name, values in block.items():
                 found[name].append(values)
         self.impacts_of_block = np.concatenate(impacts)
-        at_samples = np.cumsum(pieces) - 1
-        channels = {name: np.concatenate(parts)[at_samples] for name, parts in found.items()}
+        channels = {name: np.concatenate(parts)[last] for name, parts in found.items()}
         return {name: volts.copy() if name == DRIVE else channels[name] for name in self._channels}
 
     def _hold(
@@ -166,6 +165,15 @@ class MeasuredSession:
         values = {name: np.ascontiguousarray(rows[:, place]) for place, name in enumerate(self._variables)}
         self._tell({name: float(column[-1]) for name, column in values.items()})
         return self._chain.volts(ends, values, impacts), impacts
+
+    def instants_in(self, times: Floats) -> Counts:
+        """Return into how many steps each of those between instants is cut; shape (sample,)."""
+        return pieces_of(np.diff(times), self._chain.finest, self._chain.lead)
+
+    @property
+    def fineness(self) -> float:
+        """Steps in a second, at least, where a load cell rings; 0: it does not."""
+        return 1.0 / self._chain.finest if self._chain.finest else 0.0
 
     def _tell(self, values: Mapping[str, float]) -> None:
         force = math.fsum(value for name, value in values.items() if name.startswith("contact["))
@@ -213,14 +221,3 @@ def _refuse_wrong_block(times: Floats, volts: Floats, now: float) -> None:
         raise UsageError(f"times: expected ascending instants from {now:.17g} s on, one more than volts.")
     if not np.isfinite(volts).all():
         raise UsageError("volts: expected finite voltages, got one that is no number.")
-
-
-def _cut(times: Floats, volts: Floats, pieces: NDArray[np.int64]) -> tuple[Floats, Floats, NDArray[np.uint8]]:
-    """Cut each step into pieces of one length; return their ends, the voltage of each, and which begin a step."""
-    last = np.cumsum(pieces) - 1
-    place = np.arange(1, last[-1] + 2) - np.repeat(last + 1 - pieces, pieces)
-    ends = np.repeat(times[:-1], pieces) + np.repeat(np.diff(times), pieces) * (
-        place / np.repeat(pieces, pieces)
-    )
-    ends[last] = times[1:]
-    return ends, np.repeat(np.asarray(volts, dtype=np.float64), pieces), (place == 1).astype(np.uint8)

@@ -49,11 +49,12 @@ class MeasuringChain:
         self.needs_impacts = cell is not None and isinstance(scene.stops[cell.stop - 1], RestitutionStop)
         self._cell = None if cell is None else _opened(cell)
 
-    def instants_in(self, interval: Floats) -> NDArray[np.int64]:
-        """Return into how many steps each sample interval (s) is cut, so that the ring of the load cell is followed."""
+    @property
+    def finest(self) -> float:
+        """Longest step that follows the ring of the load cell, s; 0: there is no ring."""
         cell = self._scene.load_cell
         ring = cell.natural_frequency if cell is not None and self._cell is not None else 0.0
-        return np.maximum(1, np.ceil(RING_INSTANTS * ring * interval * (1.0 - 1e-9))).astype(np.int64)
+        return 1.0 / (RING_INSTANTS * ring) if ring else 0.0
 
     @property
     def lead(self) -> float:

@@ -1,0 +1,143 @@
+"""A recording as the plant of a virtual rig: what was measured once is on the inputs again."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vibroimpact.analysis.recording import Channel, Recording, open_signals
+from vibroimpact.analysis.recording.units import measured_unit, unit_label
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Ticks
+from vibroimpact.hardware.virtual_rig.settings import RigSettings
+from vibroimpact.hardware.virtual_rig.wiring import Wire
+from vibroimpact.orchestrator.scene.problems import nearest
+
+_GAP = 1.5
+"""Intervals of an even axis from which on two samples have a gap between them."""
+
+
+class Track:
+    """A channel of a recording as a function of time: straight from sample to sample, held over gaps and at the ends.
+
+    Parameters
+    ----------
+    channel : Channel
+    begin : float
+        Its time at which the playback begins, s.
+    factor : float
+        V for a unit of the channel, or 1.
+
+    Examples
+    --------
+    >>> from vibroimpact.analysis.recording import TimeAxis
+    >>> axis = TimeAxis(np.array([0.0, 1.0, 2.0, 5.0]), 1.0)
+    >>> flags = np.zeros(4, dtype=np.uint8)
+    >>> track = Track(Channel("a", np.array([0.0, 2.0, 4.0, 9.0]), "V", axis, flags), 0.0, 1.0)
+    >>> track.at(np.array([0.25, 1.5, 4.0, 6.0])).tolist()
+    [0.5, 3.0, 4.0, 9.0]
+    """
+
+    def __init__(self, channel: Channel, begin: float, factor: float) -> None:
+        there = np.flatnonzero(np.isfinite(channel.values))
+        self._times = channel.time[there] - begin
+        self._values = factor * channel.values[there]
+        steps, interval = np.diff(self._times), channel.axis.interval
+        gap = np.diff(there) > 1
+        if interval is not None:
+            gap |= steps > _GAP * interval
+        rises = np.diff(self._values) / steps
+        self._slopes = np.append(np.where(gap, 0.0, rises), 0.0)
+
+    @property
+    def empty(self) -> bool:
+        """Whether it has no sample that is a number."""
+        return not len(self._times)
+
+    def at(self, times: Floats) -> Floats:
+        """Return its values at times of the playback (s)."""
+        place = np.clip(np.searchsorted(self._times, times, side="right") - 1, 0, len(self._times) - 1)
+        found: Floats = self._values[place] + self._slopes[place] * np.maximum(
+            times - self._times[place], 0.0
+        )
+        return found
+
+
+class Playback:
+    """A recording on the inputs of a device; it begins with the first edge of each input task, and holds its end.
+
+    Parameters
+    ----------
+    settings : RigSettings
+
+    Attributes
+    ----------
+    now : int
+        The time reached, in ticks.
+
+    Raises
+    ------
+    DatasetError
+        The file is no recording.
+    UsageError
+        An input is wired to a channel that it does not have, or whose unit needs an amplification.
+    """
+
+    def __init__(self, settings: RigSettings) -> None:
+        assert settings.rig.recording is not None
+        path = settings.beside(settings.rig.recording)
+        recording = open_signals(path, settings.rig.run)
+        starts = [float(channel.time[0]) for channel in recording.channels.values() if len(channel.time)]
+        begin = min(starts, default=0.0)
+        self._tracks: dict[str, Track] = {}
+        for number, wire in settings.wiring.inputs.items():
+            if wire.output is None:
+                where = f"{settings.source}: wiring.ai{number}"
+                self._tracks[wire.signal] = _track(recording, wire, begin, where, path.name)
+        self.now, self._origin = 0, 0
+        self.seed, self.fineness = 0, 0.0
+
+    def begin_anew(self, tick: int) -> None:
+        """Let the recording begin at a tick."""
+        self._origin = tick
+
+    def noise_of(self, signal: str) -> float:
+        """Return 0: a recording has the noise that it was made with."""
+        return 0.0
+
+    def advance(self, instants: Ticks, volts: Floats) -> dict[str, Floats]:
+        """Go on to instants; return the channels there. No voltage changes them."""
+        self.now = int(instants[-1])
+        times = (instants - self._origin) * TICK
+        return {signal: track.at(times) for signal, track in self._tracks.items()}
+
+    @property
+    def state(self) -> dict[str, float]:
+        """The channels now."""
+        now = np.array([float(self.now - self._origin)]) * TICK
+        return {signal: float(track.at(now)[0]) for signal, track in self._tracks.items()}
+
+    @property
+    def truth(self) -> dict[str, float]:
+        """The channels now, in V or in their units."""
+        return self.state
+
+    def close(self) -> None:
+        """Nothing is left open."""
+
+
+def _track(recording: Recording, wire: Wire, begin: float, where: str, file: str) -> Track:
+    channel = recording.channels.get(wire.signal)
+    if channel is None:
+        hint = nearest(wire.signal, recording.channels)
+        raise UsageError(f"{where}: expected a channel of {file}, got {wire.signal[:60]!r}. {hint}".rstrip())
+    unit = measured_unit(channel.unit)
+    if unit.si != "V" and wire.amplification is None:
+        label = unit_label(unit.cf)
+        raise UsageError(
+            f"{where}: expected an amplification, V per {label}, got none. "
+            f'Write {{ signal = "{channel.name}", amplification = 1.0 }}.'
+        )
+    track = Track(channel, begin, unit.factor if unit.si == "V" else 1.0)
+    if track.empty:
+        raise UsageError(f"{where}: expected a channel with samples, got {channel.name} without any.")
+    return track

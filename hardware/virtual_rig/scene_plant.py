@@ -1,0 +1,115 @@
+"""A scene as the plant of a virtual rig."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from vibroimpact.fmus.errors import SceneError, UsageError
+from vibroimpact.hardware.virtual_rig.plant import TICK, Floats, Plant, Ticks
+from vibroimpact.hardware.virtual_rig.playback import Playback
+from vibroimpact.hardware.virtual_rig.settings import RigSettings
+from vibroimpact.orchestrator.run.measuring import MeasuredSession
+from vibroimpact.orchestrator.scene import Scene, load_scene
+from vibroimpact.orchestrator.scene.measuring_models import DRIVE
+from vibroimpact.orchestrator.scene.models import MOST_IMPACTS_PER_POINT
+
+MOST_STEPS = 100_000
+"""Of one call of the session: rows that are in memory at once."""
+
+
+class ScenePlant:
+    """A scene that goes on for as long as the rig is served.
+
+    Parameters
+    ----------
+    settings : RigSettings
+
+    Attributes
+    ----------
+    now : int
+        The time reached, in ticks.
+    state : dict of str to float
+        V of its channels then.
+
+    Raises
+    ------
+    SceneError, UsageError
+        The scene is wrong, or no plant: a chain, components, a replay, a base that moves, or without what is wired.
+    """
+
+    def __init__(self, settings: RigSettings) -> None:
+        scene = plant_scene(settings)
+        try:
+            self._session = MeasuredSession(scene, settings.wiring.signals)
+        except UsageError as error:
+            raise UsageError(f"{settings.source}: rig.scene: {error}") from None
+        self._noise = scene.noise
+        self.seed = scene.noise.seed if scene.noise is not None else 0
+        self._session.begin()
+        self.now = 0
+        self.state: dict[str, float] = {}
+        self.fineness = self._session.fineness
+        self.advance(np.array([1]), np.zeros(1))
+
+    @property
+    def truth(self) -> dict[str, float]:
+        """Displacement (m), velocity (m/s) and forces (N) now."""
+        return self._session.truth
+
+    def noise_of(self, signal: str) -> float:
+        """Return the rms of the noise on a channel; on the wire of an output it is that of the drive."""
+        return 0.0 if self._noise is None else self._noise.of(signal or DRIVE)
+
+    def advance(self, instants: Ticks, volts: Floats) -> dict[str, Floats]:
+        """Go on to instants, a voltage held before each; return the channels there, V before noise and conversion."""
+        times = np.concatenate([[self.now], instants]) * TICK
+        # after months some ticks round to the same time: nothing happens between them
+        later = np.diff(times) > 0.0
+        rows = {name: [np.array([value])] for name, value in self.state.items()}
+        if later.any():
+            for block in self._blocks(times[np.append(True, later)], volts[later]):
+                for name, values in block.items():
+                    rows.setdefault(name, [np.zeros(1)]).append(values)
+        found = {name: np.concatenate(parts)[np.cumsum(later)] for name, parts in rows.items()}
+        self.now = int(instants[-1])
+        self.state = {name: float(values[-1]) for name, values in found.items()}
+        return found
+
+    def _blocks(self, times: Floats, volts: Floats) -> Iterator[dict[str, Floats]]:
+        steps = np.cumsum(self._session.instants_in(times))
+        begin = 0
+        while begin < len(volts):
+            done = steps[begin - 1] if begin else 0
+            end = max(int(np.searchsorted(steps, done + MOST_STEPS)), begin + 1)
+            yield self._session.advance(times[begin : end + 1], volts[begin:end])
+            begin = end
+
+    def begin_anew(self, tick: int) -> None:
+        """A plant goes on, whoever measures it."""
+
+    def close(self) -> None:
+        """Free the components."""
+        self._session.close()
+
+
+def plant_scene(settings: RigSettings) -> Scene:
+    """Return the scene of a rig as its plant: without its sweep, for as long as it is served."""
+    assert settings.rig.scene is not None
+    scene = load_scene(settings.beside(settings.rig.scene))
+    if scene.general is not None or scene.replay is not None:
+        raise UsageError(
+            f"{settings.source}: rig.scene: expected an oscillator or a beam, got a scene of another kind."
+        )
+    if scene.sweep:
+        scene = scene.with_sweep({})
+    try:
+        return scene.with_values({"execution.impact_limit": MOST_IMPACTS_PER_POINT})
+    except SceneError as error:
+        raise UsageError(f"{settings.source}: rig.scene: {error}") from None
+
+
+def opened_plant(settings: RigSettings) -> Plant:
+    """Return the plant of a rig, its scene or its recording."""
+    return Playback(settings) if settings.rig.recording is not None else ScenePlant(settings)
