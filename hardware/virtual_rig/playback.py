@@ -113,7 +113,7 @@ class Playback:
     @property
     def state(self) -> dict[str, float]:
         """The channels now."""
-        now = np.array([float(self.now - self._origin)]) * TICK
+        now: Floats = np.asarray([(self.now - self._origin) * TICK], dtype=np.float64)
         return {signal: float(track.at(now)[0]) for signal, track in self._tracks.items()}
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -530,13 +531,30 @@ def test_a_lab_pc_samples_one_input_after_the_other() -> None:
             with bench.task() as drive:
                 drive.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-5, max_val=5)
                 drive.write(3.0)
-                displacement, velocity, loop = np.array(task.read(2000))
+                displacement, _, loop = np.array(task.read(2000))
     step = 5.0 / 2**11
     assert np.max(np.abs(displacement)) > 50 * step
-    np.testing.assert_allclose(loop, 3.0, atol=step)
-    # 12 us for a conversion: the velocity is that much later than the displacement
-    slope = np.gradient(displacement / 500.0, 1e-4)
-    assert np.corrcoef(slope[20:-20], velocity[20:-20])[0, 1] > 0.9
+    np.testing.assert_allclose(loop, 3.0, atol=4 * step)  # noise of 1 mV
+
+
+def test_inputs_of_a_lab_pc_see_one_signal_12_us_later_each(tmp_path: Path) -> None:
+    scene = (ROOT / "examples" / "rig" / "oscillator_scene.toml").as_posix()
+    file = tmp_path / "rig.toml"
+    wires = "".join(f'ai{place} = "sensor.displacement"\n' for place in range(8))
+    file.write_text(
+        f'[rig]\nscene = "{scene}"\ndevice = "labpc+"\n[wiring]\nao0 = "exciter"\n{wires}', encoding="utf-8"
+    )
+    with served(read_rig(file)) as server, open_channel(server.address) as channel:
+        bench = Bench(server, channel)
+        bench.control.pace(lockstep=True)
+        with bench.task() as drive, bench.task() as task:
+            drive.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-5, max_val=5)
+            drive.write(2.0)
+            task.ai_channels.add_ai_voltage_chan("Dev1/ai0:7", min_val=-5, max_val=5)
+            task.timing.cfg_samp_clk_timing(1000.0, samps_per_chan=150)
+            first, *_, last = np.array(task.read(150))
+    shift = np.sum((last - first) * np.gradient(first, 1e-3)) / np.sum(np.gradient(first, 1e-3) ** 2)
+    assert shift == pytest.approx(7 * 12e-6, rel=0.05)
 
 
 def test_a_scan_of_a_lab_pc_is_the_same_when_time_stops_in_the_middle_of_it() -> None:
