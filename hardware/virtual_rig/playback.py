@@ -107,7 +107,7 @@ class Playback:
     def advance(self, instants: Ticks, volts: Floats) -> dict[str, Floats]:
         """Go on to instants; return the channels there. No voltage changes them."""
         self.now = int(instants[-1])
-        times = (instants - self._origin) * TICK
+        times: Floats = np.asarray((instants - self._origin) * TICK, dtype=np.float64)
         return {signal: track.at(times) for signal, track in self._tracks.items()}
 
     @property
