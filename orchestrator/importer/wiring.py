@@ -257,7 +257,9 @@ class SettlingInputs:
 def equal_values(a: NDArray[Any], b: NDArray[Any], tolerance: float) -> bool:
     """Are values equal, relative to the largest? Booleans and integers count as numbers; NaN equals NaN."""
     wide_a, wide_b = a.astype(np.float64), b.astype(np.float64)
-    close = np.abs(wide_a - wide_b) <= tolerance * (SMALLEST + np.abs(wide_a).max())
+    # fmax: a value that is none does not hide how large the others are
+    largest = np.fmax.reduce(np.abs(wide_a), initial=0.0)
+    close = np.abs(wide_a - wide_b) <= tolerance * (SMALLEST + largest)
     return bool(np.all(close | (np.isnan(wide_a) & np.isnan(wide_b))))
 
 

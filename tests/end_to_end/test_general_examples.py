@@ -15,6 +15,7 @@ from support.fmu_factory import bouncing_ball
 from support.places import EXAMPLES
 
 from vibroimpact.analysis.dataset import Outcome, read_flat
+from vibroimpact.fmus.core.measuring import exciter_force, gaussian, sensor_reading
 
 SECONDS = ("point_seconds",)
 """Variables that no two runs have in common."""
@@ -79,6 +80,27 @@ def test_a_body_and_a_stop_of_two_fmi_versions_keep_the_period_one_orbit(tmp_pat
     dataset = read_flat(ran(tmp_path, "mixed_versions"))
     assert np.allclose(np.diff(dataset.event_time.values), 2.0 * math.pi, atol=1e-11)
     comes_back(tmp_path, "mixed_versions")
+
+
+def test_the_instruments_of_a_rig_say_what_their_equations_say(tmp_path: Path) -> None:
+    dataset = read_flat(ran(tmp_path, "measuring_chain"))
+    assert dataset.outcome.values[0] == Outcome.ok
+    time, x = dataset.time.values, dataset.body_displacement.values
+    volts = dataset.generator_displacement.values
+    assert volts == pytest.approx(4.0 * np.cos(40.0 * math.pi * time), abs=1e-12)
+    assert np.array_equal(dataset.exciter_force.values, exciter_force(volts, x, 2.0, 0.5, 0.02))
+    reading = sensor_reading(x, 1000.0, 0.1, 5.0)
+    assert np.array_equal(dataset.sensor_output.values, reading)
+    numbers = gaussian(16, 0, 0, 501)[np.floor(time * 1000.0 + 1e-4).astype(int)]
+    assert np.array_equal(dataset.noise_output.values, reading + 0.01 * numbers)
+    steps = dataset.input_output.values / (10.0 / 4096)
+    assert np.array_equal(steps, np.round(steps))
+    assert np.array_equal(dataset.input_sample.values, np.ceil((time - 1.2e-5 - 1e-12) * 1000.0) - 1)
+    impulse = dataset.body_contact_1_total_impulse.values[-1]
+    assert dataset.body_contact_1_total_impulse.values[0] == 0.0
+    shown = np.trapezoid(dataset.cell_output.values - 0.02, time) / 0.01
+    assert shown == pytest.approx(impulse, rel=0.02)  # five samples a half sine
+    comes_back(tmp_path, "measuring_chain")
 
 
 def test_a_ball_without_events_bounces_where_it_must(tmp_path: Path) -> None:

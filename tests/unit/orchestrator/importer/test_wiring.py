@@ -7,6 +7,7 @@ import zipfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 from support import fmu_factory
 from support.coupled_parts import EXCHANGES, body, link, part, values
@@ -19,7 +20,7 @@ from vibroimpact.orchestrator.importer.component import Component, Value
 from vibroimpact.orchestrator.importer.energy import InterfaceEnergy
 from vibroimpact.orchestrator.importer.master import Importer
 from vibroimpact.orchestrator.importer.specification import ComponentSpec, ConnectionSpec, EventSpec
-from vibroimpact.orchestrator.importer.wiring import order_of, transfers_of
+from vibroimpact.orchestrator.importer.wiring import equal_values, order_of, transfers_of
 
 LOOP = 1e-9
 """Solution of a loop: its residual, 1e-12 relative, over the distance of its gain from 1."""
@@ -467,3 +468,11 @@ def test_a_bad_status_in_a_prebound_path_names_instance_and_function(
     importer.plan_moves()
     with pytest.raises(ComponentError, match="g: fmi2SetReal returned error"):
         importer.advance(1.0)
+
+
+def test_a_value_that_is_none_leaves_the_others_comparable() -> None:
+    none = np.array([np.nan, 1.0, 2.0])
+    assert equal_values(none, none.copy(), 1e-12)
+    assert not equal_values(none, np.array([np.nan, 1.0, 2.1]), 1e-12)
+    assert not equal_values(none, np.array([0.0, 1.0, 2.0]), 1e-12)
+    assert equal_values(np.full(2, np.nan), np.full(2, np.nan), 1e-12)
