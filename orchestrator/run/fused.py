@@ -18,7 +18,13 @@ from vibroimpact.orchestrator.fmi.instance import DISCARD, WrapOf
 from vibroimpact.orchestrator.fmi.instance3 import Instance3
 from vibroimpact.orchestrator.fmi.variables import VariableGroup
 from vibroimpact.orchestrator.importer.component import description_of
-from vibroimpact.orchestrator.run.record import ROW_CAPACITY, ROW_WIDTH, ImpactLimitReached, RecordedBody
+from vibroimpact.orchestrator.run.record import (
+    ROW_CAPACITY,
+    ROW_WIDTH,
+    DeadlineReached,
+    ImpactLimitReached,
+    RecordedBody,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,10 +161,8 @@ class BodyDriver(RecordedBody):
 
         Raises
         ------
-        ImpactLimitReached
-            At the limit of impacts of the run; it has the samples before.
-        DeadlineReached
-            After the deadline of the run.
+        ImpactLimitReached, DeadlineReached
+            At the limit of impacts of the run, or after its deadline; they have the samples before.
         ComponentError
             The body fails, or touches the exciter.
         """
@@ -183,7 +187,8 @@ class BodyDriver(RecordedBody):
         )
         end = stepping.HoldEnd.again
         while end == stepping.HoldEnd.again:
-            self._deadline.refuse_late()
+            if self._deadline.is_over:
+                raise DeadlineReached(samples[: block.at])
             end = stepping.hold_samples(self._functions, plan, block)
             self.instance.time = block.time
             if block.rows_used:

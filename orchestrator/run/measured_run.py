@@ -17,13 +17,15 @@ from numpy.typing import NDArray
 
 from vibroimpact.orchestrator.run.fused import BodyDriver
 from vibroimpact.orchestrator.run.measuring_chain import MeasuringChain, held_exciter
-from vibroimpact.orchestrator.run.record import ROW_IMPACT, ImpactLimitReached, Rows, in_time_order
+from vibroimpact.orchestrator.run.record import ROW_IMPACT, Rows, RunEnded, in_time_order
 from vibroimpact.orchestrator.run.time_series import TimeSeriesPlan
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.measuring_models import CHANNELS, DRIVE
 
 Floats = NDArray[np.float64]
 INSTANTS_OF_A_BLOCK = 2048
+MOST_INSTANTS_BEFORE = 10**6
+"""Instants before the recording at which a load cell is followed, at most: one without damping never forgets."""
 _ROUNDING = 1e-12
 """Relative rounding by which a last sample may lie beyond the end of the recording."""
 
@@ -166,8 +168,8 @@ class MeasuredRun:
         """The sample with which the blocks begin: 0, or one before the recording."""
         before = self._whole(self._begin)
         if self._exciter is None:
-            lead = self._chain.lead * self._rate
-            before = math.ceil(lead) if lead < before else before
+            lead = min(self._chain.lead * self._rate, float(before), MOST_INSTANTS_BEFORE / self._pieces)
+            before = math.ceil(lead)
         return next(number for number in itertools.count(-before) if self._edge(number) >= 0.0)
 
     def _blocks(self) -> Iterator[tuple[int, int]]:
@@ -205,12 +207,12 @@ class MeasuredRun:
             held = np.full(steps, self._parameters.get("force", 0.0))
             renewed = np.zeros(steps, dtype=np.uint8)  # it is a parameter of the run
         known = len(self._driver.rows.blocks)
-        limit = None
+        limit: RunEnded | None = None
         try:
             rows = self._driver.hold(
                 ends, held, self._variables, renewed=renewed, exciter=self._exciter, recording=True
             )
-        except ImpactLimitReached as reached:
+        except RunEnded as reached:
             rows, limit = reached.samples, reached
         ends, held = ends[: len(rows)], held[: len(rows)]
         impacts = in_time_order(Rows(self._driver.rows.blocks[known:]).of_kind(ROW_IMPACT))

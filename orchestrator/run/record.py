@@ -25,13 +25,13 @@ _NOTHING: NDArray[np.float64] = np.empty(0)
 OBSERVED = ("displacement", "velocity")
 
 
-class ImpactLimitReached(Exception):
-    """A run met `impact_limit` impacts, touch-downs and rests; it ends here with what it has.
+class RunEnded(Exception):
+    """A run ends before its end, with what it has.
 
     Attributes
     ----------
     samples : ndarray, shape (sample, output)
-        The samples of a block before the limit.
+        The samples of a block before its end.
     """
 
     def __init__(self, samples: NDArray[np.float64] | None = None) -> None:
@@ -39,8 +39,12 @@ class ImpactLimitReached(Exception):
         super().__init__()
 
 
-class DeadlineReached(Exception):
-    """A run took longer than its deadline; it ends here with what it has."""
+class ImpactLimitReached(RunEnded):
+    """A run met `impact_limit` impacts, touch-downs and rests."""
+
+
+class DeadlineReached(RunEnded):
+    """A run took longer than its deadline."""
 
 
 class Deadline:
@@ -53,9 +57,14 @@ class Deadline:
         """Give the run that begins so many seconds; None: as long as it takes."""
         self._end = math.inf if seconds is None else time.perf_counter() + seconds
 
+    @property
+    def is_over(self) -> bool:
+        """Whether the time is over."""
+        return time.perf_counter() > self._end
+
     def refuse_late(self) -> None:
         """Raise DeadlineReached when the time is over."""
-        if time.perf_counter() > self._end:
+        if self.is_over:
             raise DeadlineReached
 
     def look_on(self, step_start: float) -> None:

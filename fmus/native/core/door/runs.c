@@ -1,27 +1,14 @@
 #include "door/runs.h"
 
 #include <math.h>
-#include <time.h>
 
 #include "body/record.h"
+#include "door/seconds.h"
 
 enum { STATUS_WARNING = 1, STATUS_DISCARD = 2 };
 enum { NOT_BEGUN = 0, BEFORE_RECORDING = 1, RECORDING = 2, AT_END = 3 };
 /* What a piece of a run comes to, beside VI_RUNS_*. */
 enum { GO_ON = 0, RUN_ENDS = -1 };
-
-static double seconds_now(void)
-{
-    struct timespec now;
-    return timespec_get(&now, TIME_UTC) != 0 ? (double)now.tv_sec + 1e-9 * (double)now.tv_nsec : 0.0;
-}
-
-/* The clock of the day may be set back. */
-static double seconds_since(double then)
-{
-    const double passed = seconds_now() - then;
-    return passed > 0.0 ? passed : 0.0;
-}
 
 static bool went_well(int status)
 {
@@ -133,7 +120,7 @@ static int advance(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_point
         int came_to = step(f, p, end);
         if (came_to == GO_ON && p->time < end) {
             came_to = take_rows(f, plan, p);
-            if (came_to == GO_ON && seconds_since(call) >= p->most_seconds) {
+            if (came_to == GO_ON && vi_seconds_since(call) >= p->most_seconds) {
                 came_to = VI_RUNS_LISTEN;
             }
         }
@@ -198,11 +185,11 @@ static int go_on(const vi_runs_fmu *f, const vi_runs_plan *plan, vi_runs_points 
 
 VI_DOOR int vi_door_runs(const vi_runs_fmu *fmu, const vi_runs_plan *plan, vi_runs_points *points)
 {
-    const double call = seconds_now();
+    const double call = vi_seconds_now();
     double since = call;
     while (points->at < points->count) {
         const int came_to = go_on(fmu, plan, points, call);
-        const double now = seconds_now();
+        const double now = vi_seconds_now();
         points->spent += now > since ? now - since : 0.0;
         since = now;
         if (came_to != GO_ON) {

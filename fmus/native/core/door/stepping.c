@@ -1,8 +1,11 @@
 #include "door/stepping.h"
 
 #include "body/record.h"
+#include "door/seconds.h"
 
 enum { STATUS_WARNING = 1, STATUS_DISCARD = 2 };
+/* Wall time of one call, s: signals and deadlines are heard between two. */
+static const double MOST_SECONDS = 0.05;
 
 static bool went_well(int status)
 {
@@ -90,6 +93,7 @@ static int read_sample(const vi_runs_fmu *f, const vi_hold_plan *plan, const vi_
 
 VI_DOOR int vi_door_hold(const vi_runs_fmu *fmu, const vi_hold_plan *plan, vi_hold_block *block)
 {
+    const double call = vi_seconds_now();
     while (block->at < block->count) {
         int came_to = block->begun ? VI_HOLD_DONE : set_force(fmu, plan, block);
         if (came_to == VI_HOLD_DONE) {
@@ -104,6 +108,9 @@ VI_DOOR int vi_door_hold(const vi_runs_fmu *fmu, const vi_hold_plan *plan, vi_ho
         }
         block->begun = 0;
         block->at += 1;
+        if (block->at < block->count && vi_seconds_since(call) >= MOST_SECONDS) {
+            return VI_HOLD_AGAIN;
+        }
     }
     return take_rows(fmu, plan, block);
 }

@@ -330,3 +330,38 @@ def test_a_scene_without_a_chain_loads_none_of_it() -> None:
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_deadline_is_heard_within_a_block_of_slow_samples() -> None:
+    # a beam that is pressed on an elastic stop: each sample takes milliseconds, none of them ends early
+    text = """\
+[body]
+kind = "beam"
+length = 0.25
+width = 0.02
+thickness = 0.002
+youngs_modulus = 70e9
+density = 2700
+modes = 4
+damping_ratio = 0.02
+[[stop]]
+position = 0.002
+restitution = 1.0
+[[stop]]
+position = -0.003
+side = "lower"
+restitution = 0.3
+[sensor]
+[exciter]
+gain = 2.6
+offset = 1.0
+[record]
+recorded_time = 0.3
+transient_time = 0.1
+time_series = { rate = 1000, variables = ["sensor.displacement"] }
+[execution]
+deadline = 0.2
+"""
+    record = run_of(parse_scene(text, "pressed.toml"))
+    assert record.outcome is Outcome.timeout
+    assert len(record.samples) < 301

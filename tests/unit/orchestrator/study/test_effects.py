@@ -9,8 +9,10 @@ import pytest
 from support.places import EXAMPLES
 
 import vibroimpact as vi
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.scene import Scene, load_scene
 from vibroimpact.orchestrator.study.effects import PAIRS, effects_of, not_called, shares_of
+from vibroimpact.orchestrator.study.measuring_effects import motion_alone
 
 BEAM: dict[str, Any] = {
     "body": {"kind": "beam", "modes": 4, "length": 0.3, "flexural_rigidity": 0.18, "mass_per_length": 0.16}
@@ -109,3 +111,48 @@ def test_a_component_is_taken_away_with_all_that_joins_it_and_the_others_are_com
     )
     off = np.abs(coupled - [np.cos(alone * time), -alone * np.sin(alone * time)]).max(axis=1)
     assert share.change == pytest.approx((off / np.ptp(coupled, axis=1)).max(), rel=0.02)
+
+
+MEASURED: dict[str, Any] = {
+    "body": {"mass": 1.0, "stiffness": 1000.0, "damping": 0.5},
+    "forcing": {"amplitude": 3.0, "frequency": 5.0},
+    "stop": [{"position": 0.01, "restitution": 0.7}],
+    "sensor": {"gain": 300.0},
+    "load_cell": {"sensitivity": 0.01, "contact_duration": 1e-3},
+    "exciter": {"gain": 1.5, "distance": 0.06},
+    "noise": {"sensor": 1e-3, "load_cell": 1e-3},
+    "daq": {"rate": 1000.0, "bits": 12, "range": 5.0},
+    "record": {"recorded_periods": 4, "time_series": {"variables": ["sensor.displacement", "load_cell"]}},
+}
+CHAIN = {"sensor", "load cell", "exciter", "force that falls with distance", "noise", "AD conversion"}
+
+
+def test_each_table_of_a_measuring_chain_is_taken_away_alone() -> None:
+    found = changes_of(MEASURED)
+    # without [daq] nothing holds a force that falls
+    assert set(found) & CHAIN == CHAIN - {"exciter", "AD conversion"}
+    assert found["load cell"].channels == ("sensor.displacement",)
+    assert found["load cell"].load_cell is None
+    assert found["sensor"].channels == ("load_cell",)
+    assert found["noise"].noise is None
+    assert not found["force that falls with distance"].falling_force
+    near = MEASURED | {"exciter": {"gain": 1.5}}
+    assert changes_of(near)["AD conversion"].sampling_rate == 1000.0
+    assert "force that falls with distance" in not_called(Scene.from_dict(near))
+
+
+def test_what_a_scene_lists_of_a_chain_are_its_tables() -> None:
+    bare = {name: MEASURED[name] for name in ("body", "forcing", "stop")} | {
+        "record": {"recorded_periods": 4}
+    }
+    assert set(not_called(Scene.from_dict(bare))) >= CHAIN
+    assert not set(not_called(Scene.from_dict(MEASURED))) & CHAIN
+
+
+def test_the_motion_of_a_scene_with_a_chain_is_forced_in_newtons() -> None:
+    alone = motion_alone(Scene.from_dict(MEASURED | {"exciter": {"gain": 1.5}}))
+    assert alone.forcing is not None
+    assert (alone.forcing.amplitude, alone.load_cell, alone.channels) == (4.5, None, ())
+    for exciter in ({"gain": 1.5, "distance": 0.06}, {"gain": 1.5, "offset": 0.1}):
+        with pytest.raises(UsageError, match="exciter: expected a force that is the forcing alone"):
+            motion_alone(Scene.from_dict(MEASURED | {"exciter": exciter}))
