@@ -1,7 +1,7 @@
 """The task of the inputs on a server, which outlives a program that was killed.
 
-A server keeps a task, and with it the inputs, until somebody clears it. So the task of an acquisition has a name by which
-the next program finds it. If nobody reads from it any more, its program is dead, and it is cleared.
+A server keeps a task, and with it the inputs, until somebody clears it. So the task of an acquisition has a name by
+which the next program finds it. If nobody reads from it any more, its program is dead, and it is cleared.
 """
 
 from __future__ import annotations
