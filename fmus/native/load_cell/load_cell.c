@@ -22,14 +22,21 @@ static void update_outputs(void *self)
     it->cell.force = before;
 }
 
+static void check_up_to(char *message, const char *name, double value, int largest)
+{
+    if (!((value >= VI_CELL_LEAST && value <= largest) || (value >= 0.0 && value <= 0.0))) {
+        vi_complain(message, "%s: expected 0 or %g to %d, got %.17g", name, VI_CELL_LEAST, largest, value);
+    }
+}
+
 static void check_parameters(const vi_cell_settings *given, char *message)
 {
     vi_check_finite(message, "sensitivity", given->sensitivity);
-    vi_check_not_negative(message, "natural_frequency", given->natural_frequency);
-    vi_check_not_negative(message, "damping_ratio", given->damping_ratio);
+    check_up_to(message, "natural_frequency", given->natural_frequency, VI_CELL_HIGHEST);
+    check_up_to(message, "damping_ratio", given->damping_ratio, VI_CELL_STRONGEST);
     vi_check_finite(message, "offset", given->offset);
     vi_check_finite(message, "drift", given->drift);
-    vi_check_not_negative(message, "contact_duration", given->contact_duration);
+    check_up_to(message, "contact_duration", given->contact_duration, VI_CELL_LONGEST);
 }
 
 static void check_inputs(const load_cell *it, char *message)
