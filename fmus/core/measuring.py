@@ -53,7 +53,7 @@ class LoadCell:
     natural_frequency : float
         Hz, 0 or 1e-9 to 1e7; 0: the cell does not ring, y is the force.
     damping_ratio : float
-        0 or 1e-9 to 1000.
+        0 to 1000.
     offset, drift : float
         Zero of the output, V, and how it goes on from time 0, V/s.
     contact_duration : float
@@ -88,8 +88,9 @@ class LoadCell:
             ("contact_duration", contact_duration),
         ):
             largest = CELL_LIMITS[name]
-            good = value == 0.0 or CELL_LEAST <= value <= largest
-            _check(good, f"LoadCell: {name}", f"0 or {CELL_LEAST:g} to {largest:g}", value)
+            least = 0.0 if name == "damping_ratio" else CELL_LEAST
+            good = value == 0.0 or least <= value <= largest
+            _check(good, f"LoadCell: {name}", f"0 {f'or {least:g} ' if least else ''}to {largest:g}", value)
         self._settings = _Settings(
             sensitivity, natural_frequency, damping_ratio, offset, drift, contact_duration
         )
