@@ -18,6 +18,9 @@ Array = NDArray[np.float64]
 #: Sides of a body on which an exciter may be, each with its number in the FMU.
 EXCITER_SIDES = {"lower": 1, "upper": 2}
 MOST_BITS = 32
+#: Largest numbers of a load cell: Hz, 1, s; and the least but 0.
+CELL_LIMITS = {"natural_frequency": 1e7, "damping_ratio": 1e3, "contact_duration": 1e3}
+CELL_LEAST = 1e-9
 #: Relative rounding by which an impact may lie before or after a block.
 _SAME_INSTANT = 1e-12
 
@@ -48,13 +51,13 @@ class LoadCell:
     sensitivity : float
         V/N.
     natural_frequency : float
-        Hz, >= 0; 0: the cell does not ring, y is the force.
+        Hz, 0 or 1e-9 to 1e7; 0: the cell does not ring, y is the force.
     damping_ratio : float
-        >= 0.
+        0 to 1000.
     offset, drift : float
         Zero of the output, V, and how it goes on from time 0, V/s.
     contact_duration : float
-        Of an impact, s, >= 0; 0: no impacts come.
+        Of an impact, s, 0 or 1e-9 to 1000; 0: no impacts come.
 
     Raises
     ------
@@ -84,7 +87,10 @@ class LoadCell:
             ("damping_ratio", damping_ratio),
             ("contact_duration", contact_duration),
         ):
-            _check(0.0 <= value < math.inf, f"LoadCell: {name}", "a finite number >= 0", value)
+            largest = CELL_LIMITS[name]
+            least = 0.0 if name == "damping_ratio" else CELL_LEAST
+            good = value == 0.0 or least <= value <= largest
+            _check(good, f"LoadCell: {name}", f"0 {f'or {least:g} ' if least else ''}to {largest:g}", value)
         self._settings = _Settings(
             sensitivity, natural_frequency, damping_ratio, offset, drift, contact_duration
         )
@@ -144,6 +150,12 @@ class LoadCell:
                 "LoadCell: impact_times: expected at most 2048 impacts within one contact_duration "
                 f"({self._settings.contact_duration:g} s), got more. Take a shorter contact_duration."
             )
+        _check(
+            bool(np.all(np.isfinite(volts))),
+            "LoadCell: forces",
+            "what the cell can show",
+            "numbers too large",
+        )
         return volts
 
     def _check_block(self, at: Array, force: Array, hits: Array, impulse: Array) -> None:
@@ -322,9 +334,11 @@ def exciter_force(
     _check(0.0 <= distance < math.inf, "exciter_force: distance", "a finite number >= 0", distance)
     _check(side in EXCITER_SIDES, "exciter_force: side", "lower or upper", repr(side))
     row = _row("exciter_force: volts", volts, finite=False)
-    place = _row(
-        "exciter_force: displacement", np.broadcast_to(np.asarray(displacement, dtype=np.float64), row.shape)
+    place = _row("exciter_force: displacement", displacement)
+    _check(
+        len(place) in (1, len(row)), "exciter_force: displacement", f"one number or {len(row)}", len(place)
     )
+    place = np.ascontiguousarray(np.broadcast_to(place, row.shape))
     forces = np.empty_like(row)
     done = _library().vi_door_magnet(
         len(row), _data(row), _data(place), gain, offset, distance, EXCITER_SIDES[side], _data(forces)

@@ -22,14 +22,25 @@ static void update_outputs(void *self)
     it->cell.force = before;
 }
 
+static void check_range(char *message, const char *name, double value, double least, int largest)
+{
+    if (!((value >= least && value <= largest) || (value >= 0.0 && value <= 0.0))) {
+        char lower[32] = "";
+        if (least > 0.0) {
+            (void)snprintf(lower, sizeof lower, "or %g ", least);
+        }
+        vi_complain(message, "%s: expected 0 %sto %d, got %.17g", name, lower, largest, value);
+    }
+}
+
 static void check_parameters(const vi_cell_settings *given, char *message)
 {
     vi_check_finite(message, "sensitivity", given->sensitivity);
-    vi_check_not_negative(message, "natural_frequency", given->natural_frequency);
-    vi_check_not_negative(message, "damping_ratio", given->damping_ratio);
+    check_range(message, "natural_frequency", given->natural_frequency, VI_CELL_LEAST, VI_CELL_HIGHEST);
+    check_range(message, "damping_ratio", given->damping_ratio, 0.0, VI_CELL_STRONGEST);
     vi_check_finite(message, "offset", given->offset);
     vi_check_finite(message, "drift", given->drift);
-    vi_check_not_negative(message, "contact_duration", given->contact_duration);
+    check_range(message, "contact_duration", given->contact_duration, VI_CELL_LEAST, VI_CELL_LONGEST);
 }
 
 static void check_inputs(const load_cell *it, char *message)

@@ -19,14 +19,18 @@
 
 /* Half sines that may be under way at once. */
 enum { VI_CELL_PULSES = 2048 };
+/* Largest natural frequency (Hz), damping ratio and contact duration (s): no half sine then takes more than some thousand series. */
+enum { VI_CELL_HIGHEST = 10000000, VI_CELL_STRONGEST = 1000, VI_CELL_LONGEST = 1000 };
+/* Least natural frequency and contact duration but 0: their squares are numbers. */
+#define VI_CELL_LEAST 1e-9
 
 typedef struct {
     double sensitivity;       /* V/N */
-    double natural_frequency; /* Hz, >= 0; 0: none */
-    double damping_ratio;     /* >= 0 */
+    double natural_frequency; /* Hz, 0 or VI_CELL_LEAST to VI_CELL_HIGHEST; 0: none */
+    double damping_ratio;     /* 0 to VI_CELL_STRONGEST */
     double offset;            /* V */
     double drift;             /* V/s */
-    double contact_duration;  /* s, >= 0; 0: no impacts come */
+    double contact_duration;  /* s, 0 or VI_CELL_LEAST to VI_CELL_LONGEST; 0: no impacts come */
 } vi_cell_settings;
 
 typedef struct {

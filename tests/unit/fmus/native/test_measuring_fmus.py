@@ -204,8 +204,8 @@ def test_an_edge_at_the_start_is_the_first_sample() -> None:
     [
         ("Sensor", {"gain": math.nan}, "gain: expected a finite number, got"),
         ("Sensor", {"range": -1.0}, "range: expected a finite number >= 0, got -1"),
-        ("LoadCell", {"damping_ratio": -0.1}, "damping_ratio: expected a finite number >= 0, got -0.1"),
-        ("LoadCell", {"natural_frequency": math.inf}, "natural_frequency: expected a finite number >= 0, got inf"),
+        ("LoadCell", {"damping_ratio": -0.1}, "damping_ratio: expected 0 to 1000, got -0.1"),
+        ("LoadCell", {"natural_frequency": math.inf}, "natural_frequency: expected 0 or 1e-09 to 10000000, got inf"),
         ("Exciter", {"side": 3}, "side: expected 1 (lower) or 2 (upper), got 3"),
         ("Exciter", {"distance": 1.0, "displacement": -1.0}, "displacement: expected a body that does not touch"),
         ("Noise", {"rate": 0.0}, "rate: expected a finite number > 0, got 0"),
