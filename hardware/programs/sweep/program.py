@@ -6,13 +6,10 @@ leaves a step that was driven otherwise than planned.
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
 
-from vibroimpact.analysis import figures
-from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.outputs import writing
 from vibroimpact.analysis.files.folder_lock import locked_folder, make_folder
 from vibroimpact.fmus.errors import UsageError
@@ -31,6 +28,7 @@ from vibroimpact.hardware.programs.sweep.calibrating import (
     displacement_scale,
 )
 from vibroimpact.hardware.programs.sweep.dataset import DATASET, SweepRows, store, stored
+from vibroimpact.hardware.programs.sweep.live import LiveFigure
 from vibroimpact.hardware.programs.sweep.plan import planned
 from vibroimpact.hardware.programs.sweep.settings import SweepSettings
 from vibroimpact.hardware.rig.acquisition import Acquisition, Facts
@@ -40,9 +38,6 @@ from vibroimpact.hardware.rig.output import Output
 from vibroimpact.hardware.rig.stopping import stopped_by_signals
 from vibroimpact.orchestrator.campaign.progress import Progress
 
-LIVE = "live.png"
-LIVE_SECONDS = 3.0
-"""Time between two drawings of the live figure, s."""
 _SURE_SECONDS = 1.0
 """Time, besides that of a fall from the highest voltage, after which a step is sure, s."""
 _RATE_ROUNDING = 1e-9
@@ -115,7 +110,7 @@ class _Sweep:
         self._progress = progress or Progress()
         self._waiting: deque[tuple[int, MeasuredStep]] = deque()
         self._stopped_at: int | None = None
-        self._drawn = time.monotonic()
+        self._live = LiveFigure(folder)
         self._converters: list[Converter] = []
 
     def run(self, choice: str | None) -> bool:
@@ -138,9 +133,14 @@ class _Sweep:
                 self._note_start(inputs.facts)
                 output.start()
                 self._progress.begin(len(settings.steps), len(self._rows.steps))
-                self._follow(inputs, output)
-                output.wait()
+                try:
+                    self._follow(inputs, output)
+                    output.wait()
+                finally:
+                    self._live.close()
             self._keep(plan.samples if self._stopped_at is None else self._stopped_at)
+        if len(self._rows.steps) > 1:
+            self._live.finish()
         return self._stopped_at is not None
 
     def _take_note(self, facts: Facts, rig: str) -> None:
@@ -198,12 +198,5 @@ class _Sweep:
             if step.flags:
                 direction, frequency = self._settings.steps[step.place]
                 self._progress.note(f"{direction.name} {frequency:g} Hz: {step.message}")
-            if time.monotonic() - self._drawn >= LIVE_SECONDS or self._rows.complete:
-                self._draw()
-
-    def _draw(self) -> None:
-        """Draw what is measured so far."""
-        if len(self._rows.steps) > 1:
-            with open_dataset(self._folder) as dataset, writing(self._folder / LIVE):
-                figures.save(figures.draw(dataset, "bifurcation"), self._folder / LIVE)
-        self._drawn = time.monotonic()
+            if len(self._rows.steps) > 1:
+                self._live.follow()

@@ -1,0 +1,66 @@
+"""The figure of a sweep that is under way, drawn by a process of its own: drawing would hold up the output."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from vibroimpact.analysis import figures, open_dataset
+from vibroimpact.analysis.dataset.outputs import writing
+from vibroimpact.fmus.python_child import python_command
+
+FILE = "live.png"
+SECONDS = 5.0
+"""Time between two drawings."""
+KIND = "bifurcation"
+_COMMANDS = "vibroimpact.orchestrator.commands.cli"
+
+
+class LiveFigure:
+    """The figure in the folder of a sweep.
+
+    Parameters
+    ----------
+    folder : Path
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._drawn = time.monotonic()
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def follow(self) -> None:
+        """Draw what the folder has by now, if some seconds have passed since it was drawn."""
+        if time.monotonic() - self._drawn >= SECONDS and (
+            self._process is None or self._process.poll() is not None
+        ):
+            self._start()
+
+    def finish(self) -> None:
+        """Draw what the folder has at the end, when no output waits any more."""
+        self.close()
+        with open_dataset(self._folder) as dataset, writing(self._folder / FILE):
+            figures.save(figures.draw(dataset, KIND), self._folder / FILE)
+
+    def close(self) -> None:
+        """Let no drawing go on."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+
+    def _start(self) -> None:
+        self._drawn = time.monotonic()
+        folder, figure = str(self._folder), str(self._folder / FILE)
+        self._process = subprocess.Popen(
+            python_command("-m", _COMMANDS, "plot", folder, "-o", figure, "--kind", KIND),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,  # what is wrong is said by the last drawing
+            start_new_session=True,  # Ctrl-C ends the sweep, not its figure
+        )
+        with suppress(OSError, AttributeError):  # where priorities are not to be had
+            os.setpriority(os.PRIO_PROCESS, self._process.pid, 10)
