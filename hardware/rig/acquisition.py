@@ -25,6 +25,7 @@ from vibroimpact.hardware import daqmx
 from vibroimpact.hardware.rig.inputs import Input
 from vibroimpact.hardware.rig.lateness import Lateness
 from vibroimpact.hardware.rig.opening import Rig
+from vibroimpact.hardware.rig.sessions import input_task
 
 Floats = NDArray[np.float64]
 
@@ -80,6 +81,11 @@ class Gap:
     doubt: float
     reason: str
 
+    @property
+    def end(self) -> int:
+        """Number of the first sample after it."""
+        return self.first + self.samples
+
 
 @dataclass(frozen=True, slots=True)
 class Facts:
@@ -122,9 +128,11 @@ class Acquisition:
 
     Attributes
     ----------
+    rig : Rig
     facts : Facts
         From `__enter__` on.
     gaps : list of Gap
+        The last one may grow until a block after it has come.
     lateness : Lateness
 
     Raises
@@ -153,7 +161,7 @@ class Acquisition:
             raise UsageError(f"--rate: expected a number > 0, got {rate:g}.")
         if count is not None and count < 1:
             raise UsageError(f"samples: expected 1 or more, got {count}.")
-        self._rig, self._inputs, self._asked = rig, tuple(inputs), rate
+        self.rig, self._inputs, self._asked = rig, tuple(inputs), rate
         self._count, self._trigger = count, trigger
         self.gaps: list[Gap] = []
         self._waiting: deque[Block] = deque()
@@ -167,7 +175,7 @@ class Acquisition:
 
     def __enter__(self) -> Acquisition:
         """Make the task."""
-        self._task = daqmx.nidaqmx.Task(grpc_options=self._rig.options())
+        self._task = input_task(self.rig, self._inputs[0].terminal.strip("/").partition("/")[0])
         try:
             self._configure()
         except BaseException:
@@ -259,7 +267,7 @@ class Acquisition:
 
     def _refuse_silence(self) -> None:
         if self._called and time.monotonic() - self._called > SILENCE:
-            raise RigError(f"{self._rig.name}: expected an answer within {SILENCE:g} s, got none.")
+            raise RigError(f"{self.rig.name}: expected an answer within {SILENCE:g} s, got none.")
 
     # ---- in the thread that reads ----
 
@@ -338,9 +346,9 @@ class Acquisition:
 
     def _lost(self, first: int, doubt: float, reason: str) -> None:
         """Go on with a later sample; what is before it is a gap, or the rest of one."""
-        begin = self._next
         last = self.gaps[-1] if self.gaps else None
-        if last is not None and last.first + last.samples == begin and last.reason == reason and not doubt:
-            begin = self.gaps.pop().first
-        self.gaps.append(Gap(begin, first - begin, doubt, reason))
+        if last is not None and last.end == self._next and last.reason == reason and not doubt:
+            self.gaps[-1] = replace(last, samples=first - last.first)
+        else:
+            self.gaps.append(Gap(self._next, first - self._next, doubt, reason))
         self._next = first

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from vibroimpact.fmus.errors import RigError, UsageError
+from vibroimpact.fmus.errors import RigError, UsageError, VibroimpactError
 from vibroimpact.hardware import daqmx
 from vibroimpact.hardware.virtual_rig.serving import served
 from vibroimpact.hardware.virtual_rig.settings import read_rig
@@ -70,15 +70,20 @@ def opened_rig(choice: str | None) -> Iterator[Rig]:
     try:
         with _connected(choice) as rig:
             yield rig
-    except daqmx.DaqNotFoundError:
-        raise UsageError(
-            f"rig: expected the driver NI-DAQmx on this machine, got none. {THREE_WAYS}."
-        ) from None
-    except daqmx.RpcError as error:
-        raise RigError(f"{choice}: expected a rig that answers, got none: {_one_line(error)}.") from None
-    except daqmx.DaqError as error:
+    except (daqmx.DaqNotFoundError, daqmx.RpcError, daqmx.DaqError) as error:
+        raise refusal_of(choice, error) from None
+
+
+def refusal_of(choice: str | None, error: Exception) -> VibroimpactError:
+    """Return what is said of what a rig refused, in one line."""
+    if isinstance(error, VibroimpactError):
+        return error
+    if isinstance(error, daqmx.DaqNotFoundError):
+        return UsageError(f"rig: expected the driver NI-DAQmx on this machine, got none. {THREE_WAYS}.")
+    if isinstance(error, daqmx.DaqError):
         kind = UsageError if error.error_code in ASKED_WRONGLY else RigError
-        raise kind(f"{choice or 'local'}: {_one_line(error)}") from None
+        return kind(f"{choice or 'local'}: {_one_line(error)}")
+    return RigError(f"{choice}: expected a rig that answers, got none: {_one_line(error)}.")
 
 
 @contextmanager
