@@ -7,10 +7,27 @@ from typing import Annotated
 
 import typer
 
+from vibroimpact.analysis.commands.shared_options import Force
+
 RigFile = Annotated[Path, typer.Argument(help="File of a virtual rig (TOML).", metavar="RIG.toml")]
 RigChoice = Annotated[
     str | None,
     typer.Option("--rig", help="virtual:RIG.toml, grpc://host:port or local.", metavar="RIG"),
+]
+
+Recorded = Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.nc).")]
+Channels = Annotated[
+    list[str],
+    typer.Option(
+        help="NAME=TERMINAL[,RANGE]: an input and its range in V; repeat it, 8 at most.",
+        metavar="NAME=TERMINAL[,RANGE]",
+    ),
+]
+Rate = Annotated[float, typer.Option(help="Samples per second and channel.")]
+Duration = Annotated[float | None, typer.Option(help="s; else until Ctrl-C.")]
+Calibrations = Annotated[
+    list[Path] | None,
+    typer.Option(help="File of calibrations (TOML): volts become m, N.", metavar="FILE.toml"),
 ]
 
 
@@ -20,6 +37,8 @@ def register(app: typer.Typer) -> None:
     group.command("serve")(serve)
     group.command("devices")(devices)
     group.command("record")(record)
+    group.command("spikes")(spikes)
+    group.command("recover")(recover)
     group.command("sweep")(sweep)
     app.add_typer(group, name="rig")
 
@@ -54,26 +73,82 @@ def devices(rig: RigChoice = None) -> None:
 
 
 def record(
-    output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.nc).")],
-    channel: Annotated[
-        list[str],
+    output: Recorded,
+    channel: Channels,
+    rate: Rate,
+    duration: Duration = None,
+    loopback: Annotated[
+        list[str] | None,
         typer.Option(
-            help="NAME=TERMINAL[,RANGE]: an input and its range in V; repeat it, 8 at most.",
-            metavar="NAME=TERMINAL[,RANGE]",
+            help="The same of an input to which an output is wired.", metavar="NAME=TERMINAL[,RANGE]"
         ),
-    ],
-    rate: Annotated[float, typer.Option(help="Samples per second and channel.")],
-    duration: Annotated[float, typer.Option(help="s.")],
+    ] = None,
+    calibration: Calibrations = None,
     rig: RigChoice = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace what is there.")] = False,
+    force: Force = False,
 ) -> None:
-    """Record inputs of a rig; the volts become a recording, which says which rig made it.
+    """Record inputs of a rig; the recording says which rig made it.
+
+    A journal beside it has all samples meanwhile: after any death of the program `rig recover` makes the recording.
 
     Example: vibroimpact rig record --rig virtual:RIG.toml --channel tip=Dev1/ai0,5 --rate 5000 --duration 2 -o tip.nc
     """
     from vibroimpact.hardware.programs.record import record_channels
 
-    record_channels(rig, channel, rate, duration, output, force)
+    record_channels(rig, channel, rate, duration, output, loopback or (), calibration or (), force)
+
+
+def spikes(
+    output: Recorded,
+    channel: Channels,
+    rate: Rate,
+    threshold: Annotated[
+        float, typer.Option(help="Beyond it is a pulse, unit of the channel; negative: below it.")
+    ],
+    duration: Duration = None,
+    pulses: Annotated[int | None, typer.Option(help="Pulses after which it ends.")] = None,
+    on: Annotated[str, typer.Option(help="Channel that has the pulses; else the first.")] = "",
+    presamples: Annotated[int, typer.Option(help="Samples that are kept of before a pulse.")] = 64,
+    postsamples: Annotated[int, typer.Option(help="Samples that are kept of after a pulse.")] = 64,
+    dead_time: Annotated[
+        float,
+        typer.Option(
+            help="Time from the start of a pulse, s, within which what passes the threshold belongs to it."
+        ),
+    ] = 0.0,
+    hysteresis: Annotated[
+        float, typer.Option(help="Part of the threshold below which a pulse is over.")
+    ] = 0.5,
+    calibration: Calibrations = None,
+    rig: RigChoice = None,
+    force: Force = False,
+) -> None:
+    """Record the pulses of a load cell with the samples around them; `vibroimpact spikes` measures them.
+
+    Example: vibroimpact rig spikes --rig local --channel cell=Dev1/ai1,5 --rate 50000 --threshold 0.1 -o hits.nc
+    """
+    from vibroimpact.hardware.programs.spikes import PulseOptions, record_pulses
+
+    options = PulseOptions(threshold, on, hysteresis, presamples, postsamples, dead_time, pulses)
+    record_pulses(rig, channel, rate, duration, options, output, calibration or (), force)
+
+
+def recover(
+    journal: Annotated[
+        Path, typer.Argument(help="Journal of a measurement that died.", metavar="REC.journal")
+    ],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Recording to write; else REC.nc beside it.")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Make the recording of a measurement that died, from its journal.
+
+    Example: vibroimpact rig recover tip.journal -o tip.nc
+    """
+    from vibroimpact.hardware.programs.recover import recover_into
+
+    recover_into(journal, output, force)
 
 
 def sweep(

@@ -14,7 +14,7 @@ from support.places import ROOT
 
 from vibroimpact.fmus.errors import RigError, UsageError
 from vibroimpact.hardware import daqmx
-from vibroimpact.hardware.rig import acquisition
+from vibroimpact.hardware.rig import acquisition, sessions
 from vibroimpact.hardware.rig.acquisition import Acquisition, Block
 from vibroimpact.hardware.rig.inputs import Input
 from vibroimpact.hardware.rig.opening import Rig
@@ -198,3 +198,25 @@ def test_a_rig_that_answers_no_more_is_said(bench: Bench, monkeypatch: pytest.Mo
 def test_what_is_no_acquisition_is_refused(inputs: list[Input], rate: float, count: int) -> None:
     with pytest.raises(UsageError, match="expected"):
         Acquisition(Rig("none", None), inputs, rate, count=count)
+
+
+def test_inputs_of_a_program_that_died_are_freed_and_those_of_one_that_lives_are_not(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sessions, "LOOK_SECONDS", 0.4)
+    dead = Acquisition(bench.rig, [TIP], 1000.0).__enter__()
+    dead._task.start()  # and never reads
+    bench.control.advance(0.1)
+    with Acquisition(bench.rig, [TIP], 1000.0) as living:
+        living.start()
+        reads = iter(living.blocks())
+        next(reads)
+        others = threading.Thread(target=lambda: list(reads))
+        others.start()
+        with (
+            pytest.raises(RigError, match="expected inputs that are free, got those of Dev1"),
+            Acquisition(bench.rig, [TIP], 1000.0),
+        ):
+            pass
+        living.stop()
+        others.join()

@@ -1,0 +1,205 @@
+"""What programs that measure have in common: what is asked for, checked; the rig opened; the recording at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
+from vibroimpact.analysis.recording import Recording
+from vibroimpact.fmus.errors import RigError, UsageError, VibroimpactError
+from vibroimpact.hardware import daqmx
+from vibroimpact.hardware.programs.keeping import Store, keep_all, recording_in, write_and_show
+from vibroimpact.hardware.programs.pulses import PulseFinder
+from vibroimpact.hardware.rig.acquisition import Acquisition, Facts
+from vibroimpact.hardware.rig.calibration import Calibration, read_calibrations
+from vibroimpact.hardware.rig.inputs import Input, inputs_of
+from vibroimpact.hardware.rig.journal import ENDING, Journal, refuse_full_disk, refuse_journal
+from vibroimpact.hardware.rig.live import shown_live
+from vibroimpact.hardware.rig.measurement import FEWEST_SAMPLES, Measurement
+from vibroimpact.hardware.rig.opening import Rig, opened_rig, refusal_of
+from vibroimpact.hardware.rig.stopping import stopped_by_signals
+
+UNKNOWN_DURATION = 60.0
+"""Time, s, for which a disk must have room where nobody says how long it is to be measured."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Which inputs are measured, how fast and how long.
+
+    Attributes
+    ----------
+    inputs : tuple of Input
+    loopbacks : frozenset of str
+        Names of those to which an output is wired.
+    calibrations : dict of Calibration
+    rate : float
+        Hz.
+    duration : float or None
+        s; None: until it is stopped.
+    """
+
+    inputs: tuple[Input, ...]
+    loopbacks: frozenset[str]
+    calibrations: dict[str, Calibration]
+    rate: float
+    duration: float | None
+
+    @property
+    def count(self) -> int | None:
+        """Samples of each input."""
+        return None if self.duration is None else round(self.rate * self.duration)
+
+
+def wanted_of(
+    channels: Sequence[str],
+    loopbacks: Sequence[str],
+    calibrations: Sequence[Path],
+    rate: float,
+    duration: float | None,
+) -> Wanted:
+    """Return what is asked for.
+
+    Raises
+    ------
+    UsageError
+        Something of it cannot be meant; nothing was opened yet.
+    """
+    inputs = inputs_of([*channels, *loopbacks])
+    if not inputs:
+        raise UsageError(
+            "--channel: expected an input or more, got none. For example --channel tip=Dev1/ai0,5."
+        )
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise UsageError(f"--rate: expected samples per second > 0, got {rate:g}.")
+    count = np.inf if duration is None else rate * duration
+    if duration is not None and not (np.isfinite(count) and round(count) >= FEWEST_SAMPLES):
+        raise UsageError(
+            f"--rate, --duration: expected {FEWEST_SAMPLES} samples or more, got {rate:g} Hz for {duration:g} s."
+        )
+    back = frozenset(each.name for each in inputs[len(channels) :])
+    return Wanted(tuple(inputs), back, read_calibrations(calibrations, inputs), rate, duration)
+
+
+Describe = Callable[[Rig, Facts], Measurement]
+
+
+def measured(
+    rig: str | Rig | None,
+    wanted: Wanted,
+    describe: Describe,
+    *,
+    most_pulses: int | None = None,
+    journal: Path | None = None,
+    live: bool = False,
+) -> Recording:
+    """Measure, and return the recording; its attribute `ended` says why it is shorter than asked for.
+
+    Parameters
+    ----------
+    rig : str, Rig or None
+        As `--rig` has it, or one that is open; None: the board of this machine.
+    wanted : Wanted
+    describe : callable
+        Returns the measurement, once the device has said what it makes of the inputs and the rate.
+    most_pulses : int or None
+        Pulses after which it ends, of a measurement of pulses.
+    journal : Path or None
+        Where all is kept meanwhile; None: in memory. It stays there: who has the recording removes it.
+    live : bool
+        Show how it goes.
+
+    Raises
+    ------
+    UsageError, RigError
+        The rig refuses what is asked for, or fails before there are samples.
+    """
+    with ExitStack() as stack:
+        opened = rig if isinstance(rig, Rig) else stack.enter_context(opened_rig(rig))
+        try:
+            acquired = stack.enter_context(
+                Acquisition(opened, wanted.inputs, wanted.rate, count=wanted.count)
+            )
+            measurement = describe(opened, acquired.facts)
+            _refuse_many(measurement, wanted)
+            header = measurement.model_dump(mode="json")
+            file = None if journal is None else stack.enter_context(Journal(journal, header))
+            stack.enter_context(stopped_by_signals(acquired.stop))
+            return _kept(acquired, measurement, Store(header, file), wanted, most_pulses, live)
+        except (daqmx.DaqError, daqmx.RpcError) as error:
+            raise refusal_of(opened.name, error) from None
+
+
+def _kept(
+    acquired: Acquisition,
+    measurement: Measurement,
+    store: Store,
+    wanted: Wanted,
+    most_pulses: int | None,
+    live: bool,
+) -> Recording:
+    finder = None if measurement.pulses is None else PulseFinder(measurement, most_pulses)
+    most = None if finder is None and wanted.count is not None else measurement.most_samples
+    with shown_live(acquired, measurement.inputs, wanted.duration, live) as progress:
+        failure = keep_all(acquired, store, progress, finder, most)
+    if failure is not None and not store.kept:
+        raise failure
+    if finder is not None and not finder.starts:
+        raise RigError(finder.none_found)
+    return recording_in(store.content(), measurement.rig)
+
+
+def _refuse_many(measurement: Measurement, wanted: Wanted) -> None:
+    if measurement.pulses is None and (wanted.count or 0) > measurement.most_samples:
+        raise UsageError(
+            f"--rate, --duration: expected at most {measurement.most_samples} samples of each of "
+            f"{len(measurement.inputs)} inputs, as a recording takes, got {wanted.count}."
+        )
+
+
+def measure_into(
+    output: Path,
+    force: bool,
+    rig: str | None,
+    wanted: Wanted,
+    describe: Describe,
+    *,
+    in_pieces: bool = False,
+    most_pulses: int | None = None,
+) -> None:
+    """Measure into a file, with a journal beside it meanwhile, which is removed when the file is safely there.
+
+    Where only pieces are kept (`in_pieces`) nobody knows how many: the disk must have room for those of a minute.
+
+    Raises
+    ------
+    UsageError
+        Before anything is measured: the file, its disk, or what is asked for is not to be had. After: the file
+        could not be written; the journal is still there.
+    RigError
+        The measurement ended early; what was measured until then is in the file.
+    """
+    refuse_outputs((), output, None)
+    refuse_overwriting(output, force, lambda there: False)
+    journal = output.with_suffix(ENDING)
+    refuse_journal(journal)
+    seconds = UNKNOWN_DURATION if wanted.duration is None else wanted.duration
+    if in_pieces:
+        seconds = min(seconds, UNKNOWN_DURATION)
+    refuse_full_disk(output.parent, 8.0 * len(wanted.inputs) * wanted.rate * seconds)
+    recording = measured(rig, wanted, describe, most_pulses=most_pulses, journal=journal, live=True)
+    with stopped_by_signals(lambda: None):
+        try:
+            write_and_show(recording, output)
+        except VibroimpactError as error:
+            raise UsageError(
+                f"{error}\nAll that was measured is in {journal}: vibroimpact rig recover {journal} -o FILE.nc"
+            ) from None
+        journal.unlink()
+    if recording.attrs.get("ended"):
+        raise RigError(f"{recording.attrs['rig']}: ended early: {recording.attrs['ended']}")

@@ -1,0 +1,42 @@
+"""Make the recording of a measurement that died, from its journal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
+from vibroimpact.analysis.recording import Recording
+from vibroimpact.fmus.terminal import say
+from vibroimpact.hardware.programs.keeping import recording_in, write_and_show
+from vibroimpact.hardware.rig.journal import read_journal
+
+
+def recover(journal: Path) -> Recording:
+    """Return the recording of all that is whole in a journal.
+
+    Parameters
+    ----------
+    journal : Path
+
+    Raises
+    ------
+    UsageError
+        There is none, or a program is still writing it.
+    DatasetError
+        It is no journal.
+    RigError
+        There are fewer than two samples in it.
+    """
+    content = read_journal(journal)
+    if content.lost_bytes:
+        content.notes.append({"remark": f"{content.lost_bytes} bytes of the journal are damaged or cut off"})
+    return recording_in(content, str(journal))
+
+
+def recover_into(journal: Path, output: Path | None, force: bool) -> None:
+    """Write the recording of a journal; the journal stays."""
+    target = output or journal.with_suffix(".nc")
+    refuse_outputs([journal], target, None)
+    refuse_overwriting(target, force, lambda there: False)
+    write_and_show(recover(journal), target)
+    say(f"{journal} is still there; remove it when the recording has what you need.")
