@@ -91,11 +91,11 @@ class MeasuringChain:
             assert sensor is not None  # the scene's rules see to it
             found[name] = sensor_reading(values[variable], sensor.gain, sensor.offset, sensor.range or 0.0)
         if self._cell is not None:
-            hits, impulses = self._hits(impacts)
+            hits, impulses = self.hits(impacts)
             found[LOAD_CELL] = self._cell.follow(times, values[self._force], hits, impulses)
         return found
 
-    def _hits(self, impacts: Floats) -> tuple[Floats, Floats]:
+    def hits(self, impacts: Floats) -> tuple[Floats, Floats]:
         """Return instants and impulses of what hits the load cell as half sines."""
         cell = self._scene.load_cell
         if cell is None or not self.needs_impacts:
