@@ -55,8 +55,9 @@ class MeasuredSession:
     Notes
     -----
     Steps are cut so that `RING_INSTANTS` are in a period of the load cell's ring: between them the force on the cell is
-    taken to be linear. Of a long step only as much is cut as the cell remembers, 5000 pieces at most. How samples are
-    cut into blocks makes no difference, unless more than 1000 impacts are within a contact_duration.
+    taken to be linear. Of a long step only as much is cut as the cell remembers, 5000 pieces at most. Behind a rigid
+    stop nothing is cut: half sines are exact at any step, and the force of a body at rest there is linear over it.
+    How samples are cut into blocks makes no difference, unless more than 1000 impacts are within a contact_duration.
 
     The last bounces of a chatter, which the body sums, are not in the voltage of the load cell: they are slower than
     1e-4 of its first.

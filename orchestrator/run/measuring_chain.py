@@ -51,9 +51,10 @@ class MeasuringChain:
 
     @property
     def finest(self) -> float:
-        """Longest step that follows the ring of the load cell, s; 0: there is no ring."""
+        """Longest step that follows the ring of the load cell, s; 0: none, or impacts make it, exact at any step."""
         cell = self._scene.load_cell
-        ring = cell.natural_frequency if cell is not None and self._cell is not None else 0.0
+        rings = cell is not None and self._cell is not None and not self.needs_impacts
+        ring = cell.natural_frequency if cell is not None and rings else 0.0
         return 1.0 / (RING_INSTANTS * ring) if ring else 0.0
 
     @property
