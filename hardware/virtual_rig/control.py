@@ -164,7 +164,7 @@ class Controls:
             board.catch_up()
             return {
                 "time": board.plant.now * TICK,
-                **board.plant.truth,
+                **board.plant.truth(board.analog.driving),
                 "outputs": board.analog.held.tolist(),
             }
 
@@ -245,5 +245,8 @@ class RigControl:
             self._call("Vanish")
 
     def truth(self) -> dict[str, Any]:
-        """Return displacement (m), velocity (m/s), contact force (N) of the plant and `outputs` (V) now."""
+        """Return the plant now: displacement (m), velocity (m/s), forces (N) of stops, exciter, on a wired load cell.
+
+        `outputs` are in V; of a recording the channels are there, in V or their units.
+        """
         return self._call("Truth")

@@ -34,9 +34,8 @@ class Plant(Protocol):
     def state(self) -> dict[str, float]:
         """What inputs could see now, by the name of the signal."""
 
-    @property
-    def truth(self) -> dict[str, float]:
-        """What the control service says of it."""
+    def truth(self, volts: float) -> dict[str, float]:
+        """Return what the control service says of it, where a voltage drives it."""
 
     def noise_of(self, signal: str) -> float:
         """Return the rms of the noise on a signal, V; the empty one is the voltage of an output."""

@@ -116,9 +116,8 @@ class Playback:
         now: Floats = np.asarray([(self.now - self._origin) * TICK], dtype=np.float64)
         return {signal: float(track.at(now)[0]) for signal, track in self._tracks.items()}
 
-    @property
-    def truth(self) -> dict[str, float]:
-        """The channels now, in V or in their units."""
+    def truth(self, volts: float) -> dict[str, float]:
+        """Return the channels now, in V or in their units."""
         return self.state
 
     def close(self) -> None:

@@ -41,6 +41,11 @@ class Sampling:
         noise = {number: plant.noise_of(wire.signal) for number, wire in settings.wiring.inputs.items()}
         self.inputs = Inputs(profile.bits, noise, plant.seed, settings.rig.clock_error)
 
+    @property
+    def driving(self) -> float:
+        """The voltage that drives the plant now."""
+        return 0.0 if self._wiring.driver is None else float(self.held[self._wiring.driver])
+
     def advance(self, running: Sequence[Task], target: int) -> set[str]:
         """Let tasks and plant go on to a tick; return the names of the outputs that ran empty."""
         updates = {task.name: task.generated(target) for task in running if task.kind == OUTPUT}

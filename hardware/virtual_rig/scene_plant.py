@@ -53,10 +53,9 @@ class ScenePlant:
         self.fineness = self._session.fineness
         self.advance(np.array([1]), np.zeros(1))
 
-    @property
-    def truth(self) -> dict[str, float]:
-        """Displacement (m), velocity (m/s) and forces (N) now."""
-        return self._session.truth
+    def truth(self, volts: float) -> dict[str, float]:
+        """Return displacement (m), velocity (m/s) and forces (N) now."""
+        return {**self._session.truth, "exciter_force": self._session.exciter_force(volts)}
 
     def noise_of(self, signal: str) -> float:
         """Return the rms of the noise on a channel; on the wire of an output it is that of the drive."""

@@ -12,6 +12,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from vibroimpact.fmus.core.measuring import LoadCell, exciter_force
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.fused import BodyDriver
 from vibroimpact.orchestrator.run.measuring_chain import NO_IMPACTS, Floats, MeasuringChain, held_exciter
@@ -39,7 +40,8 @@ class MeasuredSession:
     Attributes
     ----------
     truth : dict of str to float
-        Displacement (m) and velocity (m/s) of the observed point, contact force of all stops (N), at the time reached.
+        Displacement (m) and velocity (m/s) of the observed point, contact force of all stops (N), and where the load
+        cell is among the channels the force on it (N), half sines of impacts included, at the time reached.
     impacts_of_block : ndarray, shape (impact, 7)
         Impacts that the last block recorded, columns `IMPACT_COLUMNS`; a contact with a stop that yields is in the
         block in which it ends.
@@ -53,8 +55,9 @@ class MeasuredSession:
     Notes
     -----
     Steps are cut so that `RING_INSTANTS` are in a period of the load cell's ring: between them the force on the cell is
-    taken to be linear. Of a long step only as much is cut as the cell remembers, 5000 pieces at most. How samples are
-    cut into blocks makes no difference, unless more than 1000 impacts are within a contact_duration.
+    taken to be linear. Of a long step only as much is cut as the cell remembers, 5000 pieces at most. Behind a rigid
+    stop nothing is cut: half sines are exact at any step, and the force of a body at rest there is linear over it.
+    How samples are cut into blocks makes no difference, unless more than 1000 impacts are within a contact_duration.
 
     The last bounces of a chatter, which the body sums, are not in the voltage of the load cell: they are slower than
     1e-4 of its first.
@@ -76,13 +79,18 @@ class MeasuredSession:
         values = {} if scene.forcing is None else {"forcing.amplitude": 0.0}
         self._scene, self._channels = scene.at(values), tuple(channels)
         self._chain = MeasuringChain(self._scene, channels)
+        exciter = held_exciter(self._scene)
+        assert exciter is not None  # a scene without one is refused
+        self._exciter = exciter
+        self._place = 0.0
         stops = [f"contact[{k}].force" for k in range(1, len(scene.stops) + 1)]
-        self._variables = tuple(dict.fromkeys(("displacement", "velocity", *stops, *self._chain.variables)))
+        told = ("displacement", "velocity", exciter.displacement, *stops)
+        self._variables = tuple(dict.fromkeys((*told, *self._chain.variables)))
         driver = driver_of(self._scene, "fused")
         assert isinstance(driver, BodyDriver)
         self._driver = driver
         driver.watch(contacts=len(scene.stops), sampled=self._variables, state=state_variables(scene))
-        self._exciter = held_exciter(self._scene)
+        self._on_cell: LoadCell | None = None
         self.truth: dict[str, float] = {}
         self.impacts_of_block = NO_IMPACTS
 
@@ -111,7 +119,10 @@ class MeasuredSession:
         self._chain.begin(
             0.0, {name: np.array([now]) for name, now in zip(self._variables, row, strict=True)}
         )
-        self._tell(dict(zip(self._variables, row, strict=True)))
+        cell = self._scene.load_cell
+        self._on_cell = LoadCell(1.0, contact_duration=cell.contact_duration or 0.0) if cell else None
+        now = {name: np.array([value]) for name, value in zip(self._variables, row, strict=True)}
+        self._tell(np.zeros(1), now, NO_IMPACTS)
         self.impacts_of_block = NO_IMPACTS
 
     def advance(self, times: Floats, volts: Floats) -> dict[str, Floats]:
@@ -163,7 +174,7 @@ class MeasuredSession:
         impacts = in_time_order(self._driver.rows.of_kind(ROW_IMPACT))
         self._driver.rows.blocks = []
         values = {name: np.ascontiguousarray(rows[:, place]) for place, name in enumerate(self._variables)}
-        self._tell({name: float(column[-1]) for name, column in values.items()})
+        self._tell(ends, values, impacts)
         return self._chain.volts(ends, values, impacts), impacts
 
     def instants_in(self, times: Floats) -> Counts:
@@ -175,13 +186,29 @@ class MeasuredSession:
         """Steps in a second, at least, where a load cell rings; 0: it does not."""
         return 1.0 / self._chain.finest if self._chain.finest else 0.0
 
-    def _tell(self, values: Mapping[str, float]) -> None:
-        force = math.fsum(value for name, value in values.items() if name.startswith("contact["))
+    def exciter_force(self, volts: float) -> float:
+        """Return the force of the exciter at a voltage, where the body is now, N."""
+        exciter = self._scene.exciter
+        assert exciter is not None
+        force = exciter_force(
+            [volts], [self._place], exciter.gain, exciter.offset, exciter.distance, exciter.side
+        )
+        return float(force[0])
+
+    def _tell(self, ends: Floats, values: Mapping[str, Floats], impacts: Floats) -> None:
+        contacts = [float(column[-1]) for name, column in values.items() if name.startswith("contact[")]
         self.truth = {
-            "displacement": values["displacement"],
-            "velocity": values["velocity"],
-            "contact_force": force,
+            "displacement": float(values["displacement"][-1]),
+            "velocity": float(values["velocity"][-1]),
+            "contact_force": math.fsum(contacts),
         }
+        self._place = float(values[self._exciter.displacement][-1])
+        cell = self._scene.load_cell
+        if LOAD_CELL in self._channels and cell is not None and self._on_cell is not None:
+            force = values[f"contact[{cell.stop}].force"]
+            self.truth["load_cell_force"] = float(
+                self._on_cell.follow(ends, force, *self._chain.hits(impacts))[-1]
+            )
 
     def close(self) -> None:
         """Free the components."""

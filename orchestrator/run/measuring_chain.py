@@ -51,9 +51,10 @@ class MeasuringChain:
 
     @property
     def finest(self) -> float:
-        """Longest step that follows the ring of the load cell, s; 0: there is no ring."""
+        """Longest step that follows the ring of the load cell, s; 0: none, or impacts make it, exact at any step."""
         cell = self._scene.load_cell
-        ring = cell.natural_frequency if cell is not None and self._cell is not None else 0.0
+        rings = cell is not None and self._cell is not None and not self.needs_impacts
+        ring = cell.natural_frequency if cell is not None and rings else 0.0
         return 1.0 / (RING_INSTANTS * ring) if ring else 0.0
 
     @property
@@ -91,11 +92,11 @@ class MeasuringChain:
             assert sensor is not None  # the scene's rules see to it
             found[name] = sensor_reading(values[variable], sensor.gain, sensor.offset, sensor.range or 0.0)
         if self._cell is not None:
-            hits, impulses = self._hits(impacts)
+            hits, impulses = self.hits(impacts)
             found[LOAD_CELL] = self._cell.follow(times, values[self._force], hits, impulses)
         return found
 
-    def _hits(self, impacts: Floats) -> tuple[Floats, Floats]:
+    def hits(self, impacts: Floats) -> tuple[Floats, Floats]:
         """Return instants and impulses of what hits the load cell as half sines."""
         cell = self._scene.load_cell
         if cell is None or not self.needs_impacts:

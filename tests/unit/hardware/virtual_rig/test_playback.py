@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.places import ROOT
+from support.real_data import recording_folder
 from support.rig_bench import opened_bench
 
 from vibroimpact.analysis.recording import Channel, Recording, TimeAxis, write_recording
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.hardware.recordings import import_recording
 from vibroimpact.hardware.virtual_rig.scene_plant import opened_plant
 from vibroimpact.hardware.virtual_rig.settings import read_rig
 
@@ -93,3 +95,23 @@ def test_the_noise_of_a_rig_is_that_of_its_scene_and_each_input_has_its_own() ->
     assert np.std(loop) == pytest.approx(1e-3, rel=0.03)
     assert np.mean(cell) == pytest.approx(0.01, abs=1e-4)
     assert np.abs(np.corrcoef([sensor, cell, loop])[np.triu_indices(3, 1)]).max() < 0.04
+
+
+def test_a_shock_that_a_laboratory_measured_is_on_an_input_as_if_it_were_live(tmp_path: Path) -> None:
+    file = recording_folder("pcb_repeated_shock") / "dataset2_Test_001.lvm"
+    board = import_recording([file], None)
+    write_recording(board, tmp_path / "tip.nc")
+    channel = board.channels["acceleration_1"]
+    volts_per = float(9.0 / np.max(np.abs(channel.values)))
+    wires = f'ai3 = {{ signal = "acceleration_1", amplification = {volts_per!r} }}'
+    with (
+        opened_bench(rig(tmp_path, wires)) as bench,
+        bench.inputs("Dev1/ai3", 51_200.0, samps_per_chan=51_200) as task,
+    ):
+        seen = np.array(task.read(51_200))
+    delay = float(channel.time[0]) - min(float(each.time[0]) for each in board.channels.values())
+    at = np.arange(51_200) / 51_200.0 + float(channel.time[0]) - delay
+    played = volts_per * np.interp(at, channel.time, channel.values)
+    # instants of a rig are whole nanoseconds: a steep flank is that much away
+    np.testing.assert_allclose(seen, played, atol=0.51 * STEP + 1e-3)
+    assert np.max(np.abs(seen)) == pytest.approx(9.0, abs=0.01)

@@ -228,3 +228,14 @@ def test_voltages_and_instants_are_checked() -> None:
             with pytest.raises(UsageError, match=r"times: expected ascending|volts: expected finite"):
                 session.advance(np.array(times), np.array(volts))
         assert session.time == 0.0
+
+
+def test_half_sines_need_no_fine_steps_and_a_stop_that_yields_does() -> None:
+    rigid = 'law = "restitution"\nposition = 0.001\nside = "upper"\nrestitution = 0.7\n'
+    yielding = 'law = "kelvin_voigt"\nposition = 0.001\nside = "upper"\nstiffness = 1e5\n'
+    cell = "[load_cell]\nsensitivity = 0.02\nnatural_frequency = 4000.0\ndamping_ratio = 0.05\n"
+    for stop, more, fineness in ((rigid, "contact_duration = 1e-3\n", 0.0), (yielding, "", 48_000.0)):
+        text = f"[body]\nmass = 1\nstiffness = 100\n[[stop]]\n{stop}{cell}{more}[exciter]\ngain = 1\n"
+        scene = parse_scene(f"{text}[record]\nrecorded_time = 1", "cell.toml")
+        with MeasuredSession(scene, ["load_cell"]) as session:
+            assert session.fineness == pytest.approx(fineness)
