@@ -298,6 +298,16 @@ def test_what_a_rig_does_not_have_is_said_and_nothing_is_driven(
     assert output_of(bench) == 0.0
 
 
+def test_a_sweep_of_one_frequency_is_measured_too(bench: Bench, tmp_path: Path) -> None:
+    one = TEXT.replace("{ start = 6.0, stop = 7.75, step = 0.25 }", "[6.0]")
+    assert sweep(bench, tmp_path, one.replace("transient_periods = 40", 'path = "down"')).steps == 1
+    with open_dataset(tmp_path) as found:
+        assert found.displacement_range.size == 1
+    file = tmp_path / "one.toml"
+    file.write_text(one)
+    assert in_this_process("rig", "sweep", file, "-o", tmp_path / "dry", "--dry-run").returncode == 0
+
+
 def test_a_dry_run_draws_the_output_and_drives_nothing(tmp_path: Path) -> None:
     file = tmp_path / "sweep.toml"
     file.write_text(TEXT)
