@@ -33,7 +33,8 @@ def sweep_rig(file: Path, folder: Path, rig: str | None, dry_run: bool) -> None:
         say(f"Nothing to do: all {report.planned} steps are in {report.dataset} already.")
         return
     kept = f", {report.before} were there" if report.before else ""
-    say(f"{report.steps - report.before} of {report.planned} steps measured{kept}: {report.dataset}")
+    where = f": {report.dataset}" if report.steps else ""
+    say(f"{report.steps - report.before} of {report.planned} steps measured{kept}{where}")
     if report.stopped:
         say("Stopped; the output is at 0 V. The same command goes on.", err=True)
         raise typer.Exit(130)

@@ -171,6 +171,8 @@ def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows
         return rows
     try:
         attributes = file_attributes(path)
+        if not attributes:
+            read_flat(path)  # says what is wrong with it
         if attributes.get("history") != _MADE_BY:
             raise _refused(folder, "one with another dataset")
         different = _differences(json.loads(str(attributes.get("sweep_content"))), settings.content)
@@ -181,7 +183,7 @@ def stored(settings: SweepSettings, calibration: str, folder: Path) -> SweepRows
             shown = "; ".join(different[:_MOST_DIFFERENCES]) + (f"; and {more} more" if more > 0 else "")
             raise _refused(folder, f"that of another one: {shown}")
         flat = read_flat(path)
-    except (DatasetError, ValueError) as error:
+    except (DatasetError, ValueError, KeyError, TypeError) as error:
         raise UsageError(
             f"{path}: expected the dataset of this sweep, got a damaged one ({error}). Move it away, or choose another "
             f"folder{typed_or_called(' with -o')}."

@@ -34,7 +34,7 @@ from vibroimpact.hardware.programs.sweep.settings import SweepSettings
 from vibroimpact.hardware.rig.acquisition import Acquisition, Facts
 from vibroimpact.hardware.rig.limits import Limits
 from vibroimpact.hardware.rig.opening import opened_rig
-from vibroimpact.hardware.rig.output import Output
+from vibroimpact.hardware.rig.output import Output, start_trigger
 from vibroimpact.hardware.rig.stopping import stopped_by_signals
 from vibroimpact.orchestrator.campaign.progress import Progress
 
@@ -118,8 +118,10 @@ class _Sweep:
         settings, plan = self._settings, self._plan
         rate = settings.output.rate
         with opened_rig(choice) as rig:
-            output = Output(rig, settings.output.terminal, rate, plan, self._limits)
-            inputs = Acquisition(rig, settings.measured, rate, count=plan.samples, trigger=output.trigger)
+            inputs = Acquisition(
+                rig, settings.measured, rate, count=plan.samples, trigger=start_trigger(settings.output.terminal)
+            )
+            output = Output(rig, settings.output.terminal, rate, plan, self._limits, arm=inputs.start)
 
             def stop() -> None:
                 # steps that have ended by now were driven as planned
@@ -129,9 +131,8 @@ class _Sweep:
 
             with inputs, output, stopped_by_signals(stop):
                 self._take_note(inputs.facts, rig.name)
-                inputs.start()
-                self._note_start(inputs.facts)
                 output.start()
+                self._note_start(inputs.facts)
                 self._progress.begin(len(settings.steps), len(self._rows.steps))
                 try:
                     self._follow(inputs, output)
@@ -139,7 +140,7 @@ class _Sweep:
                 finally:
                     self._live.close()
             self._keep(plan.samples if self._stopped_at is None else self._stopped_at)
-        if len(self._rows.steps) > 1:
+        if self._is_a_diagram:
             self._live.finish()
         return self._stopped_at is not None
 
@@ -198,5 +199,11 @@ class _Sweep:
             if step.flags:
                 direction, frequency = self._settings.steps[step.place]
                 self._progress.note(f"{direction.name} {frequency:g} Hz: {step.message}")
-            if len(self._rows.steps) > 1:
+            if self._is_a_diagram:
                 self._live.follow()
+
+    @property
+    def _is_a_diagram(self) -> bool:
+        """Whether more than one frequency is measured."""
+        asked = self._settings.steps[: len(self._rows.steps)]
+        return len({frequency for _, frequency in asked}) > 1

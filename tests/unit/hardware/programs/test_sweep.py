@@ -32,13 +32,13 @@ TEXT = """
 [output]
 terminal = "Dev1/ao0"
 amplitude = 1.5
-rate = 4000.0
+rate = 2500.0
 highest = 2.0
 slew = 200.0
 ramp_periods = 5
 [sweep]
 frequency = { start = 6.0, stop = 7.75, step = 0.25 }
-transient_periods = 60
+transient_periods = 40
 recorded_periods = 6
 [[input]]
 name = "tip"
@@ -84,7 +84,7 @@ def simulated() -> xr.Dataset:
         tables
         | {
             "forcing": {"amplitude": VOLTS * GAIN, "frequency": 6.0},
-            "record": {"transient_periods": 60, "recorded_periods": 6},
+            "record": {"transient_periods": 40, "recorded_periods": 6},
             "sweep": {"forcing.frequency": axis},
         },
         progress=False,
@@ -247,6 +247,24 @@ def test_the_folder_of_another_sweep_is_refused_in_a_line(
     assert "\n" not in str(refused.value)
 
 
+def test_a_damaged_dataset_is_said_and_nothing_of_it_is_touched(
+    bench: Bench, measured: Path, tmp_path: Path
+) -> None:
+    content = (measured / "dataset.nc").read_bytes()
+    for damaged in (
+        content[: len(content) // 2],
+        b"hello",
+        content.replace(b"begun_with_steps", b"begun_with_stepz"),
+    ):
+        (tmp_path / "dataset.nc").write_bytes(damaged)
+        with pytest.raises(
+            UsageError, match="expected the dataset of this sweep, got a damaged one"
+        ) as refused:
+            sweep(bench, tmp_path)
+        assert "\n" not in str(refused.value)
+        assert (tmp_path / "dataset.nc").read_bytes() == damaged
+
+
 def test_the_folder_of_a_campaign_or_of_another_rig_is_refused(
     bench: Bench, measured: Path, tmp_path: Path
 ) -> None:
@@ -280,12 +298,22 @@ def test_what_a_rig_does_not_have_is_said_and_nothing_is_driven(
     assert output_of(bench) == 0.0
 
 
+def test_a_sweep_of_one_frequency_is_measured_too(bench: Bench, tmp_path: Path) -> None:
+    one = TEXT.replace("{ start = 6.0, stop = 7.75, step = 0.25 }", "[6.0]")
+    assert sweep(bench, tmp_path, one.replace("transient_periods = 40", 'path = "down"')).steps == 1
+    with open_dataset(tmp_path) as found:
+        assert found.displacement_range.size == 1
+    file = tmp_path / "one.toml"
+    file.write_text(one)
+    assert in_this_process("rig", "sweep", file, "-o", tmp_path / "dry", "--dry-run").returncode == 0
+
+
 def test_a_dry_run_draws_the_output_and_drives_nothing(tmp_path: Path) -> None:
     file = tmp_path / "sweep.toml"
     file.write_text(TEXT)
     done = in_this_process("rig", "sweep", file, "-o", tmp_path / "sweep", "--dry-run")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith("16 steps of 66 periods, 1.5 V on Dev1/ao0: 2:36 of the rig's time.")
+    assert done.stdout.startswith("16 steps of 46 periods, 1.5 V on Dev1/ao0: 1:49 of the rig's time.")
     assert (tmp_path / "sweep" / "plan.png").stat().st_size > 5000
 
 
