@@ -11,6 +11,7 @@ import os
 import threading
 import time
 import uuid
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any
 
@@ -32,6 +33,25 @@ NOBODY_KNOWS = "Nobody knows what it puts out: switch the amplifier off"
 _RATE_ROUNDING = 1e-9
 
 
+def start_trigger(terminal: str) -> str:
+    """Return the terminal of the start of an output.
+
+    Raises
+    ------
+    UsageError
+        The output is none.
+
+    Examples
+    --------
+    >>> start_trigger("Dev1/ao0")
+    '/Dev1/ao/StartTrigger'
+    """
+    device, _, channel = terminal.strip("/").partition("/")
+    if not device or not channel or any(mark in channel for mark in ",:"):
+        raise UsageError(f"--output: expected an output such as Dev1/ao0, got {terminal[:60]!r}.")
+    return f"/{device}/ao/StartTrigger"
+
+
 class Output:
     """An output that drives; a context manager, whose end stops it.
 
@@ -48,6 +68,8 @@ class Output:
         A guardian is there before the output starts.
     attach : bool or None
         Whether the guardian can attach to the task; None: where there is a server.
+    arm : callable, optional
+        Called when all is ready, just before the output starts: it arms the inputs on `trigger`.
 
     Attributes
     ----------
@@ -79,16 +101,15 @@ class Output:
         *,
         guarded: bool = True,
         attach: bool | None = None,
+        arm: Callable[[], None] | None = None,
     ) -> None:
-        device, _, channel = terminal.strip("/").partition("/")
-        if not device or not channel or any(mark in channel for mark in ",:"):
-            raise UsageError(f"--output: expected an output such as Dev1/ao0, got {terminal[:60]!r}.")
+        self.trigger = start_trigger(terminal)
         if guarded and rig.channel is not None and not rig.address:
             raise UsageError("output: expected a rig with an address, which its guardian needs, got none.")
         self._rig, self._terminal, self._rate = rig, terminal.strip("/"), rate
         self._waveform, self._limits, self._guarded = waveform, limits, guarded
         self._attach = rig.channel is not None if attach is None else attach
-        self.trigger = f"/{device}/ao/StartTrigger"
+        self._arm = arm
         self.generated = 0
         self._stopping = self._started = False
         self._stopped_at: float | None = None
@@ -258,6 +279,8 @@ class Output:
             self._guardian.await_ready()
         if self._stopping:
             return
+        if self._arm is not None:
+            self._arm()
         self._stream = stream
         stream.start()
         self._started = True

@@ -52,13 +52,13 @@ def _task(rig: Rig, name: str, behaviour: str) -> Any:
 
 
 def _is_read(task: Any) -> bool:
-    """Whether a program reads from a task, or waits for its trigger."""
+    """Whether a program reads from a task; inputs that wait for a trigger are armed just before it comes."""
     try:
         position = task.in_stream.curr_read_pos
         for _ in range(_LOOKS):
             time.sleep(LOOK_SECONDS / _LOOKS)
             if task.in_stream.curr_read_pos != position:
                 return True
-        return not task.is_task_done() and task.in_stream.total_samp_per_chan_acquired == 0
+        return False
     except daqmx.DaqError:  # it has failed meanwhile, as one does that nobody reads
         return False

@@ -119,7 +119,11 @@ class _Sweep:
         rate = settings.output.rate
         with opened_rig(choice) as rig:
             inputs = Acquisition(
-                rig, settings.measured, rate, count=plan.samples, trigger=start_trigger(settings.output.terminal)
+                rig,
+                settings.measured,
+                rate,
+                count=plan.samples,
+                trigger=start_trigger(settings.output.terminal),
             )
             output = Output(rig, settings.output.terminal, rate, plan, self._limits, arm=inputs.start)
 

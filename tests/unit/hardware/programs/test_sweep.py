@@ -24,6 +24,9 @@ from vibroimpact.analysis.dataset import MeasurementFlag, read_flat, write_datas
 from vibroimpact.fmus.errors import DatasetError, RigError, UsageError
 from vibroimpact.hardware.programs.sweep.program import SweepReport, measure
 from vibroimpact.hardware.programs.sweep.settings import parse_sweep
+from vibroimpact.hardware.rig.acquisition import Acquisition
+from vibroimpact.hardware.rig.inputs import Input
+from vibroimpact.hardware.rig.opening import opened_rig
 from vibroimpact.simulation import run
 
 OSCILLATOR = ROOT / "examples" / "rig" / "oscillator.toml"
@@ -158,6 +161,19 @@ def test_a_sweep_that_is_killed_goes_on_and_is_that_of_one_that_nothing_disturbe
     with open_dataset(folder) as found, open_dataset(measured) as unbroken:
         np.testing.assert_allclose(found.displacement_range, unbroken.displacement_range, rtol=2e-3)
         assert len(found.attrs["measured_at"].splitlines()) == 2
+
+
+def test_inputs_that_a_killed_program_has_armed_are_free_for_the_next_one(
+    bench: Bench, tmp_path: Path
+) -> None:
+    with opened_rig(f"grpc://{bench.server.address}") as rig:
+        tip = Input("tip", "Dev1/ai0", 5.0)
+        # it waits for a trigger and reads nothing, as after the death of its program
+        left = Acquisition(rig, [tip], 1000.0, trigger="/Dev1/ao/StartTrigger")
+        left.__enter__()
+        left._task.start()
+        few = TEXT.replace("{ start = 6.0, stop = 7.75, step = 0.25 }", "[6.0, 6.5]")
+        assert sweep(bench, tmp_path, few).steps == 4
 
 
 def test_ctrl_c_brings_the_output_to_rest_and_keeps_what_is_measured(bench: Bench, tmp_path: Path) -> None:
