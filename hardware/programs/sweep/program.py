@@ -136,13 +136,14 @@ class _Sweep:
             with inputs, output, stopped_by_signals(stop):
                 self._take_note(inputs.facts, rig.name)
                 output.start()
-                self._note_start(inputs.facts)
-                self._progress.begin(len(settings.steps), len(self._rows.steps))
-                try:
-                    self._follow(inputs, output)
-                    output.wait()
-                finally:
-                    self._live.close()
+                if self._stopped_at is None:  # else it may not have started, nor the inputs
+                    self._note_start(inputs.facts)
+                    self._progress.begin(len(settings.steps), len(self._rows.steps))
+                    try:
+                        self._follow(inputs, output)
+                    finally:
+                        self._live.close()
+                output.wait()
             self._keep(plan.samples if self._stopped_at is None else self._stopped_at)
         if self._is_a_diagram:
             self._live.finish()

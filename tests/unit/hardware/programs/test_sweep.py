@@ -188,6 +188,19 @@ def test_ctrl_c_brings_the_output_to_rest_and_keeps_what_is_measured(bench: Benc
     assert 2 <= read_flat(folder / "dataset.nc").sizes["run"] < 16
 
 
+def test_ctrl_c_is_heard_before_the_output_has_started(bench: Bench, tmp_path: Path) -> None:
+    with started(bench, tmp_path, tmp_path / "sweep") as process:
+        while not any(name.startswith("vibroimpact-output") for name in bench.control.state()["tasks"]):
+            assert process.poll() is None, process.communicate()
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Stopped; the output is at 0 V." in said
+    assert not bench.control.state()["tasks"]
+    assert output_of(bench) == 0.0
+
+
 def test_an_overdriven_sweep_is_flagged_and_no_plateau_is_drawn(bench: Bench, tmp_path: Path) -> None:
     few = TEXT.replace("start = 6.0, stop = 7.75, step = 0.25", "start = 6.0, stop = 7.0, step = 0.5")
     sweep(bench, tmp_path, few.replace("range = 10.0", "range = 2.0"))
