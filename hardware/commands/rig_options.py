@@ -37,6 +37,7 @@ def register(app: typer.Typer) -> None:
     group.command("serve")(serve)
     group.command("devices")(devices)
     group.command("record")(record)
+    group.command("sine")(sine)
     group.command("spikes")(spikes)
     group.command("recover")(recover)
     group.command("sweep")(sweep)
@@ -168,3 +169,25 @@ def sweep(
     from vibroimpact.hardware.programs.sweep.command import sweep_rig
 
     sweep_rig(file, output, rig, dry_run)
+
+
+def sine(
+    output: Annotated[str, typer.Option(help="Output that drives.", metavar="TERMINAL")],
+    frequency: Annotated[float, typer.Option(help="Hz.")],
+    amplitude: Annotated[float, typer.Option(help="V.")],
+    ramp: Annotated[float, typer.Option(help="Time in which it rises, and falls at the end, s.")] = 0.5,
+    duration: Annotated[float | None, typer.Option(help="s, ramps included; else until Ctrl-C.")] = None,
+    rate: Annotated[float, typer.Option(help="Samples per second.")] = 10_000.0,
+    most_amplitude: Annotated[float, typer.Option(help="Limit of the output, V.")] = 5.0,
+    most_slew: Annotated[float, typer.Option(help="Limit of the output, V/s.")] = 2000.0,
+    rig: RigChoice = None,
+) -> None:
+    """Drive an output with a sine until Ctrl-C or for a time; a guardian brings it to rest if this program cannot.
+
+    Example: vibroimpact rig sine --rig grpc://127.0.0.1:31763 --output Dev1/ao0 --frequency 5.3 --amplitude 1
+    """
+    from vibroimpact.hardware.programs.sine import drive_sine, sine_of
+    from vibroimpact.hardware.rig.limits import Limits
+
+    wanted = sine_of(frequency, amplitude, ramp, duration, rate)
+    drive_sine(rig, output, wanted, Limits(most_amplitude, most_slew))

@@ -12,7 +12,6 @@ import json
 import os
 import select
 import signal
-import sys
 import time
 from collections.abc import Callable
 from typing import Any
@@ -31,7 +30,7 @@ LOOK = 0.05
 """Time between two looks at the program, s; its end is heard at once."""
 CALL_SECONDS = 5.0
 PROBE_SECONDS = 1.0
-FREE_SECONDS = 5.0
+FREE_SECONDS = 3.0
 """Time in which the driver of a program that has ended frees the device."""
 _QUIET = 0.03
 """Time without a new sample after which no write of the dead program is under way, s."""
@@ -269,4 +268,4 @@ def _rescued(order: Order, rescue: Rescue, why: str) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(guard())
+    os._exit(guard())  # at once: the program waits for it, and there is nothing to tidy up

@@ -12,6 +12,7 @@ import threading
 import time
 import uuid
 from collections.abc import Callable
+from contextlib import suppress
 from types import TracebackType
 from typing import Any
 
@@ -235,12 +236,20 @@ class Output:
             ) from None
         session = f"vibroimpact-output-{uuid.uuid4().hex[:12]}"
         try:
-            with daqmx.nidaqmx.Task(session, grpc_options=self._options(session)) as task:
+            task = daqmx.nidaqmx.Task(session, grpc_options=self._options(session))
+            try:
                 if self._guarded:
                     self._guardian = Guardian(self._order(session, memory, 4 * length))
                 add_output(task, self._terminal, self._rate, self._limits)
                 self._refuse_other_rate(task.timing.samp_clk_rate)
                 self._drive_task(OutputStream(task, self._rate, self._limits, memory), memory, length)
+            except BaseException:
+                with suppress(
+                    daqmx.DaqError, daqmx.RpcError, ValueError
+                ):  # the first error says what matters
+                    task.close()
+                raise
+            task.close()
         finally:
             memory.close()
 
@@ -282,12 +291,14 @@ class Output:
         if self._arm is not None:
             self._arm()
         self._stream = stream
-        stream.start()
-        self._started = True
-        self._ready.set()
         try:
+            stream.start()
+            self._started = True
+            self._ready.set()
             self._follow(course, stream)
         except daqmx.DaqError as error:
+            if not self._started:
+                raise
             if error.error_code != STARVED:
                 raise self._lost(error) from None
             self._recover(stream, memory)

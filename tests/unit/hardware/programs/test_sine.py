@@ -1,0 +1,254 @@
+"""`vibroimpact rig sine` comes to rest whatever happens to it; an input that is wired to the output saw every sample.
+
+Ctrl-C and SIGKILL at random moments are in `tests/soak/drives.py`.
+"""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+
+import psutil
+import pytest
+from support.command_line import ENTRY, in_this_process
+from support.driving import SECONDS, SINE, STEEPEST, driven
+from support.places import ROOT
+from support.rig_bench import Bench, opened_bench
+
+from vibroimpact.hardware.daqmx import constants, open_channel
+from vibroimpact.hardware.rig.limits import Limits
+from vibroimpact.hardware.virtual_rig.control import RigControl
+
+RIG = ROOT / "examples" / "rig" / "oscillator.toml"
+
+
+@pytest.fixture(scope="module")
+def served_bench() -> Iterator[Bench]:
+    with opened_bench(RIG) as bench:
+        yield bench
+
+
+@pytest.fixture
+def bench(served_bench: Bench) -> Iterator[Bench]:
+    served_bench.control.pace(lockstep=True)
+    yield served_bench
+    served_bench.clear()
+
+
+@pytest.fixture
+def live(bench: Bench) -> Bench:
+    """In real time, as a board is."""
+    bench.control.pace(lockstep=False, speed=1.0)
+    return bench
+
+
+def sine(bench: Bench, *more: str, output: str = "Dev1/ao0") -> subprocess.CompletedProcess[str]:
+    words = ["--output", output, "--frequency", "5.3", "--amplitude", "2", "--ramp", "0.2"]
+    return in_this_process("rig", "sine", "--rig", f"grpc://{bench.server.address}", *words, *more)
+
+
+def guardians() -> list[int]:
+    """Return the guardians that this process has started."""
+    return [child.pid for child in psutil.Process().children() if "guardian" in " ".join(child.cmdline())]
+
+
+def test_a_sine_of_a_duration_ends_at_rest(bench: Bench) -> None:
+    done = sine(bench, "--duration", "2")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "5.3 Hz, 2 V" in done.stdout
+    state = bench.control.state()
+    assert state["time"] >= 2.0
+    assert state["tasks"] == {}
+    assert bench.control.truth()["outputs"] == [0.0, 0.0]
+    assert guardians() == []
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--frequency", "nan"], "--frequency: expected a number > 0"),
+        (["--amplitude", "nan"], "--amplitude: expected a number >= 0"),
+        (["--amplitude", "6"], "--amplitude: expected at most 5 V, got 6"),
+        (["--frequency", "400"], "expected at most 2000 V/s"),
+        (["--most-slew", "nan"], "limits: slew: expected a number > 0"),
+        (["--most-amplitude", "20"], "a range of -20 to 20 V"),
+        (["--duration", "0.3"], "--duration: expected more than twice the ramp"),
+        (["--duration", "inf"], "--duration: expected a number > 0"),
+        (["--rate", "2e6"], "a rate of 2e+06 Hz"),
+        (["--output", "Dev1/ao7"], "no such channel: Dev1/ao7"),
+        (["--output", "Dev9/ao0"], "no such device: Dev9"),
+        (["--output", "ao0"], "--output: expected an output such as Dev1/ao0"),
+    ],
+)
+def test_what_cannot_be_driven_is_one_line_and_drives_nothing(
+    bench: Bench, words: list[str], said: str
+) -> None:
+    done = sine(bench, *words)
+    assert done.returncode == 2, done.stderr
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert bench.control.truth()["outputs"] == [0.0, 0.0]
+    assert bench.control.state()["tasks"] == {}
+    assert guardians() == []
+
+
+def test_an_output_that_another_program_has_is_not_driven(bench: Bench) -> None:
+    with bench.outputs(rate=1000.0) as other:
+        other.control(constants.TaskMode.TASK_RESERVE)
+        done = sine(bench)
+        assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+        assert "reserved" in done.stderr
+        assert guardians() == []
+
+
+def test_a_program_that_hangs_is_ended_and_its_output_brought_to_rest(live: Bench) -> None:
+    with driven(live) as running:
+        since = running.drive(0.3)
+        running.program.send_signal(signal.SIGSTOP)
+        code, _, err = running.ended()
+        assert running.problem_at_rest() is None
+    assert code == -signal.SIGKILL
+    assert "showed no life for 2 s and was ended: its guardian has brought the output to 0 V" in err
+    assert running.seen.steepest <= STEEPEST
+    assert running.at_zero_after(since) > 1.0  # it held a voltage until then
+
+
+def test_a_program_that_was_too_slow_says_so_and_comes_to_rest(live: Bench) -> None:
+    with driven(live) as running:
+        running.drive(0.3)
+        running.program.send_signal(signal.SIGSTOP)
+        running.drive(0.7)
+        running.program.send_signal(signal.SIGCONT)
+        code, _, err = running.ended()
+        assert running.problem_at_rest() is None
+    assert code == 1
+    assert "Dev1/ao0 ran out of samples" in err
+    assert err.count("\n") == 1
+    assert running.seen.steepest <= STEEPEST
+
+
+def test_a_program_whose_guardian_has_gone_comes_to_rest_by_itself(live: Bench) -> None:
+    with driven(live) as running:
+        running.drive(0.3)
+        running.guardian.kill()
+        code, _, err = running.ended()
+        assert running.problem_at_rest() is None
+    assert code == 1
+    assert "guardian: its process has gone, so Dev1/ao0 was brought to 0 V." in err
+    assert running.seen.steepest <= STEEPEST
+
+
+def test_more_signals_do_not_hurry_it(live: Bench) -> None:
+    with driven(live) as running:
+        running.drive(0.3)
+        for _ in range(4):
+            running.program.send_signal(signal.SIGINT)
+            time.sleep(0.02)
+        code, _, _ = running.ended()
+        assert running.problem_at_rest() is None
+    assert code == 130
+    assert running.seen.steepest <= STEEPEST
+    assert not running.seen.volts[-1]
+
+
+@pytest.fixture
+def server() -> Iterator[tuple[subprocess.Popen[str], str]]:
+    command = [sys.executable, "-u", "-c", ENTRY, "rig", "serve", str(RIG), "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        yield process, process.stdout.readline().split("grpc://")[1].split(",")[0]
+        process.kill()
+
+
+@pytest.mark.parametrize("program_too", [True, False])
+def test_where_the_server_has_gone_nothing_is_claimed_of_the_output(
+    server: tuple[subprocess.Popen[str], str], program_too: bool
+) -> None:
+    process, address = server
+    command = [sys.executable, "-u", "-c", ENTRY, "rig", "sine", "--rig", f"grpc://{address}", *SINE]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        program.stdout.readline()
+        (guardian,) = psutil.Process(program.pid).children()
+        with open_channel(address) as channel:
+            assert RigControl(channel).state()["tasks"]
+        if program_too:
+            program.kill()
+        process.kill()
+        _, err = program.communicate(timeout=SECONDS)
+        guardian.wait(SECONDS)
+    assert err.count("\n") == 1
+    assert "Nobody knows what it puts out: switch the amplifier off." in err
+    assert "0 V" not in err
+    assert program.returncode == (-signal.SIGKILL if program_too else 1)
+
+
+def test_a_virtual_rig_of_its_own_goes_with_the_program() -> None:
+    command = [sys.executable, "-u", "-c", ENTRY, "rig", "sine", "--rig", f"virtual:{RIG}", *SINE]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        assert "virtual:oscillator.toml" in program.stdout.readline()
+        (guardian,) = psutil.Process(program.pid).children()
+        program.kill()
+        _, err = program.communicate(timeout=SECONDS)
+        guardian.wait(SECONDS)
+    assert "Nobody knows" in err
+
+
+WITHOUT_ATTACHING = """
+import sys
+from vibroimpact.hardware.rig.limits import Limits
+from vibroimpact.hardware.rig.opening import opened_rig
+from vibroimpact.hardware.rig.output import Output
+from vibroimpact.hardware.rig.waveforms import Sine
+with opened_rig("grpc://" + sys.argv[1]) as rig:
+    with Output(rig, "Dev1/ao0", 10000.0, Sine(5.3, 2.0, 10000.0, 0.2), Limits(), attach=False) as output:
+        output.start()
+        print("driving", flush=True)
+        output.wait()
+"""
+
+
+@pytest.mark.parametrize("hanging", [False, True])
+def test_where_nobody_can_attach_the_guardian_waits_for_the_device(live: Bench, hanging: bool) -> None:
+    # as with a driver in the program; the end of the task, which the driver does there, the test does here
+    command = [sys.executable, "-c", WITHOUT_ATTACHING, live.server.address]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "driving\n"
+        (guardian,) = psutil.Process(program.pid).children()
+        time.sleep(0.5)
+        program.send_signal(signal.SIGSTOP if hanging else signal.SIGKILL)
+        assert program.wait(SECONDS) == -signal.SIGKILL
+        (task,) = [task for name, task in live.server.board.tasks.items() if name.startswith("vibroimpact")]
+        held = live.control.truth()["outputs"][0]
+        live.server.board.remove(task)
+        guardian.wait(SECONDS)
+        assert program.stderr is not None
+        said = program.stderr.read()
+    assert "its guardian has brought the output to 0 V" in said
+    assert abs(held) <= 2.0
+    assert live.control.truth()["outputs"][0] == 0.0
+    assert live.control.state()["tasks"] == {}
+
+
+def test_a_device_that_is_not_freed_is_said(live: Bench) -> None:
+    command = [sys.executable, "-c", WITHOUT_ATTACHING, live.server.address]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        program.stdout.readline()
+        program.kill()
+        _, err = program.communicate(timeout=SECONDS)
+    assert "reserved" in err
+    assert "Nobody knows what it puts out: switch the amplifier off." in err
+
+
+def test_the_defaults_of_the_options_are_those_of_the_limits() -> None:
+    shown = in_this_process("rig", "sine", "--help").stdout
+    limits = Limits()
+    assert f"[default: {limits.amplitude}]" in shown
+    assert f"[default: {limits.slew}]" in shown
+    assert "Example: vibroimpact rig sine" in shown
