@@ -70,7 +70,7 @@ def test_the_fast_tests_say_what_they_leave_out() -> None:
     assert "test_help_names_every_target" in result.stdout
     assert "test_the_fast_tests_say_what_they_leave_out" not in result.stdout
     assert re.search(
-        r"^\d+ tests that are marked slow, and tests/documentation, tests/end_to_end, .*tests/soak$",
+        r"^\d+ tests that are marked slow, and tests/conformance, tests/documentation, tests/end_to_end, .*tests/soak$",
         result.stdout,
         re.M,
     )
