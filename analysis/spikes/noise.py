@@ -9,7 +9,8 @@ estimated from the peaks of the record itself. Spikes are not part of the noise,
 peaks and takes in what the law so far explains, until nothing changes: noise is taken in to its last peak, spikes
 stay out behind the gap before them. Ringing after a spike leaves no such gap; but it raises all of a stretch, where an
 outlier of heavy-tailed noise raises one sample. Stretches whose median magnitude is far above that of the record
-are therefore left out.
+are therefore left out: long ones, and short ones for the pulses and the ring of a load cell, which are over in a few
+milliseconds.
 """
 
 from __future__ import annotations
@@ -38,9 +39,14 @@ _GROWN = 0.01
 #: Stretches in which the record is searched for ringing, and fewest samples in one.
 _STRETCHES = 200
 _SHORTEST_STRETCH = 32
+_FEWEST_STRETCHES = 4
 #: Median magnitude, relative to that of the median stretch, above which a stretch rings. Noise alone, even Cauchy's in
 #: 32 samples, stays below.
 _RINGS = 3.0
+#: Half waves in a short stretch, and the same ratio for it: narrow-band noise, whose envelope is Rayleigh's, passes it
+#: once in 1e10 stretches.
+_HALF_WAVES = 20
+_RINGS_SHORTLY = 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,14 +109,21 @@ def quiet(values: Floats) -> NDArray[np.bool_]:
     values : ndarray of float, shape (sample,)
         The signal without its baseline.
     """
+    long = max(_SHORTEST_STRETCH, len(values) // _STRETCHES)
+    short = max(_SHORTEST_STRETCH, _HALF_WAVES * len(values) // max(1, half_wave_peaks(values).size))
+    still = _still(values, long, _RINGS)
+    return still & _still(values, short, _RINGS_SHORTLY) if short < long else still
+
+
+def _still(values: Floats, stretch: int, ratio: float) -> NDArray[np.bool_]:
+    """Return which samples are neither in nor beside a stretch whose median magnitude is far above the usual."""
     length = len(values)
-    stretch = max(_SHORTEST_STRETCH, length // _STRETCHES)
     count = length // stretch
-    if count < 4:
+    if count < _FEWEST_STRETCHES:
         return np.ones(length, dtype=bool)
     magnitudes = np.abs(values[: count * stretch]).reshape(count, stretch)
     medians = np.median(magnitudes, axis=1)
-    rings = medians > _RINGS * np.median(medians)
+    rings = medians > ratio * np.median(medians)
     # ringing begins and ends somewhere in the stretches beside
     still = ~(rings | np.append(rings[1:], False) | np.append(False, rings[:-1]))
     place = np.minimum(np.arange(length) // stretch, count - 1)

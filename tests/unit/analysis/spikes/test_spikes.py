@@ -20,6 +20,7 @@ from vibroimpact.analysis.spikes import (
 )
 from vibroimpact.analysis.spikes.cycle import find_cycle
 from vibroimpact.analysis.spikes.report import unobserved
+from vibroimpact.fmus.core.measuring import LoadCell
 from vibroimpact.fmus.errors import EstimationError, UsageError
 
 # A half-sine of the load cell: peak 2.5, .8 ms long, every 50 ms, read at 40 kHz, threshold .3.
@@ -324,3 +325,16 @@ def test_time_above_a_threshold_is_that_of_the_half_sine_at_any_threshold() -> N
     for threshold in (0.05, 0.5, 1.5, 2.2):
         found = measure_pulses(identify(channel(signal, 1 / RATE), SpikeSettings(threshold=threshold)))
         assert found.duration == pytest.approx(time_above(threshold, np.array([PEAK]), LENGTH)[0], rel=5e-3)
+
+
+def test_a_load_cell_that_rings_after_each_of_many_impacts_keeps_its_threshold_near_its_noise() -> None:
+    # the ring is everything from noise to a twentieth of the peak: no gap tells it from the tail of the noise
+    time = np.arange(160_000) / 20_000.0
+    starts, impulses = 0.02430 + 0.10667 * np.arange(75), np.tile([0.05, 0.0375, 0.0116], 25)
+    cell = LoadCell(1.0, natural_frequency=8e3, damping_ratio=0.05, contact_duration=1.5e-3)
+    force = cell.follow(time, np.zeros(len(time)), starts, impulses)
+    noise = np.random.default_rng(5).normal(0.0, 0.02, len(time))
+    report = spike_report(channel(force + noise, 5e-5))
+    assert report.dataset.sizes["spike"] == 75
+    assert report.found.threshold < 20.0 * 0.02
+    assert report.dataset.spike_impulse.values == pytest.approx(impulses, rel=0.01)
