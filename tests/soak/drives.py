@@ -13,6 +13,8 @@ CASES = 40
 """20 of Ctrl-C and 20 of SIGKILL."""
 SAMPLE = 6
 SECONDS = 120.0
+SPEED = 0.5
+"""Of the rig, so that cases beside it starve no output."""
 WITHIN = 1.0
 """Time of the rig from a kill to the output at 0 V, s."""
 
@@ -21,6 +23,7 @@ def check(seed: int) -> str | None:
     """Drive, interrupt or kill, and look at every sample that was put out."""
     chance, killed = random.Random(seed), bool(seed % 2)
     with opened_bench(ROOT / "examples" / "rig" / "oscillator.toml", lockstep=False) as bench:
+        bench.control.pace(speed=SPEED)
         with driven(bench) as running:
             since = running.drive(chance.uniform(0.0, 1.2))
             running.program.send_signal(signal.SIGKILL if killed else signal.SIGINT)
