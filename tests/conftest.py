@@ -40,6 +40,8 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 def pytest_addoption(parser: pytest.Parser) -> None:
     text = f"run only the tests of {' and '.join(FAST_FOLDERS)} that are not marked slow"
     parser.addoption("--fast", action="store_true", help=text)
+    where = "a board for the tests of rigs: Dev1 of this machine, or grpc://HOST:PORT/Dev1"
+    parser.addoption("--real-rig", metavar="BOARD", help=where)
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:

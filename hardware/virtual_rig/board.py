@@ -24,7 +24,7 @@ from vibroimpact.hardware.virtual_rig.tasks import INPUT, NEVER, OUTPUT, State, 
 from vibroimpact.hardware.virtual_rig.terminals import Terminals
 from vibroimpact.orchestrator.run.record import ImpactLimitReached
 
-MOST_ON_DEMAND = 10_000
+MOST_ON_DEMAND = 1_000
 """Samples per channel of a call without a sample clock: it holds the rig meanwhile."""
 MOST_AT_ONCE = 20_000
 """Samples of one advance, so that a call never waits for long."""

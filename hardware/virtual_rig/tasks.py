@@ -96,6 +96,8 @@ class Task:
         Tick of the first edge of its clock; None: it does not run, or waits for a trigger.
     rate : float
         Of the clock that runs, Hz; not quite what was asked for, where the clock is in error.
+    source : Task or None
+        Whose clock it has.
     edges_before : int
         Edges of the clock that were over when the task began.
     count : int
@@ -125,8 +127,8 @@ class Task:
         self.trigger, self.trigger_edge = "", constants.Edge.RISING.value
         self.state, self.kept = State.verified, False
         self.start: int | None = None
-        self.last_start = 0
-        self.rate, self.edges_before = 0.0, 0
+        self.source: Task | None = None
+        self.rate, self.edges_before, self.last_start = 0.0, 0, 0
         self.count = 0
         self.done = self.implicit = self.triggered = False
         self.failure: Refusal | None = None
@@ -227,6 +229,7 @@ class Task:
             raise Refusal(DAQmxErrors.EVERY_N_SAMPLES_EVENT_NOT_SUPPORTED_FOR_NON_BUFFERED_TASKS, self.name)
         self.state, self.done, self.failure = State.running, False, None
         self.count = self.edges_before = 0
+        self.source = None
         if self.every is not None:
             self.every.sent = 0
         if self.kind == INPUT and self.clock is not None:
@@ -267,7 +270,7 @@ class Task:
 
     def follow(self, other: Task) -> None:
         """Have the clock of another task, from its next edge on."""
-        self.start, self.rate = other.start, other.rate
+        self.start, self.rate, self.source = other.start, other.rate, other
         self.edges_before = other.edges_before + other.count - self.count
 
     def retune(self, rate: float) -> None:
@@ -294,7 +297,14 @@ class Task:
         count = max(int((tick - self.start) * TICK * self.rate) + 2 - self.edges_before, 0)
         while count > 0 and int(self.edge(count - 1)) > tick:
             count -= 1
+        if self.source is not None:
+            count = min(count, self.source.due(tick) + self.source.edges_before - self.edges_before)
         return count if self.needed is None else min(count, self.needed)
+
+    def due(self, tick: int) -> int:
+        """Return how many edges its clock gives up to a tick: none, once an output has run empty."""
+        edges = self.edges_until(tick)
+        return min(edges, self.position) if self.kind == OUTPUT and not self.regenerates else edges
 
     def tell(self, count: int) -> None:
         """Say to the listener that so many edges are over."""
@@ -325,9 +335,8 @@ class Task:
 
     def generated(self, until: int) -> tuple[Ticks, Floats, bool]:
         """Return ticks and values of the edges up to a tick, and whether the buffer ran empty."""
-        due = self.edges_until(until)
-        starved = not self.regenerates and due > self.position
-        due = min(due, self.position) if not self.regenerates else due
+        due = self.due(until)
+        starved = not self.regenerates and self.edges_until(until) > self.position
         numbers = np.arange(self.count, due)
         # what was written before the start and is shorter than the buffer goes round by itself
         round_length = min(self.length, self.position) if self.position < self.length else self.length

@@ -99,6 +99,8 @@ def quoted(value: object) -> str:
     --------
     >>> quoted(True), quoted("0.5"), quoted({}), quoted([1, 2]), quoted(None)
     ('true', '"0.5"', 'a table', 'an array of 2', 'nothing')
+    >>> print(quoted("two\\x85lines"))
+    "two\\u0085lines"
     """
     if value is None:
         return "nothing"
@@ -107,7 +109,9 @@ def quoted(value: object) -> str:
     if isinstance(value, list):
         return f"an array of {len(value)}" if value else "an empty array"
     if isinstance(value, bool | str):
-        return _shortened(json.dumps(value, ensure_ascii=False))
+        quoted_text = json.dumps(value, ensure_ascii=False)
+        # JSON keeps some characters that break a line, such as U+0085
+        return _shortened("".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in quoted_text))
     if isinstance(value, int) and abs(value) >= 10**LONGEST_QUOTE:
         return f"a number near 1e{math.floor(math.log10(abs(value)))}"
     return _shortened(str(value))

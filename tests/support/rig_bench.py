@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from vibroimpact.hardware.daqmx import DaqError, constants, nidaqmx, open_channel
+from vibroimpact.hardware.daqmx import DaqError, System, constants, nidaqmx, open_channel
+from vibroimpact.hardware.rig.opening import Rig, opened_rig
 from vibroimpact.hardware.virtual_rig.control import RigControl
 from vibroimpact.hardware.virtual_rig.serving import RigServer, served
 from vibroimpact.hardware.virtual_rig.settings import read_rig
@@ -20,31 +21,74 @@ BITS_16 = 10.0 / 2**15
 
 
 class Bench:
-    """A client on a rig."""
+    """A client on a virtual rig.
+
+    Attributes
+    ----------
+    device : str
+        Tests call it `Dev1`; `named` gives its name.
+    loop : str
+        An input that the first output is wired to.
+    tolerance : float
+        V, of what is put out and read back.
+    """
+
+    device, loop, tolerance = "Dev1", "Dev1/ai2", BITS_16
 
     def __init__(self, server: RigServer, channel: Any) -> None:
-        self.server, self.channel = server, channel
-        self.control = RigControl(channel)
+        self.server, self.channel, self.address = server, channel, server.address
+        self._control = RigControl(channel)
+
+    @property
+    def control(self) -> RigControl:
+        """The control service."""
+        return self._control
+
+    def named(self, text: str) -> str:
+        """Return names of channels and terminals with the name of the device."""
+        return text.replace("Dev1", self.device)
 
     def options(self, name: str = "", **others: Any) -> Any:
         return nidaqmx.GrpcSessionOptions(self.channel, name, **others)
+
+    def system(self) -> Any:
+        return System.remote(self.options())
 
     def task(self, name: str = "") -> Any:
         return nidaqmx.Task(name, grpc_options=self.options(name))
 
     def inputs(self, terminals: str = "Dev1/ai0", rate: float | None = None, **timing: Any) -> Any:
         task = self.task()
-        task.ai_channels.add_ai_voltage_chan(terminals, min_val=-10, max_val=10)
-        if rate is not None:
-            task.timing.cfg_samp_clk_timing(rate, **timing)
-        return task
+        task.ai_channels.add_ai_voltage_chan(self.named(terminals), min_val=-10, max_val=10)
+        return self._timed(task, rate, timing)
 
     def outputs(self, terminals: str = "Dev1/ao0", rate: float | None = None, **timing: Any) -> Any:
         task = self.task()
-        task.ao_channels.add_ao_voltage_chan(terminals, min_val=-10, max_val=10)
+        task.ao_channels.add_ao_voltage_chan(self.named(terminals), min_val=-10, max_val=10)
+        return self._timed(task, rate, timing)
+
+    def _timed(self, task: Any, rate: float | None, timing: dict[str, Any]) -> Any:
         if rate is not None:
-            task.timing.cfg_samp_clk_timing(rate, **timing)
+            task.timing.cfg_samp_clk_timing(
+                rate, **(timing | {"source": self.named(timing.get("source", ""))})
+            )
         return task
+
+    def as_it_waits(self) -> None:
+        """Let time go on only while a call waits for it."""
+        self.control.pace(lockstep=True)
+
+    def as_in_life(self) -> None:
+        """Let time go on by itself."""
+        self.control.pace(lockstep=False)
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time go on while the program does nothing."""
+        self.control.advance(seconds)
+
+    def output(self, number: int) -> float:
+        """Return the voltage of an output now."""
+        return float(self.control.truth()["outputs"][number])
 
     def wait_until(self, holds: Callable[[], bool]) -> None:
         """Wait until something holds; a rig that goes on by itself gets there."""
@@ -58,6 +102,62 @@ class Bench:
         for task in list(self.server.board.tasks.values()):
             self.server.board.remove(task)
         self.server.board.analog.held[:] = 0.0
+
+
+class RealBench(Bench):
+    """A client on a board: what needs the plant or the control service is skipped."""
+
+    tolerance = 0.02  # noise and calibration
+
+    def __init__(self, rig: Rig, device: str) -> None:
+        self._rig, self.device, self.channel, self._address = rig, device, rig.channel, rig.address
+        self.loop = f"{device}/_ao0_vs_aognd"
+
+    @property
+    def control(self) -> RigControl:
+        """Skip: a board has none."""
+        pytest.skip("needs the control service of a virtual rig")
+
+    @property
+    def address(self) -> str:  # type: ignore[override]
+        """Of the server; skip, where there is none."""
+        return self._address or pytest.skip("needs a rig behind gRPC")
+
+    def options(self, name: str = "", **others: Any) -> Any:
+        """Return the options of a task; None: the driver of this machine."""
+        return super().options(name, **others) if self.channel is not None else None
+
+    def system(self) -> Any:
+        """Return the system of NI's client."""
+        return self._rig.system()
+
+    def as_it_waits(self) -> None:
+        """A board does not wait."""
+
+    def as_in_life(self) -> None:
+        """A board is as in life."""
+
+    def pass_time(self, seconds: float) -> None:
+        """Wait, less long: it only has to be seen that nothing happens."""
+        time.sleep(min(seconds, 0.05))
+
+    def output(self, number: int) -> float:
+        """Return the voltage of an output, measured inside the device."""
+        with self.inputs(f"Dev1/_ao{number}_vs_aognd") as task:
+            return float(task.read())
+
+    def clear(self) -> None:
+        """Bring the first output to 0."""
+        with self.outputs() as task:
+            task.write(0.0)
+
+
+@contextmanager
+def opened_real_bench(choice: str) -> Iterator[Bench]:
+    """Open `Dev1`, the board of this machine, or `grpc://host:port/Dev1` for as long as the block lasts."""
+    address, _, device = choice.rpartition("/")
+    with opened_rig(address or "local") as rig:
+        yield RealBench(rig, device)
 
 
 @contextmanager

@@ -1,0 +1,193 @@
+"""The virtual rig by NI's unmodified client: its speed, its cost in real time, its lateness.
+
+Server and client are processes of their own on this machine.
+
+- Throughput: a stream reader of doubles empties a finite block that was acquired before, 3 channels, in blocks of 600,
+  6,000 and 60,000 samples per channel; over what 3 channels at 60 kS/s need (180,000 samples a second).
+- Cost: `examples/rig/oscillator.toml` in real time, its output driven, 3 inputs at 60 kS/s, an event and a read every
+  6,000 samples, for some seconds: processor time of the client and of the server, as a share of one core.
+- Lateness: the moment (monotonic clock) at which the program has heard of N samples, and has read them, against that
+  at which the sample clock is due to have taken the last of them. A client does not see when the clock starts: the
+  earliest of all events counts as on time, so that lateness is over the best case.
+
+Goals: 50 times, 25 % of a core. Run with `python tests/benchmarks/bench_rig.py [--runs 3] [--seconds 10]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import queue
+import re
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from vibroimpact.hardware.daqmx import constants, nidaqmx, open_channel, stream_readers
+from vibroimpact.hardware.virtual_rig.control import RigControl
+
+RIG = Path(__file__).parents[2] / "examples" / "rig" / "oscillator.toml"
+ENTRY = "from vibroimpact.orchestrator.commands.cli import main; main()"
+CHANNELS, RATE = 3, 60_000
+NEEDED = CHANNELS * RATE
+"""Samples a second that a program reads in real time."""
+TIMES, SHARE = 50.0, 0.25
+"""Goals: throughput over `NEEDED`, processor time of client and server over that of a core."""
+BLOCKS = (600, 6_000, 60_000)
+EVERY = 6_000
+
+
+@contextmanager
+def served_rig() -> Iterator[tuple[str, psutil.Process]]:
+    """Serve the rig in a process of its own; yield its address and the process."""
+    command = [sys.executable, "-u", "-c", ENTRY, "rig", "serve", str(RIG), "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
+        try:
+            assert process.stdout is not None
+            said = (re.search(r"grpc://([\d.]+:\d+)", line) for line in process.stdout)
+            address = next(found[1] for found in said if found)
+            yield address, psutil.Process(process.pid)
+        finally:
+            process.terminate()
+
+
+def processor_time(process: psutil.Process) -> float:
+    """Return the processor time of a process, s."""
+    times = process.cpu_times()
+    return float(times.user + times.system)
+
+
+def inputs(channel: object, mode: constants.AcquisitionType, samples: int) -> nidaqmx.Task:
+    """Return a task of three inputs at 60 kS/s."""
+    task = nidaqmx.Task(grpc_options=nidaqmx.GrpcSessionOptions(channel, ""))
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai0:2", min_val=-10, max_val=10)
+    task.timing.cfg_samp_clk_timing(RATE, sample_mode=mode, samps_per_chan=samples)
+    return task
+
+
+def throughput(channel: object, block: int) -> float:
+    """Return the samples a second that a stream reader takes of a block that is there."""
+    count = max(600_000 // block, 1) * block
+    with inputs(channel, constants.AcquisitionType.FINITE, count) as task:
+        task.start()
+        RigControl(channel).advance(count / RATE + 1.0)
+        reader = stream_readers.AnalogMultiChannelReader(task.in_stream)
+        reader.verify_array_shape = False
+        data = np.zeros((CHANNELS, block))
+        began = time.perf_counter()
+        for _ in range(count // block):
+            reader.read_many_sample(data, block)
+        return CHANNELS * count / (time.perf_counter() - began)
+
+
+@dataclass(frozen=True, slots=True)
+class RealTime:
+    """A run in real time: shares of a core, and lateness of events and of reads, s."""
+
+    client: float
+    server: float
+    events: list[float]
+    reads: list[float]
+
+
+def in_real_time(address: str, server: psutil.Process, seconds: float) -> RealTime:
+    """Drive the rig and read it for some seconds; return what it cost and how late it was."""
+    me = psutil.Process(os.getpid())
+    with open_channel(address) as channel:
+        RigControl(channel).pace(lockstep=False, speed=1.0)
+        options = nidaqmx.GrpcSessionOptions(channel, "")
+        with (
+            nidaqmx.Task(grpc_options=options) as drive,
+            inputs(channel, constants.AcquisitionType.CONTINUOUS, 10 * EVERY) as task,
+        ):
+            drive.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-5, max_val=5)
+            drive.timing.cfg_samp_clk_timing(RATE, sample_mode=constants.AcquisitionType.CONTINUOUS)
+            drive.write(3.0 * np.sin(2.0 * np.pi * np.arange(10_000) / 10_000))
+            heard: queue.SimpleQueue[float] = queue.SimpleQueue()
+
+            def hear(*_: object) -> int:
+                heard.put(time.monotonic())
+                return 0
+
+            task.register_every_n_samples_acquired_into_buffer_event(EVERY, hear)
+            reader = stream_readers.AnalogMultiChannelReader(task.in_stream)
+            reader.verify_array_shape = False
+            data = np.zeros((CHANNELS, EVERY))
+            drive.start()
+            task.start()
+            heard.get(timeout=10.0)  # the first calls make the connection
+            reader.read_many_sample(data, EVERY)
+            events, reads = [], []
+            before = processor_time(me), processor_time(server)
+            began = time.monotonic()
+            for _ in range(round(seconds * RATE / EVERY)):
+                events.append(heard.get(timeout=10.0))
+                reader.read_many_sample(data, EVERY)
+                reads.append(time.monotonic())
+            passed = time.monotonic() - began
+            after = processor_time(me), processor_time(server)
+            task.stop()
+            drive.stop()
+            task.register_every_n_samples_acquired_into_buffer_event(EVERY, None)
+    due = np.arange(len(events)) * EVERY / RATE
+    start = float(np.min(np.array(events) - due))
+    return RealTime(
+        (after[0] - before[0]) / passed,
+        (after[1] - before[1]) / passed,
+        [float(each) for each in np.array(events) - due - start],
+        [float(each) for each in np.array(reads) - due - start],
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--seconds", type=float, default=10.0)
+    given = parser.parse_args()
+    busy = psutil.cpu_percent(1.0)
+    print(
+        f"{os.cpu_count()} cores, {busy:.0f} % busy before; nidaqmx {nidaqmx.__version__}, {given.runs} runs"
+    )
+    least = np.inf
+    with served_rig() as (address, server):
+        with open_channel(address) as channel:
+            RigControl(channel).pace(lockstep=True)
+            print("Stream reader of doubles, 3 channels, over what 60 kS/s need")
+            for block in BLOCKS:
+                found = [throughput(channel, block) / NEEDED for _ in range(given.runs + 1)][1:]
+                middle = statistics.median(found)
+                least = min(least, middle) if block > BLOCKS[0] else least
+                print(f"  blocks of {block:6d} {middle:8.1f} times  ({min(found):.1f} to {max(found):.1f})")
+        print(
+            f"In real time, 3 x 60 kS/s, {given.seconds:g} s, share of a core; lateness over the best event, ms"
+        )
+        shares = []
+        for _ in range(given.runs):
+            run = in_real_time(address, server, given.seconds)
+            shares.append(run.client + run.server)
+            events, reads = np.array(run.events) * 1e3, np.array(run.reads) * 1e3
+            print(
+                f"  client {100 * run.client:.1f} %, server {100 * run.server:.1f} %; "
+                f"events {np.median(events):.2f} median, {events.max():.2f} at most; "
+                f"reads {np.median(reads):.2f}, {reads.max():.2f}"
+            )
+    share = statistics.median(shares)
+    fast, cheap = ("met" if held else "missed" for held in (least >= TIMES, share < SHARE))
+    print(
+        f"In blocks of 6,000 and more a stream reader takes {least:.0f} times what 3 channels at 60 kS/s need (goal "
+        f"{TIMES:g}: {fast}); in real time client and server take {100 * share:.0f} % of a core (goal "
+        f"{100 * SHARE:g} %: {cheap})."
+    )
+
+
+if __name__ == "__main__":
+    main()
