@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from support.command_line import in_this_process
 
+from vibroimpact.analysis.dataset.reading import open_measured
 from vibroimpact.analysis.recording import Recording, open_recording, write_recording
 from vibroimpact.analysis.spikes import Mechanics, SpikeSettings, spike_report
 from vibroimpact.fmus.errors import RigError, UsageError
@@ -40,7 +41,7 @@ restitution = {RESTITUTION}
 [exciter]
 gain = 0.1
 [sensor]
-gain = 1000.0
+gain = 500.0
 [load_cell]
 sensitivity = 0.0218
 offset = 0.01
@@ -204,3 +205,20 @@ def test_a_level_of_rest_beyond_the_threshold_is_said(driven: Rig) -> None:
 def test_what_is_no_pulse_is_refused_before_a_rig_is_opened(given: dict[str, float], said: str) -> None:
     with pytest.raises(UsageError, match=said):
         record_spikes("no rig", ["cell=Dev1/ai1"], RATE, **({"threshold": 1.0} | given))  # type: ignore[arg-type]
+
+
+def test_restitution_and_number_of_impacts_come_back_from_recorded_channels(
+    driven: Rig, tmp_path: Path
+) -> None:
+    words = ["tip=Dev1/ai0,10", "cell=Dev1/ai1,5"]
+    write_recording(record(driven, words, 5000.0, 12.0 / FREQUENCY), tmp_path / "both.nc")
+    drive = ["--forcing-frequency", f"{FREQUENCY:g}", "-o", tmp_path / "found.nc"]
+    done = in_this_process("estimate", "impacts", tmp_path / "both.nc", "--channel", "tip", *drive)
+    assert done.returncode == 0, done.stderr
+    found = open_measured(tmp_path / "found.nc")
+    estimates = found.sel(quantity="restitution")
+    best = estimates.isel(estimator=int(np.nanargmin(estimates.standard_error)))
+    assert float(best.interval_low) <= RESTITUTION <= float(best.interval_high)
+    assert float(best.estimate) == pytest.approx(RESTITUTION, abs=0.02)
+    report = spike_report(open_recording(tmp_path / "both.nc").channel("cell")).dataset
+    assert abs(report.sizes["spike"] - 12) <= 1
