@@ -50,6 +50,9 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.analysis.spikes import SpikeSettings as SpikeSettings
     from vibroimpact.analysis.spikes import spike_report as spike_report
     from vibroimpact.fmus.errors import VibroimpactError as VibroimpactError
+    from vibroimpact.hardware.programs.record import record as record
+    from vibroimpact.hardware.programs.recover import recover as recover
+    from vibroimpact.hardware.programs.spikes import record_spikes as record_spikes
     from vibroimpact.hardware.programs.sweep import measure_sweep as measure_sweep
     from vibroimpact.hardware.recordings import ImportSettings as ImportSettings
     from vibroimpact.hardware.recordings import import_recording as import_recording
@@ -87,6 +90,9 @@ _NAMES = {
     ),
     "analysis.spikes": ("Mechanics", "SpikeSettings", "spike_report"),
     "fmus.errors": ("VibroimpactError",),
+    "hardware.programs.record": ("record",),
+    "hardware.programs.recover": ("recover",),
+    "hardware.programs.spikes": ("record_spikes",),
     "hardware.programs.sweep": ("measure_sweep",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
     "orchestrator.scene": ("Scene",),

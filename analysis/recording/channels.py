@@ -28,6 +28,8 @@ Floats = NDArray[np.float64]
 T = TypeVar("T")
 #: Relative difference of intervals up to which they are even.
 _EVEN = 1e-6
+PAUSE = 1.5
+"""Steps, in intervals, above which uneven instants have a pause."""
 
 
 class Quality(IntFlag):
@@ -81,6 +83,14 @@ class TimeAxis:
         steps = np.diff(time)
         even = len(steps) > 0 and float(np.ptp(steps)) <= _EVEN * float(np.mean(steps))
         return cls(time, float(np.mean(steps)) if even else None, source=source)
+
+    @property
+    def pace(self) -> float:
+        """Interval of samples, s; the mean one of uneven samples, the pauses between pieces of a record left out."""
+        if self.interval is not None:
+            return self.interval
+        steps = np.diff(self.time)
+        return float(np.mean(steps[steps <= PAUSE * np.median(steps)]))
 
     @property
     def rate(self) -> float:

@@ -34,7 +34,7 @@ from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.wording import option
 
 MOST_VALUES = 10**8
-"""Values above which a recording is refused: some bytes of a damaged file can promise any number."""
+"""Values of 8 bytes above which a recording is refused: some bytes of a damaged file can promise any number."""
 # Attributes that the file itself needs and no channel carries.
 _STORED = frozenset(
     {"units", "long_name", "ancillary_variables", "_FillValue", "coordinates", "event_train", "resolution"}
@@ -175,7 +175,7 @@ def _read(file: netCDF4.Dataset, path: str | os.PathLike[str]) -> Recording:
             f"{os.fspath(path)}: recording_schema: expected {RECORDING_SCHEMA}, "
             f"got {str(file.recording_schema)[:60]!r}. Import the measurement again with this version."
         )
-    if sum(int(variable.size) for variable in file.variables.values()) > MOST_VALUES:
+    if sum(int(each.size) * each.dtype.itemsize / 8 for each in file.variables.values()) > MOST_VALUES:
         raise DatasetError(f"{os.fspath(path)}: expected at most {MOST_VALUES} values, got more.")
     axes = {}
     for name, variable in file.variables.items():

@@ -146,6 +146,8 @@ class Identification:
     baseline_window : int
         Samples.
     settings : SpikeSettings
+    interval : float
+        Sampling interval, s; the mean one, pauses left out.
     remarks : list of str
     """
 
@@ -170,12 +172,8 @@ class Identification:
     settled: float
     baseline_window: int
     settings: SpikeSettings
+    interval: float
     remarks: list[str] = field(default_factory=list)
-
-    @property
-    def interval(self) -> float:
-        """Mean sampling interval, s."""
-        return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
 
 def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identification:
@@ -196,7 +194,7 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
     time = channel.time
     cycle, method, reason = _method(channel, signal, chosen)
     periodic = cycle.periodic if method != "threshold" else np.zeros(len(signal))
-    interval = float(time[-1] - time[0]) / (len(time) - 1)
+    interval = channel.axis.pace
     baseline, window = _baseline(signal - periodic, bad, chosen, interval)
     residual = signal - periodic - baseline
     polarity = POLARITIES[chosen.polarity]
@@ -238,6 +236,7 @@ def identify(channel: Channel, settings: SpikeSettings | None = None) -> Identif
         settled,
         window,
         chosen,
+        interval,
         _remarks(channel, bad)
         + (_unrest(residual[~bad], interval) if method == "threshold" and noise else []),
     )

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import resample
 
+from vibroimpact.analysis.recording.channels import PAUSE
 from vibroimpact.analysis.spikes.detection import crossing
 from vibroimpact.analysis.spikes.identify import Identification
 from vibroimpact.analysis.spikes.waveforms import WAVEFORMS, WaveformFit, chosen_waveform, fit_waveforms
@@ -248,11 +249,14 @@ def _impulse_between(found: Identification, sign: float, begin: float, end: floa
 def _band_limited(found: Identification, pulse: _Pulse) -> tuple[float, float]:
     """Return the peak between the samples and its instant, s.
 
-    The samples about the peak, without the line through the ends, are one period of a band-limited function; it is
-    read at sixteen points between samples. Samples of a clipped peak know nothing of what is between them.
+    The samples about the peak, up to a pause of the record, without the line through the ends, are one period of a
+    band-limited function; it is read at sixteen points between samples. Samples of a clipped peak know nothing of what
+    is between them.
     """
     top = pulse.top
     first, stop = max(0, top - _SAMPLES_BESIDE), min(len(found.time), top + _SAMPLES_BESIDE + 1)
+    pauses = first + 1 + np.flatnonzero(np.diff(found.time[first:stop]) > PAUSE * found.interval)
+    first, stop = max([first, *pauses[pauses <= top]]), min([stop, *pauses[pauses > top]])
     part = pulse.sign * found.residual[first:stop]
     if stop - first < 8 or np.any(found.clipped[first:stop]) or np.any(found.bad[first:stop]):
         return float(part[top - first]), float(found.time[top])
