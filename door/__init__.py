@@ -52,6 +52,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.fmus.errors import VibroimpactError as VibroimpactError
     from vibroimpact.hardware.programs.record import record as record
     from vibroimpact.hardware.programs.recover import recover as recover
+    from vibroimpact.hardware.programs.sine import drive_sine as drive_sine
     from vibroimpact.hardware.programs.spikes import record_spikes as record_spikes
     from vibroimpact.hardware.programs.sweep import measure_sweep as measure_sweep
     from vibroimpact.hardware.recordings import ImportSettings as ImportSettings
@@ -92,6 +93,7 @@ _NAMES = {
     "fmus.errors": ("VibroimpactError",),
     "hardware.programs.record": ("record",),
     "hardware.programs.recover": ("recover",),
+    "hardware.programs.sine": ("drive_sine",),
     "hardware.programs.spikes": ("record_spikes",),
     "hardware.programs.sweep": ("measure_sweep",),
     "hardware.recordings": ("ImportSettings", "import_recording"),

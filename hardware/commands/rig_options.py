@@ -186,8 +186,16 @@ def sine(
 
     Example: vibroimpact rig sine --rig grpc://127.0.0.1:31763 --output Dev1/ao0 --frequency 5.3 --amplitude 1
     """
-    from vibroimpact.hardware.programs.sine import drive_sine, sine_of
-    from vibroimpact.hardware.rig.limits import Limits
+    from vibroimpact.hardware.programs.sine import drive_sine
 
-    wanted = sine_of(frequency, amplitude, ramp, duration, rate)
-    drive_sine(rig, output, wanted, Limits(most_amplitude, most_slew))
+    drive_sine(
+        output,
+        frequency,
+        amplitude,
+        ramp=ramp,
+        duration=duration,
+        rate=rate,
+        most_amplitude=most_amplitude,
+        most_slew=most_slew,
+        rig=rig,
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 import numpy as np
 
@@ -23,31 +23,67 @@ REFRESH_SECONDS = 0.2
 
 
 def drive_sine(
-    choice: str | None, terminal: str, sine: Sine, limits: Limits, *, said: Callable[[str], None] = say
+    terminal: str,
+    frequency: float,
+    amplitude: float,
+    *,
+    ramp: float = 0.5,
+    duration: float | None = None,
+    rate: float = 10_000.0,
+    most_amplitude: float = 5.0,
+    most_slew: float = 2000.0,
+    rig: str | None = None,
+    progress: bool = True,
 ) -> float:
-    """Drive an output of a rig with a sine; return the seconds that it drove, when it is at 0 V.
+    """Drive an output of a rig with a sine; it rises from 0 V and comes to rest at 0 V.
+
+    A guardian, a process of its own, brings it to rest where this one cannot.
 
     Parameters
     ----------
-    choice : str or None
-        The rig, as `--rig` says it.
     terminal : str
         Such as `Dev1/ao0`.
-    sine : Sine
-    limits : Limits
-    said : callable
-        Hears when it begins.
+    frequency : float
+        Hz, below half of the rate.
+    amplitude : float
+        V.
+    ramp : float
+        Time in which it rises, and falls at the end, s.
+    duration : float, optional
+        s, ramps included; else until Ctrl-C.
+    rate : float
+        Samples per second.
+    most_amplitude, most_slew : float
+        Limits of the output, V and V/s.
+    rig : str, optional
+        `virtual:RIG.toml`, `grpc://host:port` or `local`; else the board of this machine.
+    progress : bool
+        Show how far it is.
+
+    Returns
+    -------
+    float
+        The time that was driven, s.
 
     Raises
     ------
-    UsageError, RigError
-        Nothing was driven; or the rig or this machine failed, and what became of the output.
+    UsageError
+        The sine is none, is beyond the limits, or the rig lacks what is asked for: nothing was driven.
+    RigError
+        The rig or this machine failed; says what became of the output.
     KeyboardInterrupt
-        It was stopped by a signal, and is at rest.
+        It was stopped by Ctrl-C and is at 0 V.
+
+    Examples
+    --------
+    >>> drive_sine("Dev1/ao0", 5.3, 1.0, duration=10.0, rig="virtual:oscillator.toml")          # doctest: +SKIP
     """
-    sine.refuse_beyond(limits)
+    wanted = sine_of(frequency, amplitude, ramp, duration, rate)
+    limits = Limits(most_amplitude, most_slew)
+    wanted.refuse_beyond(limits)
+    said = say if progress else _unsaid
     interrupted = []
-    with opened_rig(choice) as rig, Output(rig, terminal, sine.rate, sine, limits) as output:
+    with opened_rig(rig) as opened, Output(opened, terminal, rate, wanted, limits) as output:
 
         def stop() -> None:
             interrupted.append(True)
@@ -55,18 +91,19 @@ def drive_sine(
 
         with stopped_by_signals(stop):
             output.start()
-            said(
-                f"{terminal} on {rig.name}: {sine.frequency:g} Hz, {sine.amplitude:g} V. Ctrl-C brings it to rest."
-            )
-            with _shown() as show:
+            if output.has_driven:
+                said(
+                    f"{terminal} on {opened.name}: {frequency:g} Hz, {amplitude:g} V. Ctrl-C brings it to rest."
+                )
+            with _shown() if progress else nullcontext(_unsaid) as show:
                 while not output.poll(REFRESH_SECONDS):
                     stage = ", coming to rest" if interrupted else ""
-                    show(f"{terminal}: {output.generated / sine.rate:.1f} s{stage}")
+                    show(f"{terminal}: {output.generated / rate:.1f} s{stage}")
             output.wait()
         if interrupted:
-            said(f"{terminal} is at 0 V.")
+            said(f"{terminal} is at 0 V." if output.has_driven else "Nothing was driven.")
             raise KeyboardInterrupt
-    return output.generated / sine.rate
+    return output.generated / rate
 
 
 def sine_of(frequency: float, amplitude: float, ramp: float, duration: float | None, rate: float) -> Sine:
@@ -79,6 +116,10 @@ def sine_of(frequency: float, amplitude: float, ramp: float, duration: float | N
     if duration is not None and not (duration > 0.0 and np.isfinite(duration * rate)):
         raise UsageError(f"--duration: expected a number > 0, s, got {duration!r}.")
     return Sine(frequency, amplitude, rate, ramp, None if duration is None else round(duration * rate))
+
+
+def _unsaid(text: str) -> None:
+    """Say nothing."""
 
 
 @contextmanager

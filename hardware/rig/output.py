@@ -31,6 +31,8 @@ SHUTDOWN = 10.0
 CALL_SECONDS = 10.0
 """Time of a call, s, after which the server counts as one that answers no more."""
 NOBODY_KNOWS = "Nobody knows what it puts out: switch the amplifier off"
+LEAST_RATE = 100.0
+"""Hz, below which a buffer, which has 16 samples at least, holds more than 0.3 s."""
 _RATE_ROUNDING = 1e-9
 
 
@@ -83,7 +85,7 @@ class Output:
     Raises
     ------
     UsageError
-        The terminal is none.
+        The terminal is none, or the rate is too low to come to rest soon.
 
     Examples
     --------
@@ -107,6 +109,10 @@ class Output:
         self.trigger = start_trigger(terminal)
         if guarded and rig.channel is not None and not rig.address:
             raise UsageError("output: expected a rig with an address, which its guardian needs, got none.")
+        if not rate >= LEAST_RATE:
+            raise UsageError(
+                f"--rate: expected at least {LEAST_RATE:g} Hz, so that the output comes to rest soon, got {rate!r}."
+            )
         self._rig, self._terminal, self._rate = rig, terminal.strip("/"), rate
         self._waveform, self._limits, self._guarded = waveform, limits, guarded
         self._attach = rig.channel is not None if attach is None else attach
@@ -189,6 +195,11 @@ class Output:
                 self._hand_over(f"was not over within {deadline:g} s")
         self._thread.join()
         self._raise_failure()
+
+    @property
+    def has_driven(self) -> bool:
+        """Whether it was started; one that is stopped before that drives nothing."""
+        return self._started
 
     @property
     def _longest_shutdown(self) -> float:

@@ -77,6 +77,8 @@ SINE = ("--output", "Dev1/ao0", "--frequency", "5.3", "--amplitude", "2", "--ram
 RATE = 10_000.0
 STEEPEST = 2.0 * (2.0 * np.pi * 5.3 + 0.5 * np.pi / 0.05)
 """Of that sine with its ramps, and of the fall from 2 V in 50 ms, V/s: far below the default limit."""
+HEARING = f"import signal; signal.signal(signal.SIGINT, signal.default_int_handler); {ENTRY}"
+"""The program hears Ctrl-C where a shell started the tests in the background, deaf to it, too."""
 SECONDS = 30.0
 """For what should happen at once, on a machine that does other things too."""
 
@@ -134,7 +136,7 @@ class Driven:
 def driven(bench: Bench, *more: str) -> Iterator[Driven]:
     """Let the program drive; what is left of it at the end of the block is ended."""
     rig = Rig("bench", bench.channel, bench.server.address)
-    command = [sys.executable, "-u", "-c", ENTRY, "rig", "sine", "--rig", f"grpc://{bench.server.address}"]
+    command = [sys.executable, "-u", "-c", HEARING, "rig", "sine", "--rig", f"grpc://{bench.server.address}"]
     program = subprocess.Popen(
         [*command, *SINE, *more], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

@@ -5,6 +5,7 @@ Ctrl-C and SIGKILL at random moments are in `tests/soak/drives.py`.
 
 from __future__ import annotations
 
+import inspect
 import signal
 import subprocess
 import sys
@@ -18,7 +19,9 @@ from support.driving import SECONDS, SINE, STEEPEST, driven
 from support.places import ROOT
 from support.rig_bench import Bench, opened_bench
 
+import vibroimpact as vi
 from vibroimpact.hardware.daqmx import constants, open_channel
+from vibroimpact.hardware.rig.guarding import Guardian
 from vibroimpact.hardware.rig.limits import Limits
 from vibroimpact.hardware.virtual_rig.control import RigControl
 
@@ -78,6 +81,10 @@ def test_a_sine_of_a_duration_ends_at_rest(bench: Bench) -> None:
         (["--duration", "0.3"], "--duration: expected more than twice the ramp"),
         (["--duration", "inf"], "--duration: expected a number > 0"),
         (["--rate", "2e6"], "a rate of 2e+06 Hz"),
+        (
+            ["--rate", "99"],
+            "--rate: expected at least 100 Hz, so that the output comes to rest soon, got 99.0",
+        ),
         (["--output", "Dev1/ao7"], "no such channel: Dev1/ao7"),
         (["--output", "Dev9/ao0"], "no such device: Dev9"),
         (["--output", "ao0"], "--output: expected an output such as Dev1/ao0"),
@@ -91,6 +98,42 @@ def test_what_cannot_be_driven_is_one_line_and_drives_nothing(
     assert said in done.stderr
     assert done.stderr.count("\n") == 1
     assert bench.control.truth()["outputs"] == [0.0, 0.0]
+    assert bench.control.state()["tasks"] == {}
+    assert guardians() == []
+
+
+def test_in_python_it_is_one_call(bench: Bench, capfd: pytest.CaptureFixture[str]) -> None:
+    rig = f"grpc://{bench.server.address}"
+    driven_for = vi.drive_sine("Dev1/ao0", 5.3, 2.0, ramp=0.2, duration=1.0, rig=rig, progress=False)
+    assert driven_for >= 1.0
+    assert capfd.readouterr() == ("", "")
+    assert bench.control.truth()["outputs"] == [0.0, 0.0]
+    with pytest.raises(vi.VibroimpactError, match="--amplitude: expected at most 5 V, got 6"):
+        vi.drive_sine("Dev1/ao0", 5.3, 6.0, duration=2.0, rig=rig)
+    assert bench.control.state()["tasks"] == {}
+    assert guardians() == []
+
+
+def test_the_defaults_in_python_are_those_of_the_limits() -> None:
+    defaults = {name: one.default for name, one in inspect.signature(vi.drive_sine).parameters.items()}
+    assert Limits(defaults["most_amplitude"], defaults["most_slew"]) == Limits()
+
+
+def test_ctrl_c_before_the_start_drives_nothing(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    ready = Guardian.await_ready
+
+    def interrupted(guardian: Guardian) -> None:
+        ready(guardian)
+        signal.raise_signal(signal.SIGINT)
+        while signal.getsignal(signal.SIGINT) != signal.default_int_handler:
+            time.sleep(0.001)  # the main thread hears it
+
+    monkeypatch.setattr(Guardian, "await_ready", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        vi.drive_sine("Dev1/ao0", 5.3, 2.0, ramp=0.2, rig=f"grpc://{bench.server.address}")
+    assert capfd.readouterr().out == "Nothing was driven.\n"
     assert bench.control.state()["tasks"] == {}
     assert guardians() == []
 
