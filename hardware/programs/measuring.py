@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -59,7 +60,7 @@ class Wanted:
 def wanted_of(
     channels: Sequence[str],
     loopbacks: Sequence[str],
-    calibrations: Sequence[Path],
+    calibrations: Sequence[str | os.PathLike[str]],
     rate: float,
     duration: float | None,
 ) -> Wanted:
@@ -83,7 +84,9 @@ def wanted_of(
             f"--rate, --duration: expected {FEWEST_SAMPLES} samples or more, got {rate:g} Hz for {duration:g} s."
         )
     back = frozenset(each.name for each in inputs[len(channels) :])
-    return Wanted(tuple(inputs), back, read_calibrations(calibrations, inputs), rate, duration)
+    return Wanted(
+        tuple(inputs), back, read_calibrations([Path(each) for each in calibrations], inputs), rate, duration
+    )
 
 
 Describe = Callable[[Rig, Facts], Measurement]
@@ -95,7 +98,7 @@ def measured(
     describe: Describe,
     *,
     most_pulses: int | None = None,
-    journal: Path | None = None,
+    journal: str | os.PathLike[str] | None = None,
     live: bool = False,
 ) -> Recording:
     """Measure, and return the recording; its attribute `ended` says why it is shorter than asked for.
@@ -109,7 +112,7 @@ def measured(
         Returns the measurement, once the device has said what it makes of the inputs and the rate.
     most_pulses : int or None
         Pulses after which it ends, of a measurement of pulses.
-    journal : Path or None
+    journal : path or None
         Where all is kept meanwhile; None: in memory. It stays there: who has the recording removes it.
     live : bool
         Show how it goes.
@@ -128,7 +131,7 @@ def measured(
             measurement = describe(opened, acquired.facts)
             _refuse_many(measurement, wanted)
             header = measurement.model_dump(mode="json")
-            file = None if journal is None else stack.enter_context(Journal(journal, header))
+            file = None if journal is None else stack.enter_context(Journal(Path(journal), header))
             stack.enter_context(stopped_by_signals(acquired.stop))
             return _kept(acquired, measurement, Store(header, file), wanted, most_pulses, live)
         except (daqmx.DaqError, daqmx.RpcError) as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,8 +20,8 @@ def record(
     duration: float | None = None,
     *,
     loopback: Sequence[str] = (),
-    calibration: Sequence[Path] = (),
-    journal: Path | None = None,
+    calibration: Sequence[str | os.PathLike[str]] = (),
+    journal: str | os.PathLike[str] | None = None,
 ) -> Recording:
     """Record inputs of a rig.
 
@@ -36,9 +37,9 @@ def record(
         s; None: until Ctrl-C, which ends it with all that was measured.
     loopback : sequence of str
         Likewise, of inputs to which an output is wired.
-    calibration : sequence of Path
+    calibration : sequence of path
         Files of calibrations: their channels are in m or N, others in V.
-    journal : Path or None
+    journal : path or None
         File that has all of it meanwhile, and afterwards; None: none.
 
     Returns

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
@@ -11,12 +12,12 @@ from vibroimpact.hardware.programs.keeping import recording_in, write_and_show
 from vibroimpact.hardware.rig.journal import read_journal
 
 
-def recover(journal: Path) -> Recording:
+def recover(journal: str | os.PathLike[str]) -> Recording:
     """Return the recording of all that is whole in a journal.
 
     Parameters
     ----------
-    journal : Path
+    journal : path
 
     Raises
     ------
@@ -27,7 +28,7 @@ def recover(journal: Path) -> Recording:
     RigError
         There are fewer than two samples in it.
     """
-    content = read_journal(journal)
+    content = read_journal(Path(journal))
     if content.lost_bytes:
         content.notes.append({"remark": f"{content.lost_bytes} bytes of the journal are damaged or cut off"})
     return recording_in(content, str(journal))

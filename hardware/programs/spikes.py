@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,8 +88,8 @@ def record_spikes(
     postsamples: int = 64,
     dead_time: float = 0.0,
     pulses: int | None = None,
-    calibration: Sequence[Path] = (),
-    journal: Path | None = None,
+    calibration: Sequence[str | os.PathLike[str]] = (),
+    journal: str | os.PathLike[str] | None = None,
 ) -> Recording:
     """Record the pulses of a channel with the samples around them; what is between them is not kept.
 

@@ -26,7 +26,8 @@ from vibroimpact.analysis.files.folder_lock import try_lock
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.hardware.rig.acquisition import Block
 
-TITLE = b"vibroimpact journal 1\n"
+_KIND = b"vibroimpact journal "
+TITLE = _KIND + b"1\n"
 ENDING = ".journal"
 MARGIN = 64 * 2**20
 """Bytes that a disk must have left."""
@@ -231,6 +232,12 @@ def _refuse_locked(path: Path) -> None:
 
 def _header(content: Any, path: Path) -> tuple[dict[str, Any], int]:
     start, end = len(TITLE), -1
+    if content[: len(_KIND)] == _KIND and content[:start] != TITLE:
+        version = content[len(_KIND) : len(_KIND) + 20].split(b"\n")[0].decode("ascii", "backslashreplace")
+        raise DatasetError(
+            f"{path}: expected a journal of version 1, got version {version}. "
+            "Recover it with the vibroimpact that wrote it, or a newer one."
+        )
     if content[:start] == TITLE:
         end = content.find(b"\n", start, start + _LONGEST_HEADER)
     try:

@@ -26,7 +26,8 @@ def chains(draw: st.DrawFn) -> Scene:
     """Draw a scene with a load cell and an exciter, near or far, behind a rigid or a yielding stop."""
     rigid = draw(st.booleans())
     law = f"restitution = {draw(st.floats(0.0, 1.0))}" if rigid else 'law = "hertz"\nstiffness = 1e7'
-    ring, ratio = draw(st.floats(0.0, 3000.0)), draw(st.floats(0.0, 2.0))
+    ring = draw(st.just(0.0) | st.floats(1e-9, 3000.0))
+    ratio = draw(st.floats(0.0, 2.0))
     cell = (
         f"[load_cell]\nsensitivity = 0.01\nnatural_frequency = {ring}\ndamping_ratio = {ratio}\ndrift = 0.1\n"
     )

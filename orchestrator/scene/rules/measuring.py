@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from vibroimpact.fmus.core.measuring import CELL_LEAST, CELL_LIMITS
 from vibroimpact.orchestrator.scene.body_models import ChainBody
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
@@ -74,6 +75,19 @@ def load_cell_has_a_stop(draft: Draft) -> Iterator[Problem]:
         yield Problem("load_cell.contact_duration", f"none of a {stop.law} stop", quoted(given[1]), hint)
 
 
+def cell_has_numbers_of_a_cell(draft: Draft) -> Iterator[Problem]:
+    """The numbers of a load cell are within what its component takes, at every point."""
+    if draft.load_cell is None:
+        return
+    for name, largest in CELL_LIMITS.items():
+        span = draft.span(f"load_cell.{name}")
+        least = 0.0 if name == "damping_ratio" else CELL_LEAST
+        for value in dict.fromkeys(span or ()):
+            if value != 0.0 and not least <= value <= largest:
+                hint = "Such a cell measures nothing."
+                yield Problem(f"load_cell.{name}", f"{least:g} to {largest:g}", quoted(value), hint)
+
+
 def cell_rings_within_reach(draft: Draft) -> Iterator[Problem]:
     """The force that makes a cell ring is followed within a sample, but not without end."""
     ring, rate = draft.load_cell and draft.span("load_cell.natural_frequency"), draft.sampling_span()
@@ -139,6 +153,7 @@ MEASURING_RULES = (
     chain_suits_the_scene,
     replays_measure_nothing,
     load_cell_has_a_stop,
+    cell_has_numbers_of_a_cell,
     cell_rings_within_reach,
     exciter_drives_a_force,
     noise_has_its_channel,

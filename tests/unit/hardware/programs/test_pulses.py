@@ -80,7 +80,7 @@ def sample_by_sample(cell: np.ndarray, rule: PulseRule) -> tuple[list[int], set[
     hysteresis=st.floats(0.1, 1.0),
     before=st.integers(0, 40),
     after=st.integers(0, 20),
-    dead=st.integers(0, 60),
+    dead=st.integers(0, 60) | st.just(1000),
     cuts=st.lists(st.integers(0, 400), max_size=30),
 )
 @settings(max_examples=300, deadline=None)
@@ -98,6 +98,29 @@ def test_each_pulse_is_kept_once_with_its_presamples_however_blocks_are_cut(
     chance = np.random.default_rng(seed)
     cell = np.convolve(chance.normal(size=length + smooth - 1), np.ones(smooth) / np.sqrt(smooth), "valid")
     what = measurement(threshold=1.2 * sign, hysteresis=hysteresis, before=before, after=after, dead=dead)
+    assert what.pulses is not None
+    finder = PulseFinder(what)
+    numbers, samples = kept(finder, stream(cell), cuts)
+    starts, expected = sample_by_sample(cell, what.pulses)
+    assert finder.starts == starts
+    assert numbers == sorted(expected)
+    np.testing.assert_array_equal(samples, stream(cell)[:, numbers])
+
+
+@given(
+    ends=st.lists(st.floats(0.95, 1.05) | st.just(1.0), min_size=2, max_size=2),
+    noise=st.lists(st.sampled_from([0.0, 0.45, 0.5, 0.999999, 1.0, 1.000001, 4.0]), max_size=60),
+    sign=st.sampled_from([1.0, -1.0]),
+    hysteresis=st.sampled_from([0.5, 1.0]),
+    dead=st.integers(0, 8) | st.just(1000),
+    cuts=st.lists(st.integers(0, 62), max_size=20),
+)
+@settings(max_examples=300, deadline=None)
+def test_values_at_the_threshold_and_pulses_at_both_ends_are_kept_once(
+    ends: list[float], noise: list[float], sign: float, hysteresis: float, dead: int, cuts: list[int]
+) -> None:
+    cell = sign * np.array([ends[0], *noise, ends[1]])
+    what = measurement(threshold=sign, hysteresis=hysteresis, dead=dead)
     assert what.pulses is not None
     finder = PulseFinder(what)
     numbers, samples = kept(finder, stream(cell), cuts)

@@ -9,6 +9,7 @@ import inspect
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 
@@ -23,6 +24,7 @@ import vibroimpact as vi
 from vibroimpact.hardware.daqmx import constants, open_channel
 from vibroimpact.hardware.rig.guarding import Guardian
 from vibroimpact.hardware.rig.limits import Limits
+from vibroimpact.hardware.rig.output import Output
 from vibroimpact.hardware.virtual_rig.control import RigControl
 
 RIG = ROOT / "examples" / "rig" / "oscillator.toml"
@@ -119,17 +121,22 @@ def test_the_defaults_in_python_are_those_of_the_limits() -> None:
     assert Limits(defaults["most_amplitude"], defaults["most_slew"]) == Limits()
 
 
-def test_ctrl_c_before_the_start_drives_nothing(
+def test_a_signal_before_the_start_drives_nothing(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    ready = Guardian.await_ready
+    ready, heard = Guardian.await_ready, threading.Event()
+    stop = Output.stop
+
+    def stopped(output: Output) -> None:
+        stop(output)
+        heard.set()
 
     def interrupted(guardian: Guardian) -> None:
         ready(guardian)
-        signal.raise_signal(signal.SIGINT)
-        while signal.getsignal(signal.SIGINT) != signal.default_int_handler:
-            time.sleep(0.001)  # the main thread hears it
+        signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGTERM)
+        assert heard.wait(SECONDS)
 
+    monkeypatch.setattr(Output, "stop", stopped)
     monkeypatch.setattr(Guardian, "await_ready", interrupted)
     with pytest.raises(KeyboardInterrupt):
         vi.drive_sine("Dev1/ao0", 5.3, 2.0, ramp=0.2, rig=f"grpc://{bench.server.address}")

@@ -116,6 +116,13 @@ def test_another_file_is_no_journal(tmp_path: Path, content: bytes) -> None:
         read_journal(path)
 
 
+def test_a_journal_of_a_version_to_come_is_said_to_be_one(tmp_path: Path) -> None:
+    path = tmp_path / "new.journal"
+    path.write_bytes(b"vibroimpact journal 2\n{}\n")
+    with pytest.raises(DatasetError, match=r"new.journal: expected a journal of version 1, got version 2\."):
+        read_journal(path)
+
+
 def test_a_journal_is_not_overwritten_and_not_read_while_it_grows(tmp_path: Path) -> None:
     path = tmp_path / "a.journal"
     with Journal(path, HEADER) as journal:

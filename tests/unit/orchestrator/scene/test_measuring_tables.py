@@ -104,6 +104,14 @@ def scene(*tables: str) -> Scene:
             "load_cell.natural_frequency: expected at most 166667 Hz at this rate, got 1000000.0.",
         ),
         (
+            BODY + RECORD + CELL + "natural_frequency = 2e-311\n",
+            "load_cell.natural_frequency: expected 1e-09 to 1e+07, got 2e-311.",
+        ),
+        (
+            BODY + RECORD + CELL + "damping_ratio = 1e4\n",
+            "load_cell.damping_ratio: expected 0 to 1000, got 10000.0.",
+        ),
+        (
             BODY + EXCITER + DAQ.replace("2000", "2e9") + SERIES.format('variables = ["drive"]'),
             "daq.rate: expected at most",
         ),
