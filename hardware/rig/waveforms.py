@@ -62,8 +62,8 @@ class Sine:
 
     Examples
     --------
-    >>> Sine(2.5, 1.0, 10.0, 0.0).volts(10**15, 4).round(12).tolist()
-    [0.0, 1.0, 0.0, -1.0]
+    >>> Sine(1.0, 1.0, 12.0, 0.0).volts(12 * 10**15, 4).round(6).tolist()
+    [0.0, 0.5, 0.866025, 1.0]
     """
 
     frequency: float

@@ -271,13 +271,20 @@ def test_a_hanging_component_does_not_outlive_its_parent(folder: Path, how: sign
     )
     assert parent.stdout is not None
     assert parent.stdout.readline() == "ready\n"
-    (child,) = psutil.Process(parent.pid).children()
-    busy = child.cpu_times().user
-    wait_until(lambda: child.cpu_times().user > busy + 0.1)  # it hangs
+    supervised = hanging(psutil.Process(parent.pid))
     os.kill(parent.pid, how)
     parent.communicate(timeout=20)
-    wait_until(lambda: not alive(child))
-    assert not alive(child)
+    wait_until(lambda: not any(map(alive, supervised)))
+    assert not any(map(alive, supervised))
+
+
+def hanging(parent: psutil.Process) -> list[psutil.Process]:
+    """Wait until a point hangs; return its process and the one that watches it."""
+    (supervisor,) = parent.children()
+    wait_until(lambda: any(each.cpu_times().user > 0.5 for each in supervisor.children()))
+    (point,) = supervisor.children()
+    assert point.cpu_times().user > 0.5
+    return [supervisor, point]
 
 
 def alive(process: psutil.Process) -> bool:

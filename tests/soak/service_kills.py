@@ -15,7 +15,7 @@ from soak.kills import Content, content, difference
 from vibroimpact.service.client import ServiceError
 
 CASES = 20
-SAMPLE = 1
+SAMPLE = 0
 SECONDS = 300.0
 WAIT_SECONDS = 120.0
 POINTS = {"independent": 240, "up-down": 120}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from vibroimpact.fmus.core.measuring import CELL_LEAST, CELL_LIMITS
 from vibroimpact.orchestrator.scene.body_models import ChainBody
 from vibroimpact.orchestrator.scene.draft import Draft
 from vibroimpact.orchestrator.scene.keys import CHAIN_TABLES
@@ -79,6 +78,8 @@ def cell_has_numbers_of_a_cell(draft: Draft) -> Iterator[Problem]:
     """The numbers of a load cell are within what its component takes, at every point."""
     if draft.load_cell is None:
         return
+    from vibroimpact.fmus.core.measuring import CELL_LEAST, CELL_LIMITS  # a scene without a chain loads none of it
+
     for name, largest in CELL_LIMITS.items():
         span = draft.span(f"load_cell.{name}")
         least = 0.0 if name == "damping_ratio" else CELL_LEAST

@@ -43,6 +43,7 @@ def test_a_source_that_moves_makes_the_build_out_of_date(sources: Path) -> None:
 
 @pytest.mark.slow
 def test_an_error_in_the_c_is_told_in_the_compilers_words(sources: Path, tmp_path: Path) -> None:
+    keep_one_component(sources)
     (sources / "core" / "zz_wrong.c").write_text("int wrong(void) { return undeclared_name; }\n")
     with pytest.raises(ComponentError, match="undeclared_name"):
         build(tmp_path / "built", native=sources)
