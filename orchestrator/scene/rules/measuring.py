@@ -78,7 +78,8 @@ def cell_has_numbers_of_a_cell(draft: Draft) -> Iterator[Problem]:
     """The numbers of a load cell are within what its component takes, at every point."""
     if draft.load_cell is None:
         return
-    from vibroimpact.fmus.core.measuring import CELL_LEAST, CELL_LIMITS  # a scene without a chain loads none of it
+    # a scene without a chain loads none of it
+    from vibroimpact.fmus.core.measuring import CELL_LEAST, CELL_LIMITS
 
     for name, largest in CELL_LIMITS.items():
         span = draft.span(f"load_cell.{name}")
