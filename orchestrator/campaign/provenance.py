@@ -37,6 +37,8 @@ def provenance(scene: Scene, identity: RunnerIdentity) -> dict[str, Any]:
 
 def _seed(scene: Scene) -> str:
     """Return what is random in a dataset: noise where channels are sampled that have some."""
+    if scene.general is not None:
+        return "none of the scene's own; an FMU may have one among its parameters"
     if scene.noise is None or not scene.channels:
         return "none: nothing in the scene is random"
     return f"{scene.noise.seed}: noise of {', '.join(scene.channels)}"
