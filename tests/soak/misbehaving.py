@@ -26,6 +26,8 @@ SECONDS = 30.0
 
 #: Faults and places by their numbers in the model descriptions of Faulty; the event fault is one of FMI 3.0 alone.
 FAULTS, PLACES, ENDLESS_EVENTS, HANGS = range(1, 31), 11, 13, (4, 30)
+#: A million lines in a step take about as long as the deadline.
+FLOODS = (5, 6)
 #: Of these what happens shows later: a damaged heap, closed files, a killed parent.
 AT_A_DISTANCE = (26, 28, 29)
 MARK = "VIBROIMPACT_SOAK_MARK"
@@ -132,6 +134,8 @@ def _point(runner: Runner, fault: int, slope: float) -> str | None:
         return f"an innocent point is lost: {record.outcome.name}: {record.message}"
     # one that attacks its process or the processes around it may strike while another component is called
     blamed = ("culprit", "bystander", "guard: ") if fault in AT_A_DISTANCE else ("culprit", "guard: ")
+    if fault in FLOODS:  # each call returns: the time may be up between two of them
+        blamed += ("deadline: ",)
     named = record.message.startswith(blamed)
     return (
         None
