@@ -1,4 +1,4 @@
-"""Modes of beams, found by the same C functions as the FMU Beam uses: equations.md 6."""
+"""Modes of beams and chains, found by the same C functions as the FMUs use: equations.md 5 and 6."""
 
 from __future__ import annotations
 
@@ -214,6 +214,62 @@ def residual_vectors(boundary: Boundary, natural: int, points: float | Numbers) 
     return ResidualVectors(boundary, natural, s, eigenvalues, participation)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ChainModes:
+    """The modes of a chain of masses, mass-normalised: equations.md 5.2.
+
+    Attributes
+    ----------
+    frequencies : array, shape (masses,)
+        Natural angular frequencies, ascending, rad/s.
+    damping_ratios : array, shape (masses,)
+        Where the damping couples the modes, those of its diagonal.
+    shapes : array, shape (masses, masses)
+        Displacement of each mass (rows) for a unit of each mode, kg^(-1/2).
+    is_classical : bool
+        Whether the damping does not couple the modes.
+    """
+
+    frequencies: Array
+    damping_ratios: Array
+    shapes: Array
+    is_classical: bool
+
+
+def chain_modes(masses: Numbers, stiffnesses: Numbers, dampings: Numbers) -> ChainModes:
+    """Return the modes of a chain: ground, spring and dashpot, mass, spring and dashpot, mass, ... [, ground].
+
+    Parameters
+    ----------
+    masses : array of floats, shape (masses,)
+        kg, > 0; 1 to 64 of them.
+    stiffnesses, dampings : array of floats, shape (masses + 1,)
+        N/m and N s/m, >= 0; the last ties the far end to the ground.
+
+    Raises
+    ------
+    UsageError
+        Numbers that no chain has.
+
+    Examples
+    --------
+    >>> modes = chain_modes([1.0, 2.0, 0.5], [3.0, 1.0, 2.0, 0.0], [0.12, 0.04, 0.08, 0.0])
+    >>> print(modes.frequencies.round(8), modes.is_classical)
+    [0.53645647 2.         2.28302747] True
+    """
+    mass, stiffness, damping = _row(masses), _row(stiffnesses), _row(dampings)
+    count = mass.size
+    frequencies, ratios, shapes = np.empty(count), np.empty(count), np.empty((count, count))
+    fits = stiffness.size == damping.size == count + 1
+    end = _library().vi_door_chain_modes(count, mass, stiffness, damping, frequencies, ratios, shapes) if fits else -1
+    if end < 0:
+        raise UsageError(
+            "chain_modes: expected 1 to 64 masses > 0 and one spring and dashpot more, >= 0, "
+            f"got {mass}, {stiffness} and {damping}."
+        )
+    return ChainModes(frequencies, ratios, shapes, end == 0)
+
+
 def _row(points: float | Numbers) -> Array:
     return np.array(np.atleast_1d(np.asarray(points, dtype=np.float64)).ravel())
 
@@ -226,6 +282,7 @@ def _library() -> ctypes.CDLL:
     library.vi_door_beam_modes.argtypes = [integer, integer, numbers, numbers]
     library.vi_door_beam_shapes.argtypes = [integer, integer, integer, numbers, integer, numbers]
     library.vi_door_beam_residual.argtypes = [integer, integer, integer, numbers, numbers, numbers]
+    library.vi_door_chain_modes.argtypes = [integer, *[numbers] * 6]
     library.vi_door_beam_residual_shapes.argtypes = [
         integer,
         integer,

@@ -1,10 +1,13 @@
 #include "door/door_modes.h"
 
 #include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
 
 #include "door/door.h"
 #include "modes/beam_modes.h"
 #include "modes/beam_residual.h"
+#include "modes/chain_modes.h"
 
 static bool in_range(int boundary, int count)
 {
@@ -78,4 +81,28 @@ VI_DOOR int vi_door_beam_residual_shapes(int boundary, int natural, int points, 
         }
     }
     return refused;
+}
+
+VI_DOOR int vi_door_chain_modes(int masses, const double mass[], const double stiffness[], const double damping[],
+                                double natural[], double damping_ratio[], double shape[])
+{
+    vi_chain chain;
+    vi_chain_modes modes;
+    if (masses < 1 || masses > VI_MODES) {
+        return -1;
+    }
+    memset(&chain, 0, sizeof chain);
+    chain.masses = masses;
+    memcpy(chain.mass, mass, (size_t)masses * sizeof mass[0]);
+    memcpy(chain.stiffness, stiffness, (size_t)(masses + 1) * sizeof stiffness[0]);
+    memcpy(chain.damping, damping, (size_t)(masses + 1) * sizeof damping[0]);
+    if (!vi_chain_find_modes(&chain, &modes)) {
+        return -1;
+    }
+    memcpy(natural, modes.natural, (size_t)masses * sizeof natural[0]);
+    memcpy(damping_ratio, modes.damping_ratio, (size_t)masses * sizeof damping_ratio[0]);
+    for (int i = 0; i < masses; ++i) {
+        memcpy(shape + (ptrdiff_t)i * masses, modes.shape[i], (size_t)masses * sizeof shape[0]);
+    }
+    return modes.classical ? 0 : 1;
 }

@@ -1,4 +1,4 @@
-/* The functions that vibroimpact.fmus.core calls for the modes of beams, as the component finds them.
+/* The functions that vibroimpact.fmus.core calls for the modes of beams and chains, as the components find them.
  *
  * Numbers out of their range are refused, never computed with. */
 #ifndef VIBROIMPACT_DOOR_MODES_H
@@ -18,5 +18,10 @@ int vi_door_beam_residual(int boundary, int natural, int points, const double po
 /* shape[place * points + vector] of those vectors. Returns the same. */
 int vi_door_beam_residual_shapes(int boundary, int natural, int points, const double point[], int places,
                                  const double s[], double shape[]);
+
+/* chain_modes.h: stiffness and damping have `masses` + 1 elements, shape is [mass][mode]. Returns 0 where the damping does
+ * not couple the modes, 1 where it does (damping_ratio is then of the diagonal), -1 for a bad argument. */
+int vi_door_chain_modes(int masses, const double mass[], const double stiffness[], const double damping[],
+                        double natural[], double damping_ratio[], double shape[]);
 
 #endif

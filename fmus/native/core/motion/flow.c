@@ -97,6 +97,15 @@ static inline propagator propagate(const vi_mode *mode, double u)
     return p;
 }
 
+void vi_mode_propagator(const vi_mode *mode, double u, double phi[4])
+{
+    const propagator p = propagate(mode, u);
+    phi[0] = p.e_cos + mode->decay * p.e_sin;
+    phi[1] = p.e_sin;
+    phi[2] = -mode->stiffness * p.e_sin;
+    phi[3] = p.back;
+}
+
 /* `u` seconds after the start of a segment that is counted from before: the phase angle to twice the digits, so that it
  * is as exact after 10^6 periods as after one. */
 static propagator propagate_from_before(const vi_segment *s, double u)

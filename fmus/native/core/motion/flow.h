@@ -87,6 +87,9 @@ void vi_segment_continue(vi_segment *segment, double x, double v, double amplitu
 
 vi_phase vi_phase_of(double angle);
 
+/* Displacement and velocity after `u` >= 0 of the unforced mode: x = phi[0] x0 + phi[1] v0, v = phi[2] x0 + phi[3] v0. */
+void vi_mode_propagator(const vi_mode *mode, double u, double phi[4]);
+
 /* The motion at the start, from the state (x, v) that the segment was begun with: no rounding, no evaluation. */
 void vi_segment_first(const vi_segment *segment, double x, double v, vi_motion *motion);
 

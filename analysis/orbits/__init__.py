@@ -1,0 +1,8 @@
+"""Periodic orbits of bodies on restitution stops, stable and unstable, and how they change with a parameter."""
+
+from __future__ import annotations
+
+from vibroimpact.analysis.orbits.body import Contact, ImpactingBody
+from vibroimpact.analysis.orbits.periodic import OrbitError, PeriodicOrbit, closed_form, find_orbit
+
+__all__ = ["Contact", "ImpactingBody", "OrbitError", "PeriodicOrbit", "closed_form", "find_orbit"]

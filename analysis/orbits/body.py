@@ -1,0 +1,100 @@
+"""A body of modes with restitution stops and one harmonic force: what its orbits follow from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.core.orbits import OrbitBody
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A point of a body with a rigid stop.
+
+    Attributes
+    ----------
+    shape : array, shape (modes,)
+        Displacement of the point for unit modal displacements, kg^(-1/2).
+    direction : float
+        +1: the stop is above, -1: below.
+    position : float
+        m.
+    restitution : float
+        Coefficient, 0 to 1.
+    """
+
+    shape: Floats
+    direction: float
+    position: float
+    restitution: float
+
+    @cached_property
+    def mass(self) -> float:
+        """Mass that an impact meets, kg: 1 / (shape . shape), equations.md 5.3."""
+        return 1.0 / float(self.shape @ self.shape)
+
+
+@dataclass(frozen=True, eq=False)
+class ImpactingBody:
+    """A body of mass-normalised modes: q'' + 2 z w q' + w^2 q = force cos(phase) + held.
+
+    Attributes
+    ----------
+    frequencies, damping_ratios : array, shape (modes,)
+        Natural angular frequencies, rad/s; ratios.
+    force, held : array, shape (modes,)
+        Modal amplitude of the harmonic force, and the constant one, N kg^(-1/2).
+    angular_frequency, phase : float
+        Of the force, rad/s; at time 0, rad.
+    contacts : tuple of Contact
+    observed : array, shape (modes,)
+        Shape of the point that figures show.
+    """
+
+    frequencies: Floats
+    damping_ratios: Floats
+    force: Floats
+    held: Floats
+    angular_frequency: float
+    phase: float
+    contacts: tuple[Contact, ...]
+    observed: Floats
+
+    @property
+    def period(self) -> float:
+        """Of the force, s."""
+        return 2.0 * np.pi / self.angular_frequency
+
+    @cached_property
+    def kernel(self) -> OrbitBody:
+        """The body as the C functions take it."""
+        shapes = np.array([contact.shape for contact in self.contacts])
+        return OrbitBody(
+            self.angular_frequency,
+            natural=self.frequencies,
+            damping_ratio=self.damping_ratios,
+            cosine=self.force,
+            sine=np.zeros_like(self.force),
+            held=self.held,
+            shape=shapes,
+            impulse=shapes * np.array([[contact.mass] for contact in self.contacts]),
+            direction=np.array([contact.direction for contact in self.contacts]),
+            position=np.array([contact.position for contact in self.contacts]),
+            restitution=np.array([contact.restitution for contact in self.contacts]),
+        )
+
+    @cached_property
+    def scale(self) -> float:
+        """Size of its displacements at the contacts, m: what rounding is relative to."""
+        steady = self.force / np.hypot(
+            self.frequencies**2 - self.angular_frequency**2,
+            2.0 * self.damping_ratios * self.frequencies * self.angular_frequency,
+        )
+        of_contacts = [abs(each.position) + float(np.abs(each.shape * steady).sum()) for each in self.contacts]
+        return max(of_contacts)

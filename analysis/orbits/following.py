@@ -1,0 +1,370 @@
+"""Orbits followed over a parameter, through folds, with the points where they change: equations.md 4.4 to 4.7.
+
+The unknowns are the phases of the impacts and the parameter; a step goes along the branch (pseudo-arclength), so that a
+fold is a point as any other. What may happen is a function along the branch that changes its sign, and the sign change is
+narrowed down to rounding by steps of part lengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.periodic import (
+    CLOSE,
+    TOUCHES,
+    TURN,
+    OrbitError,
+    PeriodicOrbit,
+    evaluated,
+    ordered,
+)
+
+MOST_NEWTON = 12
+EASY_NEWTON = 3
+"""Newton steps up to which the next step along the branch is longer."""
+MOST_TURN = 0.1
+"""Change of the branch's direction from point to point, rad, above which a step is tried again, shorter."""
+SHORTEST = 1e-9
+"""Step along the branch, over the longest, below which it is given up."""
+LOCATED = 1e-13
+"""Width of a bracket, over the step along the branch, at which a point counts as found."""
+
+BodyAt = Callable[[float], ImpactingBody]
+
+
+@dataclass(frozen=True, slots=True)
+class FollowSettings:
+    """How a branch is followed.
+
+    Attributes
+    ----------
+    lowest, highest : float
+        Range of the parameter.
+    longest : float
+        Largest step along the branch; the range of the parameter counts 1, a radian of all phases 1.
+    most_orbits : int
+        After which a branch ends.
+    """
+
+    lowest: float
+    highest: float
+    longest: float = 0.01
+    most_orbits: int = 20_000
+
+    @property
+    def span(self) -> float:
+        """Range of the parameter."""
+        return self.highest - self.lowest
+
+
+@dataclass(frozen=True, eq=False)
+class BranchOrbit:
+    """An orbit on a branch.
+
+    Attributes
+    ----------
+    value : float
+        Of the parameter.
+    orbit : PeriodicOrbit
+        Its phases are not those of a first period: they go on from orbit to orbit.
+    tangent : array, shape (p + 1,)
+        Direction of the branch: phases, then the parameter over its range.
+    """
+
+    value: float
+    orbit: PeriodicOrbit
+    tangent: Floats
+
+    @cached_property
+    def tests(self) -> dict[str, float]:
+        """Functions whose sign changes where something happens."""
+        orbit = self.orbit
+        size = orbit.monodromy.shape[0]
+        fast = float(np.prod(np.minimum(orbit.velocities, 1.0)))
+        scale = orbit.body.scale
+        tests = {
+            "fold": float(self.tangent[-1]),
+            "period doubling": float(np.linalg.det(orbit.monodromy + np.eye(size))) * fast,
+            "graze": float(orbit.velocities.min()),
+            "graze between impacts": TOUCHES - max(orbit.highest[0] / scale, -1.0),
+        }
+        if size > 2:
+            tests["torus"] = _turning(orbit.multipliers)
+        return tests
+
+
+@dataclass(frozen=True, slots=True)
+class SpecialPoint:
+    """A point of a branch where its orbits change.
+
+    Attributes
+    ----------
+    kind : str
+        `fold`, `period doubling`, `torus`, `graze` (an impact of no speed) or `graze between impacts`, beyond which
+        the orbit would pass through a stop.
+    at : BranchOrbit
+    place : int
+        Orbit of the branch that comes next.
+    """
+
+    kind: str
+    at: BranchOrbit
+    place: int
+
+
+@dataclass(slots=True)
+class Branch:
+    """Orbits that go over into each other, in the order of the branch.
+
+    Attributes
+    ----------
+    orbits : list of BranchOrbit
+    points : list of SpecialPoint
+        In their order.
+    ends : list of str
+        Why it ends, at its first and at its last orbit.
+    origin : str
+        What it was begun from.
+    """
+
+    origin: str
+    orbits: list[BranchOrbit] = field(default_factory=list)
+    points: list[SpecialPoint] = field(default_factory=list)
+    ends: list[str] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """P(p,q)."""
+        return self.orbits[0].orbit.name
+
+    @property
+    def values(self) -> Floats:
+        """The parameter of each orbit."""
+        return np.array([each.value for each in self.orbits])
+
+
+class Follower:
+    """Follows orbits of a body that depends on a parameter.
+
+    Parameters
+    ----------
+    body_at : callable
+        Body for a value of the parameter.
+    settings : FollowSettings
+    """
+
+    def __init__(self, body_at: BodyAt, settings: FollowSettings) -> None:
+        self._body_at = body_at
+        self.settings = settings
+
+    def branch(self, orbit: PeriodicOrbit, value: float, origin: str = "") -> Branch:
+        """Follow the branch of an orbit both ways, as far as it is physical and within the range.
+
+        Raises
+        ------
+        OrbitError
+            The orbit does not lie on a branch.
+        """
+        ways = [Branch(origin), Branch(origin)]
+        for way, sign in zip(ways, (-1.0, 1.0), strict=True):
+            for _ in self.walk(way, orbit, value, sign):
+                pass
+        return joined(*ways)
+
+    def walk(self, branch: Branch, orbit: PeriodicOrbit, value: float, sign: float) -> Iterator[BranchOrbit]:
+        """Follow one way, towards higher (+1) or lower (-1) values at first; the branch grows with each orbit."""
+        start = self._first(orbit, value, sign)
+        yield from self._walked(branch, start)
+
+    def leave(self, branch: Branch, doubling: SpecialPoint) -> Iterator[BranchOrbit]:
+        """Follow the orbits of twice the period that begin at a period doubling; the branch grows with each."""
+        once = doubling.at.orbit
+        phases = np.concatenate([once.phases, once.phases + TURN * once.periods])
+        twice = PeriodicOrbit(
+            once.body, 2 * once.periods, phases, np.tile(once.contacts, 2), np.tile(once.velocities, 2)
+        )
+        slopes = evaluated(once.body, twice.contacts, phases, twice.periods).distance_slopes
+        away = np.linalg.svd(slopes)[2][-1]
+        # one half of the train comes early, the other late
+        half = 0.5 * (away[: once.phases.size] - away[once.phases.size :])
+        tangent = np.append(np.concatenate([half, -half]), 0.0)
+        start = BranchOrbit(doubling.at.value, twice, tangent / np.linalg.norm(tangent))
+        yield from self._walked(branch, start, born=True)
+
+    def _first(self, orbit: PeriodicOrbit, value: float, sign: float) -> BranchOrbit:
+        tangent = self._tangent(orbit, value, None)
+        if tangent[-1] * sign < 0.0 or (tangent[-1] == 0.0 and sign < 0.0):
+            tangent = -tangent
+        return BranchOrbit(value, orbit, tangent)
+
+    def _walked(self, branch: Branch, start: BranchOrbit, *, born: bool = False) -> Iterator[BranchOrbit]:
+        now, step, longest = start, 0.1 * self.settings.longest, self.settings.longest
+        if not born:
+            branch.orbits.append(now)
+            yield now
+        while len(branch.orbits) < self.settings.most_orbits:
+            found = self._step(now, step)
+            if found is None:
+                step *= 0.5
+                if step < SHORTEST * longest:
+                    branch.ends.append(f"cannot be followed beyond {now.value:.11g}")
+                    return
+                continue
+            taken, newton = found
+            if born:  # an orbit next to the doubling shows nothing of its own yet
+                born, now = False, taken
+                branch.orbits.append(taken)
+                yield taken
+                continue
+            events = sorted(self._events(now, taken, step), key=lambda pair: pair[0])
+            for _, kind, at in events:
+                if kind == "end of the range":
+                    branch.orbits.append(at)
+                    branch.ends.append(kind)
+                    yield at
+                    return
+                branch.points.append(SpecialPoint(kind, at, len(branch.orbits)))
+                branch.orbits.append(at)
+                yield at
+                if kind.startswith("graze"):
+                    branch.ends.append(kind)
+                    return
+            branch.orbits.append(taken)
+            yield taken
+            if _is_closed(branch, taken, longest):
+                branch.ends.append("closed")
+                return
+            now = taken
+            step = min(longest, step * (1.5 if newton <= EASY_NEWTON else 1.0))
+        branch.ends.append(f"{self.settings.most_orbits} orbits")
+
+    # ---- one step ----
+
+    def _residual(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> tuple[Floats, Floats, PeriodicOrbit]:
+        body = self._body_at(value)
+        found = evaluated(body, orbit.contacts, phases, orbit.periods)
+        made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities)
+        return found.distances, found.distance_slopes, made
+
+    def _over_value(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> Floats:
+        """Return the derivative of the distances over the parameter, counted in its range."""
+        change = 1e-6 * max(abs(value), 1e-3 * self.settings.span)
+        ends = [
+            evaluated(self._body_at(value + side * change), orbit.contacts, phases, orbit.periods).distances
+            for side in (1.0, -1.0)
+        ]
+        return (ends[0] - ends[1]) * (self.settings.span / (2.0 * change))
+
+    def _tangent(self, orbit: PeriodicOrbit, value: float, before: Floats | None) -> Floats:
+        _, slopes, _ = self._residual(orbit, orbit.phases, value)
+        matrix = np.column_stack([slopes, self._over_value(orbit, orbit.phases, value)])
+        tangent = np.linalg.svd(matrix)[2][-1]
+        return -tangent if before is not None and tangent @ before < 0.0 else tangent
+
+    def _step(self, now: BranchOrbit, step: float) -> tuple[BranchOrbit, int] | None:
+        """Return the orbit a step further, and the Newton steps that it took; None where there is none so near."""
+        span = self.settings.span
+        phases = now.orbit.phases + step * now.tangent[:-1]
+        value = now.value + step * now.tangent[-1] * span
+        least = np.inf
+        try:
+            across = self._over_value(now.orbit, phases, value)
+            for newton in range(MOST_NEWTON):
+                distances, slopes, orbit = self._residual(now.orbit, phases, value)
+                error = float(np.abs(distances).max())
+                small = error <= CLOSE * orbit.body.scale
+                if small and error >= 0.5 * least:
+                    break
+                least = min(least, error)
+                ahead = now.tangent @ np.append(phases - now.orbit.phases, (value - now.value) / span)
+                matrix = np.vstack([np.column_stack([slopes, across]), now.tangent])
+                change = np.linalg.solve(matrix, np.append(-distances, step - ahead))
+                if not np.abs(change).max() < 1.0:
+                    return None
+                phases = phases + change[:-1]
+                value += change[-1] * span
+            else:
+                if not least <= 1e3 * CLOSE * now.orbit.body.scale:
+                    return None
+            tangent = self._tangent(orbit, value, now.tangent)
+        except (OrbitError, np.linalg.LinAlgError):
+            return None
+        if tangent @ now.tangent < np.cos(MOST_TURN):
+            return None
+        return BranchOrbit(float(value), orbit, tangent), newton
+
+    # ---- what happens on the way ----
+
+    def _events(self, now: BranchOrbit, taken: BranchOrbit, step: float) -> Iterator[tuple[float, str, BranchOrbit]]:
+        settings = self.settings
+        for kind in now.tests:
+            before, after = now.tests[kind], taken.tests[kind]
+            if np.sign(before) * np.sign(after) < 0.0 and np.isfinite(before + after):
+                found = self._located(now, step, lambda each, kind=kind: each.tests[kind])
+                if found is not None and (kind != "torus" or _turns_round(found[1].orbit.multipliers)):
+                    yield found[0], kind, found[1]
+        for bound in (settings.lowest, settings.highest):
+            if (now.value - bound) * (taken.value - bound) < 0.0:
+                found = self._located(now, step, lambda each, bound=bound: each.value - bound)
+                if found is not None:
+                    yield found[0], "end of the range", found[1]
+
+    def _located(
+        self, now: BranchOrbit, step: float, test: Callable[[BranchOrbit], float]
+    ) -> tuple[float, BranchOrbit] | None:
+        """Return where along a step a test is 0, and the orbit there."""
+        lost = []
+
+        def at(part: float) -> float:
+            found = (now, 0) if part == 0.0 else self._step(now, part)
+            if found is None:
+                lost.append(part)
+                return float(np.nan)
+            return test(found[0])
+
+        try:
+            part = brentq(at, 0.0, step, xtol=LOCATED * step, rtol=4.0 * np.finfo(float).eps)
+        except (ValueError, RuntimeError):
+            return None
+        found = self._step(now, part) if part > 0.0 and not lost else None
+        return None if found is None else (part, found[0])
+
+
+def joined(backward: Branch, forward: Branch) -> Branch:
+    """Return two ways from one orbit as one branch, from the end of the first to that of the second."""
+    count = len(backward.orbits)
+    turned = [BranchOrbit(each.value, each.orbit, -each.tangent) for each in reversed(backward.orbits)]
+    points = [
+        SpecialPoint(point.kind, BranchOrbit(point.at.value, point.at.orbit, -point.at.tangent), count - 1 - point.place)
+        for point in reversed(backward.points)
+    ]
+    points += [SpecialPoint(point.kind, point.at, point.place + count - 1) for point in forward.points]
+    return Branch(forward.origin, turned + forward.orbits[1:], points, backward.ends + forward.ends)
+
+
+def _is_closed(branch: Branch, now: BranchOrbit, longest: float) -> bool:
+    if len(branch.orbits) < 10:
+        return False
+    first, span = branch.orbits[0], max(abs(branch.values - branch.orbits[0].value).max(), 1e-300)
+    apart = np.abs(ordered(now.orbit).phases - ordered(first.orbit).phases).max()
+    near = apart < 2.0 * longest and abs(now.value - first.value) < 2.0 * longest * span
+    return bool(near and now.tangent @ first.tangent > 0.9)
+
+
+def _turning(multipliers: NDArray[np.complex128]) -> float:
+    """Return the product of 1 - the product of two multipliers, over all pairs: 0 where two are on the unit circle."""
+    i, j = np.triu_indices(multipliers.size, 1)
+    return float(np.prod(1.0 - multipliers[i] * multipliers[j]).real)
+
+
+def _turns_round(multipliers: NDArray[np.complex128]) -> bool:
+    """Say whether two complex multipliers are on the unit circle, not two real ones whose product is 1."""
+    nearest = multipliers[np.argmin(np.abs(np.abs(multipliers) - 1.0))]
+    return bool(abs(nearest.imag) > 1e-6)

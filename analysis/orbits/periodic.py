@@ -1,0 +1,280 @@
+"""Periodic orbits of p impacts in q forcing periods, stable and unstable: thesis chapter 2, equations.md 4.2, 4.3, 4.7."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.fmus.core.orbits import MOST_IMPACTS, Evaluation, OrbitEnd
+from vibroimpact.fmus.errors import UsageError, VibroimpactError
+
+TURN = 2.0 * np.pi
+MOST_STEPS = 60
+"""Newton steps after which an orbit is not found."""
+CLOSE = 32.0 * np.finfo(float).eps
+"""Distance from the stops at the impacts, over the size of the motion, of an orbit that is found."""
+SAME = 1e-7
+"""Phases, rad, that are one."""
+TOUCHES = 1e-12
+"""Distance beyond a stop, over the size of the motion, that counts as a touch."""
+
+
+class OrbitError(VibroimpactError):
+    """An orbit was not found, or not followed further."""
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicOrbit:
+    """An orbit of a body, P(p,q): p impacts in q periods of the force.
+
+    Attributes
+    ----------
+    body : ImpactingBody
+    periods : int
+        q.
+    phases : array, shape (p,)
+        Forcing phases of the impacts, rad, ascending, the first in [0, 2 pi).
+    contacts : array of int, shape (p,)
+        Which contact hits, from 0.
+    velocities : array, shape (p,)
+        Speeds towards the stops before the impacts, m/s.
+    """
+
+    body: ImpactingBody
+    periods: int
+    phases: Floats
+    contacts: NDArray[np.int32]
+    velocities: Floats
+
+    @property
+    def name(self) -> str:
+        """P(p,q)."""
+        return f"P({self.phases.size},{self.periods})"
+
+    @cached_property
+    def _motion(self) -> tuple[Floats, Floats]:
+        return self.body.kernel.motion(self.contacts, self.phases, self.periods, self.velocities)
+
+    @property
+    def states(self) -> Floats:
+        """Modal displacements and velocities just after each impact, shape (p, 2 modes)."""
+        return self._motion[0]
+
+    @property
+    def monodromy(self) -> Floats:
+        """Derivative of the state after the first impact over that of q periods before: equations.md 4.2."""
+        return self._motion[1]
+
+    @cached_property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers, the largest first, shape (2 modes,); NaN of a graze."""
+        if not np.isfinite(self.monodromy).all():
+            return np.full(self.monodromy.shape[0], np.nan + 0j)
+        found = np.linalg.eigvals(self.monodromy).astype(np.complex128)
+        return found[np.argsort(-np.abs(found), kind="stable")]
+
+    @property
+    def determinant(self) -> float:
+        """Of the monodromy matrix."""
+        return float(np.linalg.det(self.monodromy))
+
+    @property
+    def exact_determinant(self) -> float:
+        """Product of restitutions squared and of the decay of all modes over the orbit: equations.md 4.2."""
+        body = self.body
+        lost = np.prod([body.contacts[each].restitution ** 2 for each in self.contacts])
+        decay = float((body.damping_ratios * body.frequencies).sum())
+        return float(lost * np.exp(-2.0 * self.periods * body.period * decay))
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all multipliers are within the unit circle."""
+        return bool(np.abs(self.multipliers[0]) < 1.0)
+
+    @cached_property
+    def highest(self) -> tuple[float, float, int]:
+        """The highest maximum between impacts: m beyond its stop (negative: clearance), its phase, its contact or -1.
+
+        All maxima at all contacts are found: the search is certified by a bound of the third derivative.
+        """
+        return self.body.kernel.maximum(self.contacts, self.phases, self.periods, self.states)
+
+    @property
+    def is_physical(self) -> bool:
+        """Whether it hits its stops from inside, and is nowhere beyond one."""
+        return bool((self.velocities > 0.0).all()) and self.highest[0] <= TOUCHES * self.body.scale
+
+    @cached_property
+    def turns(self) -> int:
+        """How often a shorter orbit is passed in it: 1 of one that is counted once."""
+        p, q = self.phases.size, self.periods
+        for turns in range(min(p, q), 1, -1):
+            if p % turns or q % turns:
+                continue
+            shifted = np.roll(self.phases, -(p // turns)) + TURN * q * (np.arange(p) >= p - p // turns)
+            same = np.abs(shifted - self.phases - TURN * (q // turns)).max() < SAME
+            if same and (np.roll(self.contacts, -(p // turns)) == self.contacts).all():
+                return turns
+        return 1
+
+    def at(self, phases: Floats) -> tuple[Floats, Floats]:
+        """Return displacement and velocity of the observed point at phases from the first impact on.
+
+        Parameters
+        ----------
+        phases : array
+            rad, ascending, from that of the first impact to 2 pi q later.
+
+        Returns
+        -------
+        tuple of array
+            m, m/s; at an impact those after it.
+        """
+        return _observed(self, phases)
+
+
+def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, periods: int) -> Evaluation:
+    """Return what belongs to phases of impacts.
+
+    Raises
+    ------
+    OrbitError
+        No motion belongs to them.
+    """
+    found = body.kernel.evaluate(contacts, phases, periods)
+    if found.end is OrbitEnd.resonant:
+        raise OrbitError(
+            "orbit: an undamped mode answers the force, or impacts in its own period, without bound: no orbit is isolated."
+        )
+    if found.end is not OrbitEnd.done:
+        raise OrbitError(f"orbit: expected impacts that a motion has, got phases {np.round(phases, 6).tolist()}.")
+    return found
+
+
+def find_orbit(
+    body: ImpactingBody, phases: Sequence[float] | Floats, contacts: Sequence[int] | None = None, periods: int = 1
+) -> PeriodicOrbit:
+    """Find the orbit near to some phases of impacts, stable or not, by Newton's method: equations.md 4.7.
+
+    Parameters
+    ----------
+    body : ImpactingBody
+    phases : array, shape (p,)
+        Forcing phases near to those of the impacts, rad, ascending, within 2 pi `periods`.
+    contacts : sequence of int, shape (p,), optional
+        Which contact hits, from 0; the first.
+    periods : int
+        q.
+
+    Raises
+    ------
+    UsageError
+        The impacts are none.
+    OrbitError
+        There is no orbit near to them.
+    """
+    at = np.array(phases, dtype=np.float64)
+    hit = np.zeros(at.size, np.int32) if contacts is None else np.array(contacts, dtype=np.int32)
+    _refuse_no_train(body, at, hit, periods)
+    least = np.inf
+    for _ in range(MOST_STEPS):
+        found = evaluated(body, hit, at, periods)
+        error = float(np.abs(found.distances).max())
+        if error <= CLOSE * body.scale and error >= 0.5 * least:
+            return ordered(PeriodicOrbit(body, periods, at, hit, found.velocities))
+        least = min(least, error)
+        at = at - shortened(np.linalg.lstsq(found.distance_slopes, found.distances, rcond=None)[0], at, periods)
+    if least <= 1e3 * CLOSE * body.scale:  # next to a fold phases are known to the root of rounding
+        return ordered(PeriodicOrbit(body, periods, at, hit, evaluated(body, hit, at, periods).velocities))
+    raise OrbitError(
+        f"orbit: expected an orbit P({at.size},{periods}) near to the phases "
+        f"{np.round(np.asarray(phases, dtype=float), 6).tolist()}, got none in {MOST_STEPS} Newton steps: "
+        f"{least:.2g} m from the stops at best."
+    )
+
+
+def shortened(step: Floats, phases: Floats, periods: int) -> Floats:
+    """Return a step of the phases, or a part of it that keeps the impacts in their order and within their train."""
+    gaps = np.append(np.diff(phases), phases[0] + TURN * periods - phases[-1])
+    closing = np.append(np.diff(-step), -step[0] + step[-1])
+    most = float(np.max(-closing / gaps, initial=0.0))
+    part = min(1.0, 0.5 / most if most > 0.0 else 1.0, 0.5 / max(float(np.abs(step).max()), 0.5))
+    return part * step
+
+
+def ordered(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """Return an orbit counted from its first impact in the first period."""
+    whole = TURN * orbit.periods
+    phases = np.mod(orbit.phases, whole)
+    order = np.argsort(phases, kind="stable")
+    first = int(np.floor(phases[order[0]] / TURN))
+    phases = phases[order] - TURN * first
+    return PeriodicOrbit(orbit.body, orbit.periods, phases, orbit.contacts[order], orbit.velocities[order])
+
+
+def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tuple[PeriodicOrbit, ...]:
+    """Return all orbits P(1,q) of a contact, physical or not, the fastest first: equations.md 4.3, any number of modes.
+
+    The distance from the stop at the impact is a + b cos(phase) + c sin(phase), so that there are two at most.
+
+    Raises
+    ------
+    OrbitError
+        An undamped mode makes them infinitely many.
+    """
+    hit = np.array([contact], dtype=np.int32)
+    at = [evaluated(body, hit, np.array([phase]), periods).distances[0] for phase in (0.0, 0.5 * np.pi, np.pi)]
+    level, cosine = 0.5 * (at[0] + at[2]), 0.5 * (at[0] - at[2])
+    sine = at[1] - level
+    size = float(np.hypot(cosine, sine))
+    if not abs(level) <= size:
+        return ()
+    middle, off = np.arctan2(sine, cosine), np.arccos(np.clip(-level / size, -1.0, 1.0))
+    orbits = []
+    for phase in dict.fromkeys(float(np.mod(middle + side * off, TURN)) for side in (1.0, -1.0)):
+        velocity = evaluated(body, hit, np.array([phase]), periods).velocities
+        if velocity[0] > 0.0:
+            orbits.append(PeriodicOrbit(body, periods, np.array([phase]), hit, velocity))
+    return tuple(sorted(orbits, key=lambda orbit: -orbit.velocities[0]))
+
+
+def _refuse_no_train(body: ImpactingBody, phases: Floats, contacts: NDArray[np.int32], periods: int) -> None:
+    most = f"1 to {MOST_IMPACTS} impacts"
+    if not (1 <= phases.size <= MOST_IMPACTS and contacts.shape == phases.shape and periods >= 1):
+        raise UsageError(f"orbit: expected {most} in 1 or more periods, got {phases.size} in {periods}.")
+    if not (np.isfinite(phases).all() and (np.diff(phases) > 0.0).all() and np.ptp(phases) < TURN * periods):
+        raise UsageError(f"orbit: phases: expected ascending ones within {periods} turns, got {phases.tolist()}.")
+    if not ((contacts >= 0) & (contacts < len(body.contacts))).all():
+        raise UsageError(f"orbit: contacts: expected 0 to {len(body.contacts) - 1}, got {contacts.tolist()}.")
+
+
+def _observed(orbit: PeriodicOrbit, phases: Floats) -> tuple[Floats, Floats]:
+    body = orbit.body
+    flight = np.clip(np.searchsorted(orbit.phases, phases, side="right") - 1, 0, orbit.phases.size - 1)
+    u = ((phases - orbit.phases[flight]) / body.angular_frequency)[:, None]
+    modes = body.frequencies.size
+    after = orbit.states[flight]
+    start = _steady(body, orbit.phases[flight])
+    now = _steady(body, phases)
+    x, v = after[:, :modes] - start[0], after[:, modes:] - start[1]
+    w, z = body.frequencies, body.damping_ratios
+    decay, rate = z * w, np.sqrt(np.abs(1.0 - z**2)) * w + 0j
+    rate = np.where(z > 1.0, 1j * rate, rate)
+    c = np.cos(rate * u)
+    s = np.where(rate == 0.0, u, np.sin(rate * u) / np.where(rate == 0.0, 1.0, rate))
+    gone = np.exp(-decay * u)
+    moved = (gone * ((c + decay * s) * x + s * v)).real + now[0]
+    faster = (gone * (-(w**2) * s * x + (c - decay * s) * v)).real + now[1]
+    return moved @ body.observed, faster @ body.observed
+
+
+def _steady(body: ImpactingBody, phases: Floats) -> tuple[Floats, Floats]:
+    w, rate = body.angular_frequency, body.frequencies
+    answer = body.force / (rate**2 - w**2 + 2j * body.damping_ratios * rate * w)
+    turned = answer * np.exp(1j * phases)[:, None]
+    return turned.real + body.held / rate**2, (1j * w * turned).real

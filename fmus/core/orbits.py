@@ -1,0 +1,149 @@
+"""Periodic orbits of bodies that hit restitution stops, in C: what belongs to the phases of their impacts."""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import POINTER, Structure, c_double, c_int32, c_void_p
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.fmus.core.library import core_library
+from vibroimpact.fmus.errors import UsageError
+
+Array = NDArray[np.float64]
+MOST_IMPACTS = 64
+
+
+class OrbitEnd(IntEnum):
+    """What a call ended with; `door/orbits.h` says more."""
+
+    done = 0
+    refused = 1
+    resonant = 2
+    singular = 3
+
+
+class _Body(Structure):
+    ARRAYS = (
+        "natural", "damping_ratio", "cosine", "sine", "held", "shape", "impulse", "direction", "position", "restitution",
+    )  # fmt: skip
+    _fields_ = [
+        ("modes", c_int32),
+        ("contacts", c_int32),
+        ("angular_frequency", c_double),
+        *((name, c_void_p) for name in ARRAYS),
+    ]
+
+
+class _Train(Structure):
+    _fields_ = [("impacts", c_int32), ("periods", c_int32), ("contact", c_void_p), ("phase", c_void_p)]
+
+
+class OrbitBody:
+    """A body of mass-normalised modes with restitution stops, as the C functions take it.
+
+    Parameters
+    ----------
+    angular_frequency : float
+        Of the force, rad/s.
+    natural, damping_ratio, cosine, sine, held : array, shape (modes,)
+        Natural angular frequencies (rad/s), damping ratios, modal force = cosine cos(phase) + sine sin(phase) + held.
+    shape, impulse : array, shape (contacts, modes)
+        Displacement of each contact for unit modal displacements; modal velocities that a unit of velocity there takes.
+    direction, position, restitution : array, shape (contacts,)
+        +1 for a stop above, -1 below; m; coefficient.
+    """
+
+    def __init__(self, angular_frequency: float, **arrays: Array) -> None:
+        self._arrays = {name: np.ascontiguousarray(arrays[name], dtype=np.float64) for name in _Body.ARRAYS}
+        contacts, self.modes = self._arrays["shape"].shape
+        addresses = [self._arrays[name].ctypes.data for name in _Body.ARRAYS]
+        self._body = _Body(self.modes, contacts, angular_frequency, *addresses)
+
+    def evaluate(self, contacts: NDArray[np.int32], phases: Array, periods: int) -> Evaluation:
+        """Return what belongs to the phases of the impacts: equations.md 4.7.
+
+        Parameters
+        ----------
+        contacts : array, shape (impacts,)
+            Contact of each, from 0.
+        phases : array, shape (impacts,)
+            rad, ascending, within 2 pi `periods`.
+        periods : int
+            Of the force in the orbit.
+        """
+        n = phases.size
+        train = _train(contacts, phases, periods)
+        velocities, distances = np.empty(n), np.empty(n)
+        slopes, faster = np.empty((n, n)), np.empty((n, n))
+        end = _library().vi_door_orbit(self._body, train, velocities, distances, slopes, faster)
+        return Evaluation(OrbitEnd(end), velocities, distances, slopes, faster)
+
+    def motion(
+        self, contacts: NDArray[np.int32], phases: Array, periods: int, velocities: Array
+    ) -> tuple[Array, Array]:
+        """Return the states after the impacts, shape (impacts, 2 modes), and the monodromy matrix of the first: 4.2."""
+        train = _train(contacts, phases, periods)
+        states, monodromy = np.empty((phases.size, 2 * self.modes)), np.empty((2 * self.modes,) * 2)
+        _check(_library().vi_door_orbit_motion(self._body, train, velocities, states, monodromy))
+        return states, monodromy
+
+    def maximum(
+        self, contacts: NDArray[np.int32], phases: Array, periods: int, states: Array
+    ) -> tuple[float, float, int]:
+        """Return how far the highest maximum inside a flight is beyond its stop (m), its phase and its contact, or -1."""
+        train = _train(contacts, phases, periods)
+        what = np.empty(3)
+        _check(_library().vi_door_orbit_maximum(self._body, train, states, what))
+        return float(what[0]), float(what[1]), int(what[2])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Evaluation:
+    """What belongs to the phases of a train of impacts.
+
+    Attributes
+    ----------
+    end : OrbitEnd
+        Numbers are there where it is `done`.
+    velocities, distances : array, shape (impacts,)
+        Speeds towards the stops before the impacts, m/s; how far beyond the stops these are, m: 0 of an orbit.
+    distance_slopes, velocity_slopes : array, shape (impacts, impacts)
+        Derivatives over the phase of each impact (columns).
+    """
+
+    end: OrbitEnd
+    velocities: Array
+    distances: Array
+    distance_slopes: Array
+    velocity_slopes: Array
+
+
+def _train(contacts: NDArray[np.int32], phases: Array, periods: int) -> _Train:
+    contact = np.ascontiguousarray(contacts, dtype=np.int32)
+    phase = np.ascontiguousarray(phases, dtype=np.float64)
+    if phase.ndim != 1 or contact.shape != phase.shape:
+        raise UsageError(f"orbit: expected a phase and a contact of each impact, got {phase.shape} and {contact.shape}.")
+    train = _Train(phase.size, periods, contact.ctypes.data, phase.ctypes.data)
+    train.kept = contact, phase  # alive as long as the train
+    return train
+
+
+def _check(end: int) -> None:
+    if end != OrbitEnd.done:
+        raise UsageError(f"orbit: expected a body and impacts that have an orbit, got {OrbitEnd(end).name}.")
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    library = core_library()
+    numbers = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
+    body, train = POINTER(_Body), POINTER(_Train)
+    library.vi_door_orbit.argtypes = [body, train, *[numbers] * 4]
+    library.vi_door_orbit_motion.argtypes = [body, train, *[numbers] * 3]
+    library.vi_door_orbit_maximum.argtypes = [body, train, *[numbers] * 2]
+    return library

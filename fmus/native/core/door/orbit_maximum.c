@@ -1,0 +1,107 @@
+#include <math.h>
+#include <stdbool.h>
+
+#include "door/orbit_response.h"
+#include "motion/majorant.h"
+
+/* Least step of the search for maxima, as a share of a flight. */
+static const double LEAST_STEP = 1e-13;
+
+/* A contact in a flight: how far beyond its stop, its first two derivatives, and a bound of the third from here on. */
+typedef struct {
+    double beyond, velocity, acceleration, bound;
+} seen;
+
+/* `state`: of all modes where the flight starts, at forcing phase `phase`. */
+static seen look(const vi_orbit_response *response, int contact, const double state[], double phase, double u)
+{
+    const vi_orbit_body *body = response->body;
+    const double *shape = body->shape + (ptrdiff_t)contact * body->modes;
+    const double w = body->angular_frequency, angle = phase + w * u, c = cos(angle), s = sin(angle);
+    seen sum = {0.0, 0.0, 0.0, 0.0};
+    double cosine = 0.0, sine = 0.0;
+    for (int j = 0; j < body->modes; ++j) {
+        const vi_mode *mode = &response->mode[j];
+        double phi[4], x, v;
+        vi_orbit_steady(response, j, phase, &x, &v);
+        x = state[j] - x;
+        v = state[body->modes + j] - v;
+        vi_mode_propagator(mode, u, phi);
+        const double moved = phi[0] * x + phi[1] * v, faster = phi[2] * x + phi[3] * v;
+        const double drag = 2.0 * mode->decay;
+        sum.beyond += shape[j] * (moved + response->level[j]);
+        sum.velocity += shape[j] * faster;
+        sum.acceleration -= shape[j] * (mode->stiffness * moved + drag * faster);
+        /* |x'''| = |(4 c^2 - w^2) v + 2 c w^2 x|, and v^2 + w^2 x^2 never grows */
+        sum.bound += fabs(shape[j]) * (fabs(drag * drag - mode->stiffness) + drag * mode->natural) *
+                     sqrt(faster * faster + mode->stiffness * moved * moved);
+        cosine += shape[j] * response->steady_cos[j];
+        sine += shape[j] * response->steady_sin[j];
+    }
+    const double direction = body->direction[contact];
+    sum.beyond = direction * (sum.beyond + cosine * c + sine * s - body->position[contact]);
+    sum.velocity = direction * (sum.velocity + w * (sine * c - cosine * s));
+    sum.acceleration = direction * (sum.acceleration - w * w * (cosine * c + sine * s));
+    sum.bound += w * w * w * sqrt(cosine * cosine + sine * sine);
+    return sum;
+}
+
+static void keep(double what[3], double beyond, double phase, int contact)
+{
+    if (beyond > what[0]) {
+        what[0] = beyond;
+        what[1] = phase;
+        what[2] = contact;
+    }
+}
+
+/* All maxima of a contact inside a flight of `length` seconds; returns its velocity at the end. Steps end before the
+ * velocity may be zero, so its sign changes over least steps alone. */
+static double search(const vi_orbit_response *response, int contact, const double state[], double phase, double length,
+                     double what[3])
+{
+    const double w = response->body->angular_frequency;
+    seen now = look(response, contact, state, phase, 0.0);
+    double u = 0.0;
+    for (int evaluation = 0; u < length; ++evaluation) {
+        const double away = now.velocity > 0.0 ? -now.acceleration : now.acceleration;
+        const double certain = vi_parabola_root(fabs(now.velocity), away, now.bound);
+        u = fmin(u + fmax(certain, vi_least_step(length, LEAST_STEP, evaluation)), length);
+        const seen next = look(response, contact, state, phase, u);
+        if (now.velocity > 0.0 && next.velocity <= 0.0) {
+            keep(what, fmax(now.beyond, next.beyond), phase + w * u, contact);
+        }
+        now = next;
+    }
+    return now.velocity;
+}
+
+VI_DOOR int vi_door_orbit_maximum(const vi_orbit_body *body, const vi_orbit_train *train, const double state[],
+                                  double what[3])
+{
+    vi_orbit_response response;
+    const int refused = vi_orbit_respond(&response, body, train);
+    what[0] = -HUGE_VAL;
+    what[1] = 0.0;
+    what[2] = -1.0;
+    if (refused != VI_ORBIT_DONE) {
+        return refused;
+    }
+    const int states = 2 * body->modes, n = train->impacts;
+    for (int i = 0; i < n; ++i) {
+        const int next = (i + 1) % n;
+        const double *start = state + (ptrdiff_t)i * states, *after = state + (ptrdiff_t)next * states;
+        for (int contact = 0; contact < body->contacts; ++contact) {
+            const double length = vi_orbit_since(&response, next, i);
+            const double arriving = search(&response, contact, start, train->phase[i], length, what);
+            /* an impact elsewhere may turn this contact round */
+            if (contact != train->contact[next] && arriving > 0.0) {
+                const seen left = look(&response, contact, after, train->phase[next], 0.0);
+                if (left.velocity <= 0.0) {
+                    keep(what, left.beyond, train->phase[next], contact);
+                }
+            }
+        }
+    }
+    return VI_ORBIT_DONE;
+}

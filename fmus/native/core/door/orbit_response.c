@@ -1,0 +1,126 @@
+#include "door/orbit_response.h"
+
+#include <math.h>
+#include <stdbool.h>
+
+#include "motion/magnitude.h"
+
+static const double TURN = 6.283185307179586;
+
+static bool is_body(const vi_orbit_body *body)
+{
+    bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1 && body->contacts <= VI_PORTS &&
+                body->angular_frequency > 0.0 && isfinite(body->angular_frequency);
+    for (int j = 0; good && j < body->modes; ++j) {
+        good = body->natural[j] > 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0 &&
+               isfinite(body->damping_ratio[j] + body->cosine[j] + body->sine[j] + body->held[j]);
+    }
+    for (int k = 0; good && k < body->contacts; ++k) {
+        good = fabs(body->direction[k]) == 1.0 && isfinite(body->position[k]) && body->restitution[k] >= 0.0 &&
+               body->restitution[k] <= 1.0;
+    }
+    return good;
+}
+
+static bool is_train(const vi_orbit_train *train, int contacts)
+{
+    bool good = train->impacts >= 1 && train->impacts <= VI_ORBIT_IMPACTS && train->periods >= 1;
+    for (int i = 0; good && i < train->impacts; ++i) {
+        good = train->contact[i] >= 0 && train->contact[i] < contacts && isfinite(train->phase[i]) &&
+               (i == 0 || train->phase[i] > train->phase[i - 1]);
+    }
+    return good && train->phase[train->impacts - 1] - train->phase[0] < TURN * train->periods;
+}
+
+/* The state just after an impulse that comes once in each train: (1 - Phi(T))^-1 (0, 1), without the cancellations of
+ * light damping. */
+static bool start_of_train(const vi_mode *mode, double length, double start[2])
+{
+    double phi[4];
+    vi_mode_propagator(mode, length, phi);
+    double whole, moved; /* det(1 - Phi), 1 - Phi11 */
+    if (mode->regime == VI_UNDERDAMPED) {
+        const double gone = -expm1(-mode->decay * length), left = exp(-mode->decay * length);
+        const double half = sin(0.5 * mode->rate * length);
+        whole = gone * gone + 4.0 * left * half * half;
+        moved = gone + 2.0 * left * half * half - mode->decay * phi[1];
+    } else {
+        whole = expm1(-mode->slow * length) * expm1(-mode->fast * length);
+        moved = 1.0 - phi[0];
+    }
+    if (!(whole > 0.0)) {
+        return false;
+    }
+    start[0] = phi[1] / whole;
+    start[1] = moved / whole;
+    return isfinite(start[0] + start[1]);
+}
+
+int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, const vi_orbit_train *train)
+{
+    if (!is_body(body) || !is_train(train, body->contacts)) {
+        return VI_ORBIT_REFUSED;
+    }
+    response->body = body;
+    response->train = train;
+    response->length = TURN * train->periods / body->angular_frequency;
+    for (int j = 0; j < body->modes; ++j) {
+        vi_mode *mode = &response->mode[j];
+        const double natural = body->natural[j], w = body->angular_frequency;
+        vi_mode_start(mode, 1.0, 2.0 * body->damping_ratio[j] * natural, natural * natural, 0.0, w);
+        const double detuning = (natural - w) * (natural + w), drag = 2.0 * mode->decay * w;
+        const double size = vi_magnitude(detuning, drag);
+        const double along = detuning / size / size, across = drag / size / size;
+        const double c = body->cosine[j], s = body->sine[j];
+        response->level[j] = body->held[j] / mode->stiffness;
+        response->steady_cos[j] = c == 0.0 && s == 0.0 ? 0.0 : c * along - s * across;
+        response->steady_sin[j] = c == 0.0 && s == 0.0 ? 0.0 : c * across + s * along;
+        if (!isfinite(response->steady_cos[j] + response->steady_sin[j]) ||
+            !start_of_train(mode, response->length, response->start[j])) {
+            return VI_ORBIT_RESONANT;
+        }
+    }
+    return VI_ORBIT_DONE;
+}
+
+double vi_orbit_since(const vi_orbit_response *response, int i, int k)
+{
+    const double *phase = response->train->phase;
+    const double passed = (phase[i] - phase[k]) / response->body->angular_frequency;
+    return i > k ? passed : response->length + passed;
+}
+
+void vi_orbit_train_answer(const vi_orbit_response *response, int j, double u, double *x, double *v)
+{
+    const double *start = response->start[j];
+    double phi[4];
+    vi_mode_propagator(&response->mode[j], u, phi);
+    *x = -(phi[0] * start[0] + phi[1] * start[1]);
+    *v = -(phi[2] * start[0] + phi[3] * start[1]);
+}
+
+void vi_orbit_steady(const vi_orbit_response *response, int j, double phase, double *x, double *v)
+{
+    const double c = response->steady_cos[j], s = response->steady_sin[j], w = response->body->angular_frequency;
+    *x = response->level[j] + c * cos(phase) + s * sin(phase);
+    *v = w * (s * cos(phase) - c * sin(phase));
+}
+
+void vi_orbit_steady_at(const vi_orbit_response *response, int i, double at[3])
+{
+    const vi_orbit_body *body = response->body;
+    const int32_t contact = response->train->contact[i];
+    const double *shape = body->shape + (ptrdiff_t)contact * body->modes;
+    const double w = body->angular_frequency;
+    double level = 0.0, x = 0.0, v = 0.0;
+    for (int j = 0; j < body->modes; ++j) {
+        double displacement, speed;
+        vi_orbit_steady(response, j, response->train->phase[i], &displacement, &speed);
+        level += shape[j] * response->level[j];
+        x += shape[j] * (displacement - response->level[j]);
+        v += shape[j] * speed;
+    }
+    at[0] = body->direction[contact] * (x + level - body->position[contact]);
+    at[1] = body->direction[contact] * v;
+    at[2] = -body->direction[contact] * w * w * x;
+}
