@@ -96,5 +96,7 @@ class ImpactingBody:
             self.frequencies**2 - self.angular_frequency**2,
             2.0 * self.damping_ratios * self.frequencies * self.angular_frequency,
         )
-        of_contacts = [abs(each.position) + float(np.abs(each.shape * steady).sum()) for each in self.contacts]
+        of_contacts = [
+            abs(each.position) + float(np.abs(each.shape * steady).sum()) for each in self.contacts
+        ]
         return max(of_contacts)

@@ -1,8 +1,8 @@
 """Orbits followed over a parameter, through folds, with the points where they change: equations.md 4.4 to 4.7.
 
-The unknowns are the phases of the impacts and the parameter; a step goes along the branch (pseudo-arclength), so that a
-fold is a point as any other. What may happen is a function along the branch that changes its sign, and the sign change is
-narrowed down to rounding by steps of part lengths.
+The unknowns are the phases of the impacts and the parameter; a step goes along the branch (pseudo-arclength), so that
+a fold is a point as any other. What may happen is a function along the branch that changes its sign, and the sign
+change is narrowed down to rounding by steps of part lengths.
 """
 
 from __future__ import annotations
@@ -247,7 +247,9 @@ class Follower:
 
     # ---- one step ----
 
-    def _residual(self, orbit: PeriodicOrbit, phases: Floats, value: float) -> tuple[Floats, Floats, PeriodicOrbit]:
+    def _residual(
+        self, orbit: PeriodicOrbit, phases: Floats, value: float
+    ) -> tuple[Floats, Floats, PeriodicOrbit]:
         body = self._body_at(value)
         found = evaluated(body, orbit.contacts, phases, orbit.periods)
         made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities)
@@ -265,7 +267,7 @@ class Follower:
     def _tangent(self, orbit: PeriodicOrbit, value: float, before: Floats | None) -> Floats:
         _, slopes, _ = self._residual(orbit, orbit.phases, value)
         matrix = np.column_stack([slopes, self._over_value(orbit, orbit.phases, value)])
-        tangent = np.linalg.svd(matrix)[2][-1]
+        tangent: Floats = np.linalg.svd(matrix)[2][-1]
         return -tangent if before is not None and tangent @ before < 0.0 else tangent
 
     def _step(self, now: BranchOrbit, step: float) -> tuple[BranchOrbit, int] | None:
@@ -276,7 +278,7 @@ class Follower:
         least = np.inf
         try:
             across = self._over_value(now.orbit, phases, value)
-            for newton in range(MOST_NEWTON):
+            for newton in range(MOST_NEWTON):  # noqa: B007  # how many is said
                 distances, slopes, orbit = self._residual(now.orbit, phases, value)
                 error = float(np.abs(distances).max())
                 small = error <= CLOSE * orbit.body.scale
@@ -302,17 +304,19 @@ class Follower:
 
     # ---- what happens on the way ----
 
-    def _events(self, now: BranchOrbit, taken: BranchOrbit, step: float) -> Iterator[tuple[float, str, BranchOrbit]]:
+    def _events(
+        self, now: BranchOrbit, taken: BranchOrbit, step: float
+    ) -> Iterator[tuple[float, str, BranchOrbit]]:
         settings = self.settings
         for kind in now.tests:
             before, after = now.tests[kind], taken.tests[kind]
             if np.sign(before) * np.sign(after) < 0.0 and np.isfinite(before + after):
-                found = self._located(now, step, lambda each, kind=kind: each.tests[kind])
+                found = self._located(now, step, _test_of(kind))
                 if found is not None and (kind != "torus" or _turns_round(found[1].orbit.multipliers)):
                     yield found[0], kind, found[1]
         for bound in (settings.lowest, settings.highest):
             if (now.value - bound) * (taken.value - bound) < 0.0:
-                found = self._located(now, step, lambda each, bound=bound: each.value - bound)
+                found = self._located(now, step, _beyond(bound))
                 if found is not None:
                     yield found[0], "end of the range", found[1]
 
@@ -337,12 +341,24 @@ class Follower:
         return None if found is None else (part, found[0])
 
 
+def _test_of(kind: str) -> Callable[[BranchOrbit], float]:
+    return lambda orbit: orbit.tests[kind]
+
+
+def _beyond(bound: float) -> Callable[[BranchOrbit], float]:
+    return lambda orbit: orbit.value - bound
+
+
 def joined(backward: Branch, forward: Branch) -> Branch:
     """Return two ways from one orbit as one branch, from the end of the first to that of the second."""
     count = len(backward.orbits)
     turned = [BranchOrbit(each.value, each.orbit, -each.tangent) for each in reversed(backward.orbits)]
     points = [
-        SpecialPoint(point.kind, BranchOrbit(point.at.value, point.at.orbit, -point.at.tangent), count - 1 - point.place)
+        SpecialPoint(
+            point.kind,
+            BranchOrbit(point.at.value, point.at.orbit, -point.at.tangent),
+            count - 1 - point.place,
+        )
         for point in reversed(backward.points)
     ]
     points += [SpecialPoint(point.kind, point.at, point.place + count - 1) for point in forward.points]

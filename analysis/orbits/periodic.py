@@ -1,4 +1,4 @@
-"""Periodic orbits of p impacts in q forcing periods, stable and unstable: thesis chapter 2, equations.md 4.2, 4.3, 4.7."""
+"""Periodic orbits of p impacts in q forcing periods, stable and unstable: equations.md 4.2, 4.3, 4.7."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from vibroimpact.fmus.errors import UsageError, VibroimpactError
 TURN = 2.0 * np.pi
 MOST_STEPS = 60
 """Newton steps after which an orbit is not found."""
+MOST_HALVINGS = 12
+"""Of a Newton step, until it leads nearer to the orbit."""
 CLOSE = 32.0 * np.finfo(float).eps
 """Distance from the stops at the impacts, over the size of the motion, of an orbit that is found."""
 SAME = 1e-7
@@ -149,15 +151,20 @@ def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, 
     found = body.kernel.evaluate(contacts, phases, periods)
     if found.end is OrbitEnd.resonant:
         raise OrbitError(
-            "orbit: an undamped mode answers the force, or impacts in its own period, without bound: no orbit is isolated."
+            "orbit: expected modes that answer force and impacts within bounds, got an undamped one in resonance."
         )
     if found.end is not OrbitEnd.done:
-        raise OrbitError(f"orbit: expected impacts that a motion has, got phases {np.round(phases, 6).tolist()}.")
+        raise OrbitError(
+            f"orbit: expected impacts that a motion has, got phases {np.round(phases, 6).tolist()}."
+        )
     return found
 
 
 def find_orbit(
-    body: ImpactingBody, phases: Sequence[float] | Floats, contacts: Sequence[int] | None = None, periods: int = 1
+    body: ImpactingBody,
+    phases: Sequence[float] | Floats,
+    contacts: Sequence[int] | None = None,
+    periods: int = 1,
 ) -> PeriodicOrbit:
     """Find the orbit near to some phases of impacts, stable or not, by Newton's method: equations.md 4.7.
 
@@ -178,24 +185,39 @@ def find_orbit(
     OrbitError
         There is no orbit near to them.
     """
-    at = np.array(phases, dtype=np.float64)
+    at: Floats = np.array(phases, dtype=np.float64)
     hit = np.zeros(at.size, np.int32) if contacts is None else np.array(contacts, dtype=np.int32)
     _refuse_no_train(body, at, hit, periods)
-    least = np.inf
+    found = evaluated(body, hit, at, periods)
     for _ in range(MOST_STEPS):
-        found = evaluated(body, hit, at, periods)
         error = float(np.abs(found.distances).max())
-        if error <= CLOSE * body.scale and error >= 0.5 * least:
-            return ordered(PeriodicOrbit(body, periods, at, hit, found.velocities))
-        least = min(least, error)
-        at = at - shortened(np.linalg.lstsq(found.distance_slopes, found.distances, rcond=None)[0], at, periods)
-    if least <= 1e3 * CLOSE * body.scale:  # next to a fold phases are known to the root of rounding
-        return ordered(PeriodicOrbit(body, periods, at, hit, evaluated(body, hit, at, periods).velocities))
+        step = np.linalg.lstsq(found.distance_slopes, found.distances, rcond=None)[0].astype(np.float64)
+        nearer = _nearer(body, hit, at, shortened(step, at, periods), periods, error)
+        if nearer is None:
+            break
+        at, found = nearer
+    # next to a fold phases are known to the root of rounding
+    error = float(np.abs(found.distances).max())
+    if error <= 1e3 * CLOSE * body.scale:
+        return ordered(PeriodicOrbit(body, periods, at, hit, found.velocities))
     raise OrbitError(
         f"orbit: expected an orbit P({at.size},{periods}) near to the phases "
-        f"{np.round(np.asarray(phases, dtype=float), 6).tolist()}, got none in {MOST_STEPS} Newton steps: "
-        f"{least:.2g} m from the stops at best."
+        f"{np.round(np.asarray(phases, dtype=float), 6).tolist()}, got none: Newton's method ends {error:.2g} m "
+        "from the stops."
     )
+
+
+def _nearer(
+    body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, step: Floats, periods: int, error: float
+) -> tuple[Floats, Evaluation] | None:
+    """Return phases that are nearer to an orbit, a part of a step away; None where there are none."""
+    for _ in range(MOST_HALVINGS):
+        tried = phases - step
+        found = evaluated(body, contacts, tried, periods)
+        if float(np.abs(found.distances).max()) < error:
+            return tried, found
+        step = 0.5 * step
+    return None
 
 
 def shortened(step: Floats, phases: Floats, periods: int) -> Floats:
@@ -228,7 +250,9 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
         An undamped mode makes them infinitely many.
     """
     hit = np.array([contact], dtype=np.int32)
-    at = [evaluated(body, hit, np.array([phase]), periods).distances[0] for phase in (0.0, 0.5 * np.pi, np.pi)]
+    at = [
+        evaluated(body, hit, np.array([phase]), periods).distances[0] for phase in (0.0, 0.5 * np.pi, np.pi)
+    ]
     level, cosine = 0.5 * (at[0] + at[2]), 0.5 * (at[0] - at[2])
     sine = at[1] - level
     size = float(np.hypot(cosine, sine))
@@ -248,7 +272,9 @@ def _refuse_no_train(body: ImpactingBody, phases: Floats, contacts: NDArray[np.i
     if not (1 <= phases.size <= MOST_IMPACTS and contacts.shape == phases.shape and periods >= 1):
         raise UsageError(f"orbit: expected {most} in 1 or more periods, got {phases.size} in {periods}.")
     if not (np.isfinite(phases).all() and (np.diff(phases) > 0.0).all() and np.ptp(phases) < TURN * periods):
-        raise UsageError(f"orbit: phases: expected ascending ones within {periods} turns, got {phases.tolist()}.")
+        raise UsageError(
+            f"orbit: phases: expected ascending ones within {periods} turns, got {phases.tolist()}."
+        )
     if not ((contacts >= 0) & (contacts < len(body.contacts))).all():
         raise UsageError(f"orbit: contacts: expected 0 to {len(body.contacts) - 1}, got {contacts.tolist()}.")
 

@@ -261,7 +261,11 @@ def chain_modes(masses: Numbers, stiffnesses: Numbers, dampings: Numbers) -> Cha
     count = mass.size
     frequencies, ratios, shapes = np.empty(count), np.empty(count), np.empty((count, count))
     fits = stiffness.size == damping.size == count + 1
-    end = _library().vi_door_chain_modes(count, mass, stiffness, damping, frequencies, ratios, shapes) if fits else -1
+    end = (
+        _library().vi_door_chain_modes(count, mass, stiffness, damping, frequencies, ratios, shapes)
+        if fits
+        else -1
+    )
     if end < 0:
         raise UsageError(
             "chain_modes: expected 1 to 64 masses > 0 and one spring and dashpot more, >= 0, "

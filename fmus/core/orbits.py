@@ -29,8 +29,9 @@ class OrbitEnd(IntEnum):
 
 class _Body(Structure):
     ARRAYS = (
-        "natural", "damping_ratio", "cosine", "sine", "held", "shape", "impulse", "direction", "position", "restitution",
-    )  # fmt: skip
+        *("natural", "damping_ratio", "cosine", "sine", "held"),
+        *("shape", "impulse", "direction", "position", "restitution"),
+    )
     _fields_ = [
         ("modes", c_int32),
         ("contacts", c_int32),
@@ -95,7 +96,7 @@ class OrbitBody:
     def maximum(
         self, contacts: NDArray[np.int32], phases: Array, periods: int, states: Array
     ) -> tuple[float, float, int]:
-        """Return how far the highest maximum inside a flight is beyond its stop (m), its phase and its contact, or -1."""
+        """Return how far the highest maximum between impacts is beyond its stop (m), its phase, its contact or -1."""
         train = _train(contacts, phases, periods)
         what = np.empty(3)
         _check(_library().vi_door_orbit_maximum(self._body, train, states, what))
@@ -127,7 +128,9 @@ def _train(contacts: NDArray[np.int32], phases: Array, periods: int) -> _Train:
     contact = np.ascontiguousarray(contacts, dtype=np.int32)
     phase = np.ascontiguousarray(phases, dtype=np.float64)
     if phase.ndim != 1 or contact.shape != phase.shape:
-        raise UsageError(f"orbit: expected a phase and a contact of each impact, got {phase.shape} and {contact.shape}.")
+        raise UsageError(
+            f"orbit: expected a phase and a contact of each impact, got {phase.shape} and {contact.shape}."
+        )
     train = _Train(phase.size, periods, contact.ctypes.data, phase.ctypes.data)
     train.kept = contact, phase  # alive as long as the train
     return train

@@ -37,7 +37,9 @@ def impacting_body(scene: Scene) -> ImpactingBody:
     body = scene.body
     if isinstance(body, OscillatorBody):
         return _oscillator(scene, numbers)
-    return _chain(scene, numbers, integers) if isinstance(body, ChainBody) else _beam(scene, numbers, integers)
+    return (
+        _chain(scene, numbers, integers) if isinstance(body, ChainBody) else _beam(scene, numbers, integers)
+    )
 
 
 def _refuse(scene: Scene) -> None:
@@ -55,21 +57,29 @@ def _refuse(scene: Scene) -> None:
         if not isinstance(stop, RestitutionStop):
             raise refused(f"stop[{number}].law", '"restitution": impacts without duration', f'"{stop.law}"')
         if stop.yield_velocity > 0.0:
-            raise refused(f"stop[{number}].yield_velocity", "0 where orbits are followed", f"{stop.yield_velocity:g}")
+            raise refused(
+                f"stop[{number}].yield_velocity", "0 where orbits are followed", f"{stop.yield_velocity:g}"
+            )
     if scene.falling_force:
-        raise refused("exciter.distance", "0 where orbits are followed", "a force that falls with the distance")
+        raise refused(
+            "exciter.distance", "0 where orbits are followed", "a force that falls with the distance"
+        )
 
 
 def _harmonic(numbers: dict[str, float]) -> tuple[float, float]:
     return numbers["forcing.angular_frequency"], numbers.get("forcing.phase", 0.0)
 
 
-def _contacts(scene: Scene, numbers: dict[str, float], integers: dict[str, int], shapes: list[Floats]) -> list[Contact]:
+def _contacts(
+    scene: Scene, numbers: dict[str, float], integers: dict[str, int], shapes: list[Floats]
+) -> list[Contact]:
     found = []
     for number, shape in enumerate(shapes, start=1):
         port = f"contact[{number}]"
         if not shape @ shape > 0.0:
-            raise UsageError(f"{scene.source}: stop[{number}]: expected a point that moves, got one that is held.")
+            raise UsageError(
+                f"{scene.source}: stop[{number}]: expected a point that moves, got one that is held."
+            )
         side = _SIDES[integers[f"{port}.side"]]
         found.append(Contact(shape, side, numbers[f"{port}.position"], numbers[f"{port}.restitution"]))
     return found
@@ -78,7 +88,9 @@ def _contacts(scene: Scene, numbers: dict[str, float], integers: dict[str, int],
 def _oscillator(scene: Scene, numbers: dict[str, float]) -> ImpactingBody:
     mass, stiffness, damping = (numbers[name] for name in ("mass", "stiffness", "damping"))
     if not stiffness > 0.0:
-        raise UsageError(f"{scene.source}: body.stiffness: expected a spring where orbits are followed, got none.")
+        raise UsageError(
+            f"{scene.source}: body.stiffness: expected a spring where orbits are followed, got none."
+        )
     natural, root = np.sqrt(stiffness / mass), np.sqrt(mass)
     shape = np.array([1.0 / root])
     integers = integer_parameters(scene)
@@ -111,7 +123,9 @@ def _chain(scene: Scene, numbers: dict[str, float], integers: dict[str, int]) ->
             "followed, got one that does. Dampings in proportion to the stiffnesses do not."
         )
     if not modes.frequencies[0] > 0.0:
-        raise UsageError(f"{scene.source}: body.stiffnesses: expected a chain tied to the ground, got one that is loose.")
+        raise UsageError(
+            f"{scene.source}: body.stiffnesses: expected a chain tied to the ground, got one that is loose."
+        )
     shape = modes.shapes[:, :kept]
     held = np.zeros(masses)
     hit = [shape[integers[f"contact[{k}].mass_number"] - 1] for k in range(1, len(scene.stops) + 1)]

@@ -1,7 +1,7 @@
-#include <math.h>
-#include <stdbool.h>
+#include "door/orbit_maximum.h"
 
-#include "door/orbit_response.h"
+#include <math.h>
+
 #include "motion/majorant.h"
 
 /* Least step of the search for maxima, as a share of a flight. */

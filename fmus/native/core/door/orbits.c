@@ -4,8 +4,6 @@
 #include <stdbool.h>
 #include <string.h>
 
-#include "door/orbit_response.h"
-
 /* ---- linear equations of the velocities ---- */
 
 /* Solve a x = b for several right sides, b[row][sides], by elimination with pivots; false where a is singular. */

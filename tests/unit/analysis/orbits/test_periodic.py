@@ -1,0 +1,92 @@
+"""Periodic orbits against the worked examples of equations.md and finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from vibroimpact.analysis.orbits import Contact, ImpactingBody, OrbitError, closed_form, find_orbit
+from vibroimpact.fmus.errors import UsageError
+
+
+def oscillator(
+    force: float, frequency: float, ratio: float = 0.04, position: float = 0.8, restitution: float = 0.75
+) -> ImpactingBody:
+    one = np.ones(1)
+    contact = Contact(one, 1.0, position, restitution)
+    return ImpactingBody(one, ratio * one, force * one, 0.0 * one, frequency, 0.0, (contact,), one)
+
+
+def test_the_closed_form_is_that_of_the_worked_example() -> None:
+    (orbit,) = closed_form(oscillator(0.45, 1.1))
+    assert orbit.velocities[0] == pytest.approx(0.952486147774719, abs=1e-14)
+    assert orbit.phases[0] == pytest.approx(0.210560661892213, abs=1e-14)
+    assert orbit.multipliers[0] == pytest.approx(-0.35720824 + 0.47810128j, abs=1e-8)
+    assert orbit.determinant == pytest.approx(0.356178568728976, abs=1e-14)
+    assert orbit.exact_determinant == pytest.approx(orbit.determinant, rel=1e-13)
+    assert orbit.is_stable
+    assert orbit.is_physical
+    assert orbit.highest[2] == -1
+
+
+def test_newton_finds_the_orbit_of_two_impacts_in_two_periods() -> None:
+    body = oscillator(0.44, 0.88)
+    orbit = find_orbit(body, 0.88 * np.array([0.6, 6.9]), periods=2)
+    assert orbit.name == "P(2,2)"
+    np.testing.assert_allclose(orbit.phases / 0.88, [0.59544845, 6.86299676], atol=1e-8)
+    np.testing.assert_allclose(orbit.velocities, [0.41652521, 0.8717915], atol=1e-8)
+    np.testing.assert_allclose(orbit.multipliers, [0.83541348, 0.12083889], atol=2e-8)
+    assert orbit.exact_determinant == pytest.approx(0.1009504356848, abs=1e-13)
+    assert orbit.turns == 1
+
+
+def test_an_orbit_that_is_counted_twice_is_known() -> None:
+    body = oscillator(0.45, 1.1)
+    (once,) = closed_form(body)
+    twice = find_orbit(body, np.array([once.phases[0], once.phases[0] + 2.0 * np.pi]), periods=2)
+    assert twice.turns == 2
+
+
+def test_two_orbits_below_the_graze_are_both_found_and_one_is_unstable() -> None:
+    slow, fast = reversed(closed_form(oscillator(0.5, 1.45, 0.05, 1.0, 0.7)))
+    assert fast.is_stable
+    assert not slow.is_stable
+    assert slow.multipliers[0].real > 1.0
+
+
+def test_derivatives_over_the_phases_are_those_of_differences() -> None:
+    shapes = np.array([[0.6, -1.1, 0.8], [0.3, 0.5, 0.2]])
+    contacts = (Contact(shapes[0], 1.0, 0.1, 0.6), Contact(shapes[1], -1.0, -0.2, 0.8))
+    body = ImpactingBody(
+        np.array([1.0, 2.7, 6.1]),
+        np.array([0.02, 1.0, 1.7]),
+        np.array([0.3, -0.2, 0.1]),
+        np.array([0.01, 0.02, 0.0]),
+        1.9,
+        0.0,
+        contacts,
+        shapes[0],
+    )
+    hit, phases, h = np.array([0, 1, 0], np.int32), np.array([0.3, 2.0, 6.6]), 1e-6
+    found = body.kernel.evaluate(hit, phases, 2)
+    for k in range(3):
+        ends = [body.kernel.evaluate(hit, phases + s * h * (np.arange(3) == k), 2) for s in (1.0, -1.0)]
+        slope = (ends[0].distances - ends[1].distances) / (2.0 * h)
+        np.testing.assert_allclose(found.distance_slopes[:, k], slope, atol=1e-8)
+        faster = (ends[0].velocities - ends[1].velocities) / (2.0 * h)
+        np.testing.assert_allclose(found.velocity_slopes[:, k], faster, atol=1e-8)
+
+
+def test_what_is_no_orbit_is_said() -> None:
+    body = oscillator(0.1, 1.6)
+    assert closed_form(body) == ()
+    with pytest.raises(
+        OrbitError, match=r"orbit: expected an orbit P\(1,1\) near to the phases \[0.3\], got none"
+    ):
+        find_orbit(body, [0.3])
+    with pytest.raises(UsageError, match="phases: expected ascending ones within 1 turns"):
+        find_orbit(body, [0.3, 0.2])
+    with pytest.raises(UsageError, match="contacts: expected 0 to 0"):
+        find_orbit(body, [0.3], [1])
+    with pytest.raises(OrbitError, match="got an undamped one in resonance"):
+        closed_form(oscillator(0.45, 1.0, 0.0))

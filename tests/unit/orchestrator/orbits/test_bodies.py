@@ -1,0 +1,88 @@
+"""Orbits of scenes against long runs of their FMUs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.places import ROOT
+
+import vibroimpact as vi
+from vibroimpact.analysis.orbits import closed_form
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.orbits import impacting_body
+from vibroimpact.orchestrator.scene import load_scene, parse_scene
+
+RECORD = "[record]\ntransient_periods = 400\nrecorded_periods = 2\nimpacts = true\n"
+UNFORCED = "[record]\nrecorded_time = 2\n"
+STOP = "[[stop]]\nposition = 0.1\nrestitution = 0.7\n"
+CHAIN = (
+    '[scene]\nunits = "nondimensional"\n[body]\nkind = "chain"\nmasses = [1, 1]\nstiffnesses = [1, 1]\n'
+    "dampings = [0.1, 0.1]\n[forcing]\namplitude = [0.5, 0]\nangular_frequency = 0.9\n" + STOP
+)
+ONE = (
+    '[scene]\nunits = "nondimensional"\n[body]\nmass = 1\nstiffness = 1\ndamping_ratio = 0.05\n'
+    "[forcing]\namplitude = 0.5\nangular_frequency = 1.0\nphase = 0.4\n"
+    "[[stop]]\nposition = 1.0\nrestitution = 0.7\n"
+)
+BEAM = (
+    '[body]\nkind = "beam"\nlength = 0.3\nflexural_rigidity = 0.05002\nmass_per_length = 0.1054\nmodes = 8\n'
+    "damping_ratio = 0.1\n[forcing]\namplitude = 0.4\nfrequency = 3.86\nlocation = 1.0\n"
+    '[[stop]]\nposition = -0.2672\nside = "lower"\nrestitution = 0.7\nlocation = 1.0\n'
+)
+
+
+@pytest.mark.parametrize("text", [ONE, CHAIN, BEAM], ids=["oscillator", "chain", "beam"])
+def test_a_stable_orbit_is_what_a_long_run_of_the_fmu_ends_on(text: str) -> None:
+    orbit = next(
+        each
+        for each in closed_form(impacting_body(parse_scene(text + RECORD, "scene.toml")))
+        if each.is_stable
+    )
+    assert orbit.is_physical
+    run = vi.run(parse_scene(text + RECORD, "scene.toml"))
+    np.testing.assert_allclose(run["impact_velocity"], orbit.velocities[0], rtol=1e-10)
+    np.testing.assert_allclose(run["impact_phase"], orbit.phases[0], atol=1e-10)
+
+
+def test_the_velocity_of_the_thesis_chain_is_the_known_one() -> None:
+    (orbit,) = closed_form(impacting_body(parse_scene(CHAIN + RECORD, "scene.toml")))
+    assert orbit.velocities[0] == pytest.approx(0.787660852554797, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            ONE.replace("angular_frequency = 1.0", "angular_frequency = 0"),
+            "forcing: expected a harmonic force",
+        ),
+        (ONE.split("[[stop]]")[0], "stop: expected a restitution stop, got none"),
+        (
+            ONE.replace("restitution = 0.7", 'law = "hertz"\nstiffness = 1e4'),
+            r'stop\[1\].law: expected "restitution"',
+        ),
+        (CHAIN.replace("[0.1, 0.1]", "[0.1, 0.3]"), "body.dampings: expected damping that does not couple"),
+        (
+            ONE.replace("restitution = 0.7", "restitution = 0.7\nyield_velocity = 1"),
+            "yield_velocity: expected 0",
+        ),
+    ],
+)
+def test_a_scene_whose_orbits_are_not_followed_is_one_line(text: str, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        impacting_body(parse_scene(text + (UNFORCED if "frequency = 0\n" in text else RECORD), "scene.toml"))
+
+
+def test_a_chain_of_one_mass_has_the_orbits_of_the_oscillator() -> None:
+    own = 'kind = "chain"\nmasses = [1]\nstiffnesses = [1]\ndampings = [0.1]'
+    chain = ONE.replace("mass = 1\nstiffness = 1\ndamping_ratio = 0.05", own)
+    (one,), (same,) = (
+        closed_form(impacting_body(parse_scene(each + RECORD, "scene.toml"))) for each in (ONE, chain)
+    )
+    assert same.velocities[0] == pytest.approx(one.velocities[0], rel=1e-14)
+    np.testing.assert_allclose(same.multipliers, one.multipliers, atol=1e-13)
+
+
+def test_examples_of_the_thesis_have_bodies() -> None:
+    for name in ("thesis/figure_6_13", "thesis/figure_7_10", "bifurcation"):
+        assert closed_form(impacting_body(load_scene(ROOT / "examples" / f"{name}.toml"))) != ()
