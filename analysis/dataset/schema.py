@@ -46,6 +46,17 @@ class Direction(IntEnum):
     down = 2
 
 
+class SpecialOrbit(IntEnum):
+    """What happens to a periodic orbit where it is on its branch."""
+
+    none = 0
+    fold = 1
+    period_doubling = 2
+    torus = 3
+    graze = 4
+    graze_between_impacts = 5
+
+
 class MeasurementFlag(IntFlag):
     """What is wrong with a measured run; several may be."""
 
@@ -218,6 +229,16 @@ _RULES = (
     VariableRule("drive_amplitude", ("run",), "V", "amplitude of the drive as an input saw it"),
     VariableRule("drive_lag", ("run",), "s", "drive as an input saw it, less the planned one"),
     VariableRule("drive_clock_error", ("run",), "1e-6", "relative error of the clock of the inputs"),
+    VariableRule("orbit_branch", ("run",), "1", "branch that the periodic orbit is on", np.int32),
+    VariableRule("orbit_periods", ("run",), "1", "forcing periods after which it repeats itself", np.int32),
+    VariableRule(
+        "orbit_stable", ("run",), "1", "whether all its multipliers are within the unit circle", np.int8
+    ),
+    VariableRule("orbit_special", ("run",), "1", "what happens to it here", np.int8, _flags(SpecialOrbit)),
+    VariableRule("orbit_multiplier_real", ("run",), "1", "real part of its largest Floquet multiplier"),
+    VariableRule(
+        "orbit_multiplier_imaginary", ("run",), "1", "imaginary part of its largest Floquet multiplier"
+    ),
 )
 RULES: Mapping[str, VariableRule] = {rule.name: rule for rule in _RULES}
 
@@ -236,9 +257,11 @@ EVENT_COLUMNS = _columns(("event",))
 SCORE_COLUMNS = _columns(("run", "comparison"))
 MEASURED_COLUMNS = ("measurement_flags", "drive_amplitude", "drive_lag", "drive_clock_error")
 """Columns of runs that a rig has measured; the last three where an input was wired to the drive."""
+ORBIT_COLUMNS = tuple(rule.name for rule in _RULES if rule.name.startswith("orbit_"))
+"""Columns of runs that are periodic orbits, followed over a parameter."""
 RAGGED = {rule.extra["sample_dimension"]: rule.name for rule in _RULES if "sample_dimension" in rule.extra}
 # What every file has; the other per-run variables are there where they were recorded.
-_NOT_IN_ALL = (*RAGGED.values(), "loop_residual", *MEASURED_COLUMNS)
+_NOT_IN_ALL = (*RAGGED.values(), "loop_residual", *MEASURED_COLUMNS, *ORBIT_COLUMNS)
 RUN_COLUMNS = tuple(name for name in _columns(("run",)) if name not in _NOT_IN_ALL)
 RESERVED_NAMES = frozenset(
     {*RULES, *(dim for rule in _RULES for dim in rule.dims), *(f"{dim}_run" for dim in RAGGED)}

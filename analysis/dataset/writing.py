@@ -109,7 +109,8 @@ def build_dataset(
     compared : sequence of str, optional
         Compared pairs of a replay, in the order of `RunRecord.scores`. A run without scores has NaN.
     measured : mapping of str to ndarray, shape (run,), optional
-        What is known of runs that a rig has measured: some of `schema.MEASURED_COLUMNS`.
+        What is known of runs that a rig has measured, or that are orbits: some of `schema.MEASURED_COLUMNS`, or
+        `schema.ORBIT_COLUMNS`.
 
     Returns
     -------

@@ -11,6 +11,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.accuracy import draw_accuracy
+from vibroimpact.analysis.figures.branches import BRANCH, draw_branches
 from vibroimpact.analysis.figures.effects import draw_effects
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.hard_cases import draw_hard_cases
@@ -117,6 +118,9 @@ KINDS: dict[str, FigureKind] = {
         {"runs": lambda data, view: _draw_sweep(data, view.over)},
         lambda data: _swept(data, 1, "displacement_range", "impact_velocity"),
         ("over",),
+    ),
+    "branches": FigureKind(
+        {"runs": lambda data, view: draw_branches(data, view.over)}, lambda data: BRANCH in data, ("over",)
     ),
     "map": FigureKind(
         {"runs": lambda data, view: draw_map(data)},
@@ -251,6 +255,8 @@ def _usual(data: Any, family: Family, view: View) -> str:
         return {"spikes": "intervals", "ladder": "convergence", "hard_cases": "hard-cases"}.get(
             family, family
         )
+    if BRANCH in data and view.run is None:
+        return "branches"
     swept = varied(data)
     if view.run is not None or not swept:
         return "run"

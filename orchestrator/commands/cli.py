@@ -43,6 +43,7 @@ PANELS = {
         "estimate",
         "spikes",
     ),
+    "Orbits": ("follow",),
     "Exchange": ("fmu", "ssp"),
     "Rigs": ("rig",),
     "Serve": ("serve", "submit", "status", "fetch", "cancel"),

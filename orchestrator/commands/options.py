@@ -12,16 +12,8 @@ import typer
 
 from vibroimpact.analysis.commands.shared_options import FigureFile, Force
 from vibroimpact.fmus.commands.options import commands as fmu_commands
-
-SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML), or a system (SSP).")]
-Changes = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        help="Change a key of the scene before it is checked, the key as messages write it; may be repeated.",
-    ),
-]
+from vibroimpact.orchestrator.commands.orbit_options import register as register_orbits
+from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
 
 ssp_commands = typer.Typer(no_args_is_help=True, help="Exchange systems of FMUs with other tools.")
 
@@ -31,6 +23,7 @@ def register(app: typer.Typer) -> None:
     for command in (check, run, campaign, demo, accuracy, effects, replay):
         app.command()(command)
     app.command("hard-cases")(hard_cases)
+    register_orbits(app)
     fmu_commands.command()(export)
     ssp_commands.command("export")(export_ssp)
     ssp_commands.command("import")(import_ssp)

@@ -135,10 +135,10 @@ def _units(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
         return units | stored if scene.units == "SI" else stored
     forcing = {} if scene.forcing is None else {"forcing": FORCING_UNITS[scene.forcing.kind]}
     forcing |= dict.fromkeys(scene.channels, "V")
-    return forcing | {file: _cf_unit(scene, key) or "1" for key, file in names.items()}
+    return forcing | {file: cf_unit(scene, key) or "1" for key, file in names.items()}
 
 
-def _cf_unit(scene: Scene, key: str) -> str | None:
+def cf_unit(scene: Scene, key: str) -> str | None:
     """Return the unit of a number of the short form as CF writes it; None where CF cannot write it."""
     if key == RECORDING_KEY:
         return "1"
@@ -158,7 +158,7 @@ def _long_names(scene: Scene, names: Mapping[str, str]) -> dict[str, str]:
     """Names of swept keys whose unit cannot be said otherwise."""
     if scene.general is not None or scene.units != "SI":
         return {}
-    unsaid = {file: key for key, file in names.items() if _cf_unit(scene, key) is None}
+    unsaid = {file: key for key, file in names.items() if cf_unit(scene, key) is None}
     return {file: f"{file.replace('_', ' ')} in {_unit(scene, key)}" for file, key in unsaid.items()}
 
 

@@ -1,0 +1,124 @@
+"""Figure of branches of periodic orbits, stable and unstable, as in thesis figure 3.1; a sweep may lie below."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vibroimpact.analysis.dataset.schema import SpecialOrbit
+from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside
+from vibroimpact.analysis.figures.sweeps import varied, wrong_sweep
+from vibroimpact.fmus.errors import DatasetError
+
+BRANCH = "orbit_branch"
+_STABLE: dict[str, Any] = {"color": "#0F4C81", "linewidth": 0.9, "linestyle": "-"}
+_UNSTABLE: dict[str, Any] = {"color": "#B5410B", "linewidth": 0.8, "linestyle": (0, (3, 1.5))}
+_BELOW: dict[str, Any] = {
+    "marker": "o",
+    "markersize": 1.4,
+    "markeredgewidth": 0.0,
+    "linestyle": "none",
+    "color": "0.75",
+}
+_MARKS = {
+    SpecialOrbit.fold: "s",
+    SpecialOrbit.period_doubling: "D",
+    SpecialOrbit.torus: "^",
+    SpecialOrbit.graze: "o",
+    SpecialOrbit.graze_between_impacts: "v",
+}
+
+
+def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure:
+    """Draw displacement range and impact velocity of orbits over their parameter: stable solid, unstable dashed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Branches of orbits.
+    over : xarray.Dataset, optional
+        A sweep of the same parameter, drawn below.
+
+    Raises
+    ------
+    DatasetError
+        The sweep is one of something else.
+    """
+    (name,) = varied(dataset) or (_parameter(dataset),)
+    panels = ["displacement_range", "impact_velocity"]
+    if over is not None:
+        panels = [panel for panel in panels if panel in over.variables]
+        if varied(over) != [name] or not panels:
+            raise DatasetError(wrong_sweep(f"a sweep of {name} below", over))
+    figure = canvas(20 + 45 * len(panels))
+    axes = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
+    for axis, panel in zip(axes, panels, strict=True):
+        if over is not None:
+            _draw_below(axis, over, name, panel)
+        _draw(axis, dataset, name, panel)
+        axis.set_ylabel(label(dataset[panel]))
+        axis.margins(x=0.02)
+    axes[-1].set_xlabel(label(dataset[name]))
+    legend_outside(figure, axes[0], ncols=3)
+    return figure
+
+
+def _parameter(dataset: xr.Dataset) -> str:
+    raise DatasetError(wrong_sweep("orbits at several values of a parameter", dataset))
+
+
+def _rows(dataset: xr.Dataset, panel: str) -> list[np.ndarray[Any, Any]]:
+    """Return the values of a panel, an array for each run: of its periods, or of its impacts."""
+    runs = dataset.vibroimpact.runs
+    if panel == "displacement_range":
+        ranges = runs["displacement_max"].values - runs["displacement_min"].values
+        return [row[np.isfinite(row)] for row in np.atleast_2d(ranges)]
+    counts = np.asarray(runs["impact_count"].values, dtype=int)
+    return np.split(np.asarray(dataset["impact_velocity"].values), np.cumsum(counts)[:-1])
+
+
+def _draw_below(axis: Axes, over: xr.Dataset, name: str, panel: str) -> None:
+    places, rows = over.vibroimpact.runs[name].values, _rows(over, panel)
+    x = np.concatenate([np.full(row.size, place) for place, row in zip(places, rows, strict=True)])
+    axis.plot(x, np.concatenate(rows), rasterized=True, label="simulated", **_BELOW)
+
+
+def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:
+    runs = dataset.vibroimpact.runs
+    order = np.argsort(runs["run_index"].values)
+    rows = _rows(dataset, panel)
+    places, branch = runs[name].values, runs[BRANCH].values
+    stable, special = runs["orbit_stable"].values > 0, runs["orbit_special"].values
+    said: set[str] = set()
+    for number in np.unique(branch[branch > 0]):
+        chosen = order[branch[order] == number]
+        columns = min(rows[each].size for each in chosen)
+        values = np.array([rows[each][:columns] for each in chosen])
+        for which, style, words in ((stable, _STABLE, "stable"), (~stable, _UNSTABLE, "unstable")):
+            # a piece goes to the neighbours on either side, so that no gap is left where stability changes
+            keep = which[chosen] | np.append(which[chosen][1:], False) & ~which[chosen]
+            shown = np.where(keep[:, None], values, np.nan)
+            lines = axis.plot(places[chosen], shown, **style)
+            if words not in said and keep.any():
+                lines[0].set_label(words)
+                said.add(words)
+        for each in chosen[special[chosen] > 0]:
+            kind = SpecialOrbit(int(special[each]))
+            words = str(kind.name).replace("_", " ")
+            axis.plot(
+                np.full(rows[each].size, places[each]),
+                rows[each],
+                linestyle="none",
+                marker=_MARKS[kind],
+                markersize=3.4,
+                markerfacecolor="white",
+                markeredgewidth=0.7,
+                color=MARK,
+                label=None if words in said else words,
+                zorder=3,
+            )
+            said.add(words)

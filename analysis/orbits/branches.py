@@ -1,0 +1,145 @@
+"""Branches of periodic orbits as a dataset of runs: each orbit is a run, so that sweeps and branches are drawn alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset
+from vibroimpact.analysis.dataset.schema import SpecialOrbit, UnitSystem
+from vibroimpact.analysis.orbits.body import Floats
+from vibroimpact.analysis.orbits.following import Branch, BranchOrbit
+from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
+
+SAMPLES = 256
+"""Of a forcing period, between which an extremum is that of a cubic: to 1e-8 of the displacement."""
+
+
+def dataset_of_branches(
+    branches: Sequence[Branch],
+    *,
+    coordinate: str,
+    unit: str,
+    units: UnitSystem = "SI",
+    attrs: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """Return the orbits of branches as the runs of a dataset, one branch after the other.
+
+    Parameters
+    ----------
+    branches : sequence of Branch
+    coordinate, unit : str
+        Name of the parameter in the dataset, and its SI unit.
+    units : {"SI", "nondimensional"}
+    attrs : mapping, optional
+        Attributes of the file.
+
+    Returns
+    -------
+    xarray.Dataset
+        With `schema.ORBIT_COLUMNS`. Impacts are those of one orbit, from phase 0 on; periods are those of the force.
+    """
+    orbits = [each for branch in branches for each in branch.orbits]
+    numbers = [number for number, branch in enumerate(branches, start=1) for _ in branch.orbits]
+    largest = np.array([each.orbit.multipliers[0] for each in orbits])
+    columns = {
+        "orbit_branch": np.array(numbers, dtype=np.int32),
+        "orbit_periods": np.array([each.orbit.periods for each in orbits], dtype=np.int32),
+        "orbit_stable": np.array([each.orbit.is_stable for each in orbits], dtype=np.int8),
+        "orbit_special": np.array([_special(branches, each) for each in orbits], dtype=np.int8),
+        "orbit_multiplier_real": largest.real,
+        "orbit_multiplier_imaginary": largest.imag,
+    }
+    most = max(each.orbit.periods for each in orbits)
+    return build_dataset(
+        [_record(each.orbit, most) for each in orbits],
+        coordinates={coordinate: np.array([each.value for each in orbits])},
+        direction=[Direction.independent] * len(orbits),
+        run_index=range(len(orbits)),
+        unit_of={coordinate: unit},
+        units=units,
+        measured=columns,
+        attrs=attrs,
+    )
+
+
+def extrema(orbit: PeriodicOrbit) -> Floats:
+    """Return the highest and the lowest displacement of the observed point in each forcing period, shape (q, 2)."""
+    periods = TURN * orbit.periods
+    ends = np.append(orbit.phases, orbit.phases[0] + periods)
+    per_flight = [
+        np.linspace(first, last, max(int(SAMPLES * (last - first) / TURN), 8) + 1)
+        for first, last in zip(ends, ends[1:], strict=False)
+    ]
+    found = np.full((orbit.periods, 2), np.nan)
+    for phases in per_flight:
+        before_impact = np.append(phases[:-1], np.nextafter(phases[-1], 0.0))
+        x, v = orbit.at(before_impact)
+        tops, at = _turns(before_impact, x, v / orbit.body.angular_frequency)
+        places = (np.floor(np.append(at, phases) / TURN) % orbit.periods).astype(int)
+        for place, value in zip(places, np.append(tops, x), strict=True):
+            found[place] = np.fmax(found[place, 0], value), np.fmin(found[place, 1], value)
+    return found
+
+
+def _turns(phases: Floats, x: Floats, slope: Floats) -> tuple[Floats, Floats]:
+    """Return the displacements where the motion turns round between samples, and their phases: of the cubic there."""
+    here = np.flatnonzero(slope[:-1] * slope[1:] < 0.0)
+    h, x0, x1 = phases[here + 1] - phases[here], x[here], x[here + 1]
+    d0, d1 = slope[here] * h, slope[here + 1] * h
+    a, b, c = 3.0 * (2.0 * (x0 - x1) + d0 + d1), 2.0 * (3.0 * (x1 - x0) - 2.0 * d0 - d1), d0
+    root = np.sqrt(np.fmax(b * b - 4.0 * a * c, 0.0))
+    q = -0.5 * (b + np.copysign(root, b))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        both = np.stack([q / a, c / q])
+    inside = np.where((both >= 0.0) & (both <= 1.0), both, np.nan)
+    s = np.where(np.isfinite(inside[0]), inside[0], inside[1])
+    value = x0 + s * (d0 + s * (b / 2.0 + s * a / 3.0))
+    good = np.isfinite(value)
+    return value[good], (phases[here] + s * h)[good]
+
+
+def _record(orbit: PeriodicOrbit, most: int) -> RunRecord:
+    w, q = orbit.body.angular_frequency, orbit.periods
+    strobes = TURN * np.arange(q)
+    later = np.sort(np.where(strobes < orbit.phases[0], strobes + TURN * q, strobes))
+    x, v = orbit.at(later)
+    order = np.argsort(later % (TURN * q))
+    periods = np.full((most, 5), np.nan)
+    periods[:q, :2] = extrema(orbit)
+    periods[:q, 2], periods[:q, 3] = x[order], v[order]
+    phases = np.mod(orbit.phases, TURN * q)
+    periods[:q, 4] = np.bincount((phases // TURN).astype(int), minlength=q)
+    order = np.argsort(phases)
+    hit = [orbit.body.contacts[each] for each in orbit.contacts]
+    impacts = np.column_stack(
+        [
+            phases / w,
+            np.mod(phases, TURN),
+            orbit.velocities,
+            [(1.0 + c.restitution) * c.mass * speed for c, speed in zip(hit, orbit.velocities, strict=True)],
+            orbit.contacts + 1.0,
+            [c.restitution for c in hit],
+            np.zeros(phases.size),
+        ]
+    )
+    return RunRecord(
+        Outcome.ok,
+        "",
+        periods,
+        impacts[order],
+        final_displacement=float(periods[0, 2]),
+        final_velocity=float(periods[0, 3]),
+        final_phase=0.0,
+    )
+
+
+def _special(branches: Sequence[Branch], orbit: BranchOrbit) -> SpecialOrbit:
+    for branch in branches:
+        for point in branch.points:
+            if point.at.orbit is orbit.orbit:
+                return SpecialOrbit[point.kind.replace(" ", "_")]
+    return SpecialOrbit.none

@@ -1,0 +1,47 @@
+"""The commands of orbits and their options."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibroimpact.analysis.commands.shared_options import FigureFile, Force
+from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of orbits to the command line."""
+    app.command()(follow)
+
+
+def follow(
+    scene: SceneFile,
+    parameter: Annotated[str, typer.Option(metavar="KEY", help="Number of the scene that is varied.")],
+    start: Annotated[float, typer.Option("--from", help="One end of its range.")],
+    stop: Annotated[float, typer.Option("--to", help="The other end.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
+    figure: FigureFile = None,
+    periods: Annotated[
+        int, typer.Option(help="Forcing periods of the orbits of one impact that are followed.")
+    ] = 1,
+    doublings: Annotated[
+        int, typer.Option(help="How often branches of twice the period are followed on.")
+    ] = 1,
+    step: Annotated[float, typer.Option(help="Largest step along a branch, over its range.")] = 0.01,
+    changes: Changes = None,
+    force: Force = False,
+) -> None:
+    """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
+
+    Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid ones
+    and the force harmonic.
+
+    Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6 -o branches.nc
+    """
+    from vibroimpact.orchestrator.commands.follow import show_branches
+
+    show_branches(
+        scene, parameter, (start, stop), (periods, doublings, step), changes or (), output, figure, force
+    )

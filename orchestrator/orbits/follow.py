@@ -1,0 +1,222 @@
+"""Branches of a scene's periodic orbits over one of its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, closed_form
+from vibroimpact.analysis.orbits.branches import dataset_of_branches
+from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, Follower, FollowSettings, joined
+from vibroimpact.analysis.orbits.periodic import ordered
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.run.dataset import cf_unit
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.keys import coordinate_name
+
+SEEDS = 25
+"""Values of the parameter at which orbits are looked for to begin with."""
+SAME_ORBIT = 0.02
+"""Distance, over the range of the parameter and a radian, at which an orbit is on a branch that is known."""
+
+Told = Callable[[Branch, BranchOrbit], None]
+
+
+@dataclass(slots=True)
+class Followed:
+    """What was followed.
+
+    Attributes
+    ----------
+    scene : Scene
+    parameter : str
+        Key of the scene.
+    branches : list of Branch
+        Grows while they are followed.
+    """
+
+    scene: Scene
+    parameter: str
+    branches: list[Branch] = field(default_factory=list)
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The orbits as runs."""
+        scene = self.scene
+        attrs: dict[str, Any] = {
+            "title": scene.title or Path(scene.source).stem,
+            "history": "periodic orbits followed by vibroimpact",
+            "source": f"vibroimpact {versions()['vibroimpact']}, scene {Path(scene.source).name}",
+            "scene": scene.text,
+            "git_commit": git_commit(),
+            "parameter": self.parameter,
+        }
+        return dataset_of_branches(
+            [branch for branch in self.branches if branch.orbits],
+            coordinate=coordinate_name(self.parameter, [self.parameter]),
+            unit=cf_unit(scene, self.parameter) or "1",
+            units=scene.units,
+            attrs=attrs,
+        )
+
+
+def follow_branches(
+    scene: Scene,
+    parameter: str,
+    start: float,
+    stop: float,
+    *,
+    periods: int = 1,
+    doublings: int = 1,
+    longest: float = 0.01,
+    told: Told = lambda branch, orbit: None,
+    followed: Followed | None = None,
+) -> Followed:
+    """Follow the orbits of one impact in `periods` forcing periods, and those that leave them at period doublings.
+
+    Parameters
+    ----------
+    scene : Scene
+        An oscillator, a chain or a beam on restitution stops; its sweep is left out.
+    parameter : str
+        Key of a number of the scene.
+    start, stop : float
+        Range of the parameter.
+    periods : int
+        q of the first P(1,q).
+    doublings : int
+        How often branches of twice the period are followed on.
+    longest : float
+        Largest step along a branch; the range of the parameter counts 1, a radian of all phases 1.
+    told : callable
+        Hears of each orbit.
+    followed : Followed, optional
+        Where branches are put, for callers that keep them when they are interrupted.
+
+    Raises
+    ------
+    UsageError
+        The scene has no such orbits, or the parameter is no number of it.
+    OrbitError
+        There is no orbit to begin with.
+    """
+    _refuse(start, stop, periods, doublings, longest)
+    body_at = _bodies(scene, parameter, 0.5 * (start + stop))
+    settings = FollowSettings(min(start, stop), max(start, stop), longest)
+    follower, result = Follower(body_at, settings), followed or Followed(scene, parameter)
+    for value, orbit in _seeds(body_at, settings, periods):
+        if not _is_known(result.branches, orbit, value, settings):
+            _both_ways(follower, orbit, value, result, told)
+    if not result.branches:
+        raise OrbitError(
+            f"follow: expected a physical orbit P(1,{periods}) at one of {SEEDS} values of {parameter} "
+            f"from {settings.lowest:g} to {settings.highest:g}, got none. Try another range, or other periods."
+        )
+    _doubled(follower, result, doublings, told)
+    return result
+
+
+def _both_ways(follower: Follower, orbit: PeriodicOrbit, value: float, result: Followed, told: Told) -> None:
+    """Follow an orbit both ways; what is there when it is interrupted is kept."""
+    origin = f"{orbit.name} at {value:g}"
+    ways = Branch(origin), Branch(origin)
+    try:
+        for way, sign in zip(ways, (-1.0, 1.0), strict=True):
+            for each in follower.walk(way, orbit, value, sign):
+                told(way, each)
+    finally:
+        backward, forward = ways
+        if backward.orbits:
+            result.branches.append(joined(backward, forward) if forward.orbits else backward)
+
+
+def _doubled(follower: Follower, result: Followed, doublings: int, told: Told) -> None:
+    begin = 0
+    for _ in range(doublings):
+        parents, begin = result.branches[begin:], len(result.branches)
+        for parent in parents:
+            for point in parent.points:
+                if point.kind != "period doubling" or _leads_back(
+                    result.branches, point.at, follower.settings
+                ):
+                    continue
+                child = Branch(f"{parent.name} at its period doubling {point.at.value:.11g}")
+                result.branches.append(child)
+                for each in follower.leave(child, point):
+                    told(child, each)
+                if not child.orbits:
+                    result.branches.pop()
+
+
+def _leads_back(branches: list[Branch], doubling: BranchOrbit, settings: FollowSettings) -> bool:
+    """Say whether a branch of twice the period has been followed to this doubling, from its other end."""
+    twice = 2 * doubling.orbit.periods
+    near = SAME_ORBIT * settings.span
+    return any(
+        branch.orbits
+        and branch.orbits[-1].orbit.periods == twice
+        and abs(branch.orbits[-1].value - doubling.value) < 0.01 * near
+        for branch in branches
+    )
+
+
+def _bodies(scene: Scene, parameter: str, value: float) -> Callable[[float], ImpactingBody]:
+    kept: dict[float, ImpactingBody] = {}
+
+    def body_at(value: float) -> ImpactingBody:
+        value = float(value)
+        if value not in kept:
+            if len(kept) > 8:
+                kept.clear()
+            kept[value] = impacting_body(scene.at({parameter: value}))
+        return kept[value]
+
+    body_at(value)  # a key that is none is refused before anything is followed
+    return body_at
+
+
+def _seeds(
+    body_at: Callable[[float], ImpactingBody], settings: FollowSettings, periods: int
+) -> Iterator[tuple[float, PeriodicOrbit]]:
+    for value in np.linspace(settings.lowest, settings.highest, SEEDS + 2)[1:-1]:
+        body = body_at(float(value))
+        for contact in range(len(body.contacts)):
+            try:
+                found = closed_form(body, periods, contact)
+            except OrbitError:
+                continue  # a resonance at this very value
+            yield from ((float(value), orbit) for orbit in found if orbit.is_physical and orbit.turns == 1)
+
+
+def _is_known(branches: list[Branch], orbit: PeriodicOrbit, value: float, settings: FollowSettings) -> bool:
+    at = np.append(ordered(orbit).phases, value / settings.span)
+    for branch in branches:
+        alike = branch.orbits[0].orbit
+        if alike.periods != orbit.periods or list(ordered(alike).contacts) != list(orbit.contacts):
+            continue
+        rows = np.array(
+            [np.append(ordered(each.orbit).phases, each.value / settings.span) for each in branch.orbits]
+        )
+        apart = rows - at
+        apart[:, :-1] = np.abs(np.mod(apart[:, :-1] + np.pi, 2.0 * np.pi) - np.pi)
+        if np.hypot.reduce(apart, axis=1).min() < SAME_ORBIT:
+            return True
+    return False
+
+
+def _refuse(start: float, stop: float, periods: int, doublings: int, longest: float) -> None:
+    if not (np.isfinite(start) and np.isfinite(stop) and start != stop):
+        raise UsageError(f"--from, --to: expected two different numbers, got {start:g} and {stop:g}.")
+    if not periods >= 1:
+        raise UsageError(f"--periods: expected 1 or more, got {periods}.")
+    if not doublings >= 0:
+        raise UsageError(f"--doublings: expected 0 or more, got {doublings}.")
+    if not 1e-4 <= longest <= 0.2:
+        raise UsageError(f"--step: expected 1e-4 to 0.2, got {longest:g}.")
