@@ -15,6 +15,8 @@ from vibroimpact.analysis.figures.sweeps import varied, wrong_sweep
 from vibroimpact.fmus.errors import DatasetError
 
 BRANCH = "orbit_branch"
+_LONG = 20
+"""Letters of an entry of the legend, of which no three fit beside each other."""
 _STABLE: dict[str, Any] = {"color": "#0F4C81", "linewidth": 0.9, "linestyle": "-"}
 _UNSTABLE: dict[str, Any] = {"color": "#B5410B", "linewidth": 0.8, "linestyle": (0, (3, 1.5))}
 _BELOW: dict[str, Any] = {
@@ -63,7 +65,8 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure
         axis.set_ylabel(label(dataset[panel]))
         axis.margins(x=0.02)
     axes[-1].set_xlabel(label(dataset[name]))
-    legend_outside(figure, axes[0], ncols=3)
+    words = axes[0].get_legend_handles_labels()[1]
+    legend_outside(figure, axes[0], ncols=3 if max(map(len, words)) < _LONG else 2)
     return figure
 
 

@@ -1,12 +1,14 @@
-"""Branches of periodic orbits as a dataset of runs: each orbit is a run, so that sweeps and branches are drawn alike."""
+"""Branches of periodic orbits as a dataset: each orbit is a run, so that sweeps and branches are drawn alike."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset
 from vibroimpact.analysis.dataset.schema import SpecialOrbit, UnitSystem
@@ -45,7 +47,7 @@ def dataset_of_branches(
     orbits = [each for branch in branches for each in branch.orbits]
     numbers = [number for number, branch in enumerate(branches, start=1) for _ in branch.orbits]
     largest = np.array([each.orbit.multipliers[0] for each in orbits])
-    columns = {
+    columns: dict[str, NDArray[Any]] = {
         "orbit_branch": np.array(numbers, dtype=np.int32),
         "orbit_periods": np.array([each.orbit.periods for each in orbits], dtype=np.int32),
         "orbit_stable": np.array([each.orbit.is_stable for each in orbits], dtype=np.int8),
@@ -72,7 +74,7 @@ def extrema(orbit: PeriodicOrbit) -> Floats:
     ends = np.append(orbit.phases, orbit.phases[0] + periods)
     per_flight = [
         np.linspace(first, last, max(int(SAMPLES * (last - first) / TURN), 8) + 1)
-        for first, last in zip(ends, ends[1:], strict=False)
+        for first, last in itertools.pairwise(ends)
     ]
     found = np.full((orbit.periods, 2), np.nan)
     for phases in per_flight:

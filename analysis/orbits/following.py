@@ -91,7 +91,7 @@ class BranchOrbit:
         scale = orbit.body.scale
         tests = {
             "fold": float(self.tangent[-1]),
-            "period doubling": float(np.linalg.det(orbit.monodromy + np.eye(size))) * fast,
+            "period doubling": _determinant(orbit.monodromy + np.eye(size)) * fast,
             "graze": float(orbit.velocities.min()),
             "graze between impacts": TOUCHES - max(orbit.highest[0] / scale, -1.0),
         }
@@ -372,6 +372,10 @@ def _is_closed(branch: Branch, now: BranchOrbit, longest: float) -> bool:
     apart = np.abs(ordered(now.orbit).phases - ordered(first.orbit).phases).max()
     near = apart < 2.0 * longest and abs(now.value - first.value) < 2.0 * longest * span
     return bool(near and now.tangent @ first.tangent > 0.9)
+
+
+def _determinant(matrix: Floats) -> float:
+    return float(np.linalg.det(matrix)) if np.isfinite(matrix).all() else float(np.nan)
 
 
 def _turning(multipliers: NDArray[np.complex128]) -> float:

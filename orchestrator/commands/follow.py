@@ -99,8 +99,8 @@ def _print(followed: Followed) -> None:
         stable = sum(each.orbit.is_stable for each in branch.orbits)
         low, high = float(branch.values.min()), float(branch.values.max())
         say(
-            f"{number}  {branch.name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, {stable} stable; "
-            f"begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
+            f"{number}  {branch.name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, "
+            f"{stable} stable; begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
         )
 
 

@@ -38,7 +38,7 @@ def follow(
     Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid ones
     and the force harmonic.
 
-    Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6 -o branches.nc
+    Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6
     """
     from vibroimpact.orchestrator.commands.follow import show_branches
 
