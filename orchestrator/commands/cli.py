@@ -43,7 +43,7 @@ PANELS = {
         "estimate",
         "spikes",
     ),
-    "Orbits": ("follow",),
+    "Orbits": ("orbit", "follow"),
     "Exchange": ("fmu", "ssp"),
     "Rigs": ("rig",),
     "Serve": ("serve", "submit", "status", "fetch", "cancel"),

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
 import typer
 
 from vibroimpact.analysis.dataset import open_dataset, write_dataset
@@ -16,6 +15,7 @@ from vibroimpact.analysis.orbits.following import Branch, BranchOrbit
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
 from vibroimpact.orchestrator.commands.failures import counted
+from vibroimpact.orchestrator.commands.orbit import multiplier_text
 from vibroimpact.orchestrator.orbits.follow import Followed, follow_branches
 from vibroimpact.orchestrator.ssp import opened_scene
 
@@ -88,7 +88,7 @@ def _print(followed: Followed) -> None:
             largest = (
                 ""
                 if point.kind == "graze"
-                else ", ".join(_multiplier(each) for each in orbit.multipliers[:2])
+                else ", ".join(multiplier_text(each) for each in orbit.multipliers[:2])
             )
             speeds = ", ".join(f"{speed:.8g}" if speed > 1e-12 else "0" for speed in orbit.velocities)
             rows.add_row(name, point.kind, f"{point.at.value:.11g}", speeds, largest)
@@ -102,12 +102,6 @@ def _print(followed: Followed) -> None:
             f"{number}  {branch.name}: {counted(len(branch.orbits), 'orbit')} from {low:.8g} to {high:.8g}, "
             f"{stable} stable; begun from {branch.origin}; ends: {', '.join(branch.ends) or 'interrupted'}."
         )
-
-
-def _multiplier(value: complex) -> str:
-    if not np.isfinite(value):
-        return "unbounded"
-    return f"{value.real:.6g}" if value.imag == 0.0 else f"{value.real:.6g}{value.imag:+.6g}i"
 
 
 def _write(followed: Followed, output: Path | None, figure: Path | None) -> None:

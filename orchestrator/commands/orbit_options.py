@@ -13,7 +13,27 @@ from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
 
 def register(app: typer.Typer) -> None:
     """Add the commands of orbits to the command line."""
-    app.command()(follow)
+    for command in (orbit, follow):
+        app.command()(command)
+
+
+def orbit(
+    scene: SceneFile,
+    impacts: Annotated[int | None, typer.Option(help="Impacts of an orbit.")] = None,
+    periods: Annotated[int | None, typer.Option(help="Forcing periods of an orbit.")] = None,
+    figure: FigureFile = None,
+    changes: Changes = None,
+) -> None:
+    """Find periodic orbits of a scene, stable and unstable ones, and say what their multipliers are.
+
+    Without --impacts and --periods all orbits of one impact a period, and the orbit that a long run ends on. Each is
+    nowhere beyond a stop: all maxima between its impacts are found, the nearest to a stop is told.
+
+    Example: vibroimpact orbit examples/bifurcation.toml --set "sweep={}" --impacts 2 --periods 2 --figure orbits.png
+    """
+    from vibroimpact.orchestrator.commands.orbit import show_orbits
+
+    show_orbits(scene, impacts, periods, changes or (), figure)
 
 
 def follow(

@@ -1,0 +1,96 @@
+"""Orbits of p impacts in q periods, found from many starts: the unstable ones as well."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.periodic import (
+    SAME,
+    TURN,
+    OrbitError,
+    PeriodicOrbit,
+    closed_form,
+    find_orbit,
+)
+from vibroimpact.fmus.core.orbits import MOST_IMPACTS
+from vibroimpact.fmus.errors import UsageError
+
+STARTS = 256
+"""Trains of impacts from which Newton's method begins, of orbits that have no closed form."""
+MOST_SPEEDS = 1e-6
+"""Speed of an impact, over the fastest, below which it is none: the orbit is one of fewer impacts."""
+
+
+def orbits_of(
+    body: ImpactingBody, impacts: int = 1, periods: int = 1, *, starts: int = STARTS
+) -> list[PeriodicOrbit]:
+    """Return the physical orbits P(p,q) that are found, stable or not, the fastest impact first.
+
+    Those of one impact are all there are (equations.md 4.3); others are what Newton's method reaches from `starts`
+    trains of impacts, the same each time.
+
+    Parameters
+    ----------
+    body : ImpactingBody
+    impacts, periods : int
+        p and q.
+    starts : int
+        How many trains are tried.
+
+    Raises
+    ------
+    UsageError
+        There are no such orbits.
+    """
+    if not (1 <= impacts <= MOST_IMPACTS and periods >= 1):
+        raise UsageError(
+            f"orbit: expected 1 to {MOST_IMPACTS} impacts in 1 or more periods, got {impacts} in {periods}."
+        )
+    if impacts == 1:
+        found = [
+            orbit for contact in range(len(body.contacts)) for orbit in closed_form(body, periods, contact)
+        ]
+    else:
+        found = _from_starts(body, impacts, periods, starts)
+    kept = [orbit for orbit in found if orbit.is_physical and orbit.turns == 1]
+    return sorted(kept, key=lambda orbit: -float(orbit.velocities.max()))
+
+
+def same_orbit(one: PeriodicOrbit, other: PeriodicOrbit) -> bool:
+    """Say whether two orbits are one, begun at another impact or in another period."""
+    if one.name != other.name or one.phases.size != other.phases.size:
+        return False
+    p, whole = one.phases.size, TURN * one.periods
+    for shift in range(p):
+        turned = np.roll(np.arange(p), -shift)
+        apart = other.phases[turned] - one.phases
+        apart = np.mod(apart - apart[0] + 0.5 * whole, whole) - 0.5 * whole
+        periods = (other.phases[turned][0] - one.phases[0]) / TURN
+        whole_periods = abs(periods - round(periods)) * TURN < SAME
+        same_contacts = (other.contacts[turned] == one.contacts).all()
+        if whole_periods and same_contacts and np.abs(apart).max() < SAME:
+            return True
+    return False
+
+
+def _from_starts(body: ImpactingBody, impacts: int, periods: int, starts: int) -> list[PeriodicOrbit]:
+    found: list[PeriodicOrbit] = []
+    for phases, contacts in _trains(impacts, periods, len(body.contacts), starts):
+        try:
+            orbit = find_orbit(body, phases, contacts.tolist(), periods)
+        except OrbitError:
+            continue
+        slow = orbit.velocities.min() < MOST_SPEEDS * float(np.abs(orbit.velocities).max())
+        if not slow and not any(same_orbit(orbit, other) for other in found):
+            found.append(orbit)
+    return found
+
+
+def _trains(impacts: int, periods: int, contacts: int, starts: int) -> list[tuple[Floats, NDArray[np.int32]]]:
+    draw = qmc.Halton(2 * impacts, seed=0).random(starts)
+    phases = np.sort(draw[:, :impacts], axis=1) * TURN * periods
+    hit = np.floor(draw[:, impacts:] * contacts).astype(np.int32)
+    return [(row, own) for row, own in zip(phases, hit, strict=True) if (np.diff(row) > SAME).all()]

@@ -1,0 +1,81 @@
+"""Periodic orbits of a scene: those of given p and q, and the one that a long run ends on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit, find_orbit
+from vibroimpact.analysis.orbits.search import orbits_of, same_orbit
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.run import PointRunner
+from vibroimpact.orchestrator.scene import Scene
+
+LONGEST = 16
+"""Forcing periods of an orbit that a run is taken to end on."""
+TRANSIENT = 2000
+"""Forcing periods that a run is given to come to its orbit."""
+REPEATS = 1e-4
+"""Difference of phases, rad, up to which a run has come near to an orbit; Newton's method does the rest."""
+
+
+def find_orbits(scene: Scene, impacts: int | None = None, periods: int | None = None) -> list[PeriodicOrbit]:
+    """Return periodic orbits of a scene, stable and unstable.
+
+    Parameters
+    ----------
+    scene : Scene
+        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
+    impacts, periods : int, optional
+        p and q. Without them, all orbits P(1,1) and the orbit that a long run of the scene ends on.
+
+    Raises
+    ------
+    UsageError
+        The scene has no such orbits to be looked for.
+    """
+    alone = scene.with_sweep({}) if scene.sweep else scene
+    body = impacting_body(alone)
+    if impacts is not None or periods is not None:
+        return orbits_of(body, impacts or 1, periods or 1)
+    found = orbits_of(body)
+    reached = orbit_of_run(alone)
+    if reached is not None and not any(same_orbit(reached, other) for other in found):
+        found.append(reached)
+    return found
+
+
+def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:
+    """Return the orbit that a long run of a scene ends on; None where it ends on none of few periods."""
+    long = scene.with_values(
+        {
+            "record.transient_periods": TRANSIENT,
+            "record.recorded_periods": 2 * LONGEST,
+            "record.impacts": True,
+        }
+    )
+    runner = PointRunner(long)
+    try:
+        rows = runner.run({}).impacts
+    finally:
+        runner.close()
+    body = impacting_body(scene)
+    if rows is None or not len(rows):
+        return None
+    turns = np.floor(
+        (rows[:, 0] - rows[0, 0] + (rows[0, 1] - rows[:, 1]) / body.angular_frequency) / body.period + 0.5
+    )
+    phases, contacts = rows[:, 1] + 2.0 * np.pi * turns, rows[:, 4].astype(int) - 1
+    for periods in range(1, LONGEST + 1):
+        count = int(np.count_nonzero(phases < phases[0] + 2.0 * np.pi * periods - REPEATS))
+        if 2 * count > phases.size:
+            return None
+        apart = np.abs(phases[count : 2 * count] - phases[:count] - 2.0 * np.pi * periods).max()
+        if apart > REPEATS or not (contacts[count : 2 * count] == contacts[:count]).all():
+            continue
+        try:
+            orbit = find_orbit(body, phases[:count], contacts[:count].tolist(), periods)
+        except (OrbitError, UsageError):  # impacts closer than phases can tell: chatter
+            return None
+        return orbit if orbit.is_physical else None
+    return None
