@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside
-from vibroimpact.analysis.figures.sweeps import varied, wrong_sweep
+from vibroimpact.analysis.figures.sweeps import draw_map, varied, wrong_sweep
 from vibroimpact.fmus.errors import DatasetError
 
 BRANCH = "orbit_branch"
@@ -25,6 +25,11 @@ _BELOW: dict[str, Any] = {
     "markeredgewidth": 0.0,
     "linestyle": "none",
     "color": "0.75",
+}
+_LOCI: dict[SpecialOrbit, dict[str, Any]] = {
+    SpecialOrbit.fold: {"color": "#0F4C81", "linestyle": "-"},
+    SpecialOrbit.period_doubling: {"color": "#B5410B", "linestyle": (0, (4, 1.5))},
+    SpecialOrbit.graze: {"color": "#3C7D3C", "linestyle": (0, (1.2, 1.2))},
 }
 _MARKS = {
     SpecialOrbit.fold: "s",
@@ -50,7 +55,12 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure
     DatasetError
         The sweep is one of something else.
     """
-    (name,) = varied(dataset) or (_parameter(dataset),)
+    names = varied(dataset)
+    if len(names) == 2:
+        return _draw_loci(dataset, names, over)
+    if len(names) != 1:
+        raise DatasetError(wrong_sweep("orbits at several values of one or two parameters", dataset))
+    (name,) = names
     panels = ["displacement_range", "impact_velocity"]
     if over is not None:
         panels = [panel for panel in panels if panel in over.variables]
@@ -70,8 +80,36 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure
     return figure
 
 
-def _parameter(dataset: xr.Dataset) -> str:
-    raise DatasetError(wrong_sweep("orbits at several values of a parameter", dataset))
+def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -> Figure:
+    """Draw bifurcations over two parameters, over a map where there is one."""
+    runs = dataset.vibroimpact.runs
+    order = np.argsort(runs["run_index"].values)
+    keys = str(dataset.attrs.get("parameter", "")).split(".")[-1]
+    x, y = sorted(names, key=lambda name: name != keys)
+    if over is not None:
+        if sorted(varied(over)) != sorted(names):
+            raise DatasetError(wrong_sweep(f"a map of {x} and {y} below", over))
+        figure = draw_map(over)
+        axis = figure.axes[0]
+        if axis.get_xlabel() != label(over[x]):
+            x, y = y, x
+    else:
+        figure = canvas(75)
+        axis = figure.subplots()
+        axis.set(xlabel=label(dataset[x]), ylabel=label(dataset[y]))
+    branch, special = runs[BRANCH].values, runs["orbit_special"].values
+    said: set[str] = set()
+    for number in np.unique(branch[branch > 0]):
+        chosen = order[branch[order] == number]
+        kind = SpecialOrbit(int(special[chosen[0]]))
+        words = str(kind.name).replace("_", " ")
+        style = _LOCI.get(kind, {"color": "0.4"})
+        shown = None if words in said else words
+        axis.plot(runs[x].values[chosen], runs[y].values[chosen], linewidth=1.0, label=shown, **style)
+        said.add(words)
+    axis.margins(x=0.02)
+    legend_outside(figure, axis, ncols=3)
+    return figure
 
 
 def _rows(dataset: xr.Dataset, panel: str) -> list[np.ndarray[Any, Any]]:

@@ -14,6 +14,7 @@ from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_da
 from vibroimpact.analysis.dataset.schema import SpecialOrbit, UnitSystem
 from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.following import Branch, BranchOrbit
+from vibroimpact.analysis.orbits.loci import Locus
 from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
 
 SAMPLES = 256
@@ -45,23 +46,81 @@ def dataset_of_branches(
         With `schema.ORBIT_COLUMNS`. Impacts are those of one orbit, from phase 0 on; periods are those of the force.
     """
     orbits = [each for branch in branches for each in branch.orbits]
-    numbers = [number for number, branch in enumerate(branches, start=1) for _ in branch.orbits]
-    largest = np.array([each.orbit.multipliers[0] for each in orbits])
+    return _dataset(
+        [each.orbit for each in orbits],
+        [number for number, branch in enumerate(branches, start=1) for _ in branch.orbits],
+        [_special(branches, each) for each in orbits],
+        {coordinate: np.array([each.value for each in orbits])},
+        {coordinate: unit},
+        units,
+        attrs,
+    )
+
+
+def dataset_of_loci(
+    loci: Sequence[Locus],
+    *,
+    coordinates: tuple[str, str],
+    unit_of: Mapping[str, str],
+    units: UnitSystem = "SI",
+    attrs: Mapping[str, Any] | None = None,
+) -> xr.Dataset:
+    """Return the orbits of loci as the runs of a dataset, over two parameters.
+
+    Parameters
+    ----------
+    loci : sequence of Locus
+    coordinates : tuple of str
+        Names of both parameters in the dataset.
+    unit_of : mapping of str to str
+        Their SI units.
+    units : {"SI", "nondimensional"}
+    attrs : mapping, optional
+        Attributes of the file.
+
+    Returns
+    -------
+    xarray.Dataset
+        As `dataset_of_branches`; `orbit_special` is what happens at each orbit, `orbit_branch` counts the loci.
+    """
+    points = [each for locus in loci for each in locus.points]
+    kinds = [SpecialOrbit[locus.kind.replace(" ", "_")] for locus in loci for _ in locus.points]
+    return _dataset(
+        [each.orbit for each in points],
+        [number for number, locus in enumerate(loci, start=1) for _ in locus.points],
+        kinds,
+        {name: np.array([each.values[place] for each in points]) for place, name in enumerate(coordinates)},
+        unit_of,
+        units,
+        attrs,
+    )
+
+
+def _dataset(
+    orbits: Sequence[PeriodicOrbit],
+    numbers: Sequence[int],
+    special: Sequence[SpecialOrbit],
+    coordinates: Mapping[str, Floats],
+    unit_of: Mapping[str, str],
+    units: UnitSystem,
+    attrs: Mapping[str, Any] | None,
+) -> xr.Dataset:
+    largest = np.array([each.multipliers[0] for each in orbits])
     columns: dict[str, NDArray[Any]] = {
         "orbit_branch": np.array(numbers, dtype=np.int32),
-        "orbit_periods": np.array([each.orbit.periods for each in orbits], dtype=np.int32),
-        "orbit_stable": np.array([each.orbit.is_stable for each in orbits], dtype=np.int8),
-        "orbit_special": np.array([_special(branches, each) for each in orbits], dtype=np.int8),
+        "orbit_periods": np.array([each.periods for each in orbits], dtype=np.int32),
+        "orbit_stable": np.array([each.is_stable for each in orbits], dtype=np.int8),
+        "orbit_special": np.array(special, dtype=np.int8),
         "orbit_multiplier_real": largest.real,
         "orbit_multiplier_imaginary": largest.imag,
     }
-    most = max(each.orbit.periods for each in orbits)
+    most = max(each.periods for each in orbits)
     return build_dataset(
-        [_record(each.orbit, most) for each in orbits],
-        coordinates={coordinate: np.array([each.value for each in orbits])},
+        [_record(each, most) for each in orbits],
+        coordinates=coordinates,
         direction=[Direction.independent] * len(orbits),
         run_index=range(len(orbits)),
-        unit_of={coordinate: unit},
+        unit_of=unit_of,
         units=units,
         measured=columns,
         attrs=attrs,

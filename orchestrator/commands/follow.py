@@ -2,35 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 import typer
 
 from vibroimpact.analysis.dataset import open_dataset, write_dataset
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.orbits import OrbitError
-from vibroimpact.analysis.orbits.following import Branch, BranchOrbit
+from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, FollowSettings
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
 from vibroimpact.orchestrator.commands.failures import counted
 from vibroimpact.orchestrator.commands.orbit import multiplier_text
-from vibroimpact.orchestrator.orbits.follow import Followed, follow_branches
+from vibroimpact.orchestrator.orbits.follow import (
+    HISTORY,
+    Followed,
+    FollowedLoci,
+    follow_branches,
+    follow_loci,
+)
 from vibroimpact.orchestrator.ssp import opened_scene
 
-HISTORY = "periodic orbits followed by vibroimpact"
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is followed: options of the command."""
+
+    parameter: str
+    span: tuple[float, float]
+    periods: int
+    doublings: int
+    step: float
+    second: str | None
+    second_span: tuple[float | None, float | None]
+
+    def refuse(self) -> None:
+        """Refuse half a second range.
+
+        Raises
+        ------
+        UsageError
+        """
+        given = (self.second is not None, *(end is not None for end in self.second_span))
+        if any(given) and not all(given):
+            raise UsageError(
+                "--second: expected --second, --second-from and --second-to together, got some of them."
+            )
+        if all(given) and self.second_span[0] == self.second_span[1]:
+            raise UsageError("--second-from, --second-to: expected two different numbers, got the same.")
 
 
 def show_branches(
-    path: Path,
-    parameter: str,
-    span: tuple[float, float],
-    options: tuple[int, int, float],
-    changes: Sequence[str],
-    output: Path | None,
-    figure: Path | None,
-    force: bool,
+    path: Path, wanted: Wanted, changes: Sequence[str], output: Path | None, figure: Path | None, force: bool
 ) -> None:
     """Follow branches, print their special points, and write what was asked for.
 
@@ -39,41 +67,53 @@ def show_branches(
     typer.Exit
         Ctrl-C came; what was followed before is printed and written.
     """
+    wanted.refuse()
     refuse_outputs([path], output, figure)
     scene = opened_scene(path, changes)
     refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
-    alone = scene.with_sweep({}) if scene.sweep else scene
-    followed = Followed(alone, parameter)
+    followed = Followed(scene.with_sweep({}) if scene.sweep else scene, wanted.parameter)
+    loci = FollowedLoci(followed, wanted.second or "")
     interrupted = False
     with Terminal(stderr=True).status("Looking for orbits") as status:
-
-        def told(branch: Branch, orbit: BranchOrbit) -> None:
-            if len(branch.orbits) % 20 == 1:
-                status.update(
-                    f"{branch.name}: {counted(len(branch.orbits), 'orbit')}, {parameter} {orbit.value:.6g}"
-                )
-
-        periods, doublings, longest = options
         try:
-            follow_branches(
-                alone,
-                parameter,
-                *span,
-                periods=periods,
-                doublings=doublings,
-                longest=longest,
-                told=told,
-                followed=followed,
-            )
+            _follow(wanted, followed, loci, status.update)
         except KeyboardInterrupt:
             interrupted = True
     if not followed.branches:
         raise OrbitError("follow: interrupted before there was an orbit.")
     _print(followed)
-    _write(followed, output, figure)
+    _print_loci(loci)
+    _write(loci if loci.loci else followed, output, figure)
     if interrupted:
-        say("Interrupted: the branches above are what was followed.", err=True)
+        say("Interrupted: the above is what was followed.", err=True)
         raise typer.Exit(130)
+
+
+def _follow(wanted: Wanted, followed: Followed, loci: FollowedLoci, show: Callable[[str], None]) -> None:
+    def told(branch: Branch, orbit: BranchOrbit) -> None:
+        if len(branch.orbits) % 20 == 1:
+            many = counted(len(branch.orbits), "orbit")
+            show(f"{branch.name}: {many}, {wanted.parameter} {orbit.value:.6g}")
+
+    follow_branches(
+        followed.scene,
+        wanted.parameter,
+        *wanted.span,
+        periods=wanted.periods,
+        doublings=wanted.doublings,
+        longest=wanted.step,
+        told=told,
+        followed=followed,
+    )
+    low, high = wanted.second_span
+    if wanted.second is None or low is None or high is None:
+        return
+    ranges = [
+        FollowSettings(min(ends), max(ends), wanted.step) for ends in (wanted.span, (float(low), float(high)))
+    ]
+    follow_loci(
+        loci, *ranges, told=lambda locus: show(f"{locus.kind}: {counted(len(locus.points), 'orbit')}")
+    )
 
 
 def _print(followed: Followed) -> None:
@@ -104,7 +144,21 @@ def _print(followed: Followed) -> None:
         )
 
 
-def _write(followed: Followed, output: Path | None, figure: Path | None) -> None:
+def _print_loci(loci: FollowedLoci) -> None:
+    first, second = loci.followed.parameter, loci.second
+    for number, locus in enumerate(loci.loci, start=1):
+        rows = np.array([each.values for each in locus.points])
+        low, high = rows.min(axis=0), rows.max(axis=0)
+        say(
+            f"{number}  {locus.kind} of {locus.points[0].orbit.name}: {counted(len(rows), 'orbit')}, "
+            f"{first} from {low[0]:.8g} to {high[0]:.8g}, {second} from {low[1]:.8g} to {high[1]:.8g}; "
+            f"ends: {', '.join(locus.ends)}."
+        )
+        for kind, point in locus.special:
+            say(f"   codimension 2, {locus.kind} and {kind}: {point.values[0]:.11g}, {point.values[1]:.11g}")
+
+
+def _write(followed: Followed | FollowedLoci, output: Path | None, figure: Path | None) -> None:
     if output is None and figure is None:
         return
     with TemporaryDirectory() as folder:

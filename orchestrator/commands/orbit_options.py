@@ -50,18 +50,24 @@ def follow(
         int, typer.Option(help="How often branches of twice the period are followed on.")
     ] = 1,
     step: Annotated[float, typer.Option(help="Largest step along a branch, over its range.")] = 0.01,
+    second: Annotated[
+        str | None,
+        typer.Option(metavar="KEY", help="Another number, over which the bifurcations are followed as well."),
+    ] = None,
+    second_start: Annotated[float | None, typer.Option("--second-from", help="One end of its range.")] = None,
+    second_stop: Annotated[float | None, typer.Option("--second-to", help="The other end.")] = None,
     changes: Changes = None,
     force: Force = False,
 ) -> None:
     """Follow periodic orbits over a number of a scene, stable and unstable ones, through their bifurcations.
 
     Folds, period doublings, grazes and the loss of physicality are located and printed. The stops must be rigid ones
-    and the force harmonic.
+    and the force harmonic. With --second the folds, period doublings and grazes are curves over both numbers, and
+    these are what is written and drawn.
 
     Example: vibroimpact follow examples/bifurcation.toml --parameter forcing.angular_frequency --from 0.6 --to 1.6
     """
-    from vibroimpact.orchestrator.commands.follow import show_branches
+    from vibroimpact.orchestrator.commands.follow import Wanted, show_branches
 
-    show_branches(
-        scene, parameter, (start, stop), (periods, doublings, step), changes or (), output, figure, force
-    )
+    wanted = Wanted(parameter, (start, stop), periods, doublings, step, second, (second_start, second_stop))
+    show_branches(scene, wanted, changes or (), output, figure, force)

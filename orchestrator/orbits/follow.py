@@ -11,8 +11,16 @@ import numpy as np
 import xarray as xr
 
 from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, closed_form
-from vibroimpact.analysis.orbits.branches import dataset_of_branches
-from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, Follower, FollowSettings, joined
+from vibroimpact.analysis.orbits.branches import dataset_of_branches, dataset_of_loci
+from vibroimpact.analysis.orbits.following import (
+    Branch,
+    BranchOrbit,
+    Follower,
+    FollowSettings,
+    SpecialPoint,
+    joined,
+)
+from vibroimpact.analysis.orbits.loci import FOLLOWED_KINDS, Locus, LocusFollower, joined_loci
 from vibroimpact.analysis.orbits.periodic import ordered
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign.provenance import git_commit, versions
@@ -21,6 +29,7 @@ from vibroimpact.orchestrator.run.dataset import cf_unit
 from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.scene.keys import coordinate_name
 
+HISTORY = "periodic orbits followed by vibroimpact"
 SEEDS = 25
 """Values of the parameter at which orbits are looked for to begin with."""
 SAME_ORBIT = 0.02
@@ -47,24 +56,120 @@ class Followed:
     branches: list[Branch] = field(default_factory=list)
 
     @property
-    def dataset(self) -> xr.Dataset:
-        """The orbits as runs."""
+    def attributes(self) -> dict[str, Any]:
+        """Of the file of its orbits."""
         scene = self.scene
-        attrs: dict[str, Any] = {
+        return {
             "title": scene.title or Path(scene.source).stem,
-            "history": "periodic orbits followed by vibroimpact",
+            "history": HISTORY,
             "source": f"vibroimpact {versions()['vibroimpact']}, scene {Path(scene.source).name}",
             "scene": scene.text,
             "git_commit": git_commit(),
             "parameter": self.parameter,
         }
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The orbits as runs."""
         return dataset_of_branches(
             [branch for branch in self.branches if branch.orbits],
             coordinate=coordinate_name(self.parameter, [self.parameter]),
-            unit=cf_unit(scene, self.parameter) or "1",
-            units=scene.units,
-            attrs=attrs,
+            unit=cf_unit(self.scene, self.parameter) or "1",
+            units=self.scene.units,
+            attrs=self.attributes,
         )
+
+
+@dataclass(slots=True)
+class FollowedLoci:
+    """Bifurcations that were followed over two parameters.
+
+    Attributes
+    ----------
+    followed : Followed
+        The branches on which they were found.
+    second : str
+        Key of the second parameter.
+    loci : list of Locus
+        Grows while they are followed.
+    """
+
+    followed: Followed
+    second: str
+    loci: list[Locus] = field(default_factory=list)
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Their orbits as runs."""
+        scene, keys = self.followed.scene, [self.followed.parameter, self.second]
+        names = coordinate_name(keys[0], keys), coordinate_name(keys[1], keys)
+        return dataset_of_loci(
+            self.loci,
+            coordinates=names,
+            unit_of={name: cf_unit(scene, key) or "1" for name, key in zip(names, keys, strict=True)},
+            units=scene.units,
+            attrs=self.followed.attributes | {"second_parameter": self.second},
+        )
+
+
+def follow_loci(
+    result: FollowedLoci,
+    first: FollowSettings,
+    second: FollowSettings,
+    *,
+    told: Callable[[Locus], None] = lambda locus: None,
+) -> FollowedLoci:
+    """Follow each fold, period doubling and graze of the branches over a second parameter of the scene.
+
+    Parameters
+    ----------
+    result : FollowedLoci
+        With the branches; the loci are put there.
+    first, second : FollowSettings
+        Ranges of both parameters.
+    told : callable
+        Hears of each orbit of a locus.
+
+    Raises
+    ------
+    UsageError
+        The second parameter is no number of the scene.
+    """
+    scene, keys = result.followed.scene, (result.followed.parameter, result.second)
+    if keys[0] == keys[1]:
+        raise UsageError(f"--second: expected another number of the scene than {keys[0]}, got the same.")
+    value = float(scene.value(result.second))
+    if not second.lowest <= value <= second.highest:
+        raise UsageError(
+            f"--second-from, --second-to: expected a range around {result.second} = {value:g} of the scene, "
+            f"got {second.lowest:g} to {second.highest:g}."
+        )
+    follower = LocusFollower(
+        lambda *both: impacting_body(scene.at(dict(zip(keys, both, strict=True)))), first, second
+    )
+    for branch in result.followed.branches:
+        for point in branch.points:
+            if point.kind not in FOLLOWED_KINDS or _is_on(result.loci, point, value, first, second):
+                continue
+            ways = Locus(point.kind), Locus(point.kind)
+            for way, sign in zip(ways, (-1.0, 1.0), strict=True):
+                for _ in follower.walk(way, point.at, (point.at.value, value), sign):
+                    told(way)
+            result.loci.append(joined_loci(*ways))
+    return result
+
+
+def _is_on(
+    loci: list[Locus], point: SpecialPoint, value: float, first: FollowSettings, second: FollowSettings
+) -> bool:
+    """Say whether a locus that is known goes through a point."""
+    for locus in loci:
+        if locus.kind == point.kind and locus.points[0].orbit.name == point.at.orbit.name:
+            rows = np.array([each.values for each in locus.points])
+            apart = (rows - (point.at.value, value)) / (first.span, second.span)
+            if np.hypot.reduce(apart, axis=1).min() < SAME_ORBIT:
+                return True
+    return False
 
 
 def follow_branches(

@@ -1,0 +1,266 @@
+"""Bifurcations followed over two parameters: where a fold, a period doubling or a graze is, equations.md 4.5 and 4.6.
+
+The unknowns are the phases of the impacts and both parameters; beside the equations of the orbit there is one more,
+the function whose sign change the bifurcation is. A locus that comes to an impact of no speed has come to a graze too:
+a point of codimension 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import brentq
+
+from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.following import (
+    EASY_NEWTON,
+    LOCATED,
+    MOST_NEWTON,
+    MOST_TURN,
+    SHORTEST,
+    BranchOrbit,
+    FollowSettings,
+    SpecialPoint,
+)
+from vibroimpact.analysis.orbits.periodic import TOUCHES, OrbitError, PeriodicOrbit, evaluated
+
+FOLLOWED_KINDS = ("fold", "period doubling", "graze")
+CHANGE = 1e-6
+"""Of an unknown, by which derivatives are found; an error of theirs costs a Newton step, and no digit."""
+CLOSED = 1e-13
+"""Change of the unknowns at which they are found."""
+
+BodyAt2 = Callable[[float, float], ImpactingBody]
+
+
+@dataclass(frozen=True, eq=False)
+class LocusPoint:
+    """An orbit at its bifurcation.
+
+    Attributes
+    ----------
+    values : tuple of float
+        Of both parameters.
+    orbit : PeriodicOrbit
+    tangent : array, shape (p + 2,)
+    """
+
+    values: tuple[float, float]
+    orbit: PeriodicOrbit
+    tangent: Floats
+
+
+@dataclass(slots=True)
+class Locus:
+    """Where a bifurcation is over two parameters.
+
+    Attributes
+    ----------
+    kind : str
+        `fold`, `period doubling` or `graze`.
+    points : list of LocusPoint
+    special : list of tuple of (str, LocusPoint)
+        Points of codimension 2: `graze`, an impact of no speed on a fold or a period doubling.
+    ends : list of str
+    """
+
+    kind: str
+    points: list[LocusPoint] = field(default_factory=list)
+    special: list[tuple[str, LocusPoint]] = field(default_factory=list)
+    ends: list[str] = field(default_factory=list)
+
+
+class LocusFollower:
+    """Follows a bifurcation of a body that depends on two parameters.
+
+    Parameters
+    ----------
+    body_at : callable
+        Body for values of both parameters.
+    first, second : FollowSettings
+        Their ranges; steps are those of the first.
+    """
+
+    def __init__(self, body_at: BodyAt2, first: FollowSettings, second: FollowSettings) -> None:
+        self._body_at = body_at
+        self._ranges = first, second
+        self._spans = np.array([first.span, second.span])
+
+    def locus(self, point: SpecialPoint, values: tuple[float, float]) -> Locus:
+        """Follow a bifurcation both ways.
+
+        Raises
+        ------
+        OrbitError
+            It is none that is followed.
+        """
+        ways = []
+        for sign in (-1.0, 1.0):
+            way = Locus(point.kind)
+            for _ in self.walk(way, point.at, values, sign):
+                pass
+            ways.append(way)
+        return joined_loci(*ways)
+
+    def walk(
+        self, locus: Locus, at: BranchOrbit, values: tuple[float, float], sign: float
+    ) -> Iterator[LocusPoint]:
+        """Follow one way, towards higher (+1) or lower (-1) values of the second parameter at first."""
+        if locus.kind not in FOLLOWED_KINDS:
+            raise OrbitError(f"loci: expected a fold, a period doubling or a graze, got a {locus.kind}.")
+        unknowns = np.concatenate([at.orbit.phases, np.array(values) / self._spans])
+        tangent = self._tangent(locus.kind, at.orbit, unknowns)
+        if tangent[-1] * sign < 0.0:
+            tangent = -tangent
+        now = LocusPoint(values, at.orbit, tangent)
+        longest = self._ranges[0].longest
+        step = 0.1 * longest
+        locus.points.append(now)
+        yield now
+        while len(locus.points) < self._ranges[0].most_orbits:
+            found = self._step(locus.kind, now, step)
+            if found is None:
+                step *= 0.5
+                if step < SHORTEST * longest:
+                    locus.ends.append("cannot be followed further")
+                    return
+                continue
+            taken, newton = found
+            end = self._end(locus, now, taken, step)
+            if end is not None:
+                reason, last = end
+                if last is not None:
+                    locus.points.append(last)
+                    yield last
+                locus.ends.append(reason)
+                return
+            locus.points.append(taken)
+            yield taken
+            now, step = taken, min(longest, step * (1.5 if newton <= EASY_NEWTON else 1.0))
+        locus.ends.append(f"{self._ranges[0].most_orbits} orbits")
+
+    # ---- equations ----
+
+    def _made(self, orbit: PeriodicOrbit, unknowns: Floats) -> tuple[PeriodicOrbit, Floats, Floats]:
+        phases = unknowns[:-2]
+        body = self._body_at(*(unknowns[-2:] * self._spans))
+        found = evaluated(body, orbit.contacts, phases, orbit.periods)
+        made = PeriodicOrbit(body, orbit.periods, phases, orbit.contacts, found.velocities)
+        return made, found.distances, found.distance_slopes
+
+    def _equations(self, kind: str, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
+        made, distances, slopes = self._made(orbit, unknowns)
+        if kind == "graze":
+            test = float(made.velocities.min())
+        elif kind == "fold":
+            test = float(np.linalg.det(slopes / made.body.scale))
+        else:
+            size = made.monodromy.shape[0]
+            fast = float(np.prod(made.velocities))
+            known = np.isfinite(made.monodromy).all()
+            test = float(np.linalg.det(made.monodromy + np.eye(size))) * fast if known else np.nan
+        if not np.isfinite(test):
+            raise OrbitError("loci: an impact of no speed has no multipliers.")
+        return np.append(distances / made.body.scale, test)
+
+    def _slopes(self, kind: str, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
+        columns = []
+        for k in range(unknowns.size):
+            ends = []
+            for side in (1.0, -1.0):
+                moved = unknowns.copy()
+                moved[k] += side * CHANGE
+                ends.append(self._equations(kind, orbit, moved))
+            columns.append((ends[0] - ends[1]) / (2.0 * CHANGE))
+        return np.column_stack(columns)
+
+    def _tangent(self, kind: str, orbit: PeriodicOrbit, unknowns: Floats) -> Floats:
+        return np.asarray(np.linalg.svd(self._slopes(kind, orbit, unknowns))[2][-1], dtype=np.float64)
+
+    def _step(self, kind: str, now: LocusPoint, step: float) -> tuple[LocusPoint, int] | None:
+        start = np.concatenate([now.orbit.phases, np.array(now.values) / self._spans])
+        unknowns = start + step * now.tangent
+        try:
+            slopes = self._slopes(kind, now.orbit, unknowns)
+            for newton in range(MOST_NEWTON):  # noqa: B007  # how many is said
+                residual = self._equations(kind, now.orbit, unknowns)
+                matrix = np.vstack([slopes, now.tangent])
+                off = step - now.tangent @ (unknowns - start)
+                change = np.linalg.solve(matrix, np.append(-residual, off))
+                if not np.abs(change).max() < 0.5:
+                    return None
+                unknowns = unknowns + change
+                if np.abs(change).max() < CLOSED * (1.0 + np.abs(unknowns).max()):
+                    break
+            else:
+                return None
+            orbit = self._made(now.orbit, unknowns)[0]
+            tangent = self._tangent(kind, orbit, unknowns)
+        except (OrbitError, np.linalg.LinAlgError):
+            return None
+        if tangent @ now.tangent < 0.0:
+            tangent = -tangent
+        if tangent @ now.tangent < np.cos(MOST_TURN):
+            return None
+        values = unknowns[-2:] * self._spans
+        return LocusPoint((float(values[0]), float(values[1])), orbit, tangent), newton
+
+    # ---- ends ----
+
+    def _end(
+        self, locus: Locus, now: LocusPoint, taken: LocusPoint, step: float
+    ) -> tuple[str, LocusPoint | None] | None:
+        """Return why a locus ends between two points, and the last one; None where it goes on."""
+        if locus.kind != "graze" and taken.orbit.velocities.min() <= 0.0 < now.orbit.velocities.min():
+            found = self._last_with_speed(locus.kind, now, step)
+            locus.special.append(("graze", found))
+            return "graze", found
+        for place, settings in enumerate(self._ranges):
+            for bound in (settings.lowest, settings.highest):
+                if (now.values[place] - bound) * (taken.values[place] - bound) < 0.0:
+                    return "end of the range", self._located(locus.kind, now, step, _beyond(place, bound))
+        if taken.orbit.highest[0] > TOUCHES * taken.orbit.body.scale >= now.orbit.highest[0]:
+            return "graze between impacts", None
+        return None
+
+    def _last_with_speed(self, kind: str, now: LocusPoint, step: float) -> LocusPoint:
+        """Return the last orbit of a step whose impacts all have a speed, without which there are no multipliers."""
+        part, beyond, last = 0.0, step, now
+        while beyond - part > LOCATED * step:
+            middle = 0.5 * (part + beyond)
+            found = self._step(kind, now, middle)
+            if found is None or not found[0].orbit.velocities.min() > 0.0:
+                beyond = middle
+            else:
+                part, last = middle, found[0]
+        return last
+
+    def _located(
+        self, kind: str, now: LocusPoint, step: float, test: Callable[[LocusPoint], float]
+    ) -> LocusPoint | None:
+        def at(part: float) -> float:
+            found = (now, 0) if part == 0.0 else self._step(kind, now, part)
+            return float(np.nan) if found is None else test(found[0])
+
+        try:
+            part = brentq(at, 0.0, step, xtol=LOCATED * step, rtol=4.0 * np.finfo(float).eps)
+        except (ValueError, RuntimeError):
+            return None
+        found = self._step(kind, now, part)
+        return None if found is None else found[0]
+
+
+def joined_loci(backward: Locus, forward: Locus) -> Locus:
+    """Return two ways from one point as one locus."""
+    return Locus(
+        forward.kind,
+        backward.points[::-1] + forward.points[1:],
+        backward.special[::-1] + forward.special,
+        backward.ends + forward.ends,
+    )
+
+
+def _beyond(place: int, bound: float) -> Callable[[LocusPoint], float]:
+    return lambda point: point.values[place] - bound
