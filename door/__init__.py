@@ -65,6 +65,8 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.simulation import effects as effects
     from vibroimpact.simulation import export_fmu as export_fmu
     from vibroimpact.simulation import export_ssp as export_ssp
+    from vibroimpact.simulation import find_orbits as find_orbits
+    from vibroimpact.simulation import follow as follow
     from vibroimpact.simulation import hard_cases as hard_cases
     from vibroimpact.simulation import import_ssp as import_ssp
     from vibroimpact.simulation import replay as replay
@@ -107,6 +109,8 @@ _NAMES = {
         "hard_cases",
         "export_fmu",
         "export_ssp",
+        "find_orbits",
+        "follow",
         "import_ssp",
         "replay",
         "run",

@@ -11,9 +11,11 @@ from typing import Any
 
 import xarray as xr
 
-from vibroimpact.analysis.dataset import open_dataset
+from vibroimpact.analysis.dataset import open_dataset, write_dataset
 from vibroimpact.analysis.dataset.results import write_results
 from vibroimpact.analysis.files.scratch import ScratchFolder
+from vibroimpact.analysis.orbits import PeriodicOrbit
+from vibroimpact.analysis.orbits.following import FollowSettings
 from vibroimpact.analysis.sensitivity import LEVEL, RESAMPLES, sensitivity_report
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.campaign import SceneCost, run_campaign, run_scene
@@ -22,6 +24,8 @@ from vibroimpact.orchestrator.campaign.cluster import Client, refuse_two_kinds_o
 from vibroimpact.orchestrator.campaign.progress import Progress, shown_progress
 from vibroimpact.orchestrator.hard_cases import dataset_of as hard_cases_dataset
 from vibroimpact.orchestrator.hard_cases import measured_cases
+from vibroimpact.orchestrator.orbits.find import find_orbits as orbits_of_scene
+from vibroimpact.orchestrator.orbits.follow import Followed, FollowedLoci, follow_branches, follow_loci
 from vibroimpact.orchestrator.replay.replaying import replay_scene
 from vibroimpact.orchestrator.run.export import export_scene
 from vibroimpact.orchestrator.scene import Scene
@@ -320,6 +324,111 @@ def sensitivity(
     if path is not None:
         write_results(found, _path(path), kind="sensitivity")
     return found.assign_attrs(results_kind="sensitivity")
+
+
+def find_orbits(
+    scene: SceneLike, impacts: int | None = None, periods: int | None = None
+) -> list[PeriodicOrbit]:
+    """Find periodic orbits of a scene, stable and unstable ones.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
+    impacts, periods : int, optional
+        p and q of P(p,q). Without them, all orbits P(1,1), and the orbit that a long run ends on.
+
+    Returns
+    -------
+    list of PeriodicOrbit
+        With `phases` (rad), `velocities` (m/s), `multipliers`, `is_stable`, `highest` maximum between impacts.
+
+    Raises
+    ------
+    UsageError
+        Orbits of the scene are not followed.
+
+    Examples
+    --------
+    >>> body = {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05}
+    >>> stop, force = {"position": 1.0, "restitution": 0.7}, {"amplitude": 0.5, "angular_frequency": 1.4}
+    >>> record = {"transient_periods": 0, "recorded_periods": 1}
+    >>> for orbit in find_orbits({"body": body, "forcing": force, "stop": [stop], "record": record}, 1):
+    ...     print(orbit.name, orbit.velocities.round(6), orbit.is_stable)
+    P(1,1) [1.884299] True
+    P(1,1) [0.787422] False
+    """
+    return orbits_of_scene(_scene(scene), impacts, periods)
+
+
+def follow(
+    scene: SceneLike,
+    parameter: str,
+    start: float,
+    stop: float,
+    path: PathLike | None = None,
+    *,
+    periods: int = 1,
+    doublings: int = 1,
+    step: float = 0.01,
+    second: str | None = None,
+    second_range: tuple[float, float] | None = None,
+) -> xr.Dataset:
+    """Follow the orbits P(1,q) of a scene over one of its numbers, through folds and period doublings.
+
+    Parameters
+    ----------
+    scene : Scene, path or mapping
+        An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
+    parameter : str
+        Key of a number, such as `forcing.angular_frequency`.
+    start, stop : float
+        Its range.
+    path : path, optional
+        The dataset to write as well (.nc).
+    periods : int
+        q of the first orbits.
+    doublings : int
+        How often branches of twice the period are followed on.
+    step : float
+        Largest step along a branch; the range of the parameter counts 1, a radian of all phases 1.
+    second : str, optional
+        Another number: folds, period doublings and grazes are followed over both.
+    second_range : tuple of float, optional
+        Its range.
+
+    Returns
+    -------
+    xarray.Dataset
+        Each orbit is a run, with `orbit_branch`, `orbit_stable`, `orbit_special` and its largest multiplier; with
+        `second`, each is an orbit at a bifurcation.
+
+    Raises
+    ------
+    UsageError
+        Orbits of the scene are not followed, or a parameter is no number of it.
+    OrbitError
+        There is no orbit to begin with.
+
+    Examples
+    --------
+    >>> follow("scene.toml", "forcing.angular_frequency", 0.6, 1.6)    # doctest: +SKIP
+    """
+    chosen = _scene(scene)
+    alone = chosen.with_sweep({}) if chosen.sweep else chosen
+    if (second is None) != (second_range is None):
+        raise UsageError("follow: second: expected a key and its range together, got one of them.")
+    followed = follow_branches(
+        alone, parameter, start, stop, periods=periods, doublings=doublings, longest=step
+    )
+    result: Followed | FollowedLoci = followed
+    if second is not None and second_range is not None:
+        ranges = [FollowSettings(min(ends), max(ends), step) for ends in ((start, stop), second_range)]
+        result = follow_loci(FollowedLoci(followed, second), *ranges)
+    with _ONE_AT_A_TIME, ScratchFolder("orbits") as folder:
+        target = Path(folder.name, "branches.nc") if path is None else _path(path)
+        write_dataset(result.dataset, target)
+        return open_dataset(target) if path is not None else _in_memory(target)
 
 
 def hard_cases(only: str | Sequence[str] = (), path: PathLike | None = None) -> xr.Dataset:

@@ -1,0 +1,182 @@
+"""Orbits found and followed from scenes: the commands, what they write, and what they refuse."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.command_line import in_this_process as ran
+from support.places import ROOT
+
+import vibroimpact as vi
+from vibroimpact.analysis.dataset.schema import SpecialOrbit
+
+
+def in_this_process(arguments: list[str]) -> tuple[int, str, str]:
+    done = ran(*arguments)
+    return done.returncode, done.stdout, done.stderr
+
+
+SCENE = ROOT / "examples" / "bifurcation.toml"
+PARAMETER = "forcing.angular_frequency"
+
+
+@pytest.fixture(scope="module")
+def branches() -> object:
+    return vi.follow(SCENE, PARAMETER, 0.6, 1.6, step=0.03)
+
+
+def test_branches_are_a_dataset_whose_runs_are_orbits(branches: object) -> None:
+    runs = branches.vibroimpact.runs  # type: ignore[attr-defined]
+    special = runs["orbit_special"].values
+    values = {
+        SpecialOrbit(kind).name: np.sort(runs["angular_frequency"].values[special == kind])
+        for kind in (1, 2, 4)
+    }
+    np.testing.assert_allclose(values["fold"], [0.9363626913, 1.5166110861], atol=1e-9)
+    np.testing.assert_allclose(values["period_doubling"], [0.9364931207], atol=1e-9)
+    np.testing.assert_allclose(values["graze"][[0, 2]], [0.7106873691, 1.2185743569], atol=1e-9)
+    assert set(np.unique(runs["orbit_branch"].values)) == {1, 2}
+
+
+def test_the_sweep_of_a_campaign_lies_on_the_stable_branch(branches: object) -> None:
+    scene = vi.Scene.from_text(SCENE.read_text(encoding="utf-8")).with_sweep(
+        {PARAMETER: {"values": [1.0, 1.2, 1.4], "path": "up"}}
+    )
+    run = vi.run(scene)
+    for value in (1.0, 1.2, 1.4):
+        fast = vi.find_orbits(scene.with_sweep({}).with_values({PARAMETER: value}), 1)[0]
+        found = run.vibroimpact.impacts(direction="up", angular_frequency=value)
+        np.testing.assert_allclose(found["impact_velocity"], fast.velocities[0], rtol=1e-10)
+        own = run.sel(direction="up", angular_frequency=value)
+        followed = branches.vibroimpact.runs  # type: ignore[attr-defined]
+        stable = (followed["orbit_stable"].values > 0) & (followed["orbit_branch"].values == 1)
+        order = np.argsort(followed["angular_frequency"].values[stable])
+        ranges = (followed["displacement_max"] - followed["displacement_min"]).values[stable, 0][order]
+        between = np.interp(value, followed["angular_frequency"].values[stable][order], ranges)
+        assert between == pytest.approx(
+            float((own["displacement_max"] - own["displacement_min"]).max()), rel=2e-4
+        )
+
+
+def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
+    output, figure = tmp_path / "b.nc", tmp_path / "b.png"
+    arguments = [
+        "follow",
+        str(SCENE),
+        "--parameter",
+        PARAMETER,
+        "--from",
+        "0.6",
+        "--to",
+        "1.6",
+        "--step",
+        "0.05",
+    ]
+    code, out, err = in_this_process([*arguments, "-o", str(output), "--figure", str(figure)])
+    assert (code, err) == (0, "")
+    for said in ("0.93649312074", "1.5166110861", "0.71068736909", "1.2185743569", "P(2,2)"):
+        assert said in out
+    assert figure.stat().st_size > 10_000
+    code, out, _ = in_this_process(["plot", str(output), "-o", str(tmp_path / "again.png")])
+    assert code == 0
+
+
+def test_bifurcations_over_two_numbers_are_written_and_drawn(tmp_path: Path) -> None:
+    found = vi.follow(
+        SCENE,
+        PARAMETER,
+        0.6,
+        1.6,
+        step=0.05,
+        doublings=0,
+        second="forcing.amplitude",
+        second_range=(0.3, 0.7),
+    )
+    assert {"angular_frequency", "amplitude"} <= set(found.coords)
+    assert set(np.unique(found["orbit_special"].values)) == {1, 2, 4}
+    vi.draw(found)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--from", "1", "--to", "1"], "--from, --to: expected two different numbers, got 1 and 1."),
+        (["--parameter", "body.kind"], "scene key: expected a numeric key"),
+        (["--parameter", "no.such"], "scene key: expected a numeric key"),
+        (["--from", "2.5", "--to", "3"], "follow: expected a physical orbit P(1,1)"),
+        (["--periods", "0"], "--periods: expected 1 or more, got 0."),
+        (["--step", "0"], "--step: expected 1e-4 to 0.2, got 0."),
+        (
+            ["--second", "forcing.amplitude"],
+            "--second: expected --second, --second-from and --second-to together",
+        ),
+        (["--set", "stop=[]"], "stop: expected a restitution stop, got none."),
+    ],
+)
+def test_what_cannot_be_followed_is_one_line(arguments: list[str], said: str) -> None:
+    base = ["follow", str(SCENE), "--parameter", PARAMETER, "--from", "0.6", "--to", "1.6"]
+    code, out, err = in_this_process([*base, *arguments])
+    assert code in (1, 2)
+    assert out == ""
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_what_was_followed_before_ctrl_c_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from vibroimpact.analysis.orbits.following import Follower
+
+    walk = Follower.walk
+
+    def interrupted(self: Follower, branch: object, *more: object) -> object:
+        for number, each in enumerate(walk(self, branch, *more)):  # type: ignore[arg-type]
+            if number == 25:
+                raise KeyboardInterrupt
+            yield each
+
+    monkeypatch.setattr(Follower, "walk", interrupted)
+    output = tmp_path / "b.nc"
+    code, _, err = in_this_process(
+        ["follow", str(SCENE), "--parameter", PARAMETER, "--from", "0.6", "--to", "1.6", "-o", str(output)]
+    )
+    assert code == 130
+    assert "Interrupted" in err
+    assert vi.open_dataset(output).sizes["angular_frequency"] >= 25
+
+
+def test_orbits_are_told_and_drawn(tmp_path: Path) -> None:
+    figure = tmp_path / "o.png"
+    arguments = [
+        "orbit",
+        str(SCENE),
+        "--set",
+        "sweep={}",
+        "--set",
+        f"{PARAMETER}=1.4",
+        "--figure",
+        str(figure),
+    ]
+    code, out, err = in_this_process(arguments)
+    assert (code, err) == (0, "")
+    assert "1.884298559" in out
+    assert "0.7874223201" in out
+    assert "2 physical orbits." in out
+    assert figure.is_file()
+    code, out, _ = in_this_process([*arguments[:-2], "--impacts", "3", "--periods", "1"])
+    assert (code, "No physical orbit P(3,1)." in out) == (0, True)
+
+
+def test_unstable_orbits_of_two_impacts_are_found_and_the_run_ends_on_the_stable_one() -> None:
+    scene = vi.Scene.from_text(SCENE.read_text(encoding="utf-8")).with_sweep({})
+    (unstable,) = vi.find_orbits(scene.with_values({PARAMETER: 0.94}), 2, 2)
+    assert not unstable.is_stable
+    once, twice = vi.find_orbits(scene.with_values({PARAMETER: 0.8}))
+    assert (once.name, once.is_stable, twice.name, twice.is_stable) == ("P(1,1)", False, "P(2,2)", True)
+
+
+def test_an_orbit_between_two_stops_is_that_of_a_long_run() -> None:
+    (orbit,) = vi.find_orbits(ROOT / "examples" / "two_stops.toml")
+    assert orbit.name == "P(2,1)"
+    assert orbit.contacts.tolist() == [0, 1]
+    assert orbit.determinant == pytest.approx(orbit.exact_determinant, rel=1e-12)
