@@ -19,6 +19,7 @@ from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
 from vibroimpact.analysis.figures.measured_sweep import draw_measured_sweep
 from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
+from vibroimpact.analysis.figures.orbit_energies import draw_orbit_energies
 from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait, draw_return_map
 from vibroimpact.analysis.figures.recordings import draw_recording
 from vibroimpact.analysis.figures.replay import draw_replay, recordings_of
@@ -55,6 +56,7 @@ Family = Literal[
     "effects",
     "sensitivity",
     "hard_cases",
+    "energies",
     "ladder",
 ]
 _WORDS: dict[Family, str] = {
@@ -67,6 +69,7 @@ _WORDS: dict[Family, str] = {
     "effects": "a study of effects",
     "sensitivity": "a study of sensitivity",
     "hard_cases": "hard cases",
+    "energies": "energies of orbits",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -151,7 +154,7 @@ KINDS: dict[str, FigureKind] = {
         (*_SINGLE, "recording"),
     ),
     "energies": FigureKind(
-        {"runs": draw_energies},
+        {"runs": draw_energies, "energies": lambda data, view: draw_orbit_energies(data)},
         lambda data: "modal_energy_1" in data and {"energy_kinetic", "energy_potential"} <= set(data),
         _SINGLE,
     ),
@@ -238,6 +241,7 @@ def _family(data: Data) -> Family:
         "effects": "effects",
         "sensitivity": "sensitivity",
         "hard_cases": "hard_cases",
+        "energies": "energies",
     }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:

@@ -1,8 +1,8 @@
-"""Energy of the modes of an orbit: what the force gives, what damping and impacts take: thesis 6.3, equations.md 5.3 to 5.6.
+"""Energy of the modes of an orbit: what force, damping and impacts give and take: thesis 6.3, equations.md 5.3 to 5.6.
 
-An impact changes the velocity of every mode, so energy goes over from one mode to others, and some is lost. The residual
-energy of a mode is the work of the force on it less what its damping takes, over the orbit; summed over the modes it is
-what the impacts lose (thesis 6.32).
+An impact changes the velocity of every mode, so energy goes over from one mode to others, and some is lost. The
+residual energy of a mode is the work of the force on it less what its damping takes, over the orbit; summed over the
+modes it is what the impacts lose (thesis 6.32).
 """
 
 from __future__ import annotations
@@ -163,7 +163,9 @@ class OrbitEnergies:
         jump = np.empty_like(self._after[1])
         for place, (number, speed) in enumerate(zip(orbit.contacts, orbit.velocities, strict=True)):
             contact = orbit.body.contacts[number]
-            jump[place] = -(1.0 + contact.restitution) * speed * contact.direction * contact.mass * contact.shape
+            jump[place] = (
+                -(1.0 + contact.restitution) * speed * contact.direction * contact.mass * contact.shape
+            )
         return np.asarray(self._after[1] - jump)
 
     @cached_property

@@ -1,9 +1,9 @@
 """Integrals of a flight of a forced mode that are exact, at any damping, at resonance too: equations.md 5.5.
 
-Both integrands are quadratic in (w q, q', f cos, f sin), which moves by a constant matrix A. So an integral over a flight
-is a quadratic form of its start. Over a step that is short against every rate it is a power series; over two equal steps
-it is P + E' P E, with the flow E of the first. No sample of the motion is taken, and nothing is divided by a difference
-of rates.
+Both integrands are quadratic in (w q, q', f cos, f sin), which moves by a constant matrix. So an integral over a
+flight is a quadratic form of its start. Over a step that is short against every rate it is a power series; over two
+equal steps it is P + E' P E, with the flow E of the first. No sample of the motion is taken, and nothing is divided by
+a difference of rates.
 """
 
 from __future__ import annotations

@@ -28,6 +28,7 @@ def register(app: typer.Typer) -> None:
     ssp_commands.command("export")(export_ssp)
     ssp_commands.command("import")(import_ssp)
     app.add_typer(ssp_commands, name="ssp")
+    register_energies(app)
 
 
 def check(scene: SceneFile, changes: Changes = None) -> None:
