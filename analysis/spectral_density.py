@@ -46,8 +46,10 @@ class SpectralDensity:
     @property
     def words(self) -> str:
         """How it was computed."""
-        count = "1 segment" if self.segments == 1 else f"{self.segments} segments, half overlapping,"
-        return f"Welch, Bartlett window, {count} of {self.segment} samples"
+        many = f"{self.segments} segments, half overlapping, of"
+        return (
+            f"Welch, Bartlett window: {'1 segment of' if self.segments == 1 else many} {self.segment} samples"
+        )
 
 
 def spectral_density(values: Floats, rate: float, segment: int | None = None) -> SpectralDensity:

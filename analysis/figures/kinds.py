@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -23,6 +24,7 @@ from vibroimpact.analysis.figures.orbit_energies import draw_orbit_energies
 from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait, draw_return_map
 from vibroimpact.analysis.figures.recordings import draw_recording
 from vibroimpact.analysis.figures.replay import draw_replay, recordings_of
+from vibroimpact.analysis.figures.resonances import draw_resonances
 from vibroimpact.analysis.figures.runs import draw_run
 from vibroimpact.analysis.figures.scores import draw_scores
 from vibroimpact.analysis.figures.sensitivity import draw_sensitivity
@@ -57,6 +59,7 @@ Family = Literal[
     "sensitivity",
     "hard_cases",
     "energies",
+    "resonances",
     "ladder",
 ]
 _WORDS: dict[Family, str] = {
@@ -70,6 +73,7 @@ _WORDS: dict[Family, str] = {
     "sensitivity": "a study of sensitivity",
     "hard_cases": "hard cases",
     "energies": "energies of orbits",
+    "resonances": "resonances",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -88,7 +92,7 @@ class FigureKind:
     fits : callable
         Whether a dataset of runs holds what the figure shows.
     takes : tuple of str
-        Options: `run`, `recording`, `window`, `over`.
+        Options: `run`, `recording`, `window`, `over`, `segment`.
     """
 
     families: dict[Family, Callable[[Any, View], Figure]]
@@ -153,6 +157,15 @@ KINDS: dict[str, FigureKind] = {
         lambda data: bool(sampled_variables(data)),
         (*_SINGLE, "recording"),
     ),
+    "density": FigureKind(
+        {
+            "runs": partial(draw_run_spectrum, density=True),
+            "recording": partial(draw_recording_spectrum, density=True),
+            "replay": partial(draw_replay_spectrum, density=True),
+        },
+        lambda data: bool(sampled_variables(data)),
+        (*_SINGLE, "recording", "segment"),
+    ),
     "energies": FigureKind(
         {"runs": draw_energies, "energies": lambda data, view: draw_orbit_energies(data)},
         lambda data: "modal_energy_1" in data and {"energy_kinetic", "energy_potential"} <= set(data),
@@ -179,6 +192,7 @@ KINDS: dict[str, FigureKind] = {
     "effects": FigureKind({"effects": lambda data, view: draw_effects(data)}),
     "sensitivity": FigureKind({"sensitivity": lambda data, view: draw_sensitivity(data)}),
     "hard-cases": FigureKind({"hard_cases": lambda data, view: draw_hard_cases(data)}),
+    "resonances": FigureKind({"resonances": lambda data, view: draw_resonances(data)}),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
@@ -242,6 +256,7 @@ def _family(data: Data) -> Family:
         "sensitivity": "sensitivity",
         "hard_cases": "hard_cases",
         "energies": "energies",
+        "resonances": "resonances",
     }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:
@@ -278,6 +293,7 @@ def _refuse_options(data: Any, kind: str, family: Family, view: View) -> None:
         ("recording", view.recording is not None, family != "replay"),
         ("window", view.window.given, False),
         ("over", view.over is not None, family != "runs"),
+        ("segment", view.segment is not None, False),
     ):
         if not is_given or (name in KINDS[kind].takes and not is_foreign):
             continue

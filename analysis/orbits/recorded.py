@@ -12,9 +12,9 @@ from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit
 from vibroimpact.fmus.core.orbits import MOST_IMPACTS
 
 REPEATS = (1e-9, 1e-6, 1e-3)
-"""Differences of phases (rad), and of velocities over the largest, of an impact and that of the round before.
+"""Differences of phases (rad), and of velocities over the largest, between rounds.
 
-The closest that is met counts: next to a period doubling the two halves of an orbit differ by less than a transient may.
+The closest that is met counts: next to a doubling the two halves of an orbit differ by less than a transient may.
 """
 
 

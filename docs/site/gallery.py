@@ -84,6 +84,7 @@ def kinds() -> dict[str, Picture]:
         "impact-map": _of("impact-map", "figure_2_11"),
         "return-map": _of("return-map", "figure_2_11"),
         "spectrum": _of("spectrum", "single_run"),
+        "density": _of("density", "single_run"),
         "energies": _of("energies", "figure_6_15"),
         "shapes": _of("shapes", "figure_7_2"),
         "recording": _of("recording", "hit", hit),
@@ -98,6 +99,9 @@ def kinds() -> dict[str, Picture]:
             "effects", "parts", "vibroimpact effects examples/thesis/figure_7_11.toml -o parts.nc"
         ),
         "sensitivity": _of("sensitivity", "shares", "vibroimpact sensitivity tolerances.nc -o shares.nc"),
+        "resonances": _of(
+            "resonances", "peaks", "vibroimpact resonances examples/thesis/figure_6_4.toml -o peaks.nc"
+        ),
         "hard-cases": _of("hard-cases", "cases", "vibroimpact hard-cases -o cases.nc"),
         "convergence": _of("convergence", "ladder"),
         "work-precision": _of("work-precision", "ladder"),

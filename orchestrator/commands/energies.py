@@ -48,14 +48,19 @@ def show_energies(
         _print_one(found)
     else:
         _print_all(found)
+    write_found(found, "energies", output, figure)
+
+
+def write_found(found: xr.Dataset, kind: str, output: Path | None, figure: Path | None) -> None:
+    """Write and draw what was found, where that is asked for."""
     if output is not None:
         with writing(output):
-            write_results(found, output, kind="energies")
+            write_results(found, output, kind=kind)
         say(f"Dataset written to {output}.")
     if figure is not None:
         from vibroimpact.analysis import figures  # half a second, which a table needs not
 
-        drawn = figures.draw(found.assign_attrs(results_kind="energies"))
+        drawn = figures.draw(found.assign_attrs(results_kind=kind))
         with writing(figure):
             figures.save(drawn, figure)
         say(f"Figure written to {figure}.")

@@ -12,6 +12,7 @@ import typer
 
 from vibroimpact.analysis.commands.shared_options import FigureFile, Force
 from vibroimpact.fmus.commands.options import commands as fmu_commands
+from vibroimpact.orchestrator.commands.energy_options import register as register_energies
 from vibroimpact.orchestrator.commands.orbit_options import register as register_orbits
 from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
 

@@ -82,7 +82,7 @@ def energies(dataset: xr.Dataset, run: int | None = None) -> xr.Dataset:
     --------
     >>> energies(open_dataset("run.nc")).residual_energy      # doctest: +SKIP
     """
-    scene = _scene_of(dataset)
+    scene = scene_of(dataset, "energies")
     runs = dataset.vibroimpact.runs
     chosen = _chosen(runs, run)
     impacts = _ImpactsOf(dataset)
@@ -102,15 +102,16 @@ def energies(dataset: xr.Dataset, run: int | None = None) -> xr.Dataset:
     return made.assign_attrs(kept)
 
 
-def _scene_of(dataset: xr.Dataset) -> Scene:
+def scene_of(dataset: xr.Dataset, who: str) -> Scene:
+    """Return the scene of a dataset of runs whose impacts were recorded."""
     missing = [name for name in ("impact_time", "impact_phase", "impact_velocity") if name not in dataset]
     if missing:
         raise DatasetError(
-            f"energies: expected recorded impacts, got no {', '.join(missing)}. "
+            f"{who}: expected recorded impacts, got no {', '.join(missing)}. "
             "Set impacts = true in [record] of a scene with a forcing and run it again."
         )
     if "scene" not in dataset.attrs:
-        raise DatasetError("energies: expected the scene text in the attribute scene, got none.")
+        raise DatasetError(f"{who}: expected the scene text in the attribute scene, got none.")
     return parse_scene(str(dataset.attrs["scene"]), "scene of the dataset")
 
 

@@ -285,7 +285,7 @@ def plotted(*arguments: str) -> str:
         (["--run", "4"], "Name a recording (--recording): board (a0.nc, fitted), board_2 (a1.nc, scored)."),
         (
             ["--kind", "run"],
-            "figure: kind: expected one that fits a replay (spectrum, replay), got 'run'.",
+            "figure: kind: expected one that fits a replay (spectrum, density, replay), got 'run'.",
         ),
         (
             ["--recording", "b"],
@@ -320,7 +320,10 @@ def test_a_replay_of_an_older_file_is_drawn_by_the_name_of_its_comparison(tmp_pa
         (["--kind", "replay"], "expected one that fits a dataset of runs (bifurcation, strobe, run,"),
         (["--kind", "energies"], "expected one that fits this dataset (bifurcation, strobe, run, portrait,"),
         (["--kind", "energies", "--run", "1"], "Kinds that fit: bifurcation, strobe, run, portrait,"),
-        (["--periods", "3"], "It goes with run, portrait, impact-map, return-map, spectrum, energies."),
+        (
+            ["--periods", "3"],
+            "It goes with run, portrait, impact-map, return-map, spectrum, density, energies.",
+        ),
         (["--kind", "strobe", "--run", "7"], "expected one run of those there are (0, 1, 2, 3, 4, 5)"),
     ],
 )
@@ -373,6 +376,7 @@ def test_kinds_that_fit_are_those_that_can_be_drawn(tmp_path: Path) -> None:
         "impact-map",
         "return-map",
         "spectrum",
+        "density",
     ]
 
 
