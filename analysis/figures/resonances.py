@@ -76,6 +76,6 @@ def _draw_natural(axis: Axes, dataset: xr.Dataset) -> None:
     shifted = dataset["shifted_frequency"].values[int(np.argmax(heights))]
     for number, (natural, moved) in enumerate(zip(dataset["natural_frequency"].values, shifted, strict=True)):
         axis.axvline(natural, color=STOP, linestyle=":", linewidth=0.6, zorder=0, label="natural")
-        if np.isfinite(moved):
+        if moved <= dataset["forcing"].values.max():
             axis.axvline(moved, color=COLOURS[number % len(COLOURS)], linestyle="--", linewidth=0.6, zorder=0,
                          label="shifted")  # fmt: skip

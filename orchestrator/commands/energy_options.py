@@ -8,14 +8,11 @@ from typing import Annotated
 import typer
 
 from vibroimpact.analysis.commands.shared_options import DatasetFile, FigureFile, Force
+from vibroimpact.orchestrator.commands.scene_options import Changes
 
 SceneOrDataset = Annotated[
     Path,
     typer.Argument(help="Scene file (TOML); or the dataset of its runs (.nc), the folder of a campaign."),
-]
-Changes = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scene; may be repeated."),
 ]
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import dataset_file
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
@@ -40,8 +41,8 @@ def show_resonances(
         ">height",
         "<motion",
         ">stop ratio",
-        ">nearest shifted mode",
-        ">off",
+        ">nearest natural",
+        ">nearest shifted",
     )
     wide_terminal().print(table(f"Peaks: {found.attrs.get('title', '')}", *headings, rows=_rows(found)))
     natural = ", ".join(f"{each:.6g}" for each in found["natural_frequency"].values)
@@ -54,21 +55,18 @@ def show_resonances(
 def _rows(found: xr.Dataset) -> Iterator[tuple[str, ...]]:
     for place in range(found.sizes["peak"]):
         own = found.isel(peak=place)
-        at, shifted = float(own.peak_frequency), own.shifted_frequency.values
-        nearest, off = "-", "-"
-        if np.isfinite(shifted).all():
-            mode = int(np.argmin(np.abs(np.log(shifted / at))))
-            nearest, off = f"{mode + 1}: {shifted[mode]:.5g}", f"{100.0 * (at / shifted[mode] - 1.0):+.1f} %"
+        at = float(own.peak_frequency)
         ratio = f"{float(own.stop_ratio):.4f}" if np.isfinite(own.stop_ratio) else "-"
         quantity = str(own.quantity.item()).replace("_", " ")
         branch = str(found["branch"].values[int(own.peak_branch)])
-        yield (
-            quantity,
-            branch,
-            f"{at:.5g}",
-            f"{float(own.peak_height):.5g}",
-            str(own.motion.item()),
-            ratio,
-            nearest,
-            off,
-        )
+        numbers = f"{at:.5g}", f"{float(own.peak_height):.5g}"
+        near = [_nearest(at, own[name].values) for name in ("natural_frequency", "shifted_frequency")]
+        yield quantity, branch, *numbers, str(own.motion.item()), ratio, *near
+
+
+def _nearest(at: float, frequencies: NDArray[np.float64]) -> str:
+    """Return the mode whose frequency is nearest to a peak, and how far off the peak is."""
+    if not np.isfinite(frequencies).all():
+        return "-"
+    mode = int(np.argmin(np.abs(np.log(frequencies / at))))
+    return f"{mode + 1}: {frequencies[mode]:.5g} ({100.0 * (at / frequencies[mode] - 1.0):+.1f} %)"
