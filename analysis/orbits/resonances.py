@@ -47,10 +47,9 @@ def frequency_shift(stop_ratio: Floats | float) -> Floats:
     [1.       1.722859 2.      ]
     """
     ratio = np.asarray(stop_ratio, dtype=np.float64)
-    if not ((ratio > -1.0) & (ratio <= 1.0 + _OVERSHOOT)).all():
-        raise UsageError(
-            f"frequency_shift: stop_ratio: expected -1 < ratio <= 1, got {_first(ratio, (ratio > -1) & (ratio <= 1))}."
-        )
+    fine = (ratio > -1.0) & (ratio <= 1.0 + _OVERSHOOT)
+    if not fine.all():
+        raise UsageError(f"frequency_shift: stop_ratio: expected -1 < ratio <= 1, got {_first(ratio, fine)}.")
     return np.asarray(np.pi / np.arccos(-np.minimum(ratio, 1.0)))
 
 
@@ -78,8 +77,9 @@ def stop_ratio(shift: Floats | float) -> Floats:
     [1.   0.   0.25]
     """
     given = np.asarray(shift, dtype=np.float64)
-    if not (given >= 1.0 - _OVERSHOOT).all() or not np.isfinite(given).all():
-        raise UsageError(f"stop_ratio: shift: expected 1 or more, got {_first(given, given >= 1.0)}.")
+    fine = (given >= 1.0 - _OVERSHOOT) & np.isfinite(given)
+    if not fine.all():
+        raise UsageError(f"stop_ratio: shift: expected 1 or more, got {_first(given, fine)}.")
     return np.asarray(-np.cos(np.pi / np.maximum(given, 1.0)))
 
 

@@ -430,3 +430,43 @@ def test_runs_that_replayed_nothing_have_no_scores() -> None:
         DatasetError, match="expected replays over a grid of values or of recordings, got none"
     ):
         figures.draw(runs, "scores")
+
+
+def test_a_density_has_the_mean_square_of_its_signal_and_says_how_it_was_computed() -> None:
+    values = 2.0 * np.cos(2.0 * np.pi * 10.0 * np.arange(1000) / 100.0)
+    figure = figures.draw(recording(values), "density", segment=256)
+    (axis,) = figure.axes
+    frequency, height = axis.get_lines()[0].get_data()
+    assert np.sum(height) * (frequency[1] - frequency[0]) == pytest.approx(2.0, rel=0.02)
+    assert (
+        axis.get_xlabel()
+        == "frequency (Hz)\nWelch, Bartlett window\n6 segments, half overlapping, of 256 samples"
+    )
+    assert axis.get_ylabel().startswith("density (")
+    assert axis.get_ylabel().endswith("²/Hz)")
+
+
+def test_the_density_of_a_nondimensional_scene_is_over_its_angular_frequency() -> None:
+    scene = "[forcing]\nangular_frequency = 2.0\n"
+    (axis,) = figures.draw(forced(scene, "nondimensional"), "density", segment=64).axes
+    assert axis.get_xlabel().startswith("angular frequency (-)")
+    frequency, height = axis.get_lines()[0].get_data()
+    (other,) = figures.draw(forced(scene, "SI"), "density", segment=64).axes
+    in_hertz, of_hertz = other.get_lines()[0].get_data()
+    np.testing.assert_allclose(frequency, 2.0 * np.pi * in_hertz)
+    np.testing.assert_allclose(height, of_hertz / (2.0 * np.pi))
+
+
+def test_a_segment_goes_with_a_density_alone() -> None:
+    with pytest.raises(
+        UsageError, match=r"segment: expected none for a recording drawn as spectrum.*density"
+    ):
+        figures.draw(recording(np.ones(100)), "spectrum", segment=64)
+    with pytest.raises(UsageError, match="segment: expected a power of two of 16 to 100 samples"):
+        figures.draw(recording(np.arange(100.0)), "density", segment=128)
+
+
+@pytest.mark.parametrize("kind", ["energies", "resonances"])
+def test_what_is_no_result_of_its_command_is_not_drawn_as_one(kind: str) -> None:
+    with pytest.raises(DatasetError, match=f"expected what `vibroimpact {kind}` writes, got none of"):
+        figures.draw(xr.Dataset(attrs={"results_kind": kind}))
