@@ -84,7 +84,7 @@ def _draw_curve(axis: Axes, dataset: xr.Dataset) -> None:
     # square root: closest where the curve is steep
     share = 1.0 - np.linspace(1.0, 0.0, 200) ** 2
     axis.plot(met * share, np.sqrt(1.0 - share), color=LINE)
-    axis.plot(residual, float(dataset["restitution"]), "o", color=MARK, markersize=4)
+    axis.plot(residual, float(dataset["residual_restitution"]), "o", color=MARK, markersize=4)
     unit = unit_symbol(dataset["residual_energy"])
     axis.set_xlabel(f"residual energy ({unit}); impacts meet {met:.4g}")
     axis.set(ylabel="restitution (-)", xlim=(0.0, 1.02 * met), ylim=(0.0, 1.05))

@@ -16,6 +16,8 @@ REPEATS = (1e-9, 1e-6, 1e-3)
 
 The closest that is met counts: next to a doubling the two halves of an orbit differ by less than a transient may.
 """
+NEAR = 1e-2
+"""Largest difference of the orbit from the recorded impacts, likewise."""
 
 
 class Impacts(NamedTuple):
@@ -77,11 +79,19 @@ def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
     gaps = found.velocities[order] - velocities
     away = np.abs(np.mod(found.phases[order] - phases[last] + begin + np.pi, TURN) - np.pi).max()
     distance = float(np.abs(gaps).max() / velocities.max())
-    if max(away, distance) > REPEATS[-1]:
+    if max(away, distance) > NEAR:
         raise OrbitError(
             f"no orbit {found.name} of this body next to the recorded impacts: nearest {max(away, distance):.2g} away"
         )
-    return RecordedOrbit(found, distance)
+    return RecordedOrbit(_once(found), distance)
+
+
+def _once(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """Return a shorter orbit that this one passes several times: what a transient that alternates goes to."""
+    if orbit.turns == 1:
+        return orbit
+    count, periods = orbit.phases.size // orbit.turns, orbit.periods // orbit.turns
+    return find_orbit(orbit.body, orbit.phases[:count], orbit.contacts[:count].tolist(), periods)
 
 
 def _unwrapped(impacts: Impacts, rate: float) -> Floats:

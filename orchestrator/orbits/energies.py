@@ -20,6 +20,7 @@ from vibroimpact.analysis.orbits.energies import (
 from vibroimpact.analysis.orbits.periodic import OrbitError
 from vibroimpact.analysis.orbits.recorded import Impacts, recorded_orbit
 from vibroimpact.fmus.errors import DatasetError, UsageError
+from vibroimpact.orchestrator.campaign.progress import Progress
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
 from vibroimpact.orchestrator.run.dataset import coordinate_names
 from vibroimpact.orchestrator.scene import Scene, parse_scene
@@ -38,7 +39,7 @@ _OF_RUNS: Mapping[str, tuple[str, str, Callable[[OrbitEnergies], float]]] = {
     "contact_energy": ("J", "energy that the impacts meet, half of contact mass times squared velocity",
                        lambda e: e.kinetic.sum()),
     "contact_loss": ("J", "energy lost at the impacts", lambda e: e.lost.sum()),
-    "restitution": ("1", "restitution that the residual energy says", lambda e: e.restitution.value),
+    "residual_restitution": ("1", "restitution that the residual energy says", lambda e: e.restitution.value),
     "identity_error": ("1", "residual energy less loss at the impacts, over the energy that they meet",
                        lambda e: e.identity_error),
 }  # fmt: skip
@@ -50,9 +51,11 @@ _OF_IMPACTS: Mapping[str, tuple[str, str, Callable[[OrbitEnergies], Floats]]] = 
     "flight_damping_loss": ("J", "loss of the mode to damping until the next impact", lambda e: e.damping),
 }
 Found = OrbitEnergies | str
+_MANY = 5000
+"""Runs from which on it takes seconds."""
 
 
-def energies(dataset: xr.Dataset, run: int | None = None) -> xr.Dataset:
+def energies(dataset: xr.Dataset, run: int | None = None, *, progress: Progress | None = None) -> xr.Dataset:
     """Return the energies of the modes over the orbit of each run: thesis 6.3, equations.md 5.3 to 5.6.
 
     Parameters
@@ -61,12 +64,14 @@ def energies(dataset: xr.Dataset, run: int | None = None) -> xr.Dataset:
         As `open_dataset` or `run` gives it: of an oscillator, a chain or a beam on restitution stops, with impacts.
     run : int, optional
         `run_index` of one run alone, of which each impact is told too.
+    progress : Progress, optional
+        Told how far it is, where there are many runs.
 
     Returns
     -------
     xarray.Dataset
         `residual_energy`, `forcing_work`, `damping_loss`, `impact_change`, `mean_kinetic_energy` (J) of each `mode`,
-        on the dimensions of the sweep; `contact_energy`, `contact_loss`, `restitution`, `impacts`, `periods`,
+        on the dimensions of the sweep; `contact_energy`, `contact_loss`, `residual_restitution`, `impacts`, `periods`,
         `identity_error`, `transient`; `reason`: why a run has none, else empty. Of one run also `energy_before`,
         `energy_after`, `energy_change` at each impact, and the matrices `velocity_transfer`, `energy_transfer` of
         each `contact`.
@@ -87,18 +92,21 @@ def energies(dataset: xr.Dataset, run: int | None = None) -> xr.Dataset:
     chosen = _chosen(runs, run)
     impacts = _ImpactsOf(dataset)
     bodies = _Bodies(scene, runs)
-    found: list[tuple[Found, float]] = []
+    seen = progress if progress is not None and len(chosen) >= _MANY else Progress()
+    seen.begin(len(chosen), 0)
+    found = []
     for place in chosen:
         found.append(_of_run(bodies, impacts, runs, place))
-    unit = 1.0 if dataset.attrs.get("units_system") == "nondimensional" else None
+        seen.advance(1)
+    plain = dataset.attrs.get("units_system") == "nondimensional"
     kept = {name: dataset.attrs[name] for name in ("title", "scene", "units_system") if name in dataset.attrs}
     if len(found) == 1:
         only = found[0][0]
         if isinstance(only, str):
             raise DatasetError(f"energies: expected a run with a periodic orbit, got none: {only}.")
-        made = _of_one(only, found[0][1], unit is not None)
+        made = _of_one(only, found[0][1], plain)
     else:
-        made = _on_sweep(dataset, found, chosen, unit is not None)
+        made = _on_sweep(dataset, found, chosen, plain)
     return made.assign_attrs(kept)
 
 
@@ -259,6 +267,10 @@ def _on_sweep(
     coords = {
         name: one.variable for name, one in dataset.coords.items() if set(one.dims) <= set(dims) and one.dims
     }
+    if taken := sorted({*rows, "mode"} & {*map(str, coords), *dims}):
+        raise DatasetError(
+            f"energies: {taken[0]}: expected a swept key or dimension of another name. Rename it."
+        )
     for one in coords.values():
         one.attrs.setdefault("units", "1")
         one.attrs.setdefault("long_name", "swept")

@@ -132,7 +132,7 @@ def test_an_orbit_between_two_stops_closes_the_identity() -> None:
     assert found.attrs["orbit"] == "P(10,2)"
     assert set(found.impact_contact.values.tolist()) == {1, 2}
     assert found.identity_error.item() < CLOSED
-    assert 0.6 < found.restitution.item() < 0.8
+    assert 0.6 < found.residual_restitution.item() < 0.8
 
 
 def test_an_unstable_orbit_of_twice_the_period_closes_the_identity_too() -> None:

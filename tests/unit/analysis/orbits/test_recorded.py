@@ -49,6 +49,15 @@ def test_a_transient_that_alternates_is_told_and_is_no_orbit_of_twice_the_period
     assert found.distance == pytest.approx(1e-4 * 0.9**7, rel=1e-3)
 
 
+def test_a_slow_transient_whose_halves_differ_more_than_rounds_do_goes_to_the_shorter_orbit() -> None:
+    (orbit,) = closed_form(oscillator(0.45, 1.1))
+    impacts = recorded(orbit, 16)
+    wobble = 2e-3 * (-0.99) ** np.arange(16)
+    found = recorded_orbit(orbit.body, impacts._replace(velocities=impacts.velocities * (1.0 + wobble)))
+    assert found.orbit.name == "P(1,1)"
+    assert found.distance == pytest.approx(2e-3, rel=0.2)
+
+
 def test_the_halves_of_an_orbit_next_to_its_doubling_are_not_taken_for_one() -> None:
     orbit = find_orbit(oscillator(0.44, 0.88), 0.88 * np.array([0.59544845, 6.86299676]), None, 2)
     found = recorded_orbit(orbit.body, recorded(orbit, 4))

@@ -84,7 +84,7 @@ def test_a_campaign_has_energies_along_its_sweep_and_a_reason_where_it_has_none(
     has = found.reason == ""
     assert float(found.identity_error.max()) < 1e-12
     assert (np.isfinite(found.residual_energy).all("mode") == has).all()
-    np.testing.assert_allclose(found.restitution.where(has).values[has.values], 0.7, atol=1e-12)
+    np.testing.assert_allclose(found.residual_restitution.where(has).values[has.values], 0.7, atol=1e-12)
     at = found.sel(direction="up")
     one = at.sel(angular_frequency=0.9, method="nearest")
     assert (one.impacts, one.periods) == (1, 1)
