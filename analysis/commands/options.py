@@ -22,9 +22,9 @@ EMBEDDING, THEILER = 6, 1
 #: Of the intervals of Sobol indices: `sensitivity.report` has the same, and takes long to load.
 LEVEL, RESAMPLES = 0.95, 1000
 _KINDS_HELP = (
-    "auto; of a sweep bifurcation, map, impacts-per-period, strobe, shapes, scores; of a run run, portrait, strobe, "
-    "impact-map, return-map, spectrum, density, energies; of a recording or replay spectrum and density too; of a "
-    "benchmark convergence, work-precision."
+    "auto; of a sweep bifurcation, map, impacts-per-period, impact-frequency, strobe, shapes, scores; of a run run, "
+    "portrait, strobe, impact-map, return-map, spectrum, density, energies; of a recording or replay spectrum and "
+    "density too; of a benchmark convergence, work-precision."
 )
 
 

@@ -16,6 +16,7 @@ from vibroimpact.analysis.figures.branches import BRANCH, draw_branches
 from vibroimpact.analysis.figures.effects import draw_effects
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.hard_cases import draw_hard_cases
+from vibroimpact.analysis.figures.impact_frequency import draw_impact_frequency
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
 from vibroimpact.analysis.figures.measured_sweep import draw_measured_sweep
@@ -136,6 +137,10 @@ KINDS: dict[str, FigureKind] = {
     "impacts-per-period": FigureKind(
         {"runs": lambda data, view: draw_impacts_per_period(data)},
         lambda data: _swept(data, 2, "impacts_per_period"),
+    ),
+    "impact-frequency": FigureKind(
+        {"runs": lambda data, view: draw_impact_frequency(data)},
+        lambda data: _swept(data, 1, "impact_time") and data.sizes.get("impact", 0) > 1,
     ),
     "strobe": FigureKind({"runs": draw_strobe}, lambda data: "strobe_displacement" in data, ("run",)),
     "run": FigureKind(

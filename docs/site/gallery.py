@@ -78,6 +78,7 @@ def kinds() -> dict[str, Picture]:
         "bifurcation": _of("bifurcation", "bifurcation"),
         "map": _of("map", "fine", f"vibroimpact run examples/gap_sweep.toml -o fine.nc --set '{fine}'"),
         "impacts-per-period": _of("impacts-per-period", "fine"),
+        "impact-frequency": _of("impact-frequency", "figure_2_7"),
         "strobe": _of("strobe", "bifurcation"),
         "run": _of("run", "chatter"),
         "portrait": _of("portrait", "two_stops"),

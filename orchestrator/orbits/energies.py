@@ -180,7 +180,7 @@ def _of_run(bodies: _Bodies, impacts: _ImpactsOf, runs: xr.Dataset, place: int) 
         near = recorded_orbit(body, impacts[int(runs["run_id"].values[place])])
         return orbit_energies(near.orbit), near.distance
     except (OrbitError, UsageError) as problem:
-        return str(problem), np.nan
+        return str(problem).removeprefix("orbit: "), np.nan
 
 
 def _units(rows: Mapping[str, Row], plain: bool) -> dict[str, Any]:

@@ -317,9 +317,18 @@ def test_a_replay_of_an_older_file_is_drawn_by_the_name_of_its_comparison(tmp_pa
             ["--recording", "a"],
             "recording: expected none for a dataset of runs drawn as bifurcation, got one.",
         ),
-        (["--kind", "replay"], "expected one that fits a dataset of runs (bifurcation, strobe, run,"),
-        (["--kind", "energies"], "expected one that fits this dataset (bifurcation, strobe, run, portrait,"),
-        (["--kind", "energies", "--run", "1"], "Kinds that fit: bifurcation, strobe, run, portrait,"),
+        (
+            ["--kind", "replay"],
+            "expected one that fits a dataset of runs (bifurcation, impact-frequency, strobe, run,",
+        ),
+        (
+            ["--kind", "energies"],
+            "expected one that fits this dataset (bifurcation, impact-frequency, strobe, run, portrait,",
+        ),
+        (
+            ["--kind", "energies", "--run", "1"],
+            "Kinds that fit: bifurcation, impact-frequency, strobe, run, portrait,",
+        ),
         (
             ["--periods", "3"],
             "It goes with run, portrait, impact-map, return-map, spectrum, density, energies.",
@@ -370,6 +379,7 @@ def test_kinds_that_fit_are_those_that_can_be_drawn(tmp_path: Path) -> None:
         assert figures.draw(sweep, kind, run=3 if takes_run else None).axes
     assert fitting(sweep) == [
         "bifurcation",
+        "impact-frequency",
         "strobe",
         "run",
         "portrait",
