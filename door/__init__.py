@@ -40,12 +40,16 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.analysis.estimation import estimate_modes as estimate_modes
     from vibroimpact.analysis.figures import draw as draw
     from vibroimpact.analysis.intervals import interval_report as interval_report
+    from vibroimpact.analysis.orbits.energies import residual_restitution as residual_restitution
+    from vibroimpact.analysis.orbits.resonances import frequency_shift as frequency_shift
+    from vibroimpact.analysis.orbits.resonances import stop_ratio as stop_ratio
     from vibroimpact.analysis.recording import Channel as Channel
     from vibroimpact.analysis.recording import Recording as Recording
     from vibroimpact.analysis.recording import array_of as array_of
     from vibroimpact.analysis.recording import open_recording as open_recording
     from vibroimpact.analysis.recording import open_signals as open_signals
     from vibroimpact.analysis.recording import write_recording as write_recording
+    from vibroimpact.analysis.spectral_density import spectral_density as spectral_density
     from vibroimpact.analysis.spikes import Mechanics as Mechanics
     from vibroimpact.analysis.spikes import SpikeSettings as SpikeSettings
     from vibroimpact.analysis.spikes import spike_report as spike_report
@@ -57,6 +61,8 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.hardware.programs.sweep import measure_sweep as measure_sweep
     from vibroimpact.hardware.recordings import ImportSettings as ImportSettings
     from vibroimpact.hardware.recordings import import_recording as import_recording
+    from vibroimpact.orchestrator.orbits.energies import energies as energies
+    from vibroimpact.orchestrator.orbits.resonances import resonances as resonances
     from vibroimpact.orchestrator.scene import Scene as Scene
     from vibroimpact.service.client import Service as Service
     from vibroimpact.simulation import accuracy as accuracy
@@ -83,6 +89,8 @@ _NAMES = {
     "analysis.estimation": ("Forcing", "Known", "estimate_bounces", "estimate_impacts", "estimate_modes"),
     "analysis.figures": ("draw",),
     "analysis.intervals": ("interval_report",),
+    "analysis.orbits.energies": ("residual_restitution",),
+    "analysis.orbits.resonances": ("frequency_shift", "stop_ratio"),
     "analysis.recording": (
         "Channel",
         "Recording",
@@ -91,6 +99,7 @@ _NAMES = {
         "open_signals",
         "write_recording",
     ),
+    "analysis.spectral_density": ("spectral_density",),
     "analysis.spikes": ("Mechanics", "SpikeSettings", "spike_report"),
     "fmus.errors": ("VibroimpactError",),
     "hardware.programs.record": ("record",),
@@ -99,6 +108,8 @@ _NAMES = {
     "hardware.programs.spikes": ("record_spikes",),
     "hardware.programs.sweep": ("measure_sweep",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
+    "orchestrator.orbits.energies": ("energies",),
+    "orchestrator.orbits.resonances": ("resonances",),
     "orchestrator.scene": ("Scene",),
     "service.client": ("Service",),
     "simulation": (

@@ -22,9 +22,9 @@ EMBEDDING, THEILER = 6, 1
 #: Of the intervals of Sobol indices: `sensitivity.report` has the same, and takes long to load.
 LEVEL, RESAMPLES = 0.95, 1000
 _KINDS_HELP = (
-    "auto; of a sweep bifurcation, map, impacts-per-period, strobe, shapes, scores; of a run run, portrait, strobe, "
-    "impact-map, return-map, spectrum, energies; of a recording or replay spectrum too; of a benchmark convergence, "
-    "work-precision."
+    "auto; of a sweep bifurcation, map, impacts-per-period, impact-frequency, strobe, shapes, scores; of a run run, "
+    "portrait, strobe, impact-map, return-map, spectrum, density, energies; of a recording or replay spectrum and "
+    "density too; of a benchmark convergence, work-precision."
 )
 
 
@@ -59,6 +59,9 @@ def plot(
         Path | None,
         typer.Option(help="Another sweep, drawn below: the simulated one of a measured one.", metavar="FILE"),
     ] = None,
+    segment: Annotated[
+        int | None, typer.Option(help="Of a density: samples of a segment, a power of two; else 1024.")
+    ] = None,
     title: Annotated[str | None, typer.Option(help='Title above the figure; "" for none.')] = None,
     width: Annotated[float | None, typer.Option(help="Width of the figure, mm; else one column, 85.")] = None,
     height: Annotated[float | None, typer.Option(help="Height of the figure, mm.")] = None,
@@ -72,7 +75,7 @@ def plot(
     from vibroimpact.analysis.commands.plot import draw_file
 
     options: dict[str, Any] = {"recording": recording, "start": start, "stop": stop, "periods": periods}
-    options |= {"title": title, "width": width, "height": height}
+    options |= {"segment": segment, "title": title, "width": width, "height": height}
     draw_file(file, output, kind, run, options, over)
 
 

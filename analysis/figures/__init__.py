@@ -51,6 +51,7 @@ def draw(
     stop: float | None = None,
     periods: float | None = None,
     over: xr.Dataset | None = None,
+    segment: int | None = None,
     title: str | None = None,
     width: float | None = None,
     height: float | None = None,
@@ -76,6 +77,8 @@ def draw(
         Length of the window in forcing periods, from `start` on or up to `stop`.
     over : xarray.Dataset, optional
         Another sweep of the same parameter, drawn below this one: a measured sweep over the simulated one.
+    segment : int, optional
+        Of a density: samples of a segment, a power of two.
     title : str, optional
         Above the figure. Default: none, as journals want it; of a ladder that of its dataset. "" is none.
     width, height : float, optional
@@ -97,7 +100,7 @@ def draw(
     >>> dataset = open_dataset("campaign")                                             # doctest: +SKIP
     >>> save(draw(dataset, "strobe", run=3, width=120.0), "section.pdf")               # doctest: +SKIP
     """
-    view = View(run, recording, Window(start, stop, periods), over)
+    view = View(run, recording, Window(start, stop, periods), over, segment)
     with page_style():
         return laid_out(draw_view(data, kind, view), title, width, height)
 
@@ -116,6 +119,7 @@ def draw_into(
     stop: float | None = None,
     periods: float | None = None,
     over: xr.Dataset | None = None,
+    segment: int | None = None,
 ) -> T:
     """Draw into axes that there are already, in the style that they have, and return them.
 
@@ -123,7 +127,7 @@ def draw_into(
     ----------
     axes : Axes, or sequence or array of Axes
         As many as the figure has panels, row by row.
-    data, kind, run, recording, start, stop, periods, over
+    data, kind, run, recording, start, stop, periods, over, segment
         See `draw`.
 
     Raises
@@ -144,5 +148,5 @@ def draw_into(
             f"figure: axes: expected axes of matplotlib, got {type(axes).__name__}. Make some: plt.subplots()."
         )
     with drawing_into(given):
-        draw_view(data, kind, View(run, recording, Window(start, stop, periods), over))
+        draw_view(data, kind, View(run, recording, Window(start, stop, periods), over, segment))
     return axes

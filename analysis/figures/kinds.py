@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -15,13 +16,16 @@ from vibroimpact.analysis.figures.branches import BRANCH, draw_branches
 from vibroimpact.analysis.figures.effects import draw_effects
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.hard_cases import draw_hard_cases
+from vibroimpact.analysis.figures.impact_frequency import draw_impact_frequency
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
 from vibroimpact.analysis.figures.measured_sweep import draw_measured_sweep
 from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
+from vibroimpact.analysis.figures.orbit_energies import draw_orbit_energies
 from vibroimpact.analysis.figures.portraits import draw_impact_map, draw_portrait, draw_return_map
 from vibroimpact.analysis.figures.recordings import draw_recording
 from vibroimpact.analysis.figures.replay import draw_replay, recordings_of
+from vibroimpact.analysis.figures.resonances import draw_resonances
 from vibroimpact.analysis.figures.runs import draw_run
 from vibroimpact.analysis.figures.scores import draw_scores
 from vibroimpact.analysis.figures.sensitivity import draw_sensitivity
@@ -55,6 +59,8 @@ Family = Literal[
     "effects",
     "sensitivity",
     "hard_cases",
+    "energies",
+    "resonances",
     "ladder",
 ]
 _WORDS: dict[Family, str] = {
@@ -67,6 +73,8 @@ _WORDS: dict[Family, str] = {
     "effects": "a study of effects",
     "sensitivity": "a study of sensitivity",
     "hard_cases": "hard cases",
+    "energies": "energies of orbits",
+    "resonances": "resonances",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -85,7 +93,7 @@ class FigureKind:
     fits : callable
         Whether a dataset of runs holds what the figure shows.
     takes : tuple of str
-        Options: `run`, `recording`, `window`, `over`.
+        Options: `run`, `recording`, `window`, `over`, `segment`.
     """
 
     families: dict[Family, Callable[[Any, View], Figure]]
@@ -130,6 +138,10 @@ KINDS: dict[str, FigureKind] = {
         {"runs": lambda data, view: draw_impacts_per_period(data)},
         lambda data: _swept(data, 2, "impacts_per_period"),
     ),
+    "impact-frequency": FigureKind(
+        {"runs": lambda data, view: draw_impact_frequency(data)},
+        lambda data: _swept(data, 1, "impact_time") and data.sizes.get("impact", 0) > 1,
+    ),
     "strobe": FigureKind({"runs": draw_strobe}, lambda data: "strobe_displacement" in data, ("run",)),
     "run": FigureKind(
         {"runs": draw_run},
@@ -150,8 +162,17 @@ KINDS: dict[str, FigureKind] = {
         lambda data: bool(sampled_variables(data)),
         (*_SINGLE, "recording"),
     ),
+    "density": FigureKind(
+        {
+            "runs": partial(draw_run_spectrum, density=True),
+            "recording": partial(draw_recording_spectrum, density=True),
+            "replay": partial(draw_replay_spectrum, density=True),
+        },
+        lambda data: bool(sampled_variables(data)),
+        (*_SINGLE, "recording", "segment"),
+    ),
     "energies": FigureKind(
-        {"runs": draw_energies},
+        {"runs": draw_energies, "energies": lambda data, view: draw_orbit_energies(data)},
         lambda data: "modal_energy_1" in data and {"energy_kinetic", "energy_potential"} <= set(data),
         _SINGLE,
     ),
@@ -176,6 +197,7 @@ KINDS: dict[str, FigureKind] = {
     "effects": FigureKind({"effects": lambda data, view: draw_effects(data)}),
     "sensitivity": FigureKind({"sensitivity": lambda data, view: draw_sensitivity(data)}),
     "hard-cases": FigureKind({"hard_cases": lambda data, view: draw_hard_cases(data)}),
+    "resonances": FigureKind({"resonances": lambda data, view: draw_resonances(data)}),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
@@ -238,6 +260,8 @@ def _family(data: Data) -> Family:
         "effects": "effects",
         "sensitivity": "sensitivity",
         "hard_cases": "hard_cases",
+        "energies": "energies",
+        "resonances": "resonances",
     }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:
@@ -274,6 +298,7 @@ def _refuse_options(data: Any, kind: str, family: Family, view: View) -> None:
         ("recording", view.recording is not None, family != "replay"),
         ("window", view.window.given, False),
         ("over", view.over is not None, family != "runs"),
+        ("segment", view.segment is not None, False),
     ):
         if not is_given or (name in KINDS[kind].takes and not is_foreign):
             continue

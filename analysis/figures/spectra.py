@@ -1,9 +1,9 @@
-"""Figures of amplitude spectra: of the time series of a run, of a recording, of both signals of a replay."""
+"""Figures of spectra, amplitude or power density: of a run, of a recording, of both signals of a replay."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from vibroimpact.analysis.figures.scene_text import forcing_rate, in_scene_order
 from vibroimpact.analysis.figures.series import sampled_variables, samples_within
 from vibroimpact.analysis.figures.window import View
 from vibroimpact.analysis.recording import Recording
+from vibroimpact.analysis.spectral_density import spectral_density
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.fmus.units import written_unit
 
@@ -53,11 +54,49 @@ class _Signal(NamedTuple):
     colour: str = LINE
 
 
-def draw_run_spectrum(dataset: xr.Dataset, view: View) -> Figure:
+class _Spectrum(NamedTuple):
+    """What is drawn over the frequency.
+
+    `of` returns angular frequencies (rad/s) and heights of a signal, `power` is 2 where heights are squares of
+    amplitudes, `quantity` names them for a unit, `words` say how they were computed.
+    """
+
+    of: Callable[[_Signal], tuple[Floats, Floats]]
+    power: int
+    quantity: Callable[[str], str]
+    words: list[str]
+
+
+def _amplitudes(rate: float | None) -> _Spectrum:
+    def of(signal: _Signal) -> tuple[Floats, Floats]:
+        return amplitude_spectrum(signal.name, signal.time, signal.values, rate)
+
+    return _Spectrum(of, 1, lambda unit: f"amplitude ({unit})", [])
+
+
+def _densities(segment: int | None, is_angular: bool) -> _Spectrum:
+    """Return densities, over the angular frequency where that is on the axis."""
+    words: list[str] = []
+
+    def of(signal: _Signal) -> tuple[Floats, Floats]:
+        interval, values = _even_part(signal.name, signal.time, signal.values)
+        found = spectral_density(values - values.mean(), 1.0 / interval, segment)
+        words[:] = found.words.split(": ")
+        return 2.0 * np.pi * found.frequency, found.density / (2.0 * np.pi if is_angular else 1.0)
+
+    def quantity(unit: str) -> str:
+        squared = f"({unit})" if "/" in unit or " " in unit else unit
+        return "density (-)" if is_angular else f"density ({squared}²/Hz)"
+
+    return _Spectrum(of, 2, quantity, words)
+
+
+def draw_run_spectrum(dataset: xr.Dataset, view: View, *, density: bool = False) -> Figure:
     """Draw the amplitude spectra of the sampled variables of one run, with the multiples of its forcing frequency.
 
     A harmonic motion of amplitude A is a peak of height A. Of a forced motion whole periods are taken, so that the
-    multiples lie on the grid of the frequencies. Of a nondimensional scene the axis is the angular frequency.
+    multiples lie on the grid of the frequencies. Of a nondimensional scene the axis is the angular frequency. A density
+    is that of all samples.
     """
     if not sampled_variables(dataset):
         raise DatasetError(
@@ -72,11 +111,13 @@ def draw_run_spectrum(dataset: xr.Dataset, view: View) -> Figure:
         for name in names
     ]
     is_angular = dataset.attrs.get("units_system") == "nondimensional"
-    return _draw_panels(signals, forcing_rate(dataset, samples), is_run=True, is_angular=is_angular)
+    rate = forcing_rate(dataset, samples)
+    spectrum = _densities(view.segment, is_angular) if density else _amplitudes(rate)
+    return _draw_panels(signals, rate, spectrum, is_run=True, is_angular=is_angular)
 
 
-def draw_recording_spectrum(recording: Recording, view: View) -> Figure:
-    """Draw the amplitude spectrum of each channel of a recording: of its longest stretch without a gap."""
+def draw_recording_spectrum(recording: Recording, view: View, *, density: bool = False) -> Figure:
+    """Draw the spectrum of each channel of a recording: of its longest stretch without a gap."""
     channels = [channel for channel in recording.channels.values() if channel.axis.interval is not None]
     if not channels:
         raise DatasetError(
@@ -84,11 +125,13 @@ def draw_recording_spectrum(recording: Recording, view: View) -> Figure:
             "Only such samples have a spectrum."
         )
     parts = [channel.between(*view.window.part(channel.time)) for channel in channels[:MOST_PANELS]]
-    return _draw_panels([[_Signal(part.name, part.unit, part.time, part.values)] for part in parts], None)
+    spectrum = _densities(view.segment, False) if density else _amplitudes(None)
+    signals = [[_Signal(part.name, part.unit, part.time, part.values)] for part in parts]
+    return _draw_panels(signals, None, spectrum)
 
 
-def draw_replay_spectrum(dataset: xr.Dataset, view: View) -> Figure:
-    """Draw the amplitude spectra of a measured signal and of its replay over each other."""
+def draw_replay_spectrum(dataset: xr.Dataset, view: View, *, density: bool = False) -> Figure:
+    """Draw the spectra of a measured signal and of its replay over each other."""
     name, words = comparison_of(dataset, view.recording)
     measured = dataset[f"{name}_measured"]
     time = measured[str(measured.dims[0])].values
@@ -100,13 +143,19 @@ def draw_replay_spectrum(dataset: xr.Dataset, view: View) -> Figure:
         )
         for kind, colour in (("measured", LINE), ("simulated", MARK))
     ]
-    figure = _draw_panels([signals], None)
+    spectrum = _densities(view.segment, False) if density else _amplitudes(None)
+    figure = _draw_panels([signals], None, spectrum)
     figure.axes[0].set_title(f"{name}, {words}" if words else name, fontsize=7.5, loc="left")
     return figure
 
 
 def _draw_panels(
-    panels: Sequence[Sequence[_Signal]], rate: float | None, *, is_run: bool = False, is_angular: bool = False
+    panels: Sequence[Sequence[_Signal]],
+    rate: float | None,
+    spectrum: _Spectrum,
+    *,
+    is_run: bool = False,
+    is_angular: bool = False,
 ) -> Figure:
     """Draw a panel for each group of signals; those of a run share the frequencies that its first one has.
 
@@ -114,29 +163,28 @@ def _draw_panels(
     """
     factor = 1.0 if is_angular else 0.5 / math.pi
     with page_style():
-        figure = canvas(10 + _PANEL_MM * len(panels))
+        figure = canvas(10 + _PANEL_MM * len(panels) + (8 if spectrum.power > 1 else 0))
         axes = figure.subplots(len(panels), 1, squeeze=False, sharex=is_run)[:, 0]
         end = None
         for axis, signals in zip(axes, panels, strict=True):
-            spectra = [
-                amplitude_spectrum(signal.name, signal.time, signal.values, rate) for signal in signals
-            ]
-            end = _end(spectra, rate) if end is None or not is_run else end
-            _draw_panel(axis, signals, spectra, factor, end)
+            spectra = [spectrum.of(signal) for signal in signals]
+            end = _end(spectra, rate, spectrum.power) if end is None or not is_run else end
+            _draw_panel(axis, signals, spectra, factor, end, spectrum)
             if rate is not None:
                 for multiple in range(1, min(int(end / rate), _MOST_MULTIPLES) + 1):
                     axis.axvline(factor * rate * multiple, label=_MULTIPLES, **_MULTIPLE_LINE)
-        axes[-1].set_xlabel("angular frequency (-)" if is_angular else "frequency (Hz)")
+        words = ["angular frequency (-)" if is_angular else "frequency (Hz)", *spectrum.words]
+        axes[-1].set_xlabel("\n".join(words))
         legend_outside(figure, axes[0], ncols=3)
         figure.align_ylabels(axes)
     return figure
 
 
-def _end(spectra: Sequence[tuple[Floats, Floats]], rate: float | None) -> float:
+def _end(spectra: Sequence[tuple[Floats, Floats]], rate: float | None, power: int) -> float:
     """Return the angular frequency up to which spectra are shown, rad/s."""
     end = 0.0 if rate is None else _LEAST_MULTIPLES * rate
-    for frequency, amplitude in spectra:
-        high = np.flatnonzero(amplitude > _LAST * amplitude.max())
+    for frequency, height in spectra:
+        high = np.flatnonzero(height > _LAST**power * height.max())
         end = max(end, 1.1 * float(frequency[high[-1]]) if high.size else 0.0)
     highest = min(float(frequency[-1]) for frequency, _ in spectra)
     return min(end, highest) or highest
@@ -148,21 +196,25 @@ def _draw_panel(
     spectra: Sequence[tuple[Floats, Floats]],
     factor: float,
     end: float,
+    spectrum: _Spectrum,
 ) -> None:
     """Draw spectra of one unit; `factor` makes of an angular frequency what the axis shows."""
+    lowest = math.inf
     for signal, (frequency, amplitude) in zip(signals, spectra, strict=True):
         inside = frequency <= end
         # the mean was taken off
         inside[0] = False
         places, heights = _upper_edge(frequency[inside], amplitude[inside])
+        # amplitudes have the same room in every figure
+        lowest = min(lowest, 0.3 * float(heights.min(initial=math.inf)) if spectrum.power > 1 else 0.0)
         words = signal.name if len(signals) > 1 else None
         axis.plot(factor * places, heights, color=signal.colour, linewidth=0.6, label=words, rasterized=True)
     largest = max(float(amplitude.max()) for _, amplitude in spectra)
     axis.set_xlim(0.0, factor * end)
     if largest > 0.0:
         axis.set_yscale("log")
-        axis.set_ylim(_FLOOR * largest, 3.0 * largest)
-    axis.set_ylabel(f"amplitude ({written_unit(signals[0].unit)})")
+        axis.set_ylim(max(_FLOOR**spectrum.power * largest, lowest), 3.0**spectrum.power * largest)
+    axis.set_ylabel(spectrum.quantity(written_unit(signals[0].unit)))
     axis.set_title(short_name(signals[0].name), fontsize=7.5, loc="left", pad=2)
 
 
@@ -207,15 +259,7 @@ def amplitude_spectrum(
     >>> round(float(frequency[place]) / (2.0 * np.pi), 6), round(float(amplitude[place]), 6)
     (4.0, 2.0)
     """
-    first, stop = max(spans_of(np.isfinite(values)), key=np.ptp, default=(0, 0))
-    time, values = time[first:stop], values[first:stop]
-    if len(time) < _FEWEST:
-        raise DatasetError(
-            f"figure: {name}: expected {_FEWEST} samples without a gap for a spectrum, got {len(time)}."
-        )
-    interval = float(time[-1] - time[0]) / (len(time) - 1)
-    if np.abs(np.diff(time) - interval).max() > _UNEVEN * interval:
-        raise DatasetError(f"figure: {name}: expected evenly spaced samples for a spectrum, got uneven ones.")
+    interval, values = _even_part(name, time, values)
     count = len(values)
     if rate is not None:
         period = 2.0 * math.pi / (rate * interval)
@@ -227,3 +271,17 @@ def amplitude_spectrum(
     amplitude = np.asarray(2.0 * np.abs(np.fft.rfft(weights * swing)) / weights.sum(), dtype=np.float64)
     frequency: Floats = np.arange(len(amplitude), dtype=np.float64) * (2.0 * np.pi / (count * interval))
     return frequency, amplitude
+
+
+def _even_part(name: str, time: Floats, values: Floats) -> tuple[float, Floats]:
+    """Return the sampling interval (s) and the values of the longest stretch without a gap."""
+    first, stop = max(spans_of(np.isfinite(values)), key=np.ptp, default=(0, 0))
+    time, values = time[first:stop], values[first:stop]
+    if len(time) < _FEWEST:
+        raise DatasetError(
+            f"figure: {name}: expected {_FEWEST} samples without a gap for a spectrum, got {len(time)}."
+        )
+    interval = float(time[-1] - time[0]) / (len(time) - 1)
+    if np.abs(np.diff(time) - interval).max() > _UNEVEN * interval:
+        raise DatasetError(f"figure: {name}: expected evenly spaced samples for a spectrum, got uneven ones.")
+    return interval, values

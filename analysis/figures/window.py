@@ -98,9 +98,10 @@ ANY = Window()
 
 
 class View(NamedTuple):
-    """What of the data is drawn: a run by its `run_index`, a recording of a replay, a window of time; over what."""
+    """What is drawn: a run by its `run_index`, a recording of a replay, a window of time; over what, and how."""
 
     run: int | None
     recording: str | None
     window: Window
     over: xr.Dataset | None = None
+    segment: int | None = None

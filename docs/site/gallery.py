@@ -78,12 +78,14 @@ def kinds() -> dict[str, Picture]:
         "bifurcation": _of("bifurcation", "bifurcation"),
         "map": _of("map", "fine", f"vibroimpact run examples/gap_sweep.toml -o fine.nc --set '{fine}'"),
         "impacts-per-period": _of("impacts-per-period", "fine"),
+        "impact-frequency": _of("impact-frequency", "figure_2_7"),
         "strobe": _of("strobe", "bifurcation"),
         "run": _of("run", "chatter"),
         "portrait": _of("portrait", "two_stops"),
         "impact-map": _of("impact-map", "figure_2_11"),
         "return-map": _of("return-map", "figure_2_11"),
         "spectrum": _of("spectrum", "single_run"),
+        "density": _of("density", "single_run"),
         "energies": _of("energies", "figure_6_15"),
         "shapes": _of("shapes", "figure_7_2"),
         "recording": _of("recording", "hit", hit),
@@ -98,6 +100,9 @@ def kinds() -> dict[str, Picture]:
             "effects", "parts", "vibroimpact effects examples/thesis/figure_7_11.toml -o parts.nc"
         ),
         "sensitivity": _of("sensitivity", "shares", "vibroimpact sensitivity tolerances.nc -o shares.nc"),
+        "resonances": _of(
+            "resonances", "peaks", "vibroimpact resonances examples/thesis/figure_6_4.toml -o peaks.nc"
+        ),
         "hard-cases": _of("hard-cases", "cases", "vibroimpact hard-cases -o cases.nc"),
         "convergence": _of("convergence", "ladder"),
         "work-precision": _of("work-precision", "ladder"),

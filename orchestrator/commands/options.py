@@ -12,6 +12,7 @@ import typer
 
 from vibroimpact.analysis.commands.shared_options import FigureFile, Force
 from vibroimpact.fmus.commands.options import commands as fmu_commands
+from vibroimpact.orchestrator.commands.energy_options import register as register_energies
 from vibroimpact.orchestrator.commands.orbit_options import register as register_orbits
 from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
 
@@ -28,6 +29,7 @@ def register(app: typer.Typer) -> None:
     ssp_commands.command("export")(export_ssp)
     ssp_commands.command("import")(import_ssp)
     app.add_typer(ssp_commands, name="ssp")
+    register_energies(app)
 
 
 def check(scene: SceneFile, changes: Changes = None) -> None:

@@ -95,6 +95,15 @@ def test_a_periodic_motion_has_the_impacts_and_periods_of_its_figure(
     assert dataset.stick_count == 0
 
 
+def test_figure_2_7_has_the_frequencies_of_the_cut_ellipse(run) -> None:
+    dataset = run("figure_2_7")
+    figure = figures.draw(dataset, "impact-frequency")
+    simulated, curve = figure.axes[0].get_lines()[:2]
+    np.testing.assert_array_equal(simulated.get_xdata(), curve.get_xdata())
+    np.testing.assert_allclose(simulated.get_ydata(), curve.get_ydata(), rtol=1e-12)
+    np.testing.assert_allclose(curve.get_ydata(), np.pi / np.arccos(-dataset.position.values), rtol=1e-12)
+
+
 def test_the_motion_of_figure_2_8_is_not_periodic_and_its_impacts_in_figure_2_11_fill_a_thin_set(run) -> None:
     short, long = run("figure_2_8"), run("figure_2_11")
     assert motion(short, 1e-3) is None

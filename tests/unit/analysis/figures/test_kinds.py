@@ -285,7 +285,7 @@ def plotted(*arguments: str) -> str:
         (["--run", "4"], "Name a recording (--recording): board (a0.nc, fitted), board_2 (a1.nc, scored)."),
         (
             ["--kind", "run"],
-            "figure: kind: expected one that fits a replay (spectrum, replay), got 'run'.",
+            "figure: kind: expected one that fits a replay (spectrum, density, replay), got 'run'.",
         ),
         (
             ["--recording", "b"],
@@ -317,10 +317,22 @@ def test_a_replay_of_an_older_file_is_drawn_by_the_name_of_its_comparison(tmp_pa
             ["--recording", "a"],
             "recording: expected none for a dataset of runs drawn as bifurcation, got one.",
         ),
-        (["--kind", "replay"], "expected one that fits a dataset of runs (bifurcation, strobe, run,"),
-        (["--kind", "energies"], "expected one that fits this dataset (bifurcation, strobe, run, portrait,"),
-        (["--kind", "energies", "--run", "1"], "Kinds that fit: bifurcation, strobe, run, portrait,"),
-        (["--periods", "3"], "It goes with run, portrait, impact-map, return-map, spectrum, energies."),
+        (
+            ["--kind", "replay"],
+            "expected one that fits a dataset of runs (bifurcation, impact-frequency, strobe, run,",
+        ),
+        (
+            ["--kind", "energies"],
+            "expected one that fits this dataset (bifurcation, impact-frequency, strobe, run, portrait,",
+        ),
+        (
+            ["--kind", "energies", "--run", "1"],
+            "Kinds that fit: bifurcation, impact-frequency, strobe, run, portrait,",
+        ),
+        (
+            ["--periods", "3"],
+            "It goes with run, portrait, impact-map, return-map, spectrum, density, energies.",
+        ),
         (["--kind", "strobe", "--run", "7"], "expected one run of those there are (0, 1, 2, 3, 4, 5)"),
     ],
 )
@@ -367,12 +379,14 @@ def test_kinds_that_fit_are_those_that_can_be_drawn(tmp_path: Path) -> None:
         assert figures.draw(sweep, kind, run=3 if takes_run else None).axes
     assert fitting(sweep) == [
         "bifurcation",
+        "impact-frequency",
         "strobe",
         "run",
         "portrait",
         "impact-map",
         "return-map",
         "spectrum",
+        "density",
     ]
 
 
@@ -426,3 +440,43 @@ def test_runs_that_replayed_nothing_have_no_scores() -> None:
         DatasetError, match="expected replays over a grid of values or of recordings, got none"
     ):
         figures.draw(runs, "scores")
+
+
+def test_a_density_has_the_mean_square_of_its_signal_and_says_how_it_was_computed() -> None:
+    values = 2.0 * np.cos(2.0 * np.pi * 10.0 * np.arange(1000) / 100.0)
+    figure = figures.draw(recording(values), "density", segment=256)
+    (axis,) = figure.axes
+    frequency, height = axis.get_lines()[0].get_data()
+    assert np.sum(height) * (frequency[1] - frequency[0]) == pytest.approx(2.0, rel=0.02)
+    assert (
+        axis.get_xlabel()
+        == "frequency (Hz)\nWelch, Bartlett window\n6 segments, half overlapping, of 256 samples"
+    )
+    assert axis.get_ylabel().startswith("density (")
+    assert axis.get_ylabel().endswith("²/Hz)")
+
+
+def test_the_density_of_a_nondimensional_scene_is_over_its_angular_frequency() -> None:
+    scene = "[forcing]\nangular_frequency = 2.0\n"
+    (axis,) = figures.draw(forced(scene, "nondimensional"), "density", segment=64).axes
+    assert axis.get_xlabel().startswith("angular frequency (-)")
+    frequency, height = axis.get_lines()[0].get_data()
+    (other,) = figures.draw(forced(scene, "SI"), "density", segment=64).axes
+    in_hertz, of_hertz = other.get_lines()[0].get_data()
+    np.testing.assert_allclose(frequency, 2.0 * np.pi * in_hertz)
+    np.testing.assert_allclose(height, of_hertz / (2.0 * np.pi))
+
+
+def test_a_segment_goes_with_a_density_alone() -> None:
+    with pytest.raises(
+        UsageError, match=r"segment: expected none for a recording drawn as spectrum.*density"
+    ):
+        figures.draw(recording(np.ones(100)), "spectrum", segment=64)
+    with pytest.raises(UsageError, match="segment: expected a power of two of 16 to 100 samples"):
+        figures.draw(recording(np.arange(100.0)), "density", segment=128)
+
+
+@pytest.mark.parametrize("kind", ["energies", "resonances"])
+def test_what_is_no_result_of_its_command_is_not_drawn_as_one(kind: str) -> None:
+    with pytest.raises(DatasetError, match=f"expected what `vibroimpact {kind}` writes, got none of"):
+        figures.draw(xr.Dataset(attrs={"results_kind": kind}))

@@ -1,0 +1,278 @@
+"""Energy of the modes of an orbit: what force, damping and impacts give and take: thesis 6.3, equations.md 5.3 to 5.6.
+
+An impact changes the velocity of every mode, so energy goes over from one mode to others, and some is lost. The
+residual energy of a mode is the work of the force on it less what its damping takes, over the orbit; summed over the
+modes it is what the impacts lose (thesis 6.32).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from vibroimpact.analysis.orbits.body import Contact, Floats
+from vibroimpact.analysis.orbits.flight_work import FlightWork, flight_work
+from vibroimpact.analysis.orbits.periodic import TURN, PeriodicOrbit
+from vibroimpact.fmus.errors import UsageError
+
+
+def velocity_transfer(contact: Contact) -> Floats:
+    """Return the matrix that an impact multiplies the modal velocities with: [R^] of thesis (6.25), (6.40).
+
+    Parameters
+    ----------
+    contact : Contact
+
+    Returns
+    -------
+    array, shape (modes, modes)
+        I - (1 + r) phi phi' / (phi . phi), of determinant -r, for mass-normalised modes.
+
+    Examples
+    --------
+    The thesis's chain of two masses:
+
+    >>> angle = np.arctan((1.0 + np.sqrt(5.0)) / 2.0)
+    >>> tip = Contact(np.array([np.sin(angle), -np.cos(angle)]), 1.0, 0.1, 0.7)
+    >>> print(velocity_transfer(tip).round(6))
+    [[-0.230132  0.760263]
+     [ 0.760263  0.530132]]
+    """
+    return _removed(contact, 1.0 + contact.restitution)
+
+
+def energy_transfer(contact: Contact) -> Floats:
+    """Return the matrix of the kinetic energy after an impact, half of q'. R* q' before it: thesis (6.27), (6.39).
+
+    Parameters
+    ----------
+    contact : Contact
+
+    Returns
+    -------
+    array, shape (modes, modes)
+        I - (1 - r^2) phi phi' / (phi . phi): symmetric, of eigenvalues 1 and, once, r^2. It is a form of the energy of
+        all modes together: an entry on its diagonal is not the share that a mode keeps.
+
+    Examples
+    --------
+    Of the printed matrix (6.39) the first entry has the wrong sign, and the last is psi_22^2 (1 + r^2):
+
+    >>> angle = np.arctan((1.0 + np.sqrt(5.0)) / 2.0)
+    >>> tip = Contact(np.array([np.sin(angle), np.cos(angle)]), 1.0, 0.1, 0.7)
+    >>> print(energy_transfer(tip).round(6))
+    [[ 0.630961 -0.228079]
+     [-0.228079  0.859039]]
+    """
+    return _removed(contact, 1.0 - contact.restitution**2)
+
+
+def _removed(contact: Contact, factor: float) -> Floats:
+    shape = contact.shape
+    return np.eye(shape.size) - factor * contact.mass * np.outer(shape, shape)
+
+
+@dataclass(frozen=True, slots=True)
+class ResidualRestitution:
+    """Coefficient of restitution that energies say: thesis (6.38), (6.41).
+
+    Attributes
+    ----------
+    value : float
+        sqrt(1 - residual / kinetic); NaN where the energies contradict each other.
+    slope : float
+        Its derivative over the residual energy, 1/J: -1 / (2 r kinetic), without bound as r goes to 0.
+    problem : str
+        Why there is none: 0 <= residual <= kinetic does not hold. Empty where it does.
+    """
+
+    value: float
+    slope: float
+    problem: str = ""
+
+
+def residual_restitution(residual: float, kinetic: float) -> ResidualRestitution:
+    """Return the restitution at which impacts lose the residual energy of all modes: equations.md 5.6.
+
+    Parameters
+    ----------
+    residual : float
+        Work of the force less loss to damping, over the orbit, all modes together, J.
+    kinetic : float
+        Half of contact mass times squared velocity before the impact, summed over the impacts of the orbit, J. With
+        several impacts the restitution is the mean that is weighted with this energy.
+
+    Raises
+    ------
+    UsageError
+        An energy is no number, or there is no kinetic energy.
+
+    Examples
+    --------
+    >>> residual_restitution(5.1, 10.0).value.__round__(12)
+    0.7
+    >>> print(residual_restitution(11.0, 10.0).problem)
+    residual energy 11 J is more than the impacts have, 10 J: data or contact mass are wrong
+    """
+    if not (np.isfinite(residual) and np.isfinite(kinetic) and kinetic > 0.0):
+        raise UsageError(
+            f"restitution: expected a residual energy and a kinetic energy > 0, J, got {residual:g} and {kinetic:g}."
+        )
+    # rounding of the sums of an elastic impact, or of one that keeps nothing
+    slack = 1e-12 * kinetic
+    if residual > kinetic + slack:
+        return ResidualRestitution(
+            np.nan,
+            np.nan,
+            f"residual energy {residual:.6g} J is more than the impacts have, {kinetic:.6g} J: "
+            "data or contact mass are wrong",
+        )
+    if residual < -slack:
+        return ResidualRestitution(
+            np.nan,
+            np.nan,
+            f"residual energy {residual:.6g} J is negative: impacts would give energy; data are wrong",
+        )
+    value = float(np.sqrt(max(1.0 - max(residual, 0.0) / kinetic, 0.0)))
+    return ResidualRestitution(value, -0.5 / (value * kinetic) if value > 0.0 else -np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitEnergies:
+    """Energies of the modes over one orbit, all in J; an impact is followed by the flight of the same number.
+
+    Attributes
+    ----------
+    orbit : PeriodicOrbit
+    """
+
+    orbit: PeriodicOrbit
+
+    @cached_property
+    def _after(self) -> tuple[Floats, Floats]:
+        """Displacements and velocities of the modes just after each impact."""
+        modes = self.orbit.body.frequencies.size
+        return self.orbit.states[:, :modes], self.orbit.states[:, modes:]
+
+    @cached_property
+    def _speed_before(self) -> Floats:
+        """Velocities of the modes just before each impact: equations.md 5.3."""
+        orbit = self.orbit
+        jump = np.empty_like(self._after[1])
+        for place, (number, speed) in enumerate(zip(orbit.contacts, orbit.velocities, strict=True)):
+            contact = orbit.body.contacts[number]
+            jump[place] = (
+                -(1.0 + contact.restitution) * speed * contact.direction * contact.mass * contact.shape
+            )
+        return np.asarray(self._after[1] - jump)
+
+    @cached_property
+    def _potential(self) -> Floats:
+        return np.asarray(0.5 * (self.orbit.body.frequencies * self._after[0]) ** 2)
+
+    @cached_property
+    def before(self) -> Floats:
+        """Energy of each mode just before each impact, shape (p, modes)."""
+        return np.asarray(self._potential + 0.5 * self._speed_before**2)
+
+    @cached_property
+    def after(self) -> Floats:
+        """Energy of each mode just after each impact, shape (p, modes)."""
+        return np.asarray(self._potential + 0.5 * self._after[1] ** 2)
+
+    @cached_property
+    def change(self) -> Floats:
+        """Change of the energy of each mode at each impact, dE_j, shape (p, modes): equations.md 5.4."""
+        return np.asarray(0.5 * (self._after[1] - self._speed_before) * (self._after[1] + self._speed_before))
+
+    @cached_property
+    def _work(self) -> FlightWork:
+        orbit, body = self.orbit, self.orbit.body
+        ends = np.append(orbit.phases[1:], orbit.phases[0] + TURN * orbit.periods)
+        start = np.empty((*self._after[0].shape, 4))
+        # a constant force moves the rest position; its own work over the orbit is none
+        start[..., 0] = body.frequencies * self._after[0] - body.held / body.frequencies
+        start[..., 1] = self._after[1]
+        start[..., 2] = np.cos(orbit.phases)[:, None] * body.force
+        start[..., 3] = np.sin(orbit.phases)[:, None] * body.force
+        lengths = (ends - orbit.phases) / body.angular_frequency
+        return flight_work(body.frequencies, body.damping_ratios, body.angular_frequency, lengths, start)
+
+    @property
+    def forcing(self) -> Floats:
+        """Work of the harmonic force on each mode in each flight, FE_j, shape (p, modes)."""
+        return self._work.forcing
+
+    @property
+    def damping(self) -> Floats:
+        """What damping takes from each mode in each flight, DE_j, shape (p, modes)."""
+        body = self.orbit.body
+        return np.asarray(2.0 * body.damping_ratios * body.frequencies * self._work.squared)
+
+    @property
+    def mean_kinetic(self) -> Floats:
+        """Mean kinetic energy of each mode over the orbit, shape (modes,)."""
+        orbit = self.orbit
+        return np.asarray(0.5 * self._work.squared.sum(axis=0) / (orbit.periods * orbit.body.period))
+
+    @cached_property
+    def residual(self) -> Floats:
+        """Residual energy of each mode over the orbit, FE_j - DE_j, shape (modes,)."""
+        return np.asarray((self.forcing - self.damping).sum(axis=0))
+
+    @cached_property
+    def kinetic(self) -> Floats:
+        """Energy that each impact meets, half of contact mass times squared velocity, shape (p,)."""
+        hit = [self.orbit.body.contacts[number] for number in self.orbit.contacts]
+        return np.asarray(0.5 * np.array([each.mass for each in hit]) * self.orbit.velocities**2)
+
+    @cached_property
+    def lost(self) -> Floats:
+        """What each impact loses, (1 - r^2) of the energy that it meets, shape (p,)."""
+        hit = [self.orbit.body.contacts[number] for number in self.orbit.contacts]
+        return np.asarray(np.array([1.0 - each.restitution**2 for each in hit]) * self.kinetic)
+
+    @property
+    def restitution(self) -> ResidualRestitution:
+        """What the residual energy says that the restitution is."""
+        return residual_restitution(float(self.residual.sum()), float(self.kinetic.sum()))
+
+    @property
+    def identity_error(self) -> float:
+        """Residual energy of all modes less loss at the impacts (thesis 6.32), over the energy that impacts meet."""
+        return float(abs(self.residual.sum() - self.lost.sum()) / self.kinetic.sum())
+
+    @property
+    def modal_error(self) -> float:
+        """Largest sum of residual energy and changes at impacts of one mode, over the energy that impacts meet."""
+        return float(np.abs(self.residual + self.change.sum(axis=0)).max() / self.kinetic.sum())
+
+
+def orbit_energies(orbit: PeriodicOrbit) -> OrbitEnergies:
+    """Return the energies of the modes over an orbit.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+        Stable or not, physical or not.
+
+    Raises
+    ------
+    UsageError
+        An impact of the orbit has no speed: a graze, where nothing is exchanged.
+
+    Examples
+    --------
+    >>> from vibroimpact.analysis.orbits import ImpactingBody, closed_form
+    >>> one = np.array([1.0])
+    >>> stop = Contact(one, 1.0, 0.8, 0.75)
+    >>> body = ImpactingBody(one, 0.04 * one, 0.45 * one, 0.0 * one, 1.1, 0.0, (stop,), one)
+    >>> found = orbit_energies(closed_form(body)[0])
+    >>> found.identity_error < 1e-12, round(found.restitution.value, 12)
+    (True, 0.75)
+    """
+    if not (orbit.velocities > 0.0).all():
+        raise UsageError(f"energies: {orbit.name}: expected impacts with a speed, got a graze.")
+    return OrbitEnergies(orbit)

@@ -1,0 +1,128 @@
+"""The periodic orbit of recorded impacts: how they repeat, and the exact orbit that lies next to them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.periodic import TURN, OrbitError, PeriodicOrbit, find_orbit
+from vibroimpact.fmus.core.orbits import MOST_IMPACTS
+
+REPEATS = (1e-9, 1e-6, 1e-3)
+"""Differences of phases (rad), and of velocities over the largest, between rounds.
+
+The closest that is met counts: next to a doubling the two halves of an orbit differ by less than a transient may.
+"""
+NEAR = 1e-2
+"""Largest difference of the orbit from the recorded impacts, likewise."""
+
+
+class Impacts(NamedTuple):
+    """Impacts of one run, in the order of time.
+
+    Attributes
+    ----------
+    times, phases, velocities : array, shape (impact,)
+        s; forcing phases, rad; speeds towards the stops, m/s.
+    contacts : array of int, shape (impact,)
+        Which contact was hit, from 0.
+    """
+
+    times: Floats
+    phases: Floats
+    velocities: Floats
+    contacts: NDArray[np.int64]
+
+
+class RecordedOrbit(NamedTuple):
+    """The orbit next to recorded impacts.
+
+    Attributes
+    ----------
+    orbit : PeriodicOrbit
+    distance : float
+        Largest difference of a velocity from that of the orbit, over the largest: what is left of a transient.
+    """
+
+    orbit: PeriodicOrbit
+    distance: float
+
+
+def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
+    """Return the orbit P(p,q) that recorded impacts repeat, found by Newton's method from the last round of them.
+
+    Parameters
+    ----------
+    body : ImpactingBody
+    impacts : Impacts
+        Two rounds of the orbit at least, without transient.
+
+    Raises
+    ------
+    OrbitError
+        They do not repeat, or there is no orbit of this body next to them.
+    """
+    if not impacts.times.size:
+        raise OrbitError("no impacts")
+    phases = _unwrapped(impacts, body.angular_frequency)
+    count, periods = _round(phases, impacts)
+    last = slice(phases.size - count, None)
+    first = phases[last][0]
+    # counted from the period of the first impact
+    begin = TURN * np.floor(first / TURN)
+    found = find_orbit(body, phases[last] - begin, impacts.contacts[last].tolist(), periods)
+    velocities = impacts.velocities[last]
+    order = _same_order(found.phases, phases[last] - begin, periods)
+    gaps = found.velocities[order] - velocities
+    away = np.abs(np.mod(found.phases[order] - phases[last] + begin + np.pi, TURN) - np.pi).max()
+    distance = float(np.abs(gaps).max() / velocities.max())
+    if max(away, distance) > NEAR:
+        raise OrbitError(
+            f"no orbit {found.name} of this body next to the recorded impacts: nearest {max(away, distance):.2g} away"
+        )
+    return RecordedOrbit(_once(found), distance)
+
+
+def _once(orbit: PeriodicOrbit) -> PeriodicOrbit:
+    """Return a shorter orbit that this one passes several times: what a transient that alternates goes to."""
+    if orbit.turns == 1:
+        return orbit
+    count, periods = orbit.phases.size // orbit.turns, orbit.periods // orbit.turns
+    return find_orbit(orbit.body, orbit.phases[:count], orbit.contacts[:count].tolist(), periods)
+
+
+def _unwrapped(impacts: Impacts, rate: float) -> Floats:
+    """Return phases that go on over the turns of the force, which the times count."""
+    passed = rate * (impacts.times - impacts.times[0])
+    turns = np.round((passed - (impacts.phases - impacts.phases[0])) / TURN)
+    return np.asarray(impacts.phases + TURN * turns)
+
+
+def _round(phases: Floats, impacts: Impacts) -> tuple[int, int]:
+    """Return after how many impacts, in how many turns, the impacts repeat."""
+    speeds = impacts.velocities / impacts.velocities.max()
+    off: dict[int, float] = {}
+    for count in range(1, min(phases.size // 2, MOST_IMPACTS) + 1):
+        gone = phases[count:] - phases[:-count]
+        periods = round(float(gone[0] / TURN))
+        if periods >= 1 and (impacts.contacts[count:] == impacts.contacts[:-count]).all():
+            slower = np.abs(speeds[count:] - speeds[:-count]).max()
+            off[count] = float(max(slower, np.abs(gone - TURN * periods).max()))
+            if off[count] <= REPEATS[0]:
+                break
+    for close in REPEATS:
+        for count, difference in off.items():
+            if difference <= close:
+                return count, round(float((phases[count] - phases[0]) / TURN))
+    raise OrbitError(
+        f"not periodic: {phases.size} recorded impacts do not repeat within half of them, {MOST_IMPACTS} at most"
+    )
+
+
+def _same_order(found: Floats, recorded: Floats, periods: int) -> NDArray[np.intp]:
+    """Return which impact of the orbit is which of the recorded ones: an orbit may begin with another impact."""
+    off = np.mod(found[None, :] - recorded[:, None] + np.pi * periods, TURN * periods) - np.pi * periods
+    return np.asarray(np.argmin(np.abs(off), axis=1))

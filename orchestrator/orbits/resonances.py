@@ -1,0 +1,190 @@
+"""Peaks of the response of a campaign over the forcing frequency, beside the shifted natural frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.resonances import Peak, frequency_shift, peaks_of
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.energies import energies, scene_of
+from vibroimpact.orchestrator.scene import Scene
+
+_KEYS = {"forcing.angular_frequency": 1.0, "forcing.frequency": 2.0 * np.pi}
+_SAME = 1e-9
+
+
+class _Found(NamedTuple):
+    """A peak: of which quantity, on which branch."""
+
+    quantity: str
+    branch: int
+    peak: Peak
+
+
+def resonances(dataset: xr.Dataset) -> xr.Dataset:
+    """Return the peaks of the response of a body over the forcing frequency, of the whole body and of each mode.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As `open_dataset` or `run` gives it: a sweep of `forcing.angular_frequency` or `forcing.frequency` alone, of an
+        oscillator, a chain or a beam on restitution stops, with impacts and extrema.
+
+    Returns
+    -------
+    xarray.Dataset
+        Along `peak`: `quantity` (displacement_range, impact_velocity, mean_kinetic_energy of a mode), `branch`,
+        `peak_frequency`, `peak_height`, `grid_step`, `motion` (P(p,q), or why it has no period); `stop_ratio` of
+        the first stop over the deepest excursion on the other side; `shifted_frequency` of each `mode` at that ratio,
+        thesis (2.35): right for one mode, elastic, undamped and unforced, else a guess. And what peaks are of, along
+        `branch` and the frequency. Frequencies are angular ones, rad/s.
+
+    Raises
+    ------
+    DatasetError
+        It is another sweep, or nothing was recorded that has peaks.
+    UsageError
+        The scene is none whose orbits are followed.
+
+    Examples
+    --------
+    >>> resonances(open_dataset("campaign")).peak_frequency     # doctest: +SKIP
+    """
+    scene = scene_of(dataset, "resonances")
+    name, factor = _swept(dataset, scene)
+    exchanged = energies(dataset)
+    body = impacting_body(scene)
+    order = [name] if "direction" not in dataset["outcome"].dims else ["direction", name]
+    branches = (
+        [str(each) for each in np.atleast_1d(dataset["direction"].values)] if "direction" in order else [""]
+    )
+    frequency = factor * dataset[name].values.astype(np.float64)
+    curves = dict(_curves(dataset, exchanged, order, frequency.size))
+    found = [
+        _Found(quantity, branch, peak)
+        for quantity, values in curves.items()
+        for branch in range(len(branches))
+        for peak in peaks_of(frequency, values[branch])
+    ]
+    if not found:
+        raise DatasetError("resonances: expected a response with a peak inside of the sweep, got none.")
+    deepest = _deepest(dataset, body, order, frequency.size)
+    shape = (len(branches), frequency.size)
+    motion = _motions(exchanged, order).reshape(shape)
+    ratio = np.array([deepest[each.branch, each.peak.place] for each in found])
+    shifted = np.full((len(found), body.frequencies.size), np.nan)
+    known = (ratio > -1.0) & (ratio <= 1.0 + _SAME)
+    shifted[known] = frequency_shift(ratio[known])[:, None] * body.frequencies
+    peaks = [each.peak for each in found]
+
+    def of_peak(values: object, unit: str, words: str) -> Row:
+        kind = object if isinstance(values, list) and isinstance(values[0], str) else None
+        return "peak", np.array(values, dtype=kind), unit, words
+
+    rows: dict[str, Row] = {
+        "quantity": of_peak([each.quantity for each in found], "1", "what has the peak"),
+        "peak_branch": of_peak([each.branch for each in found], "1", "index of its branch"),
+        "peak_frequency": of_peak(
+            [each.frequency for each in peaks], "rad s-1", "angular frequency of the peak"
+        ),
+        "peak_height": of_peak(
+            [each.height for each in peaks], "1", "height of the peak, in the unit of its quantity"
+        ),
+        "grid_step": of_peak(
+            [each.step for each in peaks], "rad s-1", "distance of the neighbours of the peak"
+        ),
+        "motion": of_peak(
+            [str(motion[each.branch, each.peak.place]) for each in found],
+            "1",
+            "P(p,q) at the peak, or why there is no period",
+        ),
+        "stop_ratio": of_peak(
+            ratio, "1", "stop over deepest excursion on the other side, from the equilibrium"
+        ),
+        "shifted_frequency": (
+            ("peak", "mode"),
+            shifted,
+            "rad s-1",
+            "natural angular frequency, shifted by the stop",
+        ),
+        "natural_frequency": ("mode", body.frequencies, "rad s-1", "natural angular frequency"),
+    }
+    units = {"displacement_range": "m", "impact_velocity": "m s-1"}
+    for quantity, values in curves.items():
+        words = f"{quantity.replace('_', ' ')} of the run"
+        rows[quantity] = (("branch", "forcing"), values, units.get(quantity, "J"), words)
+    coords: dict[str, Row] = {
+        "branch": ("branch", np.array(branches, dtype=object), "1", "direction of the sweep"),
+        "forcing": ("forcing", frequency, "rad s-1", "angular frequency of the force"),
+        "mode": (
+            "mode",
+            np.arange(1, body.frequencies.size + 1),
+            "1",
+            "number of the mode, the slowest first",
+        ),
+    }
+    if dataset.attrs.get("units_system") == "nondimensional":
+        for each in (rows, coords):
+            each |= {key: (dims, values, "1", words) for key, (dims, values, _, words) in each.items()}
+    kept = {key: dataset.attrs[key] for key in ("title", "scene", "units_system") if key in dataset.attrs}
+    return xr.Dataset(described(rows), described(coords)).assign_attrs(kept)
+
+
+def _swept(dataset: xr.Dataset, scene: Scene) -> tuple[str, float]:
+    """Return the dimension of the frequency, and what makes it an angular one."""
+    keys = [axis.key for axis in scene.sweep]
+    dims = [str(dim) for dim in dataset["outcome"].dims if dim != "direction"]
+    if len(keys) != 1 or keys[0] not in _KEYS or len(dims) != 1 or dims[0] == "run":
+        raise DatasetError(
+            "resonances: expected a sweep of forcing.angular_frequency or forcing.frequency alone, "
+            f"got {', '.join(keys) or 'none'}."
+        )
+    return dims[0], _KEYS[keys[0]]
+
+
+def _curves(
+    dataset: xr.Dataset, exchanged: xr.Dataset, order: list[str], count: int
+) -> Iterator[tuple[str, Floats]]:
+    if "displacement_range" in dataset:
+        yield "displacement_range", dataset["displacement_range"].transpose(*order).values.reshape(-1, count)
+    run_id = dataset["run_id"].transpose(*order).values
+    largest = np.full(int(run_id.max()) + 1, np.nan)
+    np.fmax.at(largest, dataset["impact_run"].values, dataset["impact_velocity"].values)
+    yield "impact_velocity", largest[run_id].reshape(-1, count)
+    kinetic = exchanged["mean_kinetic_energy"].transpose("mode", *order).values
+    for mode, values in enumerate(kinetic, start=1):
+        yield f"mean_kinetic_energy_{mode}", values.reshape(-1, count)
+
+
+def _deepest(dataset: xr.Dataset, body: ImpactingBody, order: list[str], count: int) -> Floats:
+    """Return position of the first stop over the deepest excursion on the other side; NaN where it is not recorded."""
+    contact = body.contacts[0]
+    side = "displacement_min" if contact.direction > 0.0 else "displacement_max"
+    nothing = np.full((dataset["outcome"].size // count, count), np.nan)
+    size = float(np.abs(contact.shape).max())
+    if side not in dataset or np.abs(contact.shape - body.observed).max() > _SAME * size:
+        return nothing
+    rest = contact.direction * float(contact.shape @ (body.held / body.frequencies**2))
+    extreme = dataset[side] if "period" not in dataset[side].dims else dataset[side].min("period")
+    if contact.direction < 0.0 and "period" in dataset[side].dims:
+        extreme = dataset[side].max("period")
+    depth = rest - contact.direction * extreme.transpose(*order).values.reshape(-1, count)
+    place = contact.direction * contact.position - rest
+    return np.where(depth > 0.0, place / np.where(depth > 0.0, depth, 1.0), nothing)
+
+
+def _motions(exchanged: xr.Dataset, order: list[str]) -> np.ndarray[tuple[int, ...], np.dtype[np.object_]]:
+    impacts, periods = (exchanged[name].transpose(*order).values for name in ("impacts", "periods"))
+    reasons = exchanged["reason"].transpose(*order).values
+    told = [
+        f"P({p:.0f},{q:.0f})" if np.isfinite(p) else str(reason).split(":")[0]
+        for p, q, reason in zip(impacts.ravel(), periods.ravel(), reasons.ravel(), strict=True)
+    ]
+    return np.array(told, dtype=object)
