@@ -73,9 +73,13 @@ def kinds() -> dict[str, Picture]:
     """Return a picture of every kind of figure. Their files are made in this order, after those of the scenes."""
     board, fit = "examples/recordings/board.toml", "--fit body.frequency,body.damping_ratio,sensor.gain"
     fine = 'sweep."stop[1].position"={start=0.0005,stop=0.004,points=36}'
+    span = "--parameter forcing.angular_frequency --from 0.6 --to 1.6"
     hit = "vibroimpact import hit.csv --name base --name board --unit g -o hit.nc"
     return {
         "bifurcation": _of("bifurcation", "bifurcation"),
+        "branches": _of(
+            "branches", "branches", f"vibroimpact follow examples/bifurcation.toml {span} -o branches.nc"
+        ),
         "map": _of("map", "fine", f"vibroimpact run examples/gap_sweep.toml -o fine.nc --set '{fine}'"),
         "impacts-per-period": _of("impacts-per-period", "fine"),
         "impact-frequency": _of("impact-frequency", "figure_2_7"),

@@ -33,8 +33,8 @@ static seen look(const vi_orbit_response *response, int contact, const double st
         sum.velocity += shape[j] * faster;
         sum.acceleration -= shape[j] * (mode->stiffness * moved + drag * faster);
         /* |x'''| = |(4 c^2 - w^2) v + 2 c w^2 x|, and v^2 + w^2 x^2 never grows */
-        sum.bound += fabs(shape[j]) * (fabs(drag * drag - mode->stiffness) + drag * mode->natural) *
-                     sqrt(faster * faster + mode->stiffness * moved * moved);
+        sum.bound += fabs(shape[j]) * (fabs(drag * drag - mode->stiffness) + drag * mode->natural)
+                     * sqrt(faster * faster + mode->stiffness * moved * moved);
         cosine += shape[j] * response->steady_cos[j];
         sine += shape[j] * response->steady_sin[j];
     }

@@ -9,15 +9,15 @@ static const double TURN = 6.283185307179586;
 
 static bool is_body(const vi_orbit_body *body)
 {
-    bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1 && body->contacts <= VI_PORTS &&
-                body->angular_frequency > 0.0 && isfinite(body->angular_frequency);
+    bool good = body->modes >= 1 && body->modes <= VI_MODES && body->contacts >= 1 && body->contacts <= VI_PORTS
+                && body->angular_frequency > 0.0 && isfinite(body->angular_frequency);
     for (int j = 0; good && j < body->modes; ++j) {
-        good = body->natural[j] > 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0 &&
-               isfinite(body->damping_ratio[j] + body->cosine[j] + body->sine[j] + body->held[j]);
+        good = body->natural[j] > 0.0 && isfinite(body->natural[j]) && body->damping_ratio[j] >= 0.0
+               && isfinite(body->damping_ratio[j] + body->cosine[j] + body->sine[j] + body->held[j]);
     }
     for (int k = 0; good && k < body->contacts; ++k) {
-        good = fabs(body->direction[k]) == 1.0 && isfinite(body->position[k]) && body->restitution[k] >= 0.0 &&
-               body->restitution[k] <= 1.0;
+        good = fabs(body->direction[k]) == 1.0 && isfinite(body->position[k]) && body->restitution[k] >= 0.0
+               && body->restitution[k] <= 1.0;
     }
     return good;
 }
@@ -26,8 +26,8 @@ static bool is_train(const vi_orbit_train *train, int contacts)
 {
     bool good = train->impacts >= 1 && train->impacts <= VI_ORBIT_IMPACTS && train->periods >= 1;
     for (int i = 0; good && i < train->impacts; ++i) {
-        good = train->contact[i] >= 0 && train->contact[i] < contacts && isfinite(train->phase[i]) &&
-               (i == 0 || train->phase[i] > train->phase[i - 1]);
+        good = train->contact[i] >= 0 && train->contact[i] < contacts && isfinite(train->phase[i])
+               && (i == 0 || train->phase[i] > train->phase[i - 1]);
     }
     return good && train->phase[train->impacts - 1] - train->phase[0] < TURN * train->periods;
 }
@@ -75,8 +75,8 @@ int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, con
         response->level[j] = body->held[j] / mode->stiffness;
         response->steady_cos[j] = c == 0.0 && s == 0.0 ? 0.0 : c * along - s * across;
         response->steady_sin[j] = c == 0.0 && s == 0.0 ? 0.0 : c * across + s * along;
-        if (!isfinite(response->steady_cos[j] + response->steady_sin[j]) ||
-            !start_of_train(mode, response->length, response->start[j])) {
+        if (!isfinite(response->steady_cos[j] + response->steady_sin[j])
+            || !start_of_train(mode, response->length, response->start[j])) {
             return VI_ORBIT_RESONANT;
         }
     }

@@ -27,10 +27,10 @@ typedef struct {
     const double *cosine, *sine;  /* [modes] modal force = cosine cos(phase) + sine sin(phase) */
     const double *held;           /* [modes] constant modal force */
     const double *shape;          /* displacement of each contact */
-    const double *impulse;        /* modal velocities that a unit of velocity at the contact takes: shape . impulse = 1 */
-    const double *direction;      /* [contacts] +1: the stop is above, -1: below */
-    const double *position;       /* [contacts] m */
-    const double *restitution;    /* [contacts] */
+    const double *impulse; /* modal velocities that a unit of velocity at the contact takes: shape . impulse = 1 */
+    const double *direction; /* [contacts] +1: the stop is above, -1: below */
+    const double *position; /* [contacts] m */
+    const double *restitution; /* [contacts] */
 } vi_orbit_body;
 
 /* Impacts in their order: of which contact, and at which phase, rad, 0 <= phase[0] < phase[1] < ... < 2 pi periods. */

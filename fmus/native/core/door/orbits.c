@@ -56,8 +56,8 @@ static void answer(const vi_orbit_response *response, int i, int k, double g[3])
     const double *shape = body->shape + (ptrdiff_t)contact[i] * body->modes;
     const double *impulse = body->impulse + (ptrdiff_t)contact[k] * body->modes;
     const double u = vi_orbit_since(response, i, k);
-    const double factor = (1.0 + body->restitution[contact[k]]) * body->direction[contact[i]] *
-                          body->direction[contact[k]];
+    const double factor = (1.0 + body->restitution[contact[k]]) * body->direction[contact[i]]
+                          * body->direction[contact[k]];
     g[0] = g[1] = g[2] = 0.0;
     for (int j = 0; j < body->modes; ++j) {
         const vi_mode *mode = &response->mode[j];
@@ -136,8 +136,8 @@ static void after_impact(const vi_orbit_response *response, const double velocit
         vi_orbit_steady(response, j, train->phase[i], &state[j], &state[body->modes + j]);
         for (int k = 0; k < train->impacts; ++k) {
             const int32_t contact = train->contact[k];
-            const double strength = (1.0 + body->restitution[contact]) * velocity[k] * body->direction[contact] *
-                                    body->impulse[(ptrdiff_t)contact * body->modes + j];
+            const double strength = (1.0 + body->restitution[contact]) * velocity[k] * body->direction[contact]
+                                    * body->impulse[(ptrdiff_t)contact * body->modes + j];
             double x, v;
             vi_orbit_train_answer(response, j, k == i ? 0.0 : vi_orbit_since(response, i, k), &x, &v);
             state[j] += strength * x;
@@ -161,8 +161,9 @@ static void salt(const vi_orbit_response *response, int i, double velocity, cons
     for (int j = 0; j < modes; ++j) {
         const vi_mode *mode = &response->mode[j];
         const double before = state[modes + j] + lost * speed * impulse[j];
-        acceleration += shape[j] * (body->cosine[j] * cos(phase) + body->sine[j] * sin(phase) + body->held[j] -
-                                    2.0 * mode->decay * before - mode->stiffness * state[j]);
+        acceleration += shape[j]
+                        * (body->cosine[j] * cos(phase) + body->sine[j] * sin(phase) + body->held[j]
+                           - 2.0 * mode->decay * before - mode->stiffness * state[j]);
     }
     for (int c = 0; c < columns; ++c) {
         double displaced = 0.0, faster = 0.0;

@@ -403,7 +403,7 @@ def test_plot_help_has_an_example() -> None:
         (
             ["runs.nc", "-o", "a.png", "--kind", "convergence"],
             DatasetError,
-            "kind: expected one that fits a dataset of runs (bifurcation, impact-frequency, strobe, run, portrait, impact-map,",
+            "kind: expected one that fits a dataset of runs (bifurcation, impact-frequency, strobe, run, portrait,",
         ),
         (["runs.nc", "-o", "a.docx"], UsageError, "expected a name ending in .png, .pdf, .svg, got '.docx'"),
         (

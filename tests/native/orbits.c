@@ -1,0 +1,165 @@
+/* Periodic orbits of random bodies: the determinant of what impacts and flights make of a state, slopes, refusals. */
+#include "door/orbits.h"
+
+#include <math.h>
+#include <stdbool.h>
+
+#include "check.h"
+#include "door/orbit_maximum.h"
+
+static const double TURN = 6.283185307179586;
+
+typedef struct {
+    double natural[VI_MODES], damping_ratio[VI_MODES], cosine[VI_MODES], sine[VI_MODES], held[VI_MODES];
+    double shape[VI_PORTS * VI_MODES], impulse[VI_PORTS * VI_MODES];
+    double direction[VI_PORTS], position[VI_PORTS], restitution[VI_PORTS];
+    double phase[VI_ORBIT_IMPACTS];
+    int32_t contact[VI_ORBIT_IMPACTS];
+    vi_orbit_body body;
+    vi_orbit_train train;
+} sample;
+
+static void draw(sample *s, uint64_t *seed, int most_modes)
+{
+    const int modes = 1 + (int)choice(seed, (unsigned)most_modes), contacts = 1 + (int)choice(seed, VI_PORTS);
+    for (int j = 0; j < modes; ++j) {
+        s->natural[j] = pow(10.0, uniform(seed, -1.0, 1.5));
+        s->damping_ratio[j] = choice(seed, 4) ? uniform(seed, 0.0, 0.2) : uniform(seed, 0.9, 3.0);
+        s->cosine[j] = uniform(seed, -1.0, 1.0);
+        s->sine[j] = uniform(seed, -1.0, 1.0);
+        s->held[j] = uniform(seed, -0.1, 0.1);
+    }
+    for (int k = 0; k < contacts; ++k) {
+        double square = 0.0;
+        for (int j = 0; j < modes; ++j) {
+            s->shape[k * modes + j] = uniform(seed, -1.0, 1.0);
+            square += s->shape[k * modes + j] * s->shape[k * modes + j];
+        }
+        for (int j = 0; j < modes; ++j) {
+            s->impulse[k * modes + j] = s->shape[k * modes + j] / square;
+        }
+        s->direction[k] = choice(seed, 2) ? 1.0 : -1.0;
+        s->position[k] = uniform(seed, -1.0, 1.0);
+        s->restitution[k] = uniform(seed, 0.1, 1.0);
+    }
+    s->train = (vi_orbit_train){.impacts = 1 + (int)choice(seed, 5), .periods = 1 + (int)choice(seed, 3)};
+    double phase = uniform(seed, 0.0, 1.0);
+    for (int i = 0; i < s->train.impacts; ++i) {
+        s->phase[i] = phase;
+        s->contact[i] = (int32_t)choice(seed, (unsigned)contacts);
+        phase += uniform(seed, 0.1, 1.0) * (TURN - 2.0) / s->train.impacts;
+    }
+    s->train.phase = s->phase;
+    s->train.contact = s->contact;
+    s->body = (vi_orbit_body){.modes = modes,
+                              .contacts = contacts,
+                              .angular_frequency = uniform(seed, 0.3, 3.0),
+                              .natural = s->natural,
+                              .damping_ratio = s->damping_ratio,
+                              .cosine = s->cosine,
+                              .sine = s->sine,
+                              .held = s->held,
+                              .shape = s->shape,
+                              .impulse = s->impulse,
+                              .direction = s->direction,
+                              .position = s->position,
+                              .restitution = s->restitution};
+}
+
+/* Determinant by elimination; the matrix is overwritten. */
+static double determinant(int n, double a[])
+{
+    double product = 1.0;
+    for (int k = 0; k < n; ++k) {
+        int pivot = k;
+        for (int i = k + 1; i < n; ++i) {
+            pivot = fabs(a[i * n + k]) > fabs(a[pivot * n + k]) ? i : pivot;
+        }
+        for (int j = 0; pivot != k && j < n; ++j) {
+            const double kept = a[k * n + j];
+            a[k * n + j] = a[pivot * n + j];
+            a[pivot * n + j] = kept;
+        }
+        product *= pivot == k ? a[k * n + k] : -a[k * n + k];
+        for (int i = k + 1; i < n && a[k * n + k] != 0.0; ++i) {
+            const double share = a[i * n + k] / a[k * n + k];
+            for (int j = k; j < n; ++j) {
+                a[i * n + j] -= share * a[k * n + j];
+            }
+        }
+    }
+    return product;
+}
+
+static void check_body(uint64_t *seed, int most_modes, bool invariants)
+{
+    static sample s;
+    static double state[VI_ORBIT_IMPACTS * VI_ORBIT_STATES], monodromy[VI_ORBIT_STATES * VI_ORBIT_STATES];
+    double velocity[VI_ORBIT_IMPACTS], distance[VI_ORBIT_IMPACTS];
+    double slope[VI_ORBIT_IMPACTS * VI_ORBIT_IMPACTS], faster[VI_ORBIT_IMPACTS * VI_ORBIT_IMPACTS];
+    draw(&s, seed, most_modes);
+    const int end = vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster);
+    CHECK(end == VI_ORBIT_DONE || end == VI_ORBIT_SINGULAR || end == VI_ORBIT_RESONANT, "end %d", end);
+    if (end != VI_ORBIT_DONE) {
+        return;
+    }
+    CHECK(vi_door_orbit_motion(&s.body, &s.train, velocity, state, monodromy) == VI_ORBIT_DONE, "no motion");
+    double what[3];
+    CHECK(vi_door_orbit_maximum(&s.body, &s.train, state, what) == VI_ORBIT_DONE, "no maximum");
+    const int modes = s.body.modes;
+    double expected = 0.0, slowest = HUGE_VAL;
+    for (int i = 0; i < s.train.impacts; ++i) {
+        expected += 2.0 * log(s.restitution[s.contact[i]]);
+        slowest = fmin(slowest, fabs(velocity[i]));
+        /* the state after an impact moves away at restitution times the speed before */
+        double speed = 0.0;
+        for (int j = 0; j < modes; ++j) {
+            speed += s.shape[s.contact[i] * modes + j] * state[i * 2 * modes + modes + j];
+        }
+        const double left = -s.direction[s.contact[i]] * speed, came = s.restitution[s.contact[i]] * velocity[i];
+        CHECK(fabs(left - came) <= 1e-9 * (1.0 + fabs(velocity[i])), "impact %d: %.17g, not %.17g", i, left, came);
+    }
+    for (int j = 0; j < modes; ++j) {
+        expected -= 2.0 * s.damping_ratio[j] * s.natural[j] * TURN * s.train.periods / s.body.angular_frequency;
+    }
+    if (invariants && expected > -12.0 && slowest > 1e-3) {
+        const double found = determinant(2 * modes, monodromy);
+        CHECK(fabs(found / exp(expected) - 1.0) <= 1e-6, "%d modes: determinant %.17g, not %.17g", modes, found,
+              exp(expected));
+    }
+}
+
+static void check_refusals(uint64_t *seed)
+{
+    static sample s;
+    double velocity[VI_ORBIT_IMPACTS], distance[VI_ORBIT_IMPACTS], slope[25], faster[25];
+    draw(&s, seed, 3);
+    s.natural[0] = 0.0;
+    CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_REFUSED, "a loose mode");
+    draw(&s, seed, 3);
+    s.contact[0] = (int32_t)VI_PORTS;
+    CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_REFUSED, "no contact");
+    draw(&s, seed, 3);
+    s.phase[0] = NAN;
+    CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_REFUSED, "no phase");
+    draw(&s, seed, 3);
+    s.train.impacts = VI_ORBIT_IMPACTS + 1;
+    CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_REFUSED, "impacts");
+    draw(&s, seed, 1);
+    s.damping_ratio[0] = 0.0;
+    s.natural[0] = s.body.angular_frequency = 1.0;
+    CHECK(vi_door_orbit(&s.body, &s.train, velocity, distance, slope, faster) == VI_ORBIT_RESONANT, "resonance");
+}
+
+int main(void)
+{
+    uint64_t seed = 7;
+    for (int i = 0; i < 3000; ++i) {
+        check_body(&seed, 4, true);
+    }
+    for (int i = 0; i < 20; ++i) {
+        check_body(&seed, VI_MODES, false);
+    }
+    check_refusals(&seed);
+    return 0;
+}
