@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset, with_constants
-from vibroimpact.analysis.dataset.schema import MEASURED_COLUMNS
+from vibroimpact.analysis.dataset.schema import MEASURED_COLUMNS, ORBIT_COLUMNS, RULES
 
 PERIODS = 3
 
@@ -165,6 +165,7 @@ def everything(**changes: Any) -> xr.Dataset:
         measured={
             "measurement_flags": np.array([0, 5, 8]),
             **{name: np.ones(3) for name in MEASURED_COLUMNS[1:]},
+            **{name: np.ones(3, dtype=RULES[name].dtype) for name in ORBIT_COLUMNS},
         },
         **changes,
     )
