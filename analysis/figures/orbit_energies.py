@@ -127,5 +127,6 @@ def _draw_plane(axis: Axes, dataset: xr.Dataset) -> None:
     axis.plot(met[known], residual[known], ".", color=MARK, markersize=2, rasterized=True)
     unit = unit_symbol(dataset["contact_energy"])
     axis.set(xlim=(0.0, most), ylim=(0.0, most))
-    axis.set_xlabel(f"energy that impacts meet ({unit}); right: restitution")
+    axis.set_xlabel(f"energy that impacts meet ({unit})")
+    axis.set_title("restitution", fontsize=6, loc="right", pad=2)
     axis.set_ylabel(f"residual energy ({unit})")

@@ -18,7 +18,7 @@ from vibroimpact.analysis.figures.page import (
 )
 from vibroimpact.fmus.errors import DatasetError
 
-_PANEL_MM = 34
+_PANEL_MM = 38
 _NEEDED = ("quantity", "peak_frequency", "peak_height", "shifted_frequency", "natural_frequency", "forcing")
 
 

@@ -16,6 +16,7 @@ REPEATS = (1e-9, 1e-6, 1e-3)
 
 The closest that is met counts: next to a doubling the two halves of an orbit differ by less than a transient may.
 """
+NO_IMPACTS = "no impacts"
 NEAR = 1e-2
 """Largest difference of the orbit from the recorded impacts, likewise."""
 
@@ -66,7 +67,7 @@ def recorded_orbit(body: ImpactingBody, impacts: Impacts) -> RecordedOrbit:
         They do not repeat, or there is no orbit of this body next to them.
     """
     if not impacts.times.size:
-        raise OrbitError("no impacts")
+        raise OrbitError(NO_IMPACTS)
     phases = _unwrapped(impacts, body.angular_frequency)
     count, periods = _round(phases, impacts)
     last = slice(phases.size - count, None)

@@ -113,6 +113,8 @@ def _print_one(found: xr.Dataset) -> None:
     say(
         f"Impacts meet {met:.6g} and lose {lost:.6g}; identity (6.32) closed to {float(found.identity_error):.1e}."
     )
+    masses = ", ".join(f"{each:.6g}" for each in found["contact_mass"].values)
+    say(f"Mass that an impact meets{', kg' if unit else ''}: {masses}.")
     said = residual_restitution(float(found.residual_energy.sum()), met)
     slope = f", {said.slope:.4g} per unit of residual energy" if np.isfinite(said.slope) else ""
     say(f"Restitution from the residual energy: {said.problem or f'{said.value:.9g}{slope}'}.")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from os import PathLike
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import Row, described
 from vibroimpact.analysis.dataset.schema import Outcome
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
@@ -55,13 +57,16 @@ _MANY = 5000
 """Runs from which on it takes seconds."""
 
 
-def energies(dataset: xr.Dataset, run: int | None = None, *, progress: Progress | None = None) -> xr.Dataset:
+def energies(
+    dataset: xr.Dataset | str | PathLike[str], run: int | None = None, *, progress: Progress | None = None
+) -> xr.Dataset:
     """Return the energies of the modes over the orbit of each run: thesis 6.3, equations.md 5.3 to 5.6.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        As `open_dataset` or `run` gives it: of an oscillator, a chain or a beam on restitution stops, with impacts.
+    dataset : xarray.Dataset or path
+        As `open_dataset` or `run` gives it, or its file or folder: of an oscillator, a chain or a beam on restitution
+        stops, with impacts.
     run : int, optional
         `run_index` of one run alone, of which each impact is told too.
     progress : Progress, optional
@@ -85,8 +90,11 @@ def energies(dataset: xr.Dataset, run: int | None = None, *, progress: Progress 
 
     Examples
     --------
-    >>> energies(open_dataset("run.nc")).residual_energy      # doctest: +SKIP
+    >>> energies("run.nc").residual_energy      # doctest: +SKIP
     """
+    if not isinstance(dataset, xr.Dataset):
+        with open_dataset(dataset) as opened:
+            return energies(opened, run, progress=progress)
     scene = scene_of(dataset, "energies")
     runs = dataset.vibroimpact.runs
     chosen = _chosen(runs, run)
@@ -106,7 +114,7 @@ def energies(dataset: xr.Dataset, run: int | None = None, *, progress: Progress 
             raise DatasetError(f"energies: expected a run with a periodic orbit, got none: {only}.")
         made = _of_one(only, found[0][1], plain)
     else:
-        made = _on_sweep(dataset, found, chosen, plain)
+        made = _on_sweep(dataset, found, bodies.most_modes, plain)
     return made.assign_attrs(kept)
 
 
@@ -158,11 +166,13 @@ class _Bodies:
         self._scene = scene
         self._columns = {key: runs[name].values for key, name in coordinate_names(scene).items()}
         self._last: tuple[dict[str, float], ImpactingBody] | None = None
+        self.most_modes = 0
 
     def __getitem__(self, place: int) -> ImpactingBody:
         values = {key: float(column[place]) for key, column in self._columns.items()}
         if self._last is None or self._last[0] != values:
             self._last = values, impacting_body(self._scene.at(values))
+            self.most_modes = max(self.most_modes, self._last[1].frequencies.size)
         return self._last[1]
 
 
@@ -214,6 +224,8 @@ def _of_one(found: OrbitEnergies, distance: float, plain: bool) -> xr.Dataset:
         )
         values = np.array([of(contact) for contact in body.contacts])
         rows[name] = (("contact", "mode", "other_mode"), values, "1", words)
+    masses = np.array([contact.mass for contact in body.contacts])
+    rows["contact_mass"] = ("contact", masses, "kg", "mass that an impact meets, of all modes that are kept")
     rows["impact_phase"] = (
         "impact",
         orbit.phases,
@@ -232,18 +244,12 @@ def _modes(count: int) -> dict[str, Any]:
     return described({"mode": ("mode", number, "1", "number of the mode, the slowest first")})
 
 
-def _on_sweep(
-    dataset: xr.Dataset, found: list[tuple[Found, float]], chosen: list[int], plain: bool
-) -> xr.Dataset:
+def _on_sweep(dataset: xr.Dataset, found: list[tuple[Found, float]], most: int, plain: bool) -> xr.Dataset:
     """Return the energies of all runs on the dimensions of the dataset."""
     run_id = dataset["run_id"].values
-    place = dict(
-        zip(dataset.vibroimpact.runs["run_id"].values[chosen].tolist(), range(len(found)), strict=True)
-    )
+    place = dict(zip(dataset.vibroimpact.runs["run_id"].values.tolist(), range(len(found)), strict=True))
     index = np.array([place.get(int(number), -1) for number in run_id.ravel()]).reshape(run_id.shape)
     dims = tuple(map(str, dataset["run_id"].dims))
-    there = [each for each, _ in found if not isinstance(each, str)]
-    most = max((each.orbit.body.frequencies.size for each in there), default=0)
 
     def placed(values: Floats) -> Floats:
         return np.asarray(np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])[index])

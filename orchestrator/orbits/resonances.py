@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from os import PathLike
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import Row, described
 from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.recorded import NO_IMPACTS
 from vibroimpact.analysis.orbits.resonances import Peak, frequency_shift, peaks_of
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
@@ -28,14 +31,14 @@ class _Found(NamedTuple):
     peak: Peak
 
 
-def resonances(dataset: xr.Dataset) -> xr.Dataset:
+def resonances(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
     """Return the peaks of the response of a body over the forcing frequency, of the whole body and of each mode.
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        As `open_dataset` or `run` gives it: a sweep of `forcing.angular_frequency` or `forcing.frequency` alone, of an
-        oscillator, a chain or a beam on restitution stops, with impacts and extrema.
+    dataset : xarray.Dataset or path
+        As `open_dataset` or `run` gives it, or its file or folder: a sweep of `forcing.angular_frequency` or
+        `forcing.frequency` alone, of an oscillator, a chain or a beam on restitution stops, with impacts and extrema.
 
     Returns
     -------
@@ -55,8 +58,11 @@ def resonances(dataset: xr.Dataset) -> xr.Dataset:
 
     Examples
     --------
-    >>> resonances(open_dataset("campaign")).peak_frequency     # doctest: +SKIP
+    >>> resonances("campaign").peak_frequency     # doctest: +SKIP
     """
+    if not isinstance(dataset, xr.Dataset):
+        with open_dataset(dataset) as opened:
+            return resonances(opened)
     scene = scene_of(dataset, "resonances")
     name, factor = _swept(dataset, scene)
     exchanged = energies(dataset)
@@ -66,7 +72,7 @@ def resonances(dataset: xr.Dataset) -> xr.Dataset:
         [str(each) for each in np.atleast_1d(dataset["direction"].values)] if "direction" in order else [""]
     )
     frequency = factor * dataset[name].values.astype(np.float64)
-    curves = dict(_curves(dataset, exchanged, order, frequency.size))
+    curves = dict(_curves(dataset, exchanged, order, frequency, body))
     found = [
         _Found(quantity, branch, peak)
         for quantity, values in curves.items()
@@ -150,17 +156,26 @@ def _swept(dataset: xr.Dataset, scene: Scene) -> tuple[str, float]:
 
 
 def _curves(
-    dataset: xr.Dataset, exchanged: xr.Dataset, order: list[str], count: int
+    dataset: xr.Dataset, exchanged: xr.Dataset, order: list[str], frequency: Floats, body: ImpactingBody
 ) -> Iterator[tuple[str, Floats]]:
+    count = frequency.size
     if "displacement_range" in dataset:
         yield "displacement_range", dataset["displacement_range"].transpose(*order).values.reshape(-1, count)
     run_id = dataset["run_id"].transpose(*order).values
     largest = np.full(int(run_id.max()) + 1, np.nan)
     np.fmax.at(largest, dataset["impact_run"].values, dataset["impact_velocity"].values)
-    yield "impact_velocity", largest[run_id].reshape(-1, count)
+    # a point of the grid that no run covers has no run_id
+    yield "impact_velocity", np.where(run_id < 0, np.nan, largest[run_id]).reshape(-1, count)
     kinetic = exchanged["mean_kinetic_energy"].transpose("mode", *order).values
-    for mode, values in enumerate(kinetic, start=1):
-        yield f"mean_kinetic_energy_{mode}", values.reshape(-1, count)
+    is_free = (exchanged["reason"].transpose(*order).values == NO_IMPACTS).reshape(-1, count)
+    for mode, values in enumerate(kinetic):
+        w, z = body.frequencies[mode], body.damping_ratios[mode]
+        # the steady response, equations.md 1.3; without bound where an undamped mode resonates
+        stiffness = np.abs(w**2 - frequency**2 + 2j * z * w * frequency)
+        speed = np.divide(
+            frequency * body.force[mode], stiffness, out=np.full(count, np.nan), where=stiffness > 0.0
+        )
+        yield f"mean_kinetic_energy_{mode + 1}", np.where(is_free, 0.25 * speed**2, values.reshape(-1, count))
 
 
 def _deepest(dataset: xr.Dataset, body: ImpactingBody, order: list[str], count: int) -> Floats:

@@ -191,3 +191,26 @@ def test_what_is_no_dataset_of_a_scene_is_refused(swept: xr.Dataset, tmp_path: P
         done = in_this_process(command, tmp_path / "absent.nc")
         assert done.returncode != 0
         assert "absent.nc" in done.stderr
+
+
+def test_without_impacts_modes_have_the_kinetic_energy_of_their_steady_response() -> None:
+    """The FMU's kinetic energy of a chain that swings free, averaged over whole periods, against the modes' own."""
+    series = 'time_series = { rate = 400, variables = ["energy.kinetic"] }\n'
+    lines = '[sweep]\n"forcing.angular_frequency" = { start = 2.2, stop = 2.4, points = 3 }\n'
+    free = CHAIN.replace("position = 0.1", "position = 10.0") + series
+    run = vi.run(vi.Scene.from_text(free + lines.replace("2.2", "0.5").replace("2.4", "0.7")), progress=False)
+    found = vi.resonances(run)
+    for place, rate in enumerate(found.forcing.values):
+        sampled = run.vibroimpact.samples(angular_frequency=rate).energy_kinetic.values
+        period = 2.0 * np.pi / rate * 400.0
+        whole = sampled[: round(10 * period)]
+        exact = sum(float(found[f"mean_kinetic_energy_{mode}"][0, place]) for mode in (1, 2))
+        assert float(whole.mean()) == pytest.approx(exact, rel=1e-2)
+
+
+def test_a_folder_or_file_will_do_in_python(tmp_path: Path) -> None:
+    file = tmp_path / "run.nc"
+    vi.run(vi.Scene.from_text(CHAIN), file)
+    assert vi.energies(file).contact_mass.values == pytest.approx([1.0])
+    with pytest.raises(DatasetError, match="alone, got none"):
+        vi.resonances(file)
