@@ -40,6 +40,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.analysis.estimation import estimate_modes as estimate_modes
     from vibroimpact.analysis.figures import draw as draw
     from vibroimpact.analysis.intervals import interval_report as interval_report
+    from vibroimpact.analysis.orbits.classify import classify as classify
     from vibroimpact.analysis.orbits.energies import residual_restitution as residual_restitution
     from vibroimpact.analysis.orbits.resonances import frequency_shift as frequency_shift
     from vibroimpact.analysis.orbits.resonances import stop_ratio as stop_ratio
@@ -89,6 +90,7 @@ _NAMES = {
     "analysis.estimation": ("Forcing", "Known", "estimate_bounces", "estimate_impacts", "estimate_modes"),
     "analysis.figures": ("draw",),
     "analysis.intervals": ("interval_report",),
+    "analysis.orbits.classify": ("classify",),
     "analysis.orbits.energies": ("residual_restitution",),
     "analysis.orbits.resonances": ("frequency_shift", "stop_ratio"),
     "analysis.recording": (

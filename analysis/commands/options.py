@@ -22,9 +22,9 @@ EMBEDDING, THEILER = 6, 1
 #: Of the intervals of Sobol indices: `sensitivity.report` has the same, and takes long to load.
 LEVEL, RESAMPLES = 0.95, 1000
 _KINDS_HELP = (
-    "auto; of a sweep bifurcation, map, impacts-per-period, impact-frequency, strobe, shapes, scores; of a run run, "
-    "portrait, strobe, impact-map, return-map, spectrum, density, energies; of a recording or replay spectrum and "
-    "density too; of a benchmark convergence, work-precision."
+    "auto; of a sweep bifurcation, branches, classes, map, impacts-per-period, impact-frequency, strobe, shapes, "
+    "scores; of a run run, portrait, strobe, impact-map, return-map, spectrum, density, energies; of a recording or "
+    "replay spectrum and density too; of a benchmark convergence, work-precision."
 )
 
 
@@ -35,6 +35,7 @@ def register(app: typer.Typer) -> None:
     app.command("spikes")(spikes)
     app.command("describe")(describe)
     app.command("sensitivity")(sensitivity)
+    app.command("classify")(classify)
     fmu_commands.command("replay")(replay_fmu)
 
 
@@ -192,6 +193,24 @@ def sensitivity(
     from vibroimpact.analysis.commands.sensitivity import show_sensitivity
 
     show_sensitivity(file, output, figure, of or (), level, resamples, seed, force)
+
+
+def classify(
+    file: Annotated[Path, typer.Argument(help="Dataset of runs (.nc), or the folder of a campaign.")],
+    output: DatasetFile = None,
+    figure: FigureFile = None,
+    force: Force = False,
+) -> None:
+    """Say what each run of a dataset is: P(p,q), chaos, rest, sticking, no impacts, or unknown and why.
+
+    From the strobe and the extrema of each recorded period. A slow transient is told from a doubled period by its
+    distances, which shrink by a constant factor; 40 recorded periods tell chaos.
+
+    Example: vibroimpact classify campaign -o classes.nc --figure classes.png
+    """
+    from vibroimpact.analysis.commands.classify import show_classes
+
+    show_classes(file, output, figure, force)
 
 
 def replay_fmu(

@@ -57,6 +57,17 @@ class SpecialOrbit(IntEnum):
     graze_between_impacts = 5
 
 
+class OrbitClass(IntEnum):
+    """What the motion of a run is, as its recorded periods tell it."""
+
+    unknown = 0
+    no_impacts = 1
+    periodic = 2
+    sticking = 3
+    chaos = 4
+    rest = 5
+
+
 class MeasurementFlag(IntFlag):
     """What is wrong with a measured run; several may be."""
 
@@ -239,6 +250,10 @@ _RULES = (
     VariableRule(
         "orbit_multiplier_imaginary", ("run",), "1", "imaginary part of its largest Floquet multiplier"
     ),
+    VariableRule("class_kind", ("run",), "1", "class of the motion", np.int8, _flags(OrbitClass)),
+    VariableRule("class_impacts", ("run",), "1", "impacts of what repeats; -1: without number", np.int32),
+    VariableRule("class_periods", ("run",), "1", "forcing periods after which the motion repeats", np.int32),
+    VariableRule("class_reason", ("run",), "1", "why the class is unknown", object),
 )
 RULES: Mapping[str, VariableRule] = {rule.name: rule for rule in _RULES}
 
@@ -259,9 +274,11 @@ MEASURED_COLUMNS = ("measurement_flags", "drive_amplitude", "drive_lag", "drive_
 """Columns of runs that a rig has measured; the last three where an input was wired to the drive."""
 ORBIT_COLUMNS = tuple(rule.name for rule in _RULES if rule.name.startswith("orbit_"))
 """Columns of runs that are periodic orbits, followed over a parameter."""
+CLASS_COLUMNS = tuple(rule.name for rule in _RULES if rule.name.startswith("class_"))
+"""Columns of runs that have been classified."""
 RAGGED = {rule.extra["sample_dimension"]: rule.name for rule in _RULES if "sample_dimension" in rule.extra}
 # What every file has; the other per-run variables are there where they were recorded.
-_NOT_IN_ALL = (*RAGGED.values(), "loop_residual", *MEASURED_COLUMNS, *ORBIT_COLUMNS)
+_NOT_IN_ALL = (*RAGGED.values(), "loop_residual", *MEASURED_COLUMNS, *ORBIT_COLUMNS, *CLASS_COLUMNS)
 RUN_COLUMNS = tuple(name for name in _columns(("run",)) if name not in _NOT_IN_ALL)
 RESERVED_NAMES = frozenset(
     {*RULES, *(dim for rule in _RULES for dim in rule.dims), *(f"{dim}_run" for dim in RAGGED)}

@@ -13,6 +13,8 @@ from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.accuracy import draw_accuracy
 from vibroimpact.analysis.figures.branches import BRANCH, draw_branches
+from vibroimpact.analysis.figures.classes import KIND as CLASS_KIND
+from vibroimpact.analysis.figures.classes import draw_classes
 from vibroimpact.analysis.figures.effects import draw_effects
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.hard_cases import draw_hard_cases
@@ -130,6 +132,7 @@ KINDS: dict[str, FigureKind] = {
     "branches": FigureKind(
         {"runs": lambda data, view: draw_branches(data, view.over)}, lambda data: BRANCH in data, ("over",)
     ),
+    "classes": FigureKind({"runs": lambda data, view: draw_classes(data)}, lambda data: CLASS_KIND in data),
     "map": FigureKind(
         {"runs": lambda data, view: draw_map(data)},
         lambda data: _swept(data, 2, "displacement_range", "impact_velocity"),
@@ -279,8 +282,9 @@ def _usual(data: Any, family: Family, view: View) -> str:
         return {"spikes": "intervals", "ladder": "convergence", "hard_cases": "hard-cases"}.get(
             family, family
         )
-    if BRANCH in data and view.run is None:
-        return "branches"
+    for column, kind in ((BRANCH, "branches"), (CLASS_KIND, "classes")):
+        if column in data and view.run is None:
+            return kind
     swept = varied(data)
     if view.run is not None or not swept:
         return "run"

@@ -60,7 +60,7 @@ def varied(dataset: xr.Dataset) -> list[str]:
     return list(first.values())
 
 
-def _in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
+def in_order_of_the_scene(dataset: xr.Dataset, names: list[str]) -> list[str]:
     """Return swept parameters as the scene lists them; a displacement before a velocity, as in any phase plane."""
     listed = [column_of(key, names) for key in swept_keys(scene_of(dataset.attrs))]
     plane = ("displacement_start", "velocity_start")
@@ -103,7 +103,7 @@ def is_logarithmic(values: Any) -> bool:
     return bool(np.ptp(steps) <= _NOISE * abs(float(steps.max())))
 
 
-def _edges(values: Any) -> Any:
+def edges(values: Any) -> Any:
     """Return the edges of the cells around ascending or descending values, in their own spacing."""
     logarithmic = is_logarithmic(values)
     places = np.log(values) if logarithmic else np.asarray(values, dtype=np.float64)
@@ -249,7 +249,7 @@ def _draw_maps(dataset: xr.Dataset, quantities: list[tuple[xr.DataArray, str, st
     """Draw values over two swept parameters: a row for each quantity, a column for each direction."""
     if len(varied(dataset)) != 2:
         raise DatasetError(wrong_sweep("two swept parameters", dataset))
-    along, across = _in_order_of_the_scene(dataset, varied(dataset))
+    along, across = in_order_of_the_scene(dataset, varied(dataset))
     if dataset["run_id"].dims == (_SCATTERED,):
         quantities = [(_nearest(values, along, across), text, none) for values, text, none in quantities]
     elif "run" in dataset["run_id"].dims:
@@ -320,8 +320,8 @@ def _colours(axis: Axes, values: xr.DataArray, text: str, of_all: Any) -> list[s
     # a logarithm leaves what is below its scale without a colour
     lowest = float(norm.vmin or 0.0) if isinstance(norm, LogNorm) else -math.inf
     mesh = axis.pcolormesh(
-        _edges(values[along].values),
-        _edges(values[across].values),
+        edges(values[along].values),
+        edges(values[across].values),
         np.maximum(values.values, lowest),
         cmap="viridis",
         norm=norm,

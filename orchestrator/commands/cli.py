@@ -43,7 +43,7 @@ PANELS = {
         "estimate",
         "spikes",
     ),
-    "Orbits": ("orbit", "follow", "energies", "resonances"),
+    "Orbits": ("orbit", "follow", "classify", "energies", "resonances"),
     "Exchange": ("fmu", "ssp"),
     "Rigs": ("rig",),
     "Serve": ("serve", "submit", "status", "fetch", "cancel"),

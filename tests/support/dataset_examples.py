@@ -9,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.dataset import Direction, Outcome, RunRecord, build_dataset, with_constants
-from vibroimpact.analysis.dataset.schema import MEASURED_COLUMNS, ORBIT_COLUMNS, RULES
+from vibroimpact.analysis.dataset.schema import CLASS_COLUMNS, MEASURED_COLUMNS, ORBIT_COLUMNS, RULES
 
 PERIODS = 3
 
@@ -165,7 +165,8 @@ def everything(**changes: Any) -> xr.Dataset:
         measured={
             "measurement_flags": np.array([0, 5, 8]),
             **{name: np.ones(3) for name in MEASURED_COLUMNS[1:]},
-            **{name: np.ones(3, dtype=RULES[name].dtype) for name in ORBIT_COLUMNS},
+            **{name: np.ones(3).astype(RULES[name].dtype) for name in (*ORBIT_COLUMNS, *CLASS_COLUMNS[:-1])},
+            CLASS_COLUMNS[-1]: np.array(["", "chance", ""], dtype=object),
         },
         **changes,
     )

@@ -414,7 +414,7 @@ def test_plot_help_has_an_example() -> None:
         (
             ["runs.nc", "-o", "a.png", "--kind", "pie"],
             UsageError,
-            "kind: expected one of auto, bifurcation, branches, map, impacts-per-period, impact-frequency, strobe, run,",
+            "kind: expected one of auto, bifurcation, branches, classes, map, impacts-per-period, impact-frequency",
         ),
     ],
 )

@@ -1,0 +1,236 @@
+"""The class of each run of a dataset: P(p,q), chaos, rest, sticking, no impacts, or unknown and why.
+
+A run shows its state once in each forcing period. A motion repeats after q periods where the distance between states q
+periods apart is 0, or goes to 0: a slow transient of a multiplier near -1 alternates for long, but its distances shrink
+by a constant factor, those of a doubled period do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset.columns import OF_ALL_PERIODS
+from vibroimpact.analysis.dataset.schema import RULES, OrbitClass, Outcome, UnitSystem, attributes_of
+from vibroimpact.fmus.errors import DatasetError
+
+Floats = NDArray[np.float64]
+
+SAME = 1e-6
+"""Distance of two states, over the size of the motion, at which they are one."""
+NEAR_ZERO = 0.1
+"""Limit of shrinking distances, over the last one, that counts as 0."""
+LEAST_DECAY = 1e-4
+"""By which distances shrink at least in a turn, where that tells a transient."""
+FEWEST, FEWEST_OF_CHAOS = 6, 40
+"""Recorded periods below which nothing is said, and below which nothing is called chaos."""
+GROWTH, AHEAD = 0.05, 6
+"""Rate, 1 / period, at which neighbouring states part in chaos; periods that are looked ahead."""
+_STATES = ("strobe_displacement", "strobe_velocity", "displacement_max", "displacement_min")
+
+
+@dataclass(frozen=True, slots=True)
+class RunClass:
+    """The class of a run.
+
+    Attributes
+    ----------
+    kind : OrbitClass
+    impacts, periods : int
+        p and q of what repeats; 0 else, p is -1 where impacts are without number.
+    reason : str
+        Why it is unknown.
+    """
+
+    kind: OrbitClass
+    impacts: int = 0
+    periods: int = 0
+    reason: str = ""
+
+    @property
+    def name(self) -> str:
+        """In words: `P(1,1)`, `P(inf,2)`, `no impacts`, `chaos`, `rest`, `unknown`."""
+        if self.kind in (OrbitClass.periodic, OrbitClass.sticking):
+            return f"P({self.impacts if self.impacts >= 0 else 'inf'},{self.periods})"
+        return str(self.kind.name).replace("_", " ")
+
+
+def classify(dataset: xr.Dataset) -> list[RunClass]:
+    """Return the class of each run, in the order of the file.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As `open_dataset` gives it. It needs the strobe or the extrema of each recorded period, and impacts, or their
+        number in each period; without the latter a motion may be periodic, but impacts are not told.
+
+    Raises
+    ------
+    DatasetError
+        The dataset has one value for all periods, or neither strobe nor extrema.
+    """
+    runs = dataset.vibroimpact.runs
+    columns = [name for name in _STATES if name in runs.variables]
+    if not columns:
+        raise DatasetError("classify: expected strobe or extrema in the dataset, got neither. Record them.")
+    for name in columns:
+        if runs[name].attrs.get("long_name") == OF_ALL_PERIODS.get(name, ""):
+            raise DatasetError(
+                "classify: expected values of each period, got one for all. Run with each_period."
+            )
+    states = np.stack([np.atleast_2d(runs[name].values) for name in columns], axis=-1)
+    counts = runs["impacts_per_period"].values if "impacts_per_period" in runs.variables else None
+    sticks = runs["stick_count"].values if "stick_count" in runs.variables else np.zeros(len(states))
+    outcomes = runs["outcome"].values
+    return [
+        class_of(
+            states[run],
+            None if counts is None else counts[run],
+            Outcome(int(outcomes[run])),
+            bool(sticks[run] > 0),
+        )
+        for run, own in enumerate(states)
+    ]
+
+
+def with_classes(flat: xr.Dataset, classes: Sequence[RunClass], units: UnitSystem) -> xr.Dataset:
+    """Return a one-dimensional dataset with the classes of its runs, as it is written to a file.
+
+    Parameters
+    ----------
+    flat : xarray.Dataset
+        As `read_flat` gives it.
+    classes : sequence of RunClass
+        In the order of its runs.
+    units : {"SI", "nondimensional"}
+    """
+    columns = {
+        "class_kind": [each.kind for each in classes],
+        "class_impacts": [each.impacts for each in classes],
+        "class_periods": [each.periods for each in classes],
+        "class_reason": [each.reason for each in classes],
+    }
+    return flat.assign(
+        {
+            name: ("run", np.array(values, dtype=RULES[name].dtype), attributes_of(name, units))
+            for name, values in columns.items()
+        }
+    )
+
+
+def class_of(
+    states: Floats, impacts: Floats | None, outcome: Outcome = Outcome.ok, has_stuck: bool = False
+) -> RunClass:
+    """Return the class of one run.
+
+    Parameters
+    ----------
+    states : array, shape (period, quantity)
+        What is seen of each forcing period; rows of NaN are left out.
+    impacts : array, shape (period,), or None
+        In each period; infinite in one with a complete chatter; None: not recorded.
+    outcome : Outcome
+    has_stuck : bool
+        Whether it has rested on a stop.
+
+    Examples
+    --------
+    >>> class_of(np.tile([[1.0], [2.0]], (10, 1)), np.tile([1.0, 0.0], 10)).name
+    'P(1,2)'
+    """
+    if outcome is Outcome.stuck:
+        return RunClass(OrbitClass.rest)
+    if outcome is not Outcome.ok:
+        return RunClass(OrbitClass.unknown, reason=f"the run ended by {outcome.name}")
+    there = np.isfinite(states).all(axis=1)
+    if impacts is not None:
+        there &= ~np.isnan(impacts)
+    states, impacts = states[there], None if impacts is None else impacts[there]
+    if len(states) < FEWEST:
+        return RunClass(OrbitClass.unknown, reason=f"fewer than {FEWEST} recorded periods")
+    size = float(np.abs(states).max())
+    scale = np.fmax(np.abs(states).max(axis=0), 1e-3 * size)
+    scaled = states / np.where(scale > 0.0, scale, 1.0)
+    if impacts is not None and not impacts.any() and not has_stuck:
+        return RunClass(OrbitClass.no_impacts if size > 0.0 else OrbitClass.rest)
+    for periods in range(1, len(states) // 2 + 1):
+        if _repeats(scaled, periods):
+            return _repeating(impacts, periods, has_stuck)
+    if len(states) < FEWEST_OF_CHAOS:
+        reason = f"no period up to {len(states) // 2}; {FEWEST_OF_CHAOS} recorded periods tell chaos"
+        return RunClass(OrbitClass.unknown, reason=reason)
+    if _growth(scaled) >= GROWTH:
+        return RunClass(OrbitClass.chaos)
+    return RunClass(
+        OrbitClass.unknown, reason=f"no period up to {len(states) // 2}, and neighbours do not part"
+    )
+
+
+def _repeating(impacts: Floats | None, periods: int, has_stuck: bool) -> RunClass:
+    if impacts is None:
+        return RunClass(
+            OrbitClass.unknown, 0, periods, f"repeats after {periods} periods; impacts are not recorded"
+        )
+    last = impacts[-periods:]
+    if has_stuck or np.isinf(last).any():
+        return RunClass(OrbitClass.sticking, -1, periods)
+    before = impacts[-2 * periods : -periods]
+    if before.size == periods and float(last.sum()) != float(before.sum()):
+        reason = f"repeats after {periods} periods, but not its number of impacts"
+        return RunClass(OrbitClass.unknown, 0, periods, reason)
+    count = round(float(last.sum()))
+    return RunClass(OrbitClass.periodic if count else OrbitClass.no_impacts, count, periods)
+
+
+def _repeats(states: Floats, periods: int) -> bool:
+    """Say whether states `periods` apart are one, or come together by a constant factor."""
+    distances = np.abs(states[periods:] - states[:-periods]).max(axis=1)
+    if distances[-max(periods, 2) :].max() <= SAME:
+        return True
+    # two turns later, of the same place in the orbit, since a multiplier near -1 alternates
+    before, after = distances[: -2 * periods], distances[2 * periods :]
+    if before.size < max(4, 2 * periods) or not (distances > 0.0).all():
+        return False
+    return _goes_to_zero(before, after) or _dies_away(distances)
+
+
+def _goes_to_zero(before: Floats, after: Floats) -> bool:
+    """Say whether after = ratio before + rest is a straight line that leads to 0: a real multiplier."""
+    middle = before.mean()
+    spread = before - middle
+    square = float(spread @ spread)
+    if square <= (1e-9 * middle) ** 2:
+        return False
+    ratio = float(spread @ (after - after.mean())) / square
+    rest = float(after.mean() - ratio * middle)
+    if not ratio < 1.0 - LEAST_DECAY or ratio <= 0.0:
+        return False
+    straight = float(np.abs(after - ratio * before - rest).max()) <= 1e-3 * float(before.max())
+    return straight and abs(rest / (1.0 - ratio)) <= NEAR_ZERO * float(after[-1])
+
+
+def _dies_away(distances: Floats) -> bool:
+    """Say whether distances fall by a lot, and steadily but for a turning multiplier."""
+    thirds = [float(part.max()) for part in np.array_split(distances, 3)]
+    if not (thirds[1] < 0.5 * thirds[0] and thirds[2] < 0.5 * thirds[1]):
+        return False
+    places = np.arange(distances.size)
+    slope, start = np.polyfit(places, np.log(distances), 1)
+    off = float(np.std(np.log(distances) - slope * places - start))
+    return bool(slope < 0.0 and off < 0.25 * abs(slope) * distances.size)
+
+
+def _growth(states: Floats) -> float:
+    """Return the mean rate at which neighbouring states part over some periods, 1 / period (Rosenstein's estimate)."""
+    count = len(states) - AHEAD
+    apart = np.abs(states[:count, None] - states[None, :count]).max(axis=2)
+    np.fill_diagonal(apart, np.inf)
+    nearest = apart.argmin(axis=1)
+    now = apart[np.arange(count), nearest]
+    later = np.abs(states[AHEAD:] - states[nearest + AHEAD]).max(axis=1)
+    told = (now > 0.0) & (later > 0.0)
+    return float(np.mean(np.log(later[told] / now[told]))) / AHEAD if told.any() else 0.0
