@@ -34,7 +34,7 @@ def show_orbits(
         wide_terminal().print(rows)
     kind = (
         f"P({impacts or 1},{periods or 1})"
-        if impacts or periods
+        if impacts is not None or periods is not None
         else "P(1,1), and none that a long run ends on"
     )
     say(f"{counted(len(orbits), 'physical orbit')}." if orbits else f"No physical orbit {kind}.")

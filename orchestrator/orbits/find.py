@@ -37,7 +37,7 @@ def find_orbits(scene: Scene, impacts: int | None = None, periods: int | None = 
     alone = scene.with_sweep({}) if scene.sweep else scene
     body = impacting_body(alone)
     if impacts is not None or periods is not None:
-        return orbits_of(body, impacts or 1, periods or 1)
+        return orbits_of(body, 1 if impacts is None else impacts, 1 if periods is None else periods)
     found = orbits_of(body)
     reached = orbit_of_run(alone)
     if reached is not None and not any(same_orbit(reached, other) for other in found):

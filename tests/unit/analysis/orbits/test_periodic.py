@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, OrbitError, closed_form, find_orbit
+from vibroimpact.analysis.orbits.periodic import shortened
 from vibroimpact.fmus.errors import UsageError
 
 
@@ -90,3 +91,17 @@ def test_what_is_no_orbit_is_said() -> None:
         find_orbit(body, [0.3], [1])
     with pytest.raises(OrbitError, match="got an undamped one in resonance"):
         closed_form(oscillator(0.45, 1.0, 0.0))
+
+
+@pytest.mark.parametrize(("frequency", "periods"), [(2.0, 2), (3.0, 3), (0.5, 1), (1.5, 3)])
+def test_an_undamped_mode_that_is_back_after_the_orbit_is_refused_without_a_resonant_force(
+    frequency: float, periods: int
+) -> None:
+    with pytest.raises(OrbitError, match="got an undamped one in resonance"):
+        closed_form(oscillator(0.9, frequency, 0.0), periods)
+
+
+def test_impacts_that_fall_together_are_said() -> None:
+    phases = np.array([1.0, 1.0 + 2.0 * np.pi])
+    with pytest.raises(OrbitError, match="expected impacts one after the other, got two at one phase"):
+        shortened(np.array([0.1, 0.2]), phases, 1)
