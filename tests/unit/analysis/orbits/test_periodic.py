@@ -7,6 +7,7 @@ import pytest
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, OrbitError, closed_form, find_orbit
 from vibroimpact.analysis.orbits.periodic import shortened
+from vibroimpact.fmus.core.modes import chain_modes
 from vibroimpact.fmus.errors import UsageError
 
 
@@ -76,6 +77,51 @@ def test_derivatives_over_the_phases_are_those_of_differences() -> None:
         np.testing.assert_allclose(found.distance_slopes[:, k], slope, atol=1e-8)
         faster = (ends[0].velocities - ends[1].velocities) / (2.0 * h)
         np.testing.assert_allclose(found.velocity_slopes[:, k], faster, atol=1e-8)
+
+
+def test_the_flip_of_the_worked_example_has_a_multiplier_of_minus_one() -> None:
+    # equations.md 4.5
+    (orbit,) = closed_form(oscillator(0.450214238658253, 0.88))
+    assert orbit.velocities[0] == pytest.approx(0.603188578597231, abs=1e-13)
+    assert orbit.multipliers[0] == pytest.approx(-1.0, abs=1e-12)
+
+
+def test_at_the_fold_of_the_worked_example_two_orbits_meet_and_end() -> None:
+    # equations.md 4.5; multipliers part with the root of the distance from the fold
+    force = 0.180607698844102
+    assert closed_form(oscillator(force - 1e-9, 1.35)) == ()
+    fast, slow = closed_form(oscillator(force + 1e-9, 1.35))
+    assert fast.velocities[0] == pytest.approx(0.914676801783975, abs=1e-4)
+    assert (fast.multipliers[0].real, slow.multipliers[0].real) == pytest.approx((0.99989, 1.00011), abs=1e-5)
+
+
+@pytest.mark.parametrize(("frequency", "physical"), [(0.8358, False), (0.8359, True), (0.839, True)])
+def test_physical_orbits_end_at_the_graze_of_a_maximum_between_impacts(
+    frequency: float, physical: bool
+) -> None:
+    # equations.md 9: the P(1,2) of damping ratio .1 grazes at .83585707234244, and at .839 still misses the stop
+    (orbit,) = closed_form(oscillator(0.5, frequency, 0.1, 1.0, 0.7), 2)
+    assert orbit.is_physical is physical
+    (at_graze,) = closed_form(oscillator(0.5, 0.83585707234244, 0.1, 1.0, 0.7), 2)
+    assert abs(at_graze.highest[0]) <= 1e-12
+    assert at_graze.highest[2] == 0
+
+
+def test_the_chain_of_the_energy_example_penetrates() -> None:
+    # equations.md 5.4: "that orbit penetrates: algebra test only"
+    modes = chain_modes(
+        np.array([1.0, 2.0, 0.5]), np.array([3.0, 1.0, 2.0, 0.0]), 0.04 * np.array([3, 1, 2, 0])
+    )
+    force = np.array([0.6, 0.0, 0.2]) @ modes.shapes
+    contact = Contact(modes.shapes[-1], 1.0, 0.1, 0.6)
+    body = ImpactingBody(
+        modes.frequencies, modes.damping_ratios, force, 0.0 * force, 0.75, 0.0, (contact,), modes.shapes[-1]
+    )
+    orbits = closed_form(body)
+    assert len(orbits) > 0
+    assert not any(orbit.is_physical for orbit in orbits)
+    assert contact.mass == pytest.approx(0.5, rel=1e-14)
+    assert all(orbit.highest[0] > 0.0 for orbit in orbits)
 
 
 def test_what_is_no_orbit_is_said() -> None:
