@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, OrbitError, closed_form, find_orbit
-from vibroimpact.analysis.orbits.periodic import shortened
+from vibroimpact.analysis.orbits.periodic import PeriodicOrbit, shortened
+from vibroimpact.analysis.orbits.search import orbits_of
 from vibroimpact.fmus.core.modes import chain_modes
 from vibroimpact.fmus.errors import UsageError
 
@@ -122,6 +123,36 @@ def test_the_chain_of_the_energy_example_penetrates() -> None:
     assert not any(orbit.is_physical for orbit in orbits)
     assert contact.mass == pytest.approx(0.5, rel=1e-14)
     assert all(orbit.highest[0] > 0.0 for orbit in orbits)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 1.0, 1.0 + 1e-9, 3.0, 40.0])
+def test_the_motion_between_impacts_ends_where_the_next_impact_is(ratio: float) -> None:
+    # a stiff mode of high damping decays as exp(-2 ratio natural u): a cosh of it would overflow
+    shape = np.array([1.0, 0.4])
+    natural, ratios, force = np.array([1.0, 60.0]), np.array([0.05, ratio]), np.array([0.5, 0.2])
+    contact = Contact(shape, 1.0, 0.3, 0.7)
+    body = ImpactingBody(natural, ratios, force, 0.0 * force, 0.9, 0.0, (contact,), shape)
+    for orbit in closed_form(body):
+        phases = orbit.phases[0] + np.linspace(0.0, 2.0 * np.pi, 200)
+        x, v = orbit.at(phases)
+        assert np.isfinite([x, v]).all()
+        assert x[[0, -1]] == pytest.approx(0.3, abs=1e-9)
+        assert v[0] == pytest.approx(-0.7 * orbit.velocities[0], abs=1e-9)
+        assert v[-1] == pytest.approx(orbit.velocities[0], abs=1e-9)
+
+
+def test_a_body_at_rest_on_its_stop_has_no_orbit() -> None:
+    still = oscillator(0.0, 1.1, position=0.0)
+    assert closed_form(still) == ()
+    assert orbits_of(still, 2, 3, starts=8, penetrating=True) == []
+
+
+def test_the_determinant_of_a_graze_is_none() -> None:
+    body = oscillator(0.45, 1.1)
+    (orbit,) = closed_form(body)
+    graze = PeriodicOrbit(body, 1, orbit.phases, orbit.contacts, 0.0 * orbit.velocities)
+    assert np.isnan(graze.determinant)
+    assert np.isnan(graze.multipliers).all()
 
 
 def test_what_is_no_orbit_is_said() -> None:
