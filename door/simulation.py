@@ -327,7 +327,12 @@ def sensitivity(
 
 
 def find_orbits(
-    scene: SceneLike, impacts: int | None = None, periods: int | None = None
+    scene: SceneLike,
+    impacts: int | None = None,
+    periods: int | None = None,
+    *,
+    seed: Sequence[tuple[float, int]] | None = None,
+    penetrating: bool = False,
 ) -> list[PeriodicOrbit]:
     """Find periodic orbits of a scene, stable and unstable ones.
 
@@ -337,6 +342,10 @@ def find_orbits(
         An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
     impacts, periods : int, optional
         p and q of P(p,q). Without them, all orbits P(1,1), and the orbit that a long run ends on.
+    seed : sequence of (phase, stop), optional
+        Forcing phases, rad, of impacts near to those of one orbit, and their stops, from 1: that orbit alone.
+    penetrating : bool
+        Whether orbits that pass through a stop between impacts are returned as well.
 
     Returns
     -------
@@ -347,6 +356,8 @@ def find_orbits(
     ------
     UsageError
         Orbits of the scene are not followed.
+    OrbitError
+        There is no orbit near to the seed.
 
     Examples
     --------
@@ -358,7 +369,7 @@ def find_orbits(
     P(1,1) [1.884299] True
     P(1,1) [0.787422] False
     """
-    return orbits_of_scene(_scene(scene), impacts, periods)
+    return orbits_of_scene(_scene(scene), impacts, periods, seed=seed, penetrating=penetrating)
 
 
 def follow(

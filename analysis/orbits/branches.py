@@ -57,6 +57,30 @@ def dataset_of_branches(
     )
 
 
+def dataset_of_orbits(
+    orbits: Sequence[PeriodicOrbit], *, units: UnitSystem = "SI", attrs: Mapping[str, Any] | None = None
+) -> xr.Dataset:
+    """Return orbits of one body as the runs of a dataset, each a branch of its own, over their forcing frequency.
+
+    Parameters
+    ----------
+    orbits : sequence of PeriodicOrbit
+        One at least.
+    units : {"SI", "nondimensional"}
+    attrs : mapping, optional
+        Attributes of the file.
+    """
+    return _dataset(
+        orbits,
+        range(1, len(orbits) + 1),
+        [SpecialOrbit.none] * len(orbits),
+        {"angular_frequency": np.array([each.body.angular_frequency for each in orbits])},
+        {"angular_frequency": "rad s-1" if units == "SI" else "1"},
+        units,
+        attrs,
+    )
+
+
 def dataset_of_loci(
     loci: Sequence[Locus],
     *,

@@ -82,7 +82,9 @@ class PeriodicOrbit:
 
     @property
     def determinant(self) -> float:
-        """Of the monodromy matrix."""
+        """Of the monodromy matrix; NaN of a graze."""
+        if not np.isfinite(self.monodromy).all():
+            return float("nan")
         return float(np.linalg.det(self.monodromy))
 
     @property
@@ -123,6 +125,12 @@ class PeriodicOrbit:
             if same and (np.roll(self.contacts, -(p // turns)) == self.contacts).all():
                 return turns
         return 1
+
+    @property
+    def once(self) -> PeriodicOrbit:
+        """The same motion, counted once."""
+        p, q = self.phases.size // self.turns, self.periods // self.turns
+        return PeriodicOrbit(self.body, q, self.phases[:p], self.contacts[:p], self.velocities[:p])
 
     def at(self, phases: Floats) -> tuple[Floats, Floats]:
         """Return displacement and velocity of the observed point at phases from the first impact on.
@@ -223,6 +231,10 @@ def _nearer(
 def shortened(step: Floats, phases: Floats, periods: int) -> Floats:
     """Return a step of the phases, or a part of it that keeps the impacts in their order and within their train."""
     gaps = np.append(np.diff(phases), phases[0] + TURN * periods - phases[-1])
+    if not gaps.min() > 0.0:
+        raise OrbitError(
+            f"orbit: expected impacts one after the other, got two at one phase of {np.round(phases, 6).tolist()}."
+        )
     closing = np.append(np.diff(-step), -step[0] + step[-1])
     most = float(np.max(-closing / gaps, initial=0.0))
     part = min(1.0, 0.5 / most if most > 0.0 else 1.0, 0.5 / max(float(np.abs(step).max()), 0.5))
@@ -256,7 +268,7 @@ def closed_form(body: ImpactingBody, periods: int = 1, contact: int = 0) -> tupl
     level, cosine = 0.5 * (at[0] + at[2]), 0.5 * (at[0] - at[2])
     sine = at[1] - level
     size = float(np.hypot(cosine, sine))
-    if not abs(level) <= size:
+    if not 0.0 < size >= abs(level):
         return ()
     middle, off = np.arctan2(sine, cosine), np.arccos(np.clip(-level / size, -1.0, 1.0))
     orbits = []
@@ -289,13 +301,16 @@ def _observed(orbit: PeriodicOrbit, phases: Floats) -> tuple[Floats, Floats]:
     now = _steady(body, phases)
     x, v = after[:, :modes] - start[0], after[:, modes:] - start[1]
     w, z = body.frequencies, body.damping_ratios
-    decay, rate = z * w, np.sqrt(np.abs(1.0 - z**2)) * w + 0j
-    rate = np.where(z > 1.0, 1j * rate, rate)
-    c = np.cos(rate * u)
-    s = np.where(rate == 0.0, u, np.sin(rate * u) / np.where(rate == 0.0, 1.0, rate))
-    gone = np.exp(-decay * u)
-    moved = (gone * ((c + decay * s) * x + s * v)).real + now[0]
-    faster = (gone * (-(w**2) * s * x + (c - decay * s) * v)).real + now[1]
+    decay, rate = z * w, np.sqrt(np.abs(1.0 - z**2)) * w
+    # exponentials that decay, never a cosh that overflows: equations.md 1.2
+    fast = np.where(z > 1.0, -(decay + rate), -decay - 1j * rate)
+    slow = np.where(z > 1.0, -(w**2) / (decay + rate), -decay + 1j * rate)
+    left, gone = np.exp(slow * u), np.exp(fast * u)
+    apart = np.where(rate == 0.0, 1.0, slow - fast)
+    c = 0.5 * (left + gone)
+    s = np.where(rate == 0.0, u * left, (left - gone) / apart)
+    moved = ((c + decay * s) * x + s * v).real + now[0]
+    faster = (-(w**2) * s * x + (c - decay * s) * v).real + now[1]
     return moved @ body.observed, faster @ body.observed
 
 

@@ -25,7 +25,12 @@ MOST_SPEEDS = 1e-6
 
 
 def orbits_of(
-    body: ImpactingBody, impacts: int = 1, periods: int = 1, *, starts: int = STARTS
+    body: ImpactingBody,
+    impacts: int = 1,
+    periods: int = 1,
+    *,
+    starts: int = STARTS,
+    penetrating: bool = False,
 ) -> list[PeriodicOrbit]:
     """Return the physical orbits P(p,q) that are found, stable or not, the fastest impact first.
 
@@ -39,6 +44,8 @@ def orbits_of(
         p and q.
     starts : int
         How many trains are tried.
+    penetrating : bool
+        Whether orbits that pass through a stop between impacts are returned as well: formal solutions only.
 
     Raises
     ------
@@ -55,7 +62,7 @@ def orbits_of(
         ]
     else:
         found = _from_starts(body, impacts, periods, starts)
-    kept = [orbit for orbit in found if orbit.is_physical and orbit.turns == 1]
+    kept = [orbit for orbit in found if orbit.turns == 1 and (penetrating or orbit.is_physical)]
     return sorted(kept, key=lambda orbit: -float(orbit.velocities.max()))
 
 
@@ -83,8 +90,8 @@ def _from_starts(body: ImpactingBody, impacts: int, periods: int, starts: int) -
             orbit = find_orbit(body, phases, contacts.tolist(), periods)
         except OrbitError:
             continue
-        slow = orbit.velocities.min() < MOST_SPEEDS * float(np.abs(orbit.velocities).max())
-        if not slow and not any(same_orbit(orbit, other) for other in found):
+        hits = orbit.velocities.min() > MOST_SPEEDS * float(np.abs(orbit.velocities).max())
+        if hits and not any(same_orbit(orbit, other) for other in found):
             found.append(orbit)
     return found
 

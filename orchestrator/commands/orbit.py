@@ -3,26 +3,83 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from vibroimpact.analysis.dataset.outputs import refuse_outputs, writing
+from vibroimpact.analysis.dataset import write_dataset
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.orbits import PeriodicOrbit
+from vibroimpact.analysis.orbits.branches import dataset_of_orbits
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import say, wide_terminal
 from vibroimpact.orchestrator.commands.failures import counted
 from vibroimpact.orchestrator.orbits.find import find_orbits
+from vibroimpact.orchestrator.orbits.follow import scene_attributes
+from vibroimpact.orchestrator.scene import Scene
 from vibroimpact.orchestrator.ssp import opened_scene
+
+HISTORY = "periodic orbits found by vibroimpact"
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Orbits that are looked for, as options give them."""
+
+    impacts: int | None
+    periods: int | None
+    seed: str | None
+    penetrating: bool
+
+    @property
+    def impacts_of_seed(self) -> list[tuple[float, int]] | None:
+        """Phase and stop of each impact.
+
+        Raises
+        ------
+        UsageError
+            The text is none of these.
+        """
+        if self.seed is None:
+            return None
+        found = []
+        for each in self.seed.split(","):
+            phase, _, stop = each.partition(":")
+            try:
+                found.append((float(phase), int(stop or "1")))
+            except ValueError:
+                raise UsageError(
+                    f"--seed: expected phases in rad, each with :STOP where it is not 1, got {self.seed!r}. "
+                    'For example "0.5:1,3.6:2".'
+                ) from None
+        return found
+
+    @property
+    def text(self) -> str:
+        """What they are called."""
+        if self.seed is not None:
+            return "near to the seed"
+        if self.impacts is None and self.periods is None:
+            return "P(1,1), and none that a long run ends on"
+        return f"P({self.impacts or 1},{self.periods or 1})"
 
 
 def show_orbits(
-    path: Path, impacts: int | None, periods: int | None, changes: Sequence[str], figure: Path | None
+    path: Path,
+    wanted: Wanted,
+    changes: Sequence[str],
+    output: Path | None,
+    figure: Path | None,
+    force: bool,
 ) -> None:
-    """Find orbits, print them, and draw them where that was asked for."""
-    refuse_outputs([path], None, figure)
+    """Find orbits, print them, and write and draw them where that was asked for."""
+    seed = wanted.impacts_of_seed
+    refuse_outputs([path], output, figure)
     scene = opened_scene(path, changes)
-    orbits = find_orbits(scene, impacts, periods)
+    refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
+    orbits = find_orbits(scene, wanted.impacts, wanted.periods, seed=seed, penetrating=wanted.penetrating)
     rows = table(
         f"Periodic orbits: {scene.title or scene.source}",
         *("<orbit", "<", "<phases, rad", "<stops", "<impact velocities"),
@@ -32,12 +89,9 @@ def show_orbits(
         rows.add_row(*_told(orbit))
     if orbits:
         wide_terminal().print(rows)
-    kind = (
-        f"P({impacts or 1},{periods or 1})"
-        if impacts or periods
-        else "P(1,1), and none that a long run ends on"
-    )
-    say(f"{counted(len(orbits), 'physical orbit')}." if orbits else f"No physical orbit {kind}.")
+    physical = [orbit for orbit in orbits if orbit.is_physical]
+    say(f"{counted(len(physical), 'physical orbit')}." if physical else f"No physical orbit {wanted.text}.")
+    _write(scene, physical, output)
     if figure is not None and orbits:
         from vibroimpact.analysis import figures  # half a second, which a table needs not
         from vibroimpact.analysis.figures.orbits import draw_orbits
@@ -45,6 +99,17 @@ def show_orbits(
         with writing(figure):
             figures.save(draw_orbits(orbits, scene.units), figure)
         say(f"Figure written to {figure}.")
+
+
+def _write(scene: Scene, physical: Sequence[PeriodicOrbit], output: Path | None) -> None:
+    if output is None:
+        return
+    if not physical:
+        say(f"{output} is not written: it would hold no orbit.")
+        return
+    attrs = scene_attributes(scene.with_sweep({}) if scene.sweep else scene, HISTORY)
+    write_dataset(dataset_of_orbits(physical, units=scene.units, attrs=attrs), output)
+    say(f"Dataset written to {output}.")
 
 
 def multiplier_text(value: complex) -> str:
@@ -64,5 +129,14 @@ def _told(orbit: PeriodicOrbit) -> tuple[str, ...]:
         ", ".join(f"{speed:.10g}" for speed in orbit.velocities),
         ", ".join(multiplier_text(each) for each in orbit.multipliers[:2]),
         f"{orbit.exact_determinant:.6g}, {off:.0e}",
-        "none" if orbit.highest[2] < 0 else f"{-orbit.highest[0]:.3g} below stop {orbit.highest[2] + 1}",
+        _nearest(orbit),
     )
+
+
+def _nearest(orbit: PeriodicOrbit) -> str:
+    beyond, _, contact = orbit.highest
+    if contact < 0:
+        return "none"
+    if orbit.is_physical:
+        return f"{-beyond:.3g} below stop {contact + 1}"
+    return f"penetrates stop {contact + 1} by {beyond:.3g}"

@@ -21,19 +21,33 @@ def orbit(
     scene: SceneFile,
     impacts: Annotated[int | None, typer.Option(help="Impacts of an orbit.")] = None,
     periods: Annotated[int | None, typer.Option(help="Forcing periods of an orbit.")] = None,
+    seed: Annotated[
+        str | None,
+        typer.Option(
+            metavar="PHASE:STOP,...",
+            help="Forcing phases (rad) of impacts near to those of an orbit, and their stops (1).",
+        ),
+    ] = None,
+    penetrating: Annotated[
+        bool, typer.Option("--penetrating", help="Tell orbits that pass through a stop as well.")
+    ] = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
     figure: FigureFile = None,
     changes: Changes = None,
+    force: Force = False,
 ) -> None:
     """Find periodic orbits of a scene, stable and unstable ones, and say what their multipliers are.
 
-    Without --impacts and --periods all orbits of one impact a period, and the orbit that a long run ends on. Each is
-    nowhere beyond a stop: all maxima between its impacts are found, the nearest to a stop is told.
+    Without --impacts and --periods all orbits of one impact a period, and the orbit that a long run ends on; with
+    --seed the orbit near to it. Each is nowhere beyond a stop: all maxima between its impacts are found, the nearest to
+    a stop is told.
 
     Example: vibroimpact orbit examples/bifurcation.toml --set "sweep={}" --impacts 2 --periods 2 --figure orbits.png
     """
-    from vibroimpact.orchestrator.commands.orbit import show_orbits
+    from vibroimpact.orchestrator.commands.orbit import Wanted, show_orbits
 
-    show_orbits(scene, impacts, periods, changes or (), figure)
+    wanted = Wanted(impacts, periods, seed, penetrating)
+    show_orbits(scene, wanted, changes or (), output, figure, force)
 
 
 def follow(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from vibroimpact.analysis.orbits import OrbitError, PeriodicOrbit, find_orbit
+from vibroimpact.analysis.orbits import ImpactingBody, OrbitError, PeriodicOrbit, find_orbit
 from vibroimpact.analysis.orbits.search import orbits_of, same_orbit
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
@@ -19,7 +21,18 @@ REPEATS = 1e-4
 """Difference of phases, rad, up to which a run has come near to an orbit; Newton's method does the rest."""
 
 
-def find_orbits(scene: Scene, impacts: int | None = None, periods: int | None = None) -> list[PeriodicOrbit]:
+Seed = Sequence[tuple[float, int]]
+"""Forcing phase, rad, and stop, from 1, of each impact of a train to begin with."""
+
+
+def find_orbits(
+    scene: Scene,
+    impacts: int | None = None,
+    periods: int | None = None,
+    *,
+    seed: Seed | None = None,
+    penetrating: bool = False,
+) -> list[PeriodicOrbit]:
     """Return periodic orbits of a scene, stable and unstable.
 
     Parameters
@@ -28,21 +41,49 @@ def find_orbits(scene: Scene, impacts: int | None = None, periods: int | None = 
         An oscillator, a chain or a beam on restitution stops under a harmonic force; its sweep is left out.
     impacts, periods : int, optional
         p and q. Without them, all orbits P(1,1) and the orbit that a long run of the scene ends on.
+    seed : sequence of (phase, stop), optional
+        Impacts near to those of one orbit, phases ascending within `periods`; that orbit alone is looked for, physical
+        or not.
+    penetrating : bool
+        Whether orbits that pass through a stop between impacts are returned as well.
 
     Raises
     ------
     UsageError
         The scene has no such orbits to be looked for.
+    OrbitError
+        There is no orbit near to the seed.
     """
     alone = scene.with_sweep({}) if scene.sweep else scene
     body = impacting_body(alone)
+    if seed is not None:
+        return [_of_seed(body, seed, impacts, 1 if periods is None else periods)]
     if impacts is not None or periods is not None:
-        return orbits_of(body, impacts or 1, periods or 1)
-    found = orbits_of(body)
+        counts = 1 if impacts is None else impacts, 1 if periods is None else periods
+        return orbits_of(body, *counts, penetrating=penetrating)
+    found = orbits_of(body, penetrating=penetrating)
     reached = orbit_of_run(alone)
     if reached is not None and not any(same_orbit(reached, other) for other in found):
         found.append(reached)
     return found
+
+
+def _of_seed(body: ImpactingBody, seed: Seed, impacts: int | None, periods: int) -> PeriodicOrbit:
+    if impacts not in (None, len(seed)):
+        raise UsageError(
+            f"orbit: seed: expected {impacts} impacts, as many as the orbit has, got {len(seed)}."
+        )
+    for _, stop in seed:
+        if not 1 <= stop <= len(body.contacts):
+            raise UsageError(f"orbit: seed: expected stops 1 to {len(body.contacts)}, got {stop}.")
+    phases, contacts = [phase for phase, _ in seed], [stop - 1 for _, stop in seed]
+    orbit = find_orbit(body, phases, contacts, periods)
+    if not (orbit.velocities > 0.0).all():
+        raise OrbitError(
+            "orbit: expected impacts towards the stops near to the seed, got velocities "
+            f"{orbit.velocities.round(6).tolist()}. Try other phases."
+        )
+    return orbit.once
 
 
 def orbit_of_run(scene: Scene) -> PeriodicOrbit | None:

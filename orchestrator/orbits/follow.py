@@ -38,6 +38,17 @@ SAME_ORBIT = 0.02
 Told = Callable[[Branch, BranchOrbit], None]
 
 
+def scene_attributes(scene: Scene, history: str) -> dict[str, Any]:
+    """Return the attributes of a file of orbits of a scene."""
+    return {
+        "title": scene.title or Path(scene.source).stem,
+        "history": history,
+        "source": f"vibroimpact {versions()['vibroimpact']}, scene {Path(scene.source).name}",
+        "scene": scene.text,
+        "git_commit": git_commit(),
+    }
+
+
 @dataclass(slots=True)
 class Followed:
     """What was followed.
@@ -58,15 +69,7 @@ class Followed:
     @property
     def attributes(self) -> dict[str, Any]:
         """Of the file of its orbits."""
-        scene = self.scene
-        return {
-            "title": scene.title or Path(scene.source).stem,
-            "history": HISTORY,
-            "source": f"vibroimpact {versions()['vibroimpact']}, scene {Path(scene.source).name}",
-            "scene": scene.text,
-            "git_commit": git_commit(),
-            "parameter": self.parameter,
-        }
+        return scene_attributes(self.scene, HISTORY) | {"parameter": self.parameter}
 
     @property
     def dataset(self) -> xr.Dataset:

@@ -1,5 +1,6 @@
 #include "door/orbit_response.h"
 
+#include <float.h>
 #include <math.h>
 #include <stdbool.h>
 
@@ -48,7 +49,9 @@ static bool start_of_train(const vi_mode *mode, double length, double start[2])
         whole = expm1(-mode->slow * length) * expm1(-mode->fast * length);
         moved = 1.0 - phi[0];
     }
-    if (!(whole > 0.0)) {
+    /* an undamped mode that returns after whole turns: the angle, and so 1 - Phi, is known to its rounding alone */
+    const double rounding = 4.0 * DBL_EPSILON * (1.0 + mode->natural * length);
+    if (!(whole > rounding * rounding)) {
         return false;
     }
     start[0] = phi[1] / whole;

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody, OrbitError, closed_form, find_orbit
+from vibroimpact.analysis.orbits.periodic import PeriodicOrbit, shortened
+from vibroimpact.analysis.orbits.search import orbits_of
+from vibroimpact.fmus.core.modes import chain_modes
 from vibroimpact.fmus.errors import UsageError
 
 
@@ -77,6 +80,81 @@ def test_derivatives_over_the_phases_are_those_of_differences() -> None:
         np.testing.assert_allclose(found.velocity_slopes[:, k], faster, atol=1e-8)
 
 
+def test_the_flip_of_the_worked_example_has_a_multiplier_of_minus_one() -> None:
+    # equations.md 4.5
+    (orbit,) = closed_form(oscillator(0.450214238658253, 0.88))
+    assert orbit.velocities[0] == pytest.approx(0.603188578597231, abs=1e-13)
+    assert orbit.multipliers[0] == pytest.approx(-1.0, abs=1e-12)
+
+
+def test_at_the_fold_of_the_worked_example_two_orbits_meet_and_end() -> None:
+    # equations.md 4.5; multipliers part with the root of the distance from the fold
+    force = 0.180607698844102
+    assert closed_form(oscillator(force - 1e-9, 1.35)) == ()
+    fast, slow = closed_form(oscillator(force + 1e-9, 1.35))
+    assert fast.velocities[0] == pytest.approx(0.914676801783975, abs=1e-4)
+    assert (fast.multipliers[0].real, slow.multipliers[0].real) == pytest.approx((0.99989, 1.00011), abs=1e-5)
+
+
+@pytest.mark.parametrize(("frequency", "physical"), [(0.8358, False), (0.8359, True), (0.839, True)])
+def test_physical_orbits_end_at_the_graze_of_a_maximum_between_impacts(
+    frequency: float, physical: bool
+) -> None:
+    # equations.md 9: the P(1,2) of damping ratio .1 grazes at .83585707234244, and at .839 still misses the stop
+    (orbit,) = closed_form(oscillator(0.5, frequency, 0.1, 1.0, 0.7), 2)
+    assert orbit.is_physical is physical
+    (at_graze,) = closed_form(oscillator(0.5, 0.83585707234244, 0.1, 1.0, 0.7), 2)
+    assert abs(at_graze.highest[0]) <= 1e-12
+    assert at_graze.highest[2] == 0
+
+
+def test_the_chain_of_the_energy_example_penetrates() -> None:
+    # equations.md 5.4: "that orbit penetrates: algebra test only"
+    modes = chain_modes(
+        np.array([1.0, 2.0, 0.5]), np.array([3.0, 1.0, 2.0, 0.0]), 0.04 * np.array([3, 1, 2, 0])
+    )
+    force = np.array([0.6, 0.0, 0.2]) @ modes.shapes
+    contact = Contact(modes.shapes[-1], 1.0, 0.1, 0.6)
+    body = ImpactingBody(
+        modes.frequencies, modes.damping_ratios, force, 0.0 * force, 0.75, 0.0, (contact,), modes.shapes[-1]
+    )
+    orbits = closed_form(body)
+    assert len(orbits) > 0
+    assert not any(orbit.is_physical for orbit in orbits)
+    assert contact.mass == pytest.approx(0.5, rel=1e-14)
+    assert all(orbit.highest[0] > 0.0 for orbit in orbits)
+
+
+@pytest.mark.parametrize("ratio", [0.05, 1.0, 1.0 + 1e-9, 3.0, 40.0])
+def test_the_motion_between_impacts_ends_where_the_next_impact_is(ratio: float) -> None:
+    # a stiff mode of high damping decays as exp(-2 ratio natural u): a cosh of it would overflow
+    shape = np.array([1.0, 0.4])
+    natural, ratios, force = np.array([1.0, 60.0]), np.array([0.05, ratio]), np.array([0.5, 0.2])
+    contact = Contact(shape, 1.0, 0.3, 0.7)
+    body = ImpactingBody(natural, ratios, force, 0.0 * force, 0.9, 0.0, (contact,), shape)
+    for orbit in closed_form(body):
+        phases = orbit.phases[0] + np.linspace(0.0, 2.0 * np.pi, 200)
+        x, v = orbit.at(phases)
+        assert np.isfinite([x, v]).all()
+        assert x[[0, -1]] == pytest.approx(0.3, abs=1e-9)
+        assert v[0] == pytest.approx(-0.7 * orbit.velocities[0], abs=1e-9)
+        assert v[-1] == pytest.approx(orbit.velocities[0], abs=1e-9)
+
+
+def test_a_body_at_rest_on_its_stop_has_no_orbit() -> None:
+    still = oscillator(0.0, 1.1, position=0.0)
+    assert closed_form(still) == ()
+    assert orbits_of(still, 2, 3, starts=8, penetrating=True) == []
+
+
+def test_the_determinant_of_a_graze_is_none() -> None:
+    body = oscillator(0.45, 1.1)
+    (orbit,) = closed_form(body)
+    graze = PeriodicOrbit(body, 1, orbit.phases, orbit.contacts, 0.0 * orbit.velocities)
+    assert np.isnan(graze.determinant)
+    assert np.isnan(graze.multipliers).all()
+
+
 def test_what_is_no_orbit_is_said() -> None:
     body = oscillator(0.1, 1.6)
     assert closed_form(body) == ()
@@ -90,3 +168,17 @@ def test_what_is_no_orbit_is_said() -> None:
         find_orbit(body, [0.3], [1])
     with pytest.raises(OrbitError, match="got an undamped one in resonance"):
         closed_form(oscillator(0.45, 1.0, 0.0))
+
+
+@pytest.mark.parametrize(("frequency", "periods"), [(2.0, 2), (3.0, 3), (0.5, 1), (1.5, 3)])
+def test_an_undamped_mode_that_is_back_after_the_orbit_is_refused_without_a_resonant_force(
+    frequency: float, periods: int
+) -> None:
+    with pytest.raises(OrbitError, match="got an undamped one in resonance"):
+        closed_form(oscillator(0.9, frequency, 0.0), periods)
+
+
+def test_impacts_that_fall_together_are_said() -> None:
+    phases = np.array([1.0, 1.0 + 2.0 * np.pi])
+    with pytest.raises(OrbitError, match="expected impacts one after the other, got two at one phase"):
+        shortened(np.array([0.1, 0.2]), phases, 1)

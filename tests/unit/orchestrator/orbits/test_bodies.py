@@ -8,6 +8,7 @@ from support.places import ROOT
 
 import vibroimpact as vi
 from vibroimpact.analysis.orbits import closed_form
+from vibroimpact.analysis.orbits.search import orbits_of
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.orbits import impacting_body
 from vibroimpact.orchestrator.scene import load_scene, parse_scene
@@ -42,6 +43,35 @@ def test_a_stable_orbit_is_what_a_long_run_of_the_fmu_ends_on(text: str) -> None
     run = vi.run(parse_scene(text + RECORD, "scene.toml"))
     np.testing.assert_allclose(run["impact_velocity"], orbit.velocities[0], rtol=1e-10)
     np.testing.assert_allclose(run["impact_phase"], orbit.phases[0], atol=1e-10)
+
+
+TWO_STOPS = (
+    '[scene]\nunits = "nondimensional"\n[body]\nmass = 1\nstiffness = 1\ndamping_ratio = 0.05\n'
+    "[forcing]\namplitude = 1.2\nangular_frequency = 2.0\n"
+    "[[stop]]\nposition = 0.3\nrestitution = 0.7\n"
+    '[[stop]]\nposition = -0.35\nside = "lower"\nrestitution = 0.6\n'
+)
+TWICE = (
+    '[scene]\nunits = "nondimensional"\n[body]\nmass = 1\nstiffness = 1\ndamping_ratio = 0.04\n'
+    "[forcing]\namplitude = 0.44\nangular_frequency = 0.88\n"
+    "[[stop]]\nposition = 0.8\nrestitution = 0.75\n"
+)
+
+
+@pytest.mark.parametrize(("text", "periods"), [(TWO_STOPS, 1), (TWICE, 2)], ids=["two stops", "P(2,2)"])
+def test_a_stable_orbit_of_two_impacts_is_what_a_long_run_of_the_fmu_ends_on(text: str, periods: int) -> None:
+    scene = parse_scene(text + RECORD.replace("= 400", "= 1000"), "scene.toml")
+    (orbit,) = (each for each in orbits_of(impacting_body(scene), 2, periods, starts=64) if each.is_stable)
+    run = vi.run(scene)
+    count = 2 * 2 // periods  # two impacts in each orbit, two periods recorded
+    assert run["impact_velocity"].size == count
+    order = np.argsort(run["impact_velocity"].values[:2])
+    known = np.argsort(orbit.velocities)
+    np.testing.assert_allclose(run["impact_velocity"].values[:2][order], orbit.velocities[known], rtol=1e-10)
+    np.testing.assert_allclose(
+        run["impact_phase"].values[:2][order], np.mod(orbit.phases, 2.0 * np.pi)[known], atol=1e-10
+    )
+    assert (run["impact_contact"].values[:2][order] == orbit.contacts[known] + 1).all()
 
 
 def test_the_velocity_of_the_thesis_chain_is_the_known_one() -> None:

@@ -1,0 +1,97 @@
+"""What `vibroimpact orbit` refuses, and what it finds from what it is given."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.command_line import in_this_process
+from support.places import ROOT
+
+import vibroimpact as vi
+from vibroimpact.analysis.orbits import OrbitError
+
+SCENE = ROOT / "examples" / "bifurcation.toml"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--impacts", "0"], "orbit: expected 1 to 64 impacts in 1 or more periods, got 0 in 1."),
+        (["--periods", "0"], "orbit: expected 1 to 64 impacts in 1 or more periods, got 1 in 0."),
+        (["--impacts", "65"], "orbit: expected 1 to 64 impacts in 1 or more periods, got 65 in 1."),
+        (["--impacts", "-1", "--periods", "2"], "got -1 in 2."),
+        (
+            ["--seed", "2.6,x"],
+            "--seed: expected phases in rad, each with :STOP where it is not 1, got '2.6,x'.",
+        ),
+        (["--seed", ""], "--seed: expected phases in rad"),
+        (["--seed", "nan"], "phases: expected ascending ones within 1 turns"),
+        (["--seed", "2.6:3"], "orbit: seed: expected stops 1 to 1, got 3."),
+        (["--seed", "2.6:0"], "orbit: seed: expected stops 1 to 1, got 0."),
+        (["--seed", "0.9,7.2", "--impacts", "3"], "orbit: seed: expected 3 impacts"),
+        (["--seed", "3,2"], "phases: expected ascending ones within 1 turns"),
+        (["-o", "orbits.png"], "orbits.png"),
+    ],
+)
+def test_orbits_that_cannot_be_are_refused_in_one_line(options: list[str], said: str) -> None:
+    done = in_this_process("orbit", SCENE, *options)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+
+
+AT = ["--set", "sweep={}", "--set", "forcing.angular_frequency=1.4"]
+GRAZED = {"forcing.angular_frequency": 0.83, "body.damping_ratio": 0.1}
+
+
+def scene(changes: dict[str, float]) -> vi.Scene:
+    return vi.Scene.from_text(SCENE.read_text(encoding="utf-8")).with_sweep({}).with_values(changes)
+
+
+def test_orbits_are_the_runs_of_a_dataset_which_the_same_command_may_write_again(tmp_path: Path) -> None:
+    output = tmp_path / "orbits.nc"
+    for _ in range(2):
+        assert in_this_process("orbit", SCENE, *AT, "-o", output).returncode == 0
+    with vi.open_dataset(output) as found:
+        known = vi.find_orbits(scene({"forcing.angular_frequency": 1.4}), 1)
+        np.testing.assert_array_equal(found["orbit_stable"], [1, 0])
+        np.testing.assert_allclose(found["impact_velocity"], [orbit.velocities[0] for orbit in known])
+        assert found["orbit_branch"].values.tolist() == [1, 2]
+
+
+def test_a_dataset_of_something_else_is_not_overwritten(tmp_path: Path) -> None:
+    output = tmp_path / "orbits.nc"
+    in_this_process("run", SCENE, "--set", "sweep={}", "-o", output)
+    before = output.read_bytes()
+    assert in_this_process("orbit", SCENE, *AT, "-o", output).returncode == 2
+    assert output.read_bytes() == before
+
+
+def test_a_penetrating_orbit_is_told_where_it_is_asked_for_and_no_file_holds_it(tmp_path: Path) -> None:
+    # equations.md 9: the P(1,2) of damping ratio .1 grazes at .83586
+    grazed = scene(GRAZED)
+    assert vi.find_orbits(grazed, 1, 2) == []
+    (orbit,) = vi.find_orbits(grazed, 1, 2, penetrating=True)
+    assert not orbit.is_physical
+    assert orbit.highest[0] == pytest.approx(0.0034, abs=1e-4)
+    output, changes = tmp_path / "orbits.nc", [f"{key}={value}" for key, value in GRAZED.items()]
+    options = [part for change in ("sweep={}", *changes) for part in ("--set", change)]
+    done = in_this_process("orbit", SCENE, *options, "--periods", "2", "--penetrating", "-o", output)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "penetrates stop 1 by 0.00339" in done.stdout
+    assert "is not written: it would hold no orbit" in done.stdout
+    assert not output.exists()
+
+
+def test_the_orbit_near_to_a_seed_is_found_and_counted_once() -> None:
+    at = scene({"forcing.angular_frequency": 1.4})
+    (unstable,) = vi.find_orbits(at, seed=[(2.6, 1)])
+    assert not unstable.is_stable
+    assert unstable.phases[0] == pytest.approx(2.620714454, abs=1e-9)
+    (stable,) = vi.find_orbits(at, periods=2, seed=[(0.9, 1), (7.2, 1)])
+    assert stable.name == "P(1,1)"
+    assert stable.multipliers[0] == pytest.approx(vi.find_orbits(at, 1)[0].multipliers[0], abs=1e-9)
+    with pytest.raises(OrbitError, match=r"expected an orbit P\(1,2\) near to the phases \[2.6\], got none"):
+        vi.find_orbits(at, periods=2, seed=[(2.6, 1)])
