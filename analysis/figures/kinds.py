@@ -21,6 +21,7 @@ from vibroimpact.analysis.figures.hard_cases import draw_hard_cases
 from vibroimpact.analysis.figures.impact_frequency import draw_impact_frequency
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
+from vibroimpact.analysis.figures.lyapunov import draw_lyapunov
 from vibroimpact.analysis.figures.measured_sweep import draw_measured_sweep
 from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
 from vibroimpact.analysis.figures.orbit_energies import draw_orbit_energies
@@ -63,6 +64,7 @@ Family = Literal[
     "hard_cases",
     "energies",
     "resonances",
+    "lyapunov",
     "ladder",
 ]
 _WORDS: dict[Family, str] = {
@@ -77,6 +79,7 @@ _WORDS: dict[Family, str] = {
     "hard_cases": "hard cases",
     "energies": "energies of orbits",
     "resonances": "resonances",
+    "lyapunov": "Lyapunov exponents",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -201,6 +204,7 @@ KINDS: dict[str, FigureKind] = {
     "sensitivity": FigureKind({"sensitivity": lambda data, view: draw_sensitivity(data)}),
     "hard-cases": FigureKind({"hard_cases": lambda data, view: draw_hard_cases(data)}),
     "resonances": FigureKind({"resonances": lambda data, view: draw_resonances(data)}),
+    "lyapunov": FigureKind({"lyapunov": lambda data, view: draw_lyapunov(data)}),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
@@ -265,6 +269,7 @@ def _family(data: Data) -> Family:
         "hard_cases": "hard_cases",
         "energies": "energies",
         "resonances": "resonances",
+        "lyapunov": "lyapunov",
     }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:

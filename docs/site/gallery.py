@@ -108,6 +108,7 @@ def kinds() -> dict[str, Picture]:
         "resonances": _of(
             "resonances", "peaks", "vibroimpact resonances examples/thesis/figure_6_4.toml -o peaks.nc"
         ),
+        "lyapunov": _of("lyapunov", "exponents", "vibroimpact lyapunov bifurcation.nc -o exponents.nc"),
         "hard-cases": _of("hard-cases", "cases", "vibroimpact hard-cases -o cases.nc"),
         "convergence": _of("convergence", "ladder"),
         "work-precision": _of("work-precision", "ladder"),

@@ -27,7 +27,9 @@ class OrbitEnd(IntEnum):
     singular = 3
 
 
-class _Body(Structure):
+class BODY(Structure):
+    """A body as C has it; `door/orbit_response.h` says what each field is."""
+
     ARRAYS = (
         *("natural", "damping_ratio", "cosine", "sine", "held"),
         *("shape", "impulse", "direction", "position", "restitution"),
@@ -60,10 +62,10 @@ class OrbitBody:
     """
 
     def __init__(self, angular_frequency: float, **arrays: Array) -> None:
-        self._arrays = {name: np.ascontiguousarray(arrays[name], dtype=np.float64) for name in _Body.ARRAYS}
+        self._arrays = {name: np.ascontiguousarray(arrays[name], dtype=np.float64) for name in BODY.ARRAYS}
         contacts, self.modes = self._arrays["shape"].shape
-        addresses = [self._arrays[name].ctypes.data for name in _Body.ARRAYS]
-        self._body = _Body(self.modes, contacts, angular_frequency, *addresses)
+        addresses = [self._arrays[name].ctypes.data for name in BODY.ARRAYS]
+        self.address = BODY(self.modes, contacts, angular_frequency, *addresses)
 
     def evaluate(self, contacts: NDArray[np.int32], phases: Array, periods: int) -> Evaluation:
         """Return what belongs to the phases of the impacts: equations.md 4.7.
@@ -81,7 +83,7 @@ class OrbitBody:
         train = _train(contacts, phases, periods)
         velocities, distances = np.empty(n), np.empty(n)
         slopes, faster = np.empty((n, n)), np.empty((n, n))
-        end = _library().vi_door_orbit(self._body, train, velocities, distances, slopes, faster)
+        end = _library().vi_door_orbit(self.address, train, velocities, distances, slopes, faster)
         return Evaluation(OrbitEnd(end), velocities, distances, slopes, faster)
 
     def motion(
@@ -90,7 +92,7 @@ class OrbitBody:
         """Return the states after the impacts, shape (impacts, 2 modes), and the monodromy matrix of the first: 4.2."""
         train = _train(contacts, phases, periods)
         states, monodromy = np.empty((phases.size, 2 * self.modes)), np.empty((2 * self.modes,) * 2)
-        _check(_library().vi_door_orbit_motion(self._body, train, velocities, states, monodromy))
+        _check(_library().vi_door_orbit_motion(self.address, train, velocities, states, monodromy))
         return states, monodromy
 
     def maximum(
@@ -99,7 +101,7 @@ class OrbitBody:
         """Return how far the highest maximum between impacts is beyond its stop (m), its phase, its contact or -1."""
         train = _train(contacts, phases, periods)
         what = np.empty(3)
-        _check(_library().vi_door_orbit_maximum(self._body, train, states, what))
+        _check(_library().vi_door_orbit_maximum(self.address, train, states, what))
         return float(what[0]), float(what[1]), int(what[2])
 
 
@@ -145,7 +147,7 @@ def _check(end: int) -> None:
 def _library() -> ctypes.CDLL:
     library = core_library()
     numbers = np.ctypeslib.ndpointer(dtype=np.float64, flags="C_CONTIGUOUS")
-    body, train = POINTER(_Body), POINTER(_Train)
+    body, train = POINTER(BODY), POINTER(_Train)
     library.vi_door_orbit.argtypes = [body, train, *[numbers] * 4]
     library.vi_door_orbit_motion.argtypes = [body, train, *[numbers] * 3]
     library.vi_door_orbit_maximum.argtypes = [body, train, *[numbers] * 2]

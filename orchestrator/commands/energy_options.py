@@ -20,6 +20,7 @@ def register(app: typer.Typer) -> None:
     """Add the commands to the command line."""
     app.command()(energies)
     app.command()(resonances)
+    app.command()(lyapunov)
 
 
 def energies(
@@ -61,3 +62,22 @@ def resonances(
     from vibroimpact.orchestrator.commands.resonances import show_resonances
 
     show_resonances(file, output, figure, changes or (), force)
+
+
+def lyapunov(
+    file: SceneOrDataset,
+    output: DatasetFile = None,
+    figure: FigureFile = None,
+    changes: Changes = None,
+    force: Force = False,
+) -> None:
+    """Find the Lyapunov exponents of runs with impacts, from the saltation of their impacts; their sum is checked.
+
+    Of an oscillator, a chain or a beam on restitution stops; 200 impacts and more count. A scene is run first. A run
+    without exponents (no impacts, sticking) is told with its reason.
+
+    Example: vibroimpact lyapunov examples/thesis/figure_2_11.toml --set record.recorded_periods=2000
+    """
+    from vibroimpact.orchestrator.commands.lyapunov import show_exponents
+
+    show_exponents(file, output, figure, changes or (), force)

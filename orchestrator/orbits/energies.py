@@ -12,7 +12,7 @@ import xarray as xr
 from vibroimpact.analysis.dataset import open_dataset
 from vibroimpact.analysis.dataset.results import Row, described
 from vibroimpact.analysis.dataset.schema import Outcome
-from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.body import Floats
 from vibroimpact.analysis.orbits.energies import (
     OrbitEnergies,
     energy_transfer,
@@ -20,12 +20,10 @@ from vibroimpact.analysis.orbits.energies import (
     velocity_transfer,
 )
 from vibroimpact.analysis.orbits.periodic import OrbitError
-from vibroimpact.analysis.orbits.recorded import Impacts, recorded_orbit
+from vibroimpact.analysis.orbits.recorded import recorded_orbit
 from vibroimpact.fmus.errors import DatasetError, UsageError
 from vibroimpact.orchestrator.campaign.progress import Progress
-from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.run.dataset import coordinate_names
-from vibroimpact.orchestrator.scene import Scene, parse_scene
+from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, scene_of
 
 _OF_MODES: Mapping[str, tuple[str, str, Callable[[OrbitEnergies], Floats]]] = {
     "residual_energy": ("J", "work of the force less loss to damping", lambda e: e.residual),
@@ -98,8 +96,8 @@ def energies(
     scene = scene_of(dataset, "energies")
     runs = dataset.vibroimpact.runs
     chosen = _chosen(runs, run)
-    impacts = _ImpactsOf(dataset)
-    bodies = _Bodies(scene, runs)
+    impacts = ImpactsOf(dataset)
+    bodies = Bodies(scene, runs)
     seen = progress if progress is not None and len(chosen) >= _MANY else Progress()
     seen.begin(len(chosen), 0)
     found = []
@@ -118,19 +116,6 @@ def energies(
     return made.assign_attrs(kept)
 
 
-def scene_of(dataset: xr.Dataset, who: str) -> Scene:
-    """Return the scene of a dataset of runs whose impacts were recorded."""
-    missing = [name for name in ("impact_time", "impact_phase", "impact_velocity") if name not in dataset]
-    if missing:
-        raise DatasetError(
-            f"{who}: expected recorded impacts, got no {', '.join(missing)}. "
-            "Set impacts = true in [record] of a scene with a forcing and run it again."
-        )
-    if "scene" not in dataset.attrs:
-        raise DatasetError(f"{who}: expected the scene text in the attribute scene, got none.")
-    return parse_scene(str(dataset.attrs["scene"]), "scene of the dataset")
-
-
 def _chosen(runs: xr.Dataset, run: int | None) -> list[int]:
     if run is None:
         return list(range(runs.sizes["run"]))
@@ -143,40 +128,7 @@ def _chosen(runs: xr.Dataset, run: int | None) -> list[int]:
     return [int(there[0])]
 
 
-class _ImpactsOf:
-    """The impacts of each run, by its run_id."""
-
-    def __init__(self, dataset: xr.Dataset) -> None:
-        columns = ("impact_time", "impact_phase", "impact_velocity", "impact_contact")
-        owners = dataset["impact_run"].values
-        order = np.argsort(owners, kind="stable")
-        self._owners = owners[order]
-        self._columns = [dataset[name].values[order] for name in columns]
-
-    def __getitem__(self, run_id: int) -> Impacts:
-        first, stop = np.searchsorted(self._owners, [run_id, run_id + 1])
-        time, phase, velocity, contact = (column[first:stop] for column in self._columns)
-        return Impacts(time, phase, velocity, contact.astype(np.int64) - 1)
-
-
-class _Bodies:
-    """The body of each run; runs of one point share it."""
-
-    def __init__(self, scene: Scene, runs: xr.Dataset) -> None:
-        self._scene = scene
-        self._columns = {key: runs[name].values for key, name in coordinate_names(scene).items()}
-        self._last: tuple[dict[str, float], ImpactingBody] | None = None
-        self.most_modes = 0
-
-    def __getitem__(self, place: int) -> ImpactingBody:
-        values = {key: float(column[place]) for key, column in self._columns.items()}
-        if self._last is None or self._last[0] != values:
-            self._last = values, impacting_body(self._scene.at(values))
-            self.most_modes = max(self.most_modes, self._last[1].frequencies.size)
-        return self._last[1]
-
-
-def _of_run(bodies: _Bodies, impacts: _ImpactsOf, runs: xr.Dataset, place: int) -> tuple[Found, float]:
+def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> tuple[Found, float]:
     """Return the energies of a run, or why it has none, and how far its impacts are from its orbit."""
     body = bodies[place]
     outcome = Outcome(int(runs["outcome"].values[place]))

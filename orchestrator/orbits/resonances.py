@@ -16,7 +16,8 @@ from vibroimpact.analysis.orbits.recorded import NO_IMPACTS
 from vibroimpact.analysis.orbits.resonances import Peak, frequency_shift, peaks_of
 from vibroimpact.fmus.errors import DatasetError
 from vibroimpact.orchestrator.orbits.bodies import impacting_body
-from vibroimpact.orchestrator.orbits.energies import energies, scene_of
+from vibroimpact.orchestrator.orbits.energies import energies
+from vibroimpact.orchestrator.orbits.runs import scene_of
 from vibroimpact.orchestrator.scene import Scene
 
 _KEYS = {"forcing.angular_frequency": 1.0, "forcing.frequency": 2.0 * np.pi}

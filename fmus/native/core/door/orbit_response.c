@@ -59,14 +59,12 @@ static bool start_of_train(const vi_mode *mode, double length, double start[2])
     return isfinite(start[0] + start[1]);
 }
 
-int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, const vi_orbit_train *train)
+int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body)
 {
-    if (!is_body(body) || !is_train(train, body->contacts)) {
+    if (!is_body(body)) {
         return VI_ORBIT_REFUSED;
     }
     response->body = body;
-    response->train = train;
-    response->length = TURN * train->periods / body->angular_frequency;
     for (int j = 0; j < body->modes; ++j) {
         vi_mode *mode = &response->mode[j];
         const double natural = body->natural[j], w = body->angular_frequency;
@@ -78,12 +76,44 @@ int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, con
         response->level[j] = body->held[j] / mode->stiffness;
         response->steady_cos[j] = c == 0.0 && s == 0.0 ? 0.0 : c * along - s * across;
         response->steady_sin[j] = c == 0.0 && s == 0.0 ? 0.0 : c * across + s * along;
-        if (!isfinite(response->steady_cos[j] + response->steady_sin[j])
-            || !start_of_train(mode, response->length, response->start[j])) {
+        if (!isfinite(response->steady_cos[j] + response->steady_sin[j])) {
             return VI_ORBIT_RESONANT;
         }
     }
     return VI_ORBIT_DONE;
+}
+
+int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, const vi_orbit_train *train)
+{
+    const int refused = vi_orbit_modes(response, body);
+    if (refused != VI_ORBIT_DONE) {
+        return refused;
+    }
+    if (!is_train(train, body->contacts)) {
+        return VI_ORBIT_REFUSED;
+    }
+    response->train = train;
+    response->length = TURN * train->periods / body->angular_frequency;
+    for (int j = 0; j < body->modes; ++j) {
+        if (!start_of_train(&response->mode[j], response->length, response->start[j])) {
+            return VI_ORBIT_RESONANT;
+        }
+    }
+    return VI_ORBIT_DONE;
+}
+
+void vi_orbit_carry(const vi_orbit_response *response, double u, int columns, double change[][VI_ORBIT_STATES])
+{
+    const int modes = response->body->modes;
+    for (int j = 0; j < modes; ++j) {
+        double phi[4];
+        vi_mode_propagator(&response->mode[j], u, phi);
+        for (int c = 0; c < columns; ++c) {
+            const double x = change[j][c], v = change[modes + j][c];
+            change[j][c] = phi[0] * x + phi[1] * v;
+            change[modes + j][c] = phi[2] * x + phi[3] * v;
+        }
+    }
 }
 
 double vi_orbit_since(const vi_orbit_response *response, int i, int k)
@@ -126,4 +156,35 @@ void vi_orbit_steady_at(const vi_orbit_response *response, int i, double at[3])
     at[0] = body->direction[contact] * (x + level - body->position[contact]);
     at[1] = body->direction[contact] * v;
     at[2] = -body->direction[contact] * w * w * x;
+}
+
+void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase, double velocity, const double state[],
+                   int columns, double change[][VI_ORBIT_STATES])
+{
+    const vi_orbit_body *body = response->body;
+    const int modes = body->modes;
+    const double *shape = body->shape + (ptrdiff_t)contact * modes;
+    const double *impulse = body->impulse + (ptrdiff_t)contact * modes;
+    const double lost = 1.0 + body->restitution[contact], speed = body->direction[contact] * velocity;
+    double acceleration = 0.0; /* of the contact before the impact */
+    for (int j = 0; j < modes; ++j) {
+        const vi_mode *mode = &response->mode[j];
+        const double before = state[modes + j] + lost * speed * impulse[j];
+        acceleration += shape[j]
+                        * (body->cosine[j] * cos(phase) + body->sine[j] * sin(phase) + body->held[j]
+                           - 2.0 * mode->decay * before - mode->stiffness * state[j]);
+    }
+    for (int c = 0; c < columns; ++c) {
+        double displaced = 0.0, faster = 0.0;
+        for (int j = 0; j < modes; ++j) {
+            displaced += shape[j] * change[j][c];
+            faster += shape[j] * change[modes + j][c];
+        }
+        const double later = displaced / speed;
+        for (int j = 0; j < modes; ++j) {
+            const double drag = 2.0 * response->mode[j].decay * speed * impulse[j];
+            change[j][c] -= lost * impulse[j] * displaced;
+            change[modes + j][c] += lost * ((drag + acceleration * impulse[j]) * later - impulse[j] * faster);
+        }
+    }
 }

@@ -49,7 +49,10 @@ typedef struct {
     double start[VI_MODES][2]; /* displacement and velocity just after an impact, of a unit impulse in each train */
 } vi_orbit_response;
 
-/* Returns one of VI_ORBIT_*. */
+/* The modes and their steady answers alone. Returns one of VI_ORBIT_*. */
+int vi_orbit_modes(vi_orbit_response *response, const vi_orbit_body *body);
+
+/* All of it, for a train of impacts. Returns one of VI_ORBIT_*. */
 int vi_orbit_respond(vi_orbit_response *response, const vi_orbit_body *body, const vi_orbit_train *train);
 
 /* Time from impact k to impact i, s: above 0, and a whole train from an impact to itself. */
@@ -60,6 +63,14 @@ void vi_orbit_train_answer(const vi_orbit_response *response, int j, double u, d
 
 /* Steady answer of mode j to the force. */
 void vi_orbit_steady(const vi_orbit_response *response, int j, double phase, double *x, double *v);
+
+/* An impact on a change of the state before it, change[2 modes][columns]: equations.md 4.2. `velocity`: towards the stop
+ * before it, m/s; `state`: of all modes after it. */
+void vi_orbit_salt(const vi_orbit_response *response, int contact, double phase, double velocity, const double state[],
+                   int columns, double change[][VI_ORBIT_STATES]);
+
+/* Flight of `u` seconds on a change of the state. */
+void vi_orbit_carry(const vi_orbit_response *response, double u, int columns, double change[][VI_ORBIT_STATES]);
 
 /* Steady answer at the contact of impact i, in its direction: beyond the stop, and its first two derivatives. */
 void vi_orbit_steady_at(const vi_orbit_response *response, int i, double at[3]);

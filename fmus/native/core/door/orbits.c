@@ -146,40 +146,6 @@ static void after_impact(const vi_orbit_response *response, const double velocit
     }
 }
 
-/* The impact on a change of the state before it (2 modes x columns): equations.md 4.2. */
-static void salt(const vi_orbit_response *response, int i, double velocity, const double state[],
-                 double change[][VI_ORBIT_STATES])
-{
-    const vi_orbit_body *body = response->body;
-    const int modes = body->modes, columns = 2 * modes;
-    const int32_t contact = response->train->contact[i];
-    const double *shape = body->shape + (ptrdiff_t)contact * modes;
-    const double *impulse = body->impulse + (ptrdiff_t)contact * modes;
-    const double lost = 1.0 + body->restitution[contact], speed = body->direction[contact] * velocity;
-    const double phase = response->train->phase[i];
-    double acceleration = 0.0; /* of the contact before the impact */
-    for (int j = 0; j < modes; ++j) {
-        const vi_mode *mode = &response->mode[j];
-        const double before = state[modes + j] + lost * speed * impulse[j];
-        acceleration += shape[j]
-                        * (body->cosine[j] * cos(phase) + body->sine[j] * sin(phase) + body->held[j]
-                           - 2.0 * mode->decay * before - mode->stiffness * state[j]);
-    }
-    for (int c = 0; c < columns; ++c) {
-        double displaced = 0.0, faster = 0.0;
-        for (int j = 0; j < modes; ++j) {
-            displaced += shape[j] * change[j][c];
-            faster += shape[j] * change[modes + j][c];
-        }
-        const double later = displaced / speed;
-        for (int j = 0; j < modes; ++j) {
-            const double drag = 2.0 * response->mode[j].decay * speed * impulse[j];
-            change[j][c] -= lost * impulse[j] * displaced;
-            change[modes + j][c] += lost * ((drag + acceleration * impulse[j]) * later - impulse[j] * faster);
-        }
-    }
-}
-
 VI_DOOR int vi_door_orbit_motion(const vi_orbit_body *body, const vi_orbit_train *train, const double velocity[],
                                  double state[], double monodromy[])
 {
@@ -201,16 +167,9 @@ VI_DOOR int vi_door_orbit_motion(const vi_orbit_body *body, const vi_orbit_train
     for (int passed = 1; passed <= n; ++passed) {
         const int i = passed % n;
         const double u = vi_orbit_since(&response, i, passed - 1);
-        for (int j = 0; j < modes; ++j) {
-            double phi[4];
-            vi_mode_propagator(&response.mode[j], u, phi);
-            for (int c = 0; c < states; ++c) {
-                const double x = change[j][c], v = change[modes + j][c];
-                change[j][c] = phi[0] * x + phi[1] * v;
-                change[modes + j][c] = phi[2] * x + phi[3] * v;
-            }
-        }
-        salt(&response, i, velocity[i], state + (ptrdiff_t)i * states, change);
+        vi_orbit_carry(&response, u, states, change);
+        vi_orbit_salt(&response, train->contact[i], train->phase[i], velocity[i], state + (ptrdiff_t)i * states, states,
+                      change);
     }
     for (int row = 0; row < states; ++row) {
         memcpy(monodromy + (ptrdiff_t)row * states, change[row], (size_t)states * sizeof change[row][0]);

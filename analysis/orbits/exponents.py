@@ -1,0 +1,141 @@
+"""Lyapunov exponents of a motion with impacts, from the saltation of its impacts: equations.md 4.11."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.recorded import Impacts
+from vibroimpact.fmus.core.exponents import Stretching
+from vibroimpact.fmus.errors import VibroimpactError
+
+FORGOTTEN = 1e-12
+"""Share of a wrong first state that is left where impacts begin to count."""
+SETTLING = 50
+"""Impacts in which the directions turn into those that are stretched, before they count."""
+BLOCKS = 20
+"""Parts of a run whose scatter gives the standard error."""
+LEAST = 10 * BLOCKS
+"""Impacts that count, at least."""
+SUM_RULE = 1e-10
+"""Largest difference of the sum of all exponents from its exact value, over the size of their terms."""
+
+
+class ExponentError(VibroimpactError):
+    """A run has no Lyapunov exponents, or they are not known."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exponents:
+    """Lyapunov exponents of a run.
+
+    Attributes
+    ----------
+    per_impact, standard_error : array, shape (2 modes,)
+        The largest first; the error is that of the mean over 20 parts of the run.
+    interval : float
+        Mean time from impact to impact, s: per_impact / interval are those per second.
+    impacts : int
+        That counted.
+    sum_error : float
+        Their sum less 2 ln r - 2 interval sum z w, which it is exactly, over the size of the terms.
+    """
+
+    per_impact: Floats
+    standard_error: Floats
+    interval: float
+    impacts: int
+    sum_error: float
+
+    @property
+    def dimension(self) -> float:
+        """Kaplan-Yorke dimension of the impact map's attractor; NaN where the largest exponent is not positive."""
+        sums = np.cumsum(self.per_impact)
+        if not self.per_impact[0] > 0.0 or not sums[-1] < 0.0:
+            return float(np.nan)
+        last = int(np.flatnonzero(sums > 0.0)[-1])
+        return last + 1 + float(sums[last] / abs(self.per_impact[last + 1]))
+
+
+def exponents_of(body: ImpactingBody, impacts: Impacts) -> Exponents:
+    """Return the Lyapunov exponents of a motion from its impacts.
+
+    The state follows from the impacts before, by the exact flow: what is not known of the first one decays with the
+    modes, and impacts count from where it is forgotten. The sum rule is checked.
+
+    Parameters
+    ----------
+    body : ImpactingBody
+    impacts : Impacts
+        All of them, in their order: none may be left out.
+
+    Raises
+    ------
+    ExponentError
+        There are too few impacts, a mode never forgets, an impact has no speed, or the sum rule does not hold.
+    """
+    count = impacts.times.size
+    if count < 2 or not (impacts.velocities > 0.0).all():
+        raise ExponentError(
+            "lyapunov: expected impacts with a speed, got a motion without, or at rest on a stop."
+        )
+    elapsed = np.diff(impacts.times, prepend=impacts.times[0])
+    first = _first_that_counts(body, impacts)
+    if count - first < LEAST:
+        raise ExponentError(
+            f"lyapunov: expected {LEAST} impacts after the {first} of a transient, got {max(count - first, 0)}. "
+            "Record more periods."
+        )
+    moving = Stretching(
+        body.kernel,
+        impacts.contacts.astype(np.int32),
+        impacts.phases,
+        elapsed,
+        impacts.velocities,
+        _first_state(body, impacts),
+    )
+    moving.along(1, first)
+    edges = np.linspace(first, count, BLOCKS + 1).astype(int)
+    sums = np.array([moving.along(low, high) for low, high in itertools.pairwise(edges)])
+    counted = count - first
+    interval = float(elapsed[first:].sum()) / counted
+    per_impact = sums.sum(axis=0) / counted
+    means = sums / np.diff(edges)[:, None]
+    order = np.argsort(-per_impact, kind="stable")
+    lost = [body.contacts[each].restitution for each in impacts.contacts[first:]]
+    exact = 2.0 * float(np.mean(np.log(lost))) - 2.0 * interval * float(
+        (body.damping_ratios * body.frequencies).sum()
+    )
+    off = abs(float(per_impact.sum()) - exact) / max(1.0, float(np.abs(per_impact).sum()))
+    if not off <= SUM_RULE:
+        raise ExponentError(
+            f"lyapunov: expected exponents whose sum is {exact:.12g}, got {per_impact.sum():.12g}."
+        )
+    error = means.std(axis=0, ddof=1) / np.sqrt(BLOCKS)
+    return Exponents(per_impact[order], error[order], interval, counted, off)
+
+
+def _first_that_counts(body: ImpactingBody, impacts: Impacts) -> int:
+    if body.frequencies.size == 1:
+        return 1 + SETTLING
+    ratios = body.damping_ratios
+    slow = body.frequencies * np.where(
+        ratios <= 1.0, ratios, ratios - np.sqrt(np.maximum(ratios**2 - 1.0, 0.0))
+    )
+    if not slow.min() > 0.0:
+        raise ExponentError(
+            "lyapunov: expected damping of all modes, without which a state is never forgotten, got none."
+        )
+    forgotten = impacts.times[0] - np.log(FORGOTTEN) / slow.min()
+    return int(np.searchsorted(impacts.times, forgotten)) + SETTLING
+
+
+def _first_state(body: ImpactingBody, impacts: Impacts) -> Floats:
+    """Return a state after the first impact: exact of one mode, else the contact as it is and the rest at rest."""
+    contact = body.contacts[impacts.contacts[0]]
+    away = -contact.direction * contact.restitution * impacts.velocities[0]
+    along = contact.shape * contact.mass
+    return np.concatenate([along * contact.position, along * away])

@@ -1,0 +1,78 @@
+"""What `vibroimpact lyapunov` does: exponents of the runs of a scene or a dataset, printed, written and drawn."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset import dataset_file
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.fmus.printing import table
+from vibroimpact.fmus.terminal import say, wide_terminal
+from vibroimpact.orchestrator.commands.energies import runs_of, write_found
+from vibroimpact.orchestrator.orbits.lyapunov import lyapunov
+
+_MOST_SHOWN = 30
+"""Runs that are told one by one."""
+
+
+def show_exponents(
+    path: Path, output: Path | None, figure: Path | None, changes: Sequence[str], force: bool
+) -> None:
+    """Find the exponents of the runs of a scene or a dataset; print, write and draw them."""
+    refuse_outputs([dataset_file(path)], output, figure)
+    same = ("lyapunov", str(path))
+    refuse_overwriting(
+        output, force, lambda there: (there.get("results_kind"), there.get("scene_file")) == same
+    )
+    with runs_of(path, changes) as dataset:
+        try:
+            found = lyapunov(dataset)
+        except DatasetError as problem:
+            raise DatasetError(f"{path}: {problem}") from problem
+    reasons = [str(text) for text in found.reason.values.ravel() if str(text) != "no run"]
+    if all(reasons):
+        raise DatasetError(f"{path}: lyapunov: expected runs with exponents, got none: {reasons[0]}")
+    _print(found)
+    for words, count in Counter(text for text in reasons if text).most_common():
+        say(f"{count} without: {words}")
+    write_found(found.assign_attrs(scene_file=str(path)), "lyapunov", output, figure)
+
+
+def _print(found: xr.Dataset) -> None:
+    flat = found.stack(run=found.reason.dims) if found.reason.dims else found.expand_dims("run")
+    known = flat.isel(run=np.flatnonzero(np.isfinite(flat.impacts.values)))
+    rows = table(
+        f"Lyapunov exponents per impact: {found.attrs.get('title', '')}",
+        *("<", ">largest", ">+-", ">others", ">per time", ">dimension", ">impacts"),
+    )
+    for place in range(min(known.sizes["run"], _MOST_SHOWN)):
+        one = known.isel(run=place)
+        values = one.lyapunov_exponent.values
+        rows.add_row(
+            _where(one, found),
+            f"{values[0]:.6g}",
+            f"{float(one.standard_error.values[0]):.1g}",
+            ", ".join(f"{each:.6g}" for each in values[1:4] if np.isfinite(each)),
+            f"{values[0] / float(one.impact_interval):.6g}",
+            "" if np.isnan(one.dimension) else f"{float(one.dimension):.4g}",
+            f"{int(one.impacts)}",
+        )
+    wide_terminal().print(rows)
+    if known.sizes["run"] > _MOST_SHOWN:
+        first = known.isel(exponent=0)
+        chaotic = int((first.lyapunov_exponent > 2.0 * first.standard_error).sum())
+        say(f"{known.sizes['run']} runs have exponents, of {chaotic} the largest is positive.")
+
+
+def _where(one: xr.Dataset, found: xr.Dataset) -> str:
+    told = []
+    for name in (str(dim) for dim in found.reason.dims if str(dim) in one.coords):
+        value = one[name].item()
+        told.append(f"{name} {value:.6g}" if isinstance(value, float) else str(value))
+    return ", ".join(told)

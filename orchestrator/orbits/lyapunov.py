@@ -1,0 +1,113 @@
+"""Lyapunov exponents of the runs of a dataset."""
+
+from __future__ import annotations
+
+from os import PathLike
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset import open_dataset
+from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.dataset.schema import Outcome
+from vibroimpact.analysis.orbits.exponents import ExponentError, Exponents, exponents_of
+from vibroimpact.orchestrator.orbits.runs import Bodies, ImpactsOf, scene_of
+
+
+def lyapunov(dataset: xr.Dataset | str | PathLike[str]) -> xr.Dataset:
+    """Return the Lyapunov exponents of each run of a dataset: equations.md 4.11.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset or path
+        As `open_dataset` or `run` gives it, or its file or folder: of an oscillator, a chain or a beam on restitution
+        stops, with impacts; 200 of them at least count.
+
+    Returns
+    -------
+    xarray.Dataset
+        `lyapunov_exponent` per impact and `standard_error` along `exponent`, the largest first, on the dimensions of
+        the sweep; `impact_interval` (s): exponents over it are those per second; `dimension` (Kaplan-Yorke),
+        `impacts` that counted, `sum_error`; `reason`: why a run has none, else empty.
+
+    Raises
+    ------
+    DatasetError
+        It has no impacts, or no scene.
+    UsageError
+        The scene is none whose orbits are followed.
+
+    Examples
+    --------
+    >>> lyapunov("run.nc").lyapunov_exponent      # doctest: +SKIP
+    """
+    if not isinstance(dataset, xr.Dataset):
+        with open_dataset(dataset) as opened:
+            return lyapunov(opened)
+    scene, runs = scene_of(dataset, "lyapunov"), dataset.vibroimpact.runs
+    bodies, impacts = Bodies(scene, runs), ImpactsOf(dataset)
+    found = [_of_run(bodies, impacts, runs, place) for place in range(runs.sizes["run"])]
+    plain = dataset.attrs.get("units_system") == "nondimensional"
+    kept = {name: dataset.attrs[name] for name in ("title", "scene", "units_system") if name in dataset.attrs}
+    return _on_sweep(dataset, found, 2 * bodies.most_modes, "1" if plain else "s").assign_attrs(kept)
+
+
+def _of_run(bodies: Bodies, impacts: ImpactsOf, runs: xr.Dataset, place: int) -> Exponents | str:
+    outcome = Outcome(int(runs["outcome"].values[place]))
+    body = bodies[place]
+    if outcome is not Outcome.ok:
+        return f"outcome {outcome.name}"
+    if "stick_count" in runs and runs["stick_count"].values[place] > 0:
+        return "sticking: what is held on a stop forgets all, and the sum rule ends"
+    if "impacts_per_period" in runs and np.isinf(runs["impacts_per_period"].values[place]).any():
+        return "chatter: impacts without number"
+    try:
+        return exponents_of(body, impacts[int(runs["run_id"].values[place])])
+    except ExponentError as problem:
+        return str(problem).removeprefix("lyapunov: ")
+
+
+def _on_sweep(dataset: xr.Dataset, found: list[Exponents | str], most: int, time_unit: str) -> xr.Dataset:
+    run_id = dataset["run_id"].values
+    place = dict(zip(dataset.vibroimpact.runs["run_id"].values.tolist(), range(len(found)), strict=True))
+    index = np.array([place.get(int(number), -1) for number in run_id.ravel()]).reshape(run_id.shape)
+    dims = tuple(map(str, dataset["run_id"].dims))
+    table, errors = np.full((len(found) + 1, most), np.nan), np.full((len(found) + 1, most), np.nan)
+    single = np.full((len(found) + 1, 4), np.nan)
+    for row, each in enumerate(found):
+        if not isinstance(each, str):
+            table[row, : each.per_impact.size], errors[row, : each.per_impact.size] = (
+                each.per_impact,
+                each.standard_error,
+            )
+            single[row] = each.interval, each.dimension, each.impacts, each.sum_error
+    reasons = np.array([*(each if isinstance(each, str) else "" for each in found), "no run"], dtype=object)
+    rows: dict[str, Row] = {
+        "lyapunov_exponent": ((*dims, "exponent"), table[index], "1", "Lyapunov exponent per impact"),
+        "standard_error": ((*dims, "exponent"), errors[index], "1", "standard error of the exponent"),
+        "impact_interval": (dims, single[index, 0], time_unit, "mean time from impact to impact"),
+        "dimension": (
+            dims,
+            single[index, 1],
+            "1",
+            "Kaplan-Yorke dimension of the attractor of the impact map",
+        ),
+        "impacts": (dims, single[index, 2], "1", "impacts that counted"),
+        "sum_error": (
+            dims,
+            single[index, 3],
+            "1",
+            "sum of the exponents less its exact value, over their size",
+        ),
+        "reason": (dims, reasons[index], "1", "why a run has no exponents, else empty"),
+    }
+    coords = {
+        name: one.variable for name, one in dataset.coords.items() if one.dims and set(one.dims) <= set(dims)
+    }
+    for one in coords.values():
+        one.attrs.setdefault("units", "1")
+        one.attrs.setdefault("long_name", "swept")
+    numbers = xr.Variable(
+        "exponent", np.arange(1, most + 1), {"units": "1", "long_name": "exponent, the largest first"}
+    )
+    return xr.Dataset(described(rows), coords | {"exponent": numbers})

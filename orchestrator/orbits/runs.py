@@ -1,0 +1,59 @@
+"""The runs of a dataset of impacting bodies: the scene, the body and the impacts of each."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.orbits.body import ImpactingBody
+from vibroimpact.analysis.orbits.recorded import Impacts
+from vibroimpact.fmus.errors import DatasetError
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.run.dataset import coordinate_names
+from vibroimpact.orchestrator.scene import Scene, parse_scene
+
+
+def scene_of(dataset: xr.Dataset, who: str) -> Scene:
+    """Return the scene of a dataset of runs whose impacts were recorded."""
+    missing = [name for name in ("impact_time", "impact_phase", "impact_velocity") if name not in dataset]
+    if missing:
+        raise DatasetError(
+            f"{who}: expected recorded impacts, got no {', '.join(missing)}. "
+            "Set impacts = true in [record] of a scene with a forcing and run it again."
+        )
+    if "scene" not in dataset.attrs:
+        raise DatasetError(f"{who}: expected the scene text in the attribute scene, got none.")
+    return parse_scene(str(dataset.attrs["scene"]), "scene of the dataset")
+
+
+class ImpactsOf:
+    """The impacts of each run, by its run_id."""
+
+    def __init__(self, dataset: xr.Dataset) -> None:
+        columns = ("impact_time", "impact_phase", "impact_velocity", "impact_contact")
+        owners = dataset["impact_run"].values
+        order = np.argsort(owners, kind="stable")
+        self._owners = owners[order]
+        self._columns = [dataset[name].values[order] for name in columns]
+
+    def __getitem__(self, run_id: int) -> Impacts:
+        first, stop = np.searchsorted(self._owners, [run_id, run_id + 1])
+        time, phase, velocity, contact = (column[first:stop] for column in self._columns)
+        return Impacts(time, phase, velocity, contact.astype(np.int64) - 1)
+
+
+class Bodies:
+    """The body of each run; runs of one point share it."""
+
+    def __init__(self, scene: Scene, runs: xr.Dataset) -> None:
+        self._scene = scene
+        self._columns = {key: runs[name].values for key, name in coordinate_names(scene).items()}
+        self._last: tuple[dict[str, float], ImpactingBody] | None = None
+        self.most_modes = 0
+
+    def __getitem__(self, place: int) -> ImpactingBody:
+        values = {key: float(column[place]) for key, column in self._columns.items()}
+        if self._last is None or self._last[0] != values:
+            self._last = values, impacting_body(self._scene.at(values))
+            self.most_modes = max(self.most_modes, self._last[1].frequencies.size)
+        return self._last[1]

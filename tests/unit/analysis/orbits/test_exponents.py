@@ -1,0 +1,99 @@
+"""Lyapunov exponents against the worked examples of equations.md, and multipliers of orbits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from support.command_line import in_this_process
+
+import vibroimpact as vi
+
+CHAOS: dict[str, Any] = {
+    "scene": {"units": "nondimensional"},
+    "body": {"mass": 1.0, "stiffness": 1.0, "damping_ratio": 0.05},
+    "forcing": {"amplitude": 1.0, "angular_frequency": 2.8},
+    "stop": [{"position": 0.0, "restitution": 0.8}],
+    "record": {"transient_periods": 300, "recorded_periods": 20_000, "impacts": True, "extrema": False},
+}
+CHAIN: dict[str, Any] = {
+    "scene": {"units": "nondimensional"},
+    "body": {"kind": "chain", "masses": [1.0, 1.0], "stiffnesses": [1.0, 1.0], "dampings": [0.1, 0.1]},
+    "forcing": {"amplitude": [0.5, 0.0], "angular_frequency": 0.9},
+    "stop": [{"position": 0.1, "restitution": 0.7}],
+    "record": {"transient_periods": 50, "recorded_periods": 1000, "impacts": True},
+}
+
+
+def test_the_known_exponent_of_a_chaotic_oscillator() -> None:
+    found = vi.lyapunov(vi.run(CHAOS))
+    assert float(found.lyapunov_exponent[0]) == pytest.approx(0.322, abs=0.006)
+    assert float(found.standard_error[0]) < 0.005
+    assert float(found.sum_error) < 1e-12
+    assert 1.0 < float(found.dimension) < 2.0
+
+
+def test_the_sum_rule_of_the_worked_example() -> None:
+    scene = {
+        **CHAOS,
+        "body": {
+            "mass": 1.0,
+            "stiffness": 1.0,
+            "damping_ratio": 0.03,
+            "displacement_start": 0.2,
+            "velocity_start": -0.6,
+        },
+        "forcing": {"amplitude": 0.9, "angular_frequency": 1.6},
+        "stop": [{"position": 0.2, "restitution": 0.75}],
+        "record": {"transient_periods": 0, "recorded_periods": 600, "impacts": True},
+    }
+    found = vi.lyapunov(vi.run(scene))
+    expected = 2.0 * np.log(0.75) - 2.0 * 0.03 * float(found.impact_interval)
+    assert float(found.lyapunov_exponent.sum()) == pytest.approx(expected, abs=1e-12)
+
+
+def test_exponents_of_a_periodic_orbit_of_a_chain_are_the_logarithms_of_its_multipliers() -> None:
+    found = vi.lyapunov(vi.run(CHAIN))
+    (orbit,) = vi.find_orbits(CHAIN, 1)
+    np.testing.assert_allclose(found.lyapunov_exponent, np.log(np.abs(orbit.multipliers)), atol=2e-3)
+    assert float(found.lyapunov_exponent.sum()) == pytest.approx(np.log(orbit.exact_determinant), rel=1e-9)
+
+
+def test_the_exponents_of_a_sweep_are_a_variable_and_a_figure(tmp_path: Path) -> None:
+    sweep = {"forcing.angular_frequency": {"values": [0.72, 0.8, 1.2, 1.58]}}
+    record = {"transient_periods": 300, "recorded_periods": 400, "impacts": True}
+    body = {"body": CHAOS["body"], "forcing": {"amplitude": 0.5, "angular_frequency": 1.0}}
+    scene = {
+        **CHAOS,
+        **body,
+        "stop": [{"position": 1.0, "restitution": 0.7}],
+        "record": record,
+        "sweep": sweep,
+    }
+    runs, output, figure = (tmp_path / name for name in ("runs.nc", "exponents.nc", "exponents.png"))
+    vi.run(scene, runs)
+    done = in_this_process("lyapunov", runs, "-o", output, "--figure", figure)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "1 without: expected impacts with a speed" in done.stdout
+    assert figure.stat().st_size > 4000
+    with vi.open_measured(output) as found:
+        largest = found.lyapunov_exponent.values[:, 0]
+        assert largest[0] > 0.2
+        assert (largest[1:3] < 0.0).all()
+        assert np.isnan(largest[3])
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"record": {"transient_periods": 5, "recorded_periods": 20, "impacts": True}}, "expected 200 impacts after"),
+        ({"forcing": {"amplitude": 1e-9, "angular_frequency": 2.8}, "stop": [{"position": 1.0, "restitution": 0.8}]},
+         "expected impacts with a speed"),
+    ],
+)  # fmt: skip
+def test_a_run_without_exponents_says_why(change: dict[str, Any], said: str) -> None:
+    found = vi.lyapunov(vi.run({**CHAOS, **change}))
+    assert said in str(found.reason.item())
+    assert np.isnan(found.lyapunov_exponent).all()
