@@ -7,6 +7,7 @@ by a constant factor, those of a doubled period do not.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -30,6 +31,8 @@ FEWEST, FEWEST_OF_CHAOS = 6, 40
 """Recorded periods below which nothing is said, and below which nothing is called chaos."""
 GROWTH, AHEAD = 0.05, 6
 """Rate, 1 / period, at which neighbouring states part in chaos; periods that are looked ahead."""
+FALLS = 5.0
+"""Fall of the distance of two rounds over a run, over what a round changes by, from which they may be one."""
 _STATES = ("strobe_displacement", "strobe_velocity", "displacement_max", "displacement_min")
 
 
@@ -158,8 +161,12 @@ def class_of(
     if impacts is not None and not impacts.any() and not has_stuck:
         return RunClass(OrbitClass.no_impacts if size > 0.0 else OrbitClass.rest)
     for periods in range(1, len(states) // 2 + 1):
-        if _repeats(scaled, periods):
-            return _repeating(impacts, periods, has_stuck)
+        if not _repeats(scaled, periods):
+            continue
+        if periods % 2 == 0 and _closes(scaled, periods // 2):
+            reason = f"repeats after {periods} periods, or after {periods // 2}: it comes together too slowly to tell"
+            return RunClass(OrbitClass.unknown, 0, periods, reason)
+        return _repeating(impacts, periods, has_stuck)
     if len(states) < FEWEST_OF_CHAOS:
         reason = f"no period up to {len(states) // 2}; {FEWEST_OF_CHAOS} recorded periods tell chaos"
         return RunClass(OrbitClass.unknown, reason=reason)
@@ -196,6 +203,17 @@ def _repeats(states: Floats, periods: int) -> bool:
     if before.size < max(4, 2 * periods) or not (distances > 0.0).all():
         return False
     return _goes_to_zero(before, after) or _dies_away(distances)
+
+
+def _closes(states: Floats, half: int) -> bool:
+    """Say whether the two rounds of a doubled period come nearer to each other all the time."""
+    distances = np.abs(states[half:] - states[:-half]).max(axis=1)
+    change = float(np.abs(states[2 * half :] - states[: -2 * half]).max())
+    if change > SAME:  # it has been told by how its distances shrink
+        return False
+    parts = np.array_split(distances, 4)
+    falls = all(float(late.mean()) < float(early.mean()) for early, late in itertools.pairwise(parts))
+    return falls and float(distances[0] - distances[-1]) > FALLS * change
 
 
 def _goes_to_zero(before: Floats, after: Floats) -> bool:

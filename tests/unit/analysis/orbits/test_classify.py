@@ -31,6 +31,16 @@ def test_a_slow_transient_of_any_real_multiplier_is_no_longer_period(
     assert class_of(states, np.ones(periods)).name == "P(1,1)"
 
 
+@pytest.mark.parametrize("multiplier", [-0.9999, -0.99999, -0.999])
+@pytest.mark.parametrize("size", [1e-3, 1e-4, 1e-2])
+def test_a_transient_that_is_too_slow_to_tell_is_not_called_a_doubled_period(
+    multiplier: float, size: float
+) -> None:
+    at = np.arange(PERIODS)
+    found = class_of((1.0 + size * multiplier**at)[:, None], np.ones(PERIODS))
+    assert found.name in ("unknown", "P(1,1)")
+
+
 @given(
     radius=st.floats(0.3, 0.75),
     angle=st.floats(0.1, 3.0),
