@@ -14,7 +14,7 @@ from vibroimpact.analysis.dataset import open_dataset, write_dataset
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting, writing
 from vibroimpact.analysis.orbits import OrbitError
 from vibroimpact.analysis.orbits.following import Branch, BranchOrbit, FollowSettings
-from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.errors import UsageError, VibroimpactError
 from vibroimpact.fmus.printing import table
 from vibroimpact.fmus.terminal import Terminal, say, wide_terminal
 from vibroimpact.orchestrator.commands.failures import counted
@@ -64,8 +64,10 @@ def show_branches(
 
     Raises
     ------
+    VibroimpactError
+        There is nothing to follow; or it went wrong on the way, and what was followed before is printed and written.
     typer.Exit
-        Ctrl-C came; what was followed before is printed and written.
+        Ctrl-C came; likewise.
     """
     wanted.refuse()
     refuse_outputs([path], output, figure)
@@ -73,17 +75,23 @@ def show_branches(
     refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
     followed = Followed(scene.with_sweep({}) if scene.sweep else scene, wanted.parameter)
     loci = FollowedLoci(followed, wanted.second or "")
-    interrupted = False
+    interrupted, failure = False, None
     with Terminal(stderr=True).status("Looking for orbits") as status:
         try:
             _follow(wanted, followed, loci, status.update)
         except KeyboardInterrupt:
             interrupted = True
+        except VibroimpactError as problem:
+            if not followed.branches:
+                raise
+            failure = problem
     if not followed.branches:
         raise OrbitError("follow: interrupted before there was an orbit.")
     _print(followed)
     _print_loci(loci)
     _write(loci if loci.loci else followed, output, figure)
+    if failure is not None:
+        raise failure
     if interrupted:
         say("Interrupted: the above is what was followed.", err=True)
         raise typer.Exit(130)

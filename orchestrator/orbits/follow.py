@@ -155,10 +155,13 @@ def follow_loci(
             if point.kind not in FOLLOWED_KINDS or _is_on(result.loci, point, value, first, second):
                 continue
             ways = Locus(point.kind), Locus(point.kind)
-            for way, sign in zip(ways, (-1.0, 1.0), strict=True):
-                for _ in follower.walk(way, point.at, (point.at.value, value), sign):
-                    told(way)
-            result.loci.append(joined_loci(*ways))
+            try:
+                for way, sign in zip(ways, (-1.0, 1.0), strict=True):
+                    for _ in follower.walk(way, point.at, (point.at.value, value), sign):
+                        told(way)
+            finally:
+                if ways[0].points:
+                    result.loci.append(joined_loci(*ways))
     return result
 
 
@@ -257,10 +260,12 @@ def _doubled(follower: Follower, result: Followed, doublings: int, told: Told) -
                     continue
                 child = Branch(f"{parent.name} at its period doubling {point.at.value:.11g}")
                 result.branches.append(child)
-                for each in follower.leave(child, point):
-                    told(child, each)
-                if not child.orbits:
-                    result.branches.pop()
+                try:
+                    for each in follower.leave(child, point):
+                        told(child, each)
+                finally:
+                    if not child.orbits:
+                        result.branches.pop()
 
 
 def _leads_back(branches: list[Branch], doubling: BranchOrbit, settings: FollowSettings) -> bool:

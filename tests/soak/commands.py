@@ -182,6 +182,8 @@ def invocation(draw: random.Random) -> list[str]:
     if path in ONLY_MISUSED:
         # what is there already as a file cannot be the folder that is written
         return [*path, *(word for word in words if word != "scene.toml"), "--output", "empty"]
+    if path == ("serve",):
+        return [*path, *words, "--data", "empty"]  # used well it never ends
     if path == ("fmu", "check"):
         words.append("noise.fmu")  # without a file it checks all of the package
     if draw.random() < 0.1:

@@ -180,3 +180,32 @@ def test_an_orbit_between_two_stops_is_that_of_a_long_run() -> None:
     assert orbit.name == "P(2,1)"
     assert orbit.contacts.tolist() == [0, 1]
     assert orbit.determinant == pytest.approx(orbit.exact_determinant, rel=1e-12)
+
+
+def test_a_branch_ends_where_the_scene_allows_no_further() -> None:
+    span = ["--parameter", "stop[1].restitution", "--from", "0.5", "--to", "1.5"]
+    code, out, _ = in_this_process(
+        ["follow", str(SCENE), "--set", "sweep={}", "--set", f"{PARAMETER}=1.2", *span]
+    )
+    assert code == 0
+    assert "cannot be followed beyond 0.99999" in out
+
+
+def test_what_was_followed_before_an_error_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from vibroimpact.analysis.orbits import OrbitError
+    from vibroimpact.analysis.orbits.following import Follower
+
+    def fails(self: Follower, *arguments: object) -> object:
+        raise OrbitError("orbit: expected something else.")
+
+    monkeypatch.setattr(Follower, "leave", fails)
+    output = tmp_path / "b.nc"
+    code, out, err = in_this_process(
+        ["follow", str(SCENE), "--parameter", PARAMETER, "--from", "0.6", "--to", "1.6", "-o", str(output)]
+    )
+    assert code in (1, 2)
+    assert err == "orbit: expected something else.\n"
+    assert "0.93649312074" in out
+    assert vi.open_dataset(output).sizes["angular_frequency"] > 100
