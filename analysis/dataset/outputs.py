@@ -60,11 +60,7 @@ def refuse_outputs(
     for target in (output, figure):
         if target is None:
             continue
-        if len(os.fsencode(target.name)) > LONGEST_NAME:
-            raise UsageError(
-                f"{target.name[:60]}...: expected a name of {LONGEST_NAME} bytes at most, "
-                f"got {len(os.fsencode(target.name))}."
-            )
+        _refuse_long_name(target)
         if any(_same(target, file) for file in files):
             raise UsageError(f"{target}: expected a new file, got one that is read. Choose another name.")
         if target.is_dir():
@@ -84,13 +80,22 @@ def refuse_outputs(
         raise UsageError(f"{figure}: expected a name ending in {endings}, got {got!r}.")
 
 
+def _refuse_long_name(target: Path) -> None:
+    length = len(os.fsencode(target.name))
+    if length > LONGEST_NAME:
+        raise UsageError(
+            f"{target.name[:60]}...: expected a name of {LONGEST_NAME} bytes at most, got {length}."
+        )
+
+
 def refuse_folder(folder: Path) -> None:
-    """Refuse a name for a new folder that is that of a file.
+    """Refuse a name for a new folder that is that of a file, or too long.
 
     Raises
     ------
     UsageError
     """
+    _refuse_long_name(folder)
     if folder.suffix.lower() in FILE_ENDINGS and not folder.is_dir():
         raise UsageError(
             f"{folder}: expected the name of a folder, got that of a file ({folder.suffix}). "

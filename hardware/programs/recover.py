@@ -7,6 +7,7 @@ from pathlib import Path
 
 from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
 from vibroimpact.analysis.recording import Recording
+from vibroimpact.fmus.errors import UsageError
 from vibroimpact.fmus.terminal import say
 from vibroimpact.hardware.programs.keeping import recording_in, write_and_show
 from vibroimpact.hardware.rig.journal import read_journal
@@ -36,6 +37,8 @@ def recover(journal: str | os.PathLike[str]) -> Recording:
 
 def recover_into(journal: Path, output: Path | None, force: bool) -> None:
     """Write the recording of a journal; the journal stays."""
+    if not journal.name or journal.is_dir():
+        raise UsageError(f"{journal}: expected a journal, got a folder.")
     target = output or journal.with_suffix(".nc")
     refuse_outputs([journal], target, None)
     refuse_overwriting(target, force, lambda there: False)

@@ -128,3 +128,20 @@ def test_what_cannot_be_recorded_leaves_no_file(
     assert done.returncode == 2
     assert said in done.stderr
     assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("rig", "sweep", "sweep.toml", "-o", "x" * 300 + ".nc"),
+            "expected a name of 200 bytes at most, got 303.",
+        ),
+        (("rig", "recover", "."), ".: expected a journal, got a folder."),
+    ],
+)
+def test_names_that_no_output_or_journal_can_have_are_one_line(words: tuple[str, ...], said: str) -> None:
+    done = in_this_process(*words)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
