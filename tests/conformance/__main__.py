@@ -30,6 +30,12 @@ mass = 1.0
 stiffness = 0.0
 displacement_start = 1.0
 
+[sensor]
+gain = 1.0
+
+[exciter]
+gain = 0.0
+
 [record]
 recorded_time = 1.0
 """
@@ -38,16 +44,10 @@ RIG = """
 scene = "still.toml"
 device = "xseries"
 
-[exciter]
-output = 0
-gain = 0.0
+[wiring]
+ao0 = "exciter"
 """
-SENSOR = """
-[[sensor]]
-input = {place}
-quantity = "displacement"
-gain = {gain}
-"""
+WIRE = 'ai{place} = {{ signal = "sensor.displacement", amplification = {volts} }}\n'
 
 
 def main() -> int:
@@ -89,14 +89,20 @@ def _commit(checkout: Path) -> str:
     return done.stdout.strip() if done.returncode == 0 else "unknown"
 
 
+def rig_in(folder: Path) -> Path:
+    """Write the rig that NI's tests are run on into a folder; return its file."""
+    (folder / "still.toml").write_text(SCENE, encoding="utf-8")
+    wires = "".join(WIRE.format(place=place, volts=place + 1.0) for place in range(8))
+    file = folder / "rig.toml"
+    file.write_text(RIG + wires, encoding="utf-8")
+    return file
+
+
 def _run(checkout: Path, chosen: list[str]) -> list[Outcome]:
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / "report"
         report.touch()
-        (Path(folder) / "still.toml").write_text(SCENE, encoding="utf-8")
-        sensors = "".join(SENSOR.format(place=place, gain=place + 1.0) for place in range(8))
-        (Path(folder) / "rig.toml").write_text(RIG + sensors, encoding="utf-8")
-        with served(read_rig(Path(folder) / "rig.toml")) as server:
+        with served(read_rig(rig_in(Path(folder)))) as server:
             port = server.address.rpartition(":")[2]
             changed = {ADDRESS: port, REPORT: str(report), "PYTHONPATH": str(ROOT / "tests")}
             command = [sys.executable, "-m", "pytest", "-p", "conformance.plugin", "-p", "no:cacheprovider"]
