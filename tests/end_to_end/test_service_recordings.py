@@ -27,12 +27,13 @@ pytestmark = pytest.mark.slow
 COUPLED = (EXAMPLES / "two_oscillators.toml").read_text(encoding="utf-8").replace("70.0", "2.0")
 
 
-@pytest.fixture(scope="module")
+# of the session, as the service is: workers that take tests from others set up a module's fixtures again
+@pytest.fixture(scope="session")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return hit(tmp_path_factory.mktemp("hit"))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def recording(served: Served, file: Path) -> Iterator[RemoteRecording]:
     with served.client() as service:
         yield service.upload_recording(file)
