@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from vibroimpact.analysis.dataset.schema import SpecialOrbit
 from vibroimpact.analysis.figures.page import MARK, canvas, label, legend_outside
-from vibroimpact.analysis.figures.sweeps import draw_map, varied, wrong_sweep
+from vibroimpact.analysis.figures.sweeps import draw_map, edges, in_order_of_the_scene, varied, wrong_sweep
 from vibroimpact.fmus.errors import DatasetError
 
 BRANCH = "orbit_branch"
@@ -84,19 +84,18 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
     """Draw bifurcations over two parameters, over a map where there is one."""
     runs = dataset.vibroimpact.runs
     order = np.argsort(runs["run_index"].values)
-    keys = str(dataset.attrs.get("parameter", "")).split(".")[-1]
-    x, y = sorted(names, key=lambda name: name != keys)
     if over is not None:
         if sorted(varied(over)) != sorted(names):
-            raise DatasetError(wrong_sweep(f"a map of {x} and {y} below", over))
+            raise DatasetError(wrong_sweep(f"a map of {' and '.join(names)} below", over))
         figure = draw_map(over)
-        axis = figure.axes[0]
-        if axis.get_xlabel() != label(over[x]):
-            x, y = y, x
+        x, y = in_order_of_the_scene(over, varied(over))
+        panels = [axis for axis in figure.axes if axis.get_ylabel() == label(over[y])]
     else:
         figure = canvas(75)
-        axis = figure.subplots()
-        axis.set(xlabel=label(dataset[x]), ylabel=label(dataset[y]))
+        panels = [figure.subplots()]
+        first = str(dataset.attrs.get("parameter", "")).split(".")[-1]
+        x, y = sorted(names, key=lambda name: name != first)
+        panels[0].set(xlabel=label(dataset[x]), ylabel=label(dataset[y]))
     branch, special = runs[BRANCH].values, runs["orbit_special"].values
     said: set[str] = set()
     for number in np.unique(branch[branch > 0]):
@@ -105,11 +104,20 @@ def _draw_loci(dataset: xr.Dataset, names: list[str], over: xr.Dataset | None) -
         words = str(kind.name).replace("_", " ")
         style = _LOCI.get(kind, {"color": "0.4"})
         shown = None if words in said else words
-        axis.plot(runs[x].values[chosen], runs[y].values[chosen], linewidth=1.0, label=shown, **style)
+        for axis in panels:
+            axis.plot(runs[x].values[chosen], runs[y].values[chosen], linewidth=1.0, label=shown, **style)
         said.add(words)
-    axis.margins(x=0.02)
-    legend_outside(figure, axis, ncols=3)
+    if over is None:
+        panels[0].margins(x=0.02)
+    else:  # curves may go on beyond the map
+        panels[0].set(xlim=_ends(over[x].values), ylim=_ends(over[y].values))
+    legend_outside(figure, panels[0], ncols=3)
     return figure
+
+
+def _ends(values: Any) -> tuple[float, float]:
+    cells = edges(np.unique(values))
+    return float(cells[0]), float(cells[-1])
 
 
 def _rows(dataset: xr.Dataset, panel: str) -> list[np.ndarray[Any, Any]]:

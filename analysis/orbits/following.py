@@ -379,9 +379,10 @@ def _determinant(matrix: Floats) -> float:
 
 
 def _turning(multipliers: NDArray[np.complex128]) -> float:
-    """Return the product of 1 - the product of two multipliers, over all pairs: 0 where two are on the unit circle."""
+    """Return a product over all pairs of multipliers that is 0 where two are on the unit circle."""
     i, j = np.triu_indices(multipliers.size, 1)
-    return float(np.prod(1.0 - multipliers[i] * multipliers[j]).real)
+    off = 1.0 - multipliers[i] * multipliers[j]
+    return float(np.prod(off / (1.0 + np.abs(off))).real)
 
 
 def _turns_round(multipliers: NDArray[np.complex128]) -> bool:

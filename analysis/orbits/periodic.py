@@ -161,6 +161,8 @@ def evaluated(body: ImpactingBody, contacts: NDArray[np.int32], phases: Floats, 
         raise OrbitError(
             "orbit: expected modes that answer force and impacts within bounds, got an undamped one in resonance."
         )
+    if found.end is OrbitEnd.singular:
+        raise OrbitError("orbit: expected an orbit that is isolated, got a family: the body loses no energy.")
     if found.end is not OrbitEnd.done:
         raise OrbitError(
             f"orbit: expected impacts that a motion has, got phases {np.round(phases, 6).tolist()}."

@@ -99,6 +99,34 @@ def test_bifurcations_over_two_numbers_are_written_and_drawn(tmp_path: Path) -> 
     vi.draw(found)
 
 
+def test_curves_lie_on_the_map_of_both_numbers() -> None:
+    loci = vi.follow(
+        SCENE,
+        PARAMETER,
+        0.6,
+        1.6,
+        step=0.05,
+        doublings=0,
+        second="forcing.amplitude",
+        second_range=(0.3, 0.7),
+    )
+    grid = {
+        PARAMETER: {"start": 0.7, "stop": 1.5, "points": 5},
+        "forcing.amplitude": {"values": [0.4, 0.5, 0.6]},
+    }
+    scene = vi.Scene.from_text(SCENE.read_text(encoding="utf-8")).with_sweep(grid)
+    below = vi.run(scene.with_values({"record.transient_periods": 20}))
+    figure = vi.draw(loci, over=below)
+    panels = [axis for axis in figure.axes if axis.lines]
+    assert len(panels) == 2
+    for axis in panels:
+        assert axis.get_ylabel() == "amplitude (-)"
+        curves = np.concatenate([np.column_stack(line.get_data()) for line in axis.lines])
+        np.testing.assert_allclose(np.sort(curves[:, 0]), np.sort(loci.vibroimpact.runs["angular_frequency"]))
+        assert axis.get_xlim() == pytest.approx((0.6, 1.6))
+        assert axis.get_ylim() == pytest.approx((0.35, 0.65))
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
