@@ -264,8 +264,8 @@ static void find_residual(beam *b, char *message)
     }
 }
 
-/* Amplitude of the harmonic modal force on mode j, N kg^(-1/2). equations.md 6.5 */
-static double modal_amplitude(const beam *b, int j)
+/* N kg^(-1/2). equations.md 6.5 */
+static double amplitude_on_mode(const beam *b, int j)
 {
     switch (b->forcing_kind) {
     case FORCED_AT_POINT: return b->forcing_amplitude * b->forced_shape[j];
@@ -273,6 +273,13 @@ static double modal_amplitude(const beam *b, int j)
     case FORCED_AS_MODE: return j + 1 == b->forcing_mode ? b->forcing_amplitude / b->root_mass : 0.0;
     default: return -b->forcing_amplitude * b->participation[j];
     }
+}
+
+/* Amplitude of the harmonic modal force on mode j, N kg^(-1/2); a force of frequency 0 is constant. */
+static double modal_amplitude(const beam *b, int j)
+{
+    const double share = b->body.forcing_angular_frequency == 0.0 ? cos(b->body.forcing_phase) : 1.0;
+    return share * amplitude_on_mode(b, j);
 }
 
 static double mode_damping(const beam *b, int j, double natural)
@@ -333,9 +340,7 @@ static void place_contact(beam *b, int k, char *message)
 
 static void set_mode(beam *b, int j, double natural, double ratio)
 {
-    const double share = b->body.forcing_angular_frequency == 0.0 ? cos(b->body.forcing_phase) : 1.0;
-    vi_structure_mode(&b->body.model, j, natural, ratio, share * modal_amplitude(b, j),
-                      b->body.forcing_angular_frequency);
+    vi_structure_mode(&b->body.model, j, natural, ratio, modal_amplitude(b, j), b->body.forcing_angular_frequency);
 }
 
 /* Modes as they are at the present amplitudes, until the next step. */
@@ -437,8 +442,21 @@ static double base_acceleration(const beam *b)
     return forced ? input + b->forcing_amplitude * vi_structure_component_forcing(&b->body) : input;
 }
 
+static void drive(beam *b)
+{
+    double force[VI_MODES];
+    if (!b->body.forcing_changed) {
+        return;
+    }
+    for (int j = 0; j < b->modes; ++j) {
+        force[j] = modal_amplitude(b, j);
+    }
+    vi_structure_component_drive(&b->body, force);
+}
+
 static void refresh_inputs(beam *b)
 {
+    drive(b);
     if (b->body.inputs_changed) {
         vi_structure_component_take_impulses(&b->body);
         hold_inputs(b);
@@ -458,8 +476,8 @@ static vi_exchange_body exchange_body(beam *b)
 static void update_outputs(void *self)
 {
     beam *b = self;
-    b->time = vi_structure_component_time(&b->body);
     refresh_inputs(b);
+    b->time = vi_structure_component_time(&b->body);
     const vi_structure_component *body = &b->body;
     const double base = base_acceleration(b);
     vi_structure_component_outputs(&b->body, base);
@@ -496,7 +514,11 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 
 static void was_set(void *self, uint32_t reference)
 {
-    vi_structure_component_was_set(&((beam *)self)->body, reference, BEAM_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
+    beam *b = self;
+    if (reference == BEAM_FORCING_AMPLITUDE || reference == BEAM_FORCING_ANGULAR_FREQUENCY) {
+        b->body.forcing_changed = 1;
+    }
+    vi_structure_component_was_set(&b->body, reference, BEAM_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
                                    BEAM_RECORD_TAKEN);
 }
 
@@ -511,12 +533,23 @@ static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
     return true;
 }
 
+/* Of a tuned forcing that the body has not gone on with. */
+static void check_drive(const beam *b, char *message)
+{
+    if (b->body.forcing_changed) {
+        vi_check_finite(message, "forcing.amplitude", b->forcing_amplitude);
+        vi_structure_component_check_drive(&b->body, message);
+    }
+}
+
 static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
     beam *b = self;
     vi_instant target;
     message[0] = '\0';
+    drive(b);
     check_inputs(b, message);
+    check_drive(b, message);
     if (!vi_structure_component_step_is_good(&b->body, request, &target, message)
         || !vi_structure_component_resolve(&b->body, message)) {
         return VI_STEP_ERROR;

@@ -124,20 +124,29 @@ static bool find_modes(chain *c, vi_chain_modes *modes, char *message)
     return true;
 }
 
+/* Modal amplitudes of the harmonic force; a force of frequency 0 is constant. */
+static void find_forces(const chain *c, double force[VI_MODES])
+{
+    const bool constant = c->body.forcing_angular_frequency == 0.0;
+    const double share = constant ? cos(c->body.forcing_phase) : 1.0;
+    project(c, c->forcing_amplitude, force);
+    for (int j = 0; j < modes_of(c); ++j) {
+        force[j] *= share;
+    }
+}
+
 static void fill_model(chain *c, const vi_chain_modes *modes)
 {
     vi_structure_model *model = &c->body.model;
-    const bool constant = c->body.forcing_angular_frequency == 0.0;
-    const double share = constant ? cos(c->body.forcing_phase) : 1.0;
     double force[VI_MODES];
-    project(c, c->forcing_amplitude, force);
+    find_forces(c, force);
     model->modes = (int32_t)modes_of(c);
     model->contacts = vi_structure_component_ports(&c->body);
     model->coupled = !modes->classical;
     memset(c->body.natural, 0, sizeof c->body.natural);
     for (int j = 0; j < model->modes; ++j) {
         c->body.natural[j] = modes->natural[j];
-        vi_structure_mode(model, j, modes->natural[j], modes->damping_ratio[j], share * force[j],
+        vi_structure_mode(model, j, modes->natural[j], modes->damping_ratio[j], force[j],
                           c->body.forcing_angular_frequency);
         memcpy(model->coupling[j], modes->damping[j], sizeof model->coupling[j]);
     }
@@ -185,8 +194,18 @@ static void hold_inputs(chain *c)
     vi_structure_component_hold(&c->body, held, held_rate);
 }
 
+static void drive(chain *c)
+{
+    double force[VI_MODES];
+    if (c->body.forcing_changed) {
+        find_forces(c, force);
+        vi_structure_component_drive(&c->body, force);
+    }
+}
+
 static void refresh_inputs(chain *c)
 {
+    drive(c);
     if (c->body.inputs_changed) {
         vi_structure_component_take_impulses(&c->body);
         hold_inputs(c);
@@ -196,8 +215,8 @@ static void refresh_inputs(chain *c)
 static void update_outputs(void *self)
 {
     chain *c = self;
-    c->time = vi_structure_component_time(&c->body);
     refresh_inputs(c);
+    c->time = vi_structure_component_time(&c->body);
     const double base = vi_structure_component_base_acceleration(&c->body);
     vi_structure_component_outputs(&c->body, base);
     for (int i = 0; i < c->masses; ++i) {
@@ -232,7 +251,13 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
 
 static void was_set(void *self, uint32_t reference)
 {
-    vi_structure_component_was_set(&((chain *)self)->body, reference, CHAIN_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
+    chain *c = self;
+    const size_t offset = vi_this_component.variables[reference].offset, first = offsetof(chain, forcing_amplitude);
+    if ((offset >= first && offset < first + sizeof c->forcing_amplitude)
+        || reference == CHAIN_FORCING_ANGULAR_FREQUENCY) {
+        c->body.forcing_changed = 1;
+    }
+    vi_structure_component_was_set(&c->body, reference, CHAIN_CONTACT_APPLIED_RESTITUTION_1, STRIDE,
                                    CHAIN_RECORD_TAKEN);
 }
 
@@ -247,12 +272,23 @@ static bool resolve(void *self, char message[VI_MESSAGE_LENGTH])
     return true;
 }
 
+/* Of a tuned forcing that the body has not gone on with. */
+static void check_drive(const chain *c, char *message)
+{
+    if (c->body.forcing_changed) {
+        vi_check_each(message, vi_check_finite, "forcing.amplitude", c->forcing_amplitude, (int)c->masses);
+        vi_structure_component_check_drive(&c->body, message);
+    }
+}
+
 static vi_step_result step(void *self, const vi_step_request *request, char message[VI_MESSAGE_LENGTH])
 {
     chain *c = self;
     vi_instant target;
     message[0] = '\0';
+    drive(c);
     check_inputs(c, message);
+    check_drive(c, message);
     if (!vi_structure_component_step_is_good(&c->body, request, &target, message)
         || !vi_structure_component_resolve(&c->body, message)) {
         return VI_STEP_ERROR;

@@ -89,6 +89,24 @@ void oscillator_start(oscillator *o, vi_instant now)
     }
 }
 
+void oscillator_drive(oscillator *o)
+{
+    const bool possible = isfinite(o->forcing_amplitude)
+                          && vi_clock_can_retune(&o->body.clock, o->forcing_angular_frequency);
+    if (!o->forcing_changed || !possible) {
+        return;
+    }
+    if (o->yields) {
+        const double force[VI_MODES] = {amplitude(o) / sqrt(o->mass)};
+        const vi_structure s = parts(o);
+        vi_structure_drive(&s, force, o->forcing_angular_frequency);
+        o->body.clock = o->model.clock;
+    } else {
+        vi_body_drive(&o->body, amplitude(o) / o->mass, o->forcing_angular_frequency);
+    }
+    o->forcing_changed = 0;
+}
+
 void oscillator_follow_amplitude(oscillator *o)
 {
     if (!vi_amplitude_acts(&o->amplitude)) {

@@ -19,6 +19,9 @@ bool oscillator_start_clock(oscillator *o, double start_time, vi_instant *now);
 /* Begin at an instant from the start values; the parameters are good. */
 void oscillator_start(oscillator *o, vi_instant now);
 
+/* The forcing may have been tuned: go on with it, where it is one that the body can go on with. */
+void oscillator_drive(oscillator *o);
+
 /* Spring and dashpot as they are at the present amplitude, until the next step; nothing where they do not depend on it. */
 void oscillator_follow_amplitude(oscillator *o);
 

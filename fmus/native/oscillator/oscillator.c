@@ -178,6 +178,9 @@ static void was_set(void *self, uint32_t value_reference)
         return;
     }
     o->inputs_changed = 1;
+    if (value_reference == OSCILLATOR_FORCING_AMPLITUDE || value_reference == OSCILLATOR_FORCING_ANGULAR_FREQUENCY) {
+        o->forcing_changed = 1;
+    }
     if (value_reference == OSCILLATOR_CONTACT_APPLIED_RESTITUTION_1) {
         o->body.contacts[0].answered = 1;
     } else if (value_reference == OSCILLATOR_CONTACT_APPLIED_RESTITUTION_2) {
@@ -187,6 +190,7 @@ static void was_set(void *self, uint32_t value_reference)
 
 static void refresh_inputs(oscillator *o)
 {
+    oscillator_drive(o);
     if (o->inputs_changed) {
         oscillator_take_impulses(o);
         oscillator_hold(o);
@@ -196,8 +200,8 @@ static void refresh_inputs(oscillator *o)
 static void update_outputs(void *self)
 {
     oscillator *o = self;
-    o->time = vi_clock_time(&o->body.clock, oscillator_now(o));
     refresh_inputs(o);
+    o->time = vi_clock_time(&o->body.clock, oscillator_now(o));
     oscillator_outputs(o, &o->displacement, &o->velocity, &o->relative_acceleration);
     o->acceleration = o->relative_acceleration + o->base_acceleration;
     if (o->state.exchange.on) {
@@ -223,10 +227,20 @@ static bool initialize(void *self, double start_time, char message[VI_MESSAGE_LE
                     start_time, o->forcing_angular_frequency);
         return false;
     }
+    o->forcing_changed = 0;
     oscillator_start(o, now);
     oscillator_hold(o);
     update_outputs(o);
     return true;
+}
+
+/* Of a tuned forcing that the body has not gone on with. */
+static void check_drive(char *message, const oscillator *o)
+{
+    if (o->forcing_changed) {
+        vi_check_finite(message, "forcing.amplitude", o->forcing_amplitude);
+        vi_check_retuning(message, &o->body.clock, o->forcing_angular_frequency);
+    }
 }
 
 static bool step_is_good(const oscillator *o, const vi_step_request *request, vi_instant *target, char *message)
@@ -247,6 +261,7 @@ static bool step_is_good(const oscillator *o, const vi_step_request *request, vi
         vi_complain(message, "currentCommunicationPoint: expected a time below 2^53 forcing periods, got %.17g", high);
     }
     check_inputs(message, o);
+    check_drive(message, o);
     const int passed = oscillator_passed(o);
     if (passed) {
         vi_complain(message,
@@ -293,6 +308,7 @@ static vi_step_result step(void *self, const vi_step_request *request, char mess
 {
     oscillator *o = self;
     vi_instant target;
+    oscillator_drive(o);
     if (!step_is_good(o, request, &target, message) || !resolve(o, message)) {
         return VI_STEP_ERROR;
     }

@@ -21,6 +21,7 @@ typedef struct {
     /* inputs */
     double force, force_rate, base_acceleration, base_acceleration_rate;
     int32_t inputs_changed; /* since they were last given to the body */
+    int32_t forcing_changed; /* likewise the tunable parameters of the forcing */
     /* outputs */
     double displacement, velocity, relative_acceleration, acceleration, energy_kinetic, energy_potential;
     /* A stop that yields (a law of force) is met on the engine of structure.h, with one mode; the impulsive laws alone

@@ -2,6 +2,8 @@
 #ifndef VIBROIMPACT_COMPLAINT_H
 #define VIBROIMPACT_COMPLAINT_H
 
+#include "motion/clock.h"
+
 enum { VI_MESSAGE_LENGTH = 1024 };
 
 /* Add a problem to a message that was empty or holds others. What finds no room is cut, and "..." says so. */
@@ -11,6 +13,9 @@ void vi_complain(char message[VI_MESSAGE_LENGTH], const char *format, ...);
 void vi_check_positive(char message[VI_MESSAGE_LENGTH], const char *name, double value);
 void vi_check_not_negative(char message[VI_MESSAGE_LENGTH], const char *name, double value);
 void vi_check_finite(char message[VI_MESSAGE_LENGTH], const char *name, double value);
+
+/* Complain unless a forcing that this clock counts can go on at this angular frequency, rad/s. */
+void vi_check_retuning(char message[VI_MESSAGE_LENGTH], const vi_clock *clock, double angular_frequency);
 
 typedef void (*vi_check)(char message[VI_MESSAGE_LENGTH], const char *name, double value);
 

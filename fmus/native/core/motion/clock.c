@@ -16,10 +16,16 @@ static double sum_error(double a, double b, double sum)
     return (a - (sum - b_part)) + (b - b_part);
 }
 
-static void start_forced(vi_clock *clock, double angular_frequency, double phase)
+static void take_period(vi_clock *clock, double angular_frequency)
 {
+    clock->angular_frequency = angular_frequency;
     clock->period = TWO_PI / angular_frequency;
     clock->period_low = (fma(-clock->period, angular_frequency, TWO_PI) + TWO_PI_LOW) / angular_frequency;
+}
+
+static void start_forced(vi_clock *clock, double angular_frequency, double phase)
+{
+    take_period(clock, angular_frequency);
     double turn = remainder(phase, TWO_PI);
     if (turn < 0.0) {
         turn += TWO_PI;
@@ -82,16 +88,24 @@ bool vi_clock_instant(const vi_clock *clock, double high, double low, vi_instant
     return true;
 }
 
-double vi_clock_time(const vi_clock *clock, vi_instant instant)
+/* Its periods and rest, less `origin`, s; *low is what the sum that is returned leaves over. */
+static double seconds_since(const vi_clock *clock, vi_instant instant, double origin, double origin_low, double *low)
 {
     const double count = (double)instant.periods;
     const double whole = count * clock->period;
-    double low = fma(count, clock->period, -whole) + count * clock->period_low - clock->origin_low + instant.rest_low;
+    *low = fma(count, clock->period, -whole) + count * clock->period_low - origin_low + instant.rest_low;
     const double sum = whole + instant.rest;
-    low += sum_error(whole, instant.rest, sum);
-    const double shifted = sum - clock->origin;
-    low += sum_error(sum, -clock->origin, shifted);
-    return shifted + low;
+    *low += sum_error(whole, instant.rest, sum);
+    const double shifted = sum - origin;
+    *low += sum_error(sum, -origin, shifted);
+    return shifted;
+}
+
+double vi_clock_time(const vi_clock *clock, vi_instant instant)
+{
+    double low;
+    const double high = seconds_since(clock, instant, clock->origin, clock->origin_low, &low);
+    return high + low;
 }
 
 double vi_clock_elapsed(const vi_clock *clock, vi_instant a, vi_instant b)
@@ -150,4 +164,55 @@ double vi_clock_phase(const vi_clock *clock, vi_instant instant)
     }
     const double phase = clock->angular_frequency * instant.rest;
     return phase < TWO_PI ? phase : 0.0;
+}
+
+/* ---- another frequency ---- */
+
+bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency)
+{
+    const double period = TWO_PI / angular_frequency;
+    return clock->angular_frequency == 0.0 ? angular_frequency == 0.0
+                                           : angular_frequency > 0.0 && period >= DBL_MIN && period <= DBL_MAX;
+}
+
+/* The instant of the same phase, in periods of another clock. */
+static vi_instant at_phase_of(const vi_clock *clock, double angular_frequency, vi_instant instant)
+{
+    const double w = clock->angular_frequency, turn = angular_frequency * instant.rest;
+    const double low = fma(angular_frequency, instant.rest, -turn) + angular_frequency * instant.rest_low;
+    const double rest = turn / w;
+    instant.rest_low = (fma(-rest, w, turn) + low) / w;
+    instant.rest = rest;
+    if (rest >= clock->period) { /* by rounding: the period that it is in has not ended */
+        instant.rest = nextafter(clock->period, 0.0);
+        instant.rest_low = 0.0;
+    }
+    return instant;
+}
+
+/* `now` moved back by `seconds` >= 0. */
+static vi_instant before(const vi_clock *clock, vi_instant now, double seconds)
+{
+    const double count = ceil(seconds / clock->period);
+    now.periods -= (int64_t)count;
+    return vi_clock_after(clock, now, fma(count, clock->period, -seconds) + count * clock->period_low);
+}
+
+void vi_clock_retune(vi_clock *clock, double angular_frequency, vi_instant *now, vi_instant *const past[], int count)
+{
+    if (angular_frequency == clock->angular_frequency) {
+        return;
+    }
+    const vi_clock former = *clock;
+    const vi_instant was = *now;
+    take_period(clock, angular_frequency);
+    *now = at_phase_of(clock, former.angular_frequency, was);
+    double low, time_low;
+    const double time = seconds_since(&former, was, former.origin, former.origin_low, &time_low);
+    const double high = seconds_since(clock, *now, time, time_low, &low);
+    clock->origin = high + low;
+    clock->origin_low = low - (clock->origin - high);
+    for (int i = 0; i < count; ++i) {
+        *past[i] = before(clock, *now, fmax(0.0, vi_clock_elapsed(&former, *past[i], was)));
+    }
 }

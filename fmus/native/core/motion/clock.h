@@ -1,6 +1,7 @@
 /* Time as whole forcing periods + rest, so that the phase of the 10^6th period is as exact as the first.
  *
- * The origin is the last instant of forcing phase 0 at or before time 0; hence phase = angular_frequency * rest.
+ * The origin is the last instant of forcing phase 0 at or before time 0; hence phase = angular_frequency * rest. Once
+ * the frequency has changed it may be any instant at which a force of the present frequency would have phase 0.
  * The period 2 pi / angular_frequency is kept to 32 digits (double + double). Unforced bodies count in a
  * power of two near their natural period: conversions are then exact.
  */
@@ -37,6 +38,13 @@ bool vi_clock_stands(vi_standstill *standstill, vi_instant now);
 /* A clock for a force of this angular frequency (rad/s, >= 0) and phase (rad) at time 0; `natural` (rad/s) is used
  * when angular_frequency is 0. Returns false when the period is not a finite positive number of seconds. */
 bool vi_clock_start(vi_clock *clock, double angular_frequency, double phase, double natural);
+
+/* Can it go on at this angular frequency, rad/s? A force that has a phase keeps one; a constant one has none. */
+bool vi_clock_can_retune(const vi_clock *clock, double angular_frequency);
+
+/* Go on at another angular frequency, at which it can, from *now on: time, forcing phase and count of periods stay.
+ * past[]: instants before *now, which stay the same times. */
+void vi_clock_retune(vi_clock *clock, double angular_frequency, vi_instant *now, vi_instant *const past[], int count);
 
 /* The instant of time = high + low, s. An instant closer to a period's start than double precision can tell at this
  * time is put on it. Returns false beyond 2^53 periods. */

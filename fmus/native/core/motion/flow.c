@@ -40,6 +40,14 @@ static void start_steady(vi_mode *mode)
     mode->steady_snap = w * w * w * w * mode->steady_amplitude;
 }
 
+void vi_mode_drive(vi_mode *mode, double force, double angular_frequency)
+{
+    mode->force = force;
+    mode->angular_frequency = angular_frequency;
+    mode->fastest = fmax(fmax(mode->natural, 2.0 * mode->decay), angular_frequency);
+    start_steady(mode);
+}
+
 void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness, double amplitude,
                    double angular_frequency)
 {
@@ -51,10 +59,7 @@ void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness,
     mode->rate = sqrt(fabs(d));
     mode->fast = mode->decay + mode->rate;
     mode->slow = mode->regime == VI_OVERDAMPED ? mode->stiffness / mode->fast : mode->decay;
-    mode->force = amplitude / mass;
-    mode->angular_frequency = angular_frequency;
-    mode->fastest = fmax(fmax(mode->natural, 2.0 * mode->decay), angular_frequency);
-    start_steady(mode);
+    vi_mode_drive(mode, amplitude / mass, angular_frequency);
 }
 
 /* ---- homogeneous flow: e_cos = Ce, e_sin = Se of equations.md 1.2 ---- */

@@ -75,6 +75,9 @@ typedef struct {
 void vi_mode_start(vi_mode *mode, double mass, double damping, double stiffness, double amplitude,
                    double angular_frequency);
 
+/* Another harmonic force on it: amplitude per unit mass (m/s^2), angular frequency (rad/s). */
+void vi_mode_drive(vi_mode *mode, double force, double angular_frequency);
+
 /* Begin a segment of at most `length` seconds at displacement x, velocity v and forcing phase (rad). The series form
  * may shorten the length. Low bounces ask for it (`local`): it counts from the start, so that a bounce of 1e-12 m on a
  * stop at 1 m keeps all its digits. */

@@ -417,3 +417,19 @@ def test_what_an_integrator_cannot_follow_is_refused_with_the_way_out(name: str)
     message = it.message(it.fmu.exitInitializationMode)
     assert name in message
     assert "use this component by co-simulation" in message
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_forcing_that_is_tuned_at_an_event_goes_on_at_its_phase(version: str) -> None:
+    body = Integrated("Oscillator", version)
+    body.set({"forcing.amplitude": 1.0, "forcing.angular_frequency": 2.0})
+    body.begin()
+    body.move(0.3, 0.1, 0.2)
+    body.fmu.enterEventMode()
+    body.set({"forcing.amplitude": 3.0, "forcing.angular_frequency": 5.0})
+    body.update()
+    body.fmu.enterContinuousTimeMode()
+    assert body.derivatives(2) == pytest.approx([0.2, 3.0 * math.cos(0.6) - 0.1], rel=1e-14)
+    body.move(0.5, 0.1, 0.2)
+    assert body.derivatives(2)[1] == pytest.approx(3.0 * math.cos(0.6 + 5.0 * 0.2) - 0.1, rel=1e-14)
+    body.fmu.freeInstance()

@@ -225,6 +225,7 @@ bool vi_structure_component_start(vi_structure_component *c, double start_time, 
         vi_contact_clear(&c->contacts[k]);
     }
     memset(c->state.status, 0, sizeof c->state.status); /* of a start with other start values */
+    c->forcing_changed = 0;
     c->model.tolerance = c->contact_tolerance;
     vi_structure_prepare(&c->model);
     check_points(c, message);
@@ -241,6 +242,26 @@ void vi_structure_component_take_impulses(vi_structure_component *c)
 {
     const vi_structure parts = parts_of(c);
     vi_structure_take_impulses(&parts);
+}
+
+void vi_structure_component_drive(vi_structure_component *c, const double force[VI_MODES])
+{
+    bool good = vi_clock_can_retune(&c->model.clock, c->forcing_angular_frequency);
+    for (int j = 0; j < c->model.modes; ++j) {
+        good = good && isfinite(force[j]);
+    }
+    if (good) {
+        const vi_structure parts = parts_of(c);
+        vi_structure_drive(&parts, force, c->forcing_angular_frequency);
+        c->forcing_changed = 0;
+    }
+}
+
+void vi_structure_component_check_drive(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH])
+{
+    if (c->forcing_changed) {
+        vi_check_retuning(message, &c->model.clock, c->forcing_angular_frequency);
+    }
 }
 
 void vi_structure_component_hold(vi_structure_component *c, const double held[VI_MODES],
@@ -285,8 +306,8 @@ double vi_structure_component_base_acceleration(const vi_structure_component *c)
 
 double vi_structure_component_forcing(const vi_structure_component *c)
 {
-    return c->forcing_angular_frequency > 0.0 ? cos(c->forcing_angular_frequency * c->state.now.rest)
-                                              : cos(c->forcing_phase);
+    const double w = c->model.clock.angular_frequency;
+    return w > 0.0 ? cos(w * c->state.now.rest) : cos(c->forcing_phase);
 }
 
 static void update_energies(vi_structure_component *c)

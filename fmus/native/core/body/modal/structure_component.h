@@ -24,6 +24,7 @@ typedef struct {
     double base_acceleration, base_acceleration_rate;
     int32_t record_energies;
     int32_t inputs_changed; /* since they were last given to the engine */
+    int32_t forcing_changed; /* likewise the tunable parameters of the forcing */
     /* outputs */
     double displacement, velocity, acceleration; /* of the observed point, acceleration absolute */
     double energy_kinetic, energy_potential;
@@ -55,6 +56,12 @@ bool vi_structure_component_start(vi_structure_component *c, double start_time, 
 
 /* Give the body the impulses of its contacts, once; before new forces. */
 void vi_structure_component_take_impulses(vi_structure_component *c);
+
+/* The forcing was tuned, and this is what it is for the modes: go on with it, where it is one that the body can go on with. */
+void vi_structure_component_drive(vi_structure_component *c, const double force[VI_MODES]);
+
+/* Complain of a tuned forcing that the body cannot go on with. */
+void vi_structure_component_check_drive(const vi_structure_component *c, char message[VI_MESSAGE_LENGTH]);
 
 /* Give the engine new modal input forces (from now on, with slopes). */
 void vi_structure_component_hold(vi_structure_component *c, const double held[VI_MODES],

@@ -66,6 +66,23 @@ void vi_structure_prepare(vi_structure_model *model)
     }
 }
 
+void vi_structure_drive(const vi_structure *s, const double force[], double angular_frequency)
+{
+    vi_structure_state *state = s->state;
+    vi_instant *past[VI_PORTS + 3] = {&state->held_since, &state->standstill.instant, &state->budget.mark};
+    for (int k = 0; k < VI_PORTS; ++k) {
+        past[3 + k] = &state->separated[k];
+    }
+    vi_clock_retune(&s->model->clock, angular_frequency, &state->now, past, VI_PORTS + 3);
+    for (int j = 0; j < s->model->modes; ++j) {
+        vi_mode_drive(&s->model->mode[j], force[j], angular_frequency);
+        state->origin[j].known = 0;
+    }
+    state->rest.known = 0;
+    state->budget.unfinished = 0;
+    vi_structure_prepare(s->model);
+}
+
 /* ---- the present instant ---- */
 
 double vi_structure_direction(const vi_structure *s, int k)

@@ -130,6 +130,10 @@ typedef struct {
 void vi_structure_mode(vi_structure_model *model, int j, double natural, double damping_ratio, double force,
                        double angular_frequency);
 
+/* Another harmonic force from now on, at the phase that it has: modal amplitudes, angular frequency > 0 where the clock
+ * counts one. Modal displacements and velocities stay. */
+void vi_structure_drive(const vi_structure *s, const double force[], double angular_frequency);
+
 /* After modes, shapes and impulses are set. */
 void vi_structure_prepare(vi_structure_model *model);
 

@@ -20,6 +20,15 @@ void vi_body_hold(vi_body *body, double held, double held_rate)
     body->budget.unfinished = 0;
 }
 
+void vi_body_drive(vi_body *body, double force, double angular_frequency)
+{
+    vi_instant *const past[] = {&body->held_since, &body->standstill.instant, &body->budget.mark};
+    vi_clock_retune(&body->clock, angular_frequency, &body->now, past, sizeof past / sizeof past[0]);
+    vi_mode_drive(&body->mode, force, angular_frequency);
+    body->origin.known = 0;
+    body->budget.unfinished = 0;
+}
+
 /* ---- flight ---- */
 
 /* How long one segment may be, and what its end is. */

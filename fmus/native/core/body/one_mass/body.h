@@ -12,6 +12,10 @@ void vi_body_start(vi_body *body, vi_instant now, double displacement, double ve
 /* New inputs (force per unit mass, and slope) from now on. */
 void vi_body_hold(vi_body *body, double held, double held_rate);
 
+/* Another harmonic force from now on, at the phase that it has: amplitude per unit mass, angular frequency > 0 where the
+ * clock counts one. Displacement and velocity stay. */
+void vi_body_drive(vi_body *body, double force, double angular_frequency);
+
 /* Advance to `target`. See step.h for what may end it earlier. */
 vi_step_result vi_body_advance(vi_body *body, vi_instant target, const vi_step_request *request);
 
