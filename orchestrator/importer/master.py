@@ -28,6 +28,7 @@ from vibroimpact.orchestrator.importer.specification import (
     PairSpec,
     StopContactSpec,
 )
+from vibroimpact.orchestrator.importer.tuning import Tuning, is_tunable
 from vibroimpact.orchestrator.importer.wiring import (
     LoopSolver,
     SettlingInputs,
@@ -53,7 +54,7 @@ class Importer:
     components : sequence of ComponentSpec
         In the order in which they are instantiated and, where nothing else decides, stepped.
     connections : sequence of ConnectionSpec
-        Outputs to inputs.
+        Outputs to inputs, and to tunable parameters.
     events : sequence of EventSpec
         Watched variables; their components run without event mode and early return.
     contacts : sequence of StopContactSpec
@@ -114,8 +115,11 @@ class Importer:
         self.macro_step = macro_step
         self.exchange = exchange
         self.watches = [Watch(self.components[event.component], event) for event in events]
+        tuning = [c for c in connections if is_tunable(c, self.components)]
+        connections = [c for c in connections if c not in tuning]
         order = order_of(connections, self.components)
         self.transfers = transfers_of(order, self.components)
+        self.tuning = Tuning(self.components, tuning, self.transfers)
         self.loops = LoopSolver(order.loops, self.components)
         self.contacts = ContactBonds(
             self.components, self.transfers, connections, contacts, pairs, contact_steps
@@ -140,7 +144,7 @@ class Importer:
         self._iterates = self.exchange == "iterated"
         self._saves = self._iterates or not (alone or not sources)
         self._prepares = self._saves or bool(self.loops.names)
-        simple = len(self._order) == 1 and not self.transfers and not self._prepares
+        simple = len(self._order) == 1 and not self.transfers and not self.tuning and not self._prepares
         self._alone = self._order[0] if simple and self._bare_step(self._order[0]) else None
         self._saved = [c for c in self._order if c.has_states]
         self._incoming = {c.name: [t for t in self.transfers if t.target is c] for c in self._order}
@@ -194,7 +198,8 @@ class Importer:
             own = {name: value for (who, name), value in (values or {}).items() if who == component.name}
             component.begin(own, start_time, first=not self._begun)
         self._begun = True
-        settle_connections(self.transfers, self.loops, start_time)
+        settle_connections([*self.transfers, *self.tuning.transfers], self.loops, start_time)
+        self.tuning.begin()
         for component in self._order:
             component.instance.exit_initialization()
         for watch in self.watches:
@@ -202,6 +207,7 @@ class Importer:
         self.wants_to_end = self._event_mode.begin_run(start_time)
         self.contacts.begin(start_time)
         self._note(self.contacts.pairs.resolve(start_time))
+        self._tune(start_time)
 
     # ---- advancing ----
 
@@ -295,6 +301,7 @@ class Importer:
             self.on_pause()
         if contacts.pairs:
             self._note(contacts.pairs.resolve(end))
+        self._tune(end)
 
     def _prepare(self, time: float) -> None:
         """What the rarer kinds of step need: loops solved, inputs noted, states saved."""
@@ -451,6 +458,10 @@ class Importer:
             self._event_time = self.time
             if self.on_event is not None:
                 self.on_event(Event(self.time, self._event_index, name))
+
+    def _tune(self, time: float) -> None:
+        if self.tuning and self.tuning.resolve(time):
+            self.wants_to_end = True
 
     # ---- repeated steps ----
 

@@ -199,6 +199,9 @@ def _shown(part: Part, general: GeneralScene, scene: Scene, ssp: str) -> list[Va
 
 
 def _refuse_no_connector(scene: Scene, where: str, end: str, variable: VariableFacts, ssp: str) -> None:
+    if end == "to" and variable.causality != "input":
+        got = f"the tunable parameter {variable.name}"
+        raise UsageError(f"{scene.source}: {where}: expected an input in SSP {ssp}, got {got}.")
     if variable.causality in KINDS[ssp] and (end == "to" or variable.causality in GIVING):
         return
     hint = (

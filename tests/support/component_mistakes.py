@@ -69,7 +69,7 @@ OF_COMPONENTS = [
     (
         '"a.force"',
         '"a.mass"',
-        "connection[1].to: expected an input, got the parameter a.mass. "
+        "connection[1].to: expected an input or a tunable parameter, got the parameter a.mass. "
         "Start values go into the parameters of the component.",
     ),
     (

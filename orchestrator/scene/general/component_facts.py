@@ -78,6 +78,11 @@ class VariableFacts:
         return self.causality == "input" or self.initial in ("exact", "approx")
 
     @property
+    def fed(self) -> bool:
+        """Whether a connection may feed it: an input at any time, a tunable parameter at events."""
+        return self.causality == "input" or (self.causality == "parameter" and self.variability == "tunable")
+
+    @property
     def shape(self) -> str:
         """What it holds, in words."""
         return self.type if self.scalar else f"array of {self.type}"

@@ -65,7 +65,11 @@ class ConnectionTable(SceneTable):
         Field(alias="from")
     )
     target: Annotated[
-        _Text, replace(_VARIABLE_RULE, doc="an input; each is fed by one connection at most")
+        _Text,
+        replace(
+            _VARIABLE_RULE,
+            doc="an input, or a tunable parameter, which changes at events; each is fed by one connection at most",
+        ),
     ] = Field(alias="to")
     gain: Annotated[Finite, Rule(doc="the input is gain times the output; between real numbers only")] = 1.0
     gain_unit: Annotated[

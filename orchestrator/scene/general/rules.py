@@ -191,9 +191,10 @@ def _end_problem(draft: GeneralDraft, place: int, end: str, reference: str) -> P
     if problem or variable is None:
         return problem
     got = f"the {variable.causality} {reference}"
-    if end == "to" and variable.causality != "input":
+    if end == "to" and not variable.fed:
         hint = "Start values go into the parameters of the component."
-        return Problem(where, "an input", got, hint if variable.causality == "parameter" else "")
+        expected = "an input or a tunable parameter"
+        return Problem(where, expected, got, hint if variable.causality == "parameter" else "")
     if end == "from" and variable.causality not in SOURCES:
         is_input = variable.causality == "input"
         hint = "Connect the output that feeds it." if is_input else ""
@@ -249,7 +250,7 @@ def _inputs_have_one_source(draft: GeneralDraft) -> Iterator[Problem]:
     first: dict[tuple[str, int], int] = {}
     for place, connection in enumerate(draft.connections):
         variable = draft.variable(connection.target) if connection else None
-        if connection is None or variable is None or variable.causality != "input":
+        if connection is None or variable is None or not variable.fed:
             continue
         # aliases are one input, whatever its name
         other = first.setdefault((component_variable(connection.target)[0], variable.reference), place)

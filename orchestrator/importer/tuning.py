@@ -1,0 +1,100 @@
+"""Tunable parameters that are connected: set at the end of a step, in event mode, where what feeds them has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from vibroimpact.fmus.errors import ComponentError
+from vibroimpact.orchestrator.fmi.instance3 import Instance3
+from vibroimpact.orchestrator.importer.component import Component
+from vibroimpact.orchestrator.importer.events import EVENT_ITERATIONS
+from vibroimpact.orchestrator.importer.specification import ConnectionSpec
+from vibroimpact.orchestrator.importer.wiring import Transfer, order_of, transfers_of
+
+
+def is_tunable(connection: ConnectionSpec, components: Mapping[str, Component]) -> bool:
+    """Does it feed a parameter?"""
+    name, variable = connection.target
+    return bool(components[name].variables[variable].causality == "parameter")
+
+
+class Tuning:
+    """The connections to tunable parameters.
+
+    Inputs may change at any time, parameters at events only: so those are moved once a step is agreed and its events
+    are resolved, and never in a step that may be taken back. What feeds them is given its own inputs before.
+
+    Parameters
+    ----------
+    components : dict of str to Component
+        All of an importer.
+    connections : sequence of ConnectionSpec
+        Those to tunable parameters.
+    transfers : sequence of Transfer
+        All others, in their order.
+    """
+
+    def __init__(
+        self,
+        components: dict[str, Component],
+        connections: Sequence[ConnectionSpec],
+        transfers: Sequence[Transfer],
+    ) -> None:
+        self.transfers = transfers_of(order_of(connections, components), components)
+        sources = {transfer.source.name for transfer in self.transfers}
+        self._feeding = [transfer for transfer in transfers if transfer.target.name in sources]
+        self._given = [transfer.write.values.copy() for transfer in self.transfers]
+
+    def __bool__(self) -> bool:
+        """Are there any?"""
+        return bool(self.transfers)
+
+    def begin(self) -> None:
+        """Initialization has given the parameters their first values."""
+        self._given = [transfer.write.values.copy() for transfer in self.transfers]
+
+    def resolve(self, time: float) -> bool:
+        """Give the parameters that have changed their values at `time`, s; returns whether one asks for the end.
+
+        Raises
+        ------
+        ComponentError
+            A component fails, or never settles.
+        """
+        for transfer in self._feeding:
+            transfer.move()
+        ends = False
+        for transfer, given in zip(self.transfers, self._given, strict=True):
+            values = transfer.take()
+            if not np.array_equal(values, given):
+                given[:] = values
+                ends = _give(transfer, time) or ends
+        return ends
+
+
+def _give(transfer: Transfer, time: float) -> bool:
+    """Write parameters, in event mode where their component has one."""
+    instance = transfer.target.instance
+    if not (transfer.target.event_mode and isinstance(instance, Instance3)):
+        transfer.write.set()
+        return False
+    instance.check(instance.enter_event_call(), "EnterEventMode")
+    transfer.write.set()
+    for _ in range(EVENT_ITERATIONS):
+        instance.check(instance.update_call(), "UpdateDiscreteStates")
+        if not instance.needs_update.value:
+            break
+    else:
+        raise ComponentError(
+            f"{instance.name}: fmi3UpdateDiscreteStates: expected event iteration to end after a parameter was tuned, "
+            f"got another request after {EVENT_ITERATIONS} iterations at time {time:.17g}.",
+            instance=instance.name,
+            function="fmi3UpdateDiscreteStates",
+            time=time,
+            log=instance.log.take(),
+        )
+    ends = instance.event_wants_to_end
+    instance.check(instance.enter_step_call(), "EnterStepMode")
+    return ends
