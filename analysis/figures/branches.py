@@ -70,7 +70,7 @@ def draw_branches(dataset: xr.Dataset, over: xr.Dataset | None = None) -> Figure
     axes = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
     for axis, panel in zip(axes, panels, strict=True):
         if over is not None:
-            _draw_below(axis, over, name, panel)
+            draw_below(axis, over, name, panel)
         _draw(axis, dataset, name, panel)
         axis.set_ylabel(label(dataset[panel]))
         axis.margins(x=0.02)
@@ -130,10 +130,11 @@ def _rows(dataset: xr.Dataset, panel: str) -> list[np.ndarray[Any, Any]]:
     return np.split(np.asarray(dataset["impact_velocity"].values), np.cumsum(counts)[:-1])
 
 
-def _draw_below(axis: Axes, over: xr.Dataset, name: str, panel: str) -> None:
+def draw_below(axis: Axes, over: xr.Dataset, name: str, panel: str, words: str = "simulated") -> None:
+    """Draw the values of a sweep in grey."""
     places, rows = over.vibroimpact.runs[name].values, _rows(over, panel)
     x = np.concatenate([np.full(row.size, place) for place, row in zip(places, rows, strict=True)])
-    axis.plot(x, np.concatenate(rows), rasterized=True, label="simulated", **_BELOW)
+    axis.plot(x, np.concatenate(rows), rasterized=True, label=words, **_BELOW)
 
 
 def _draw(axis: Axes, dataset: xr.Dataset, name: str, panel: str) -> None:

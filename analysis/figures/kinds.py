@@ -15,6 +15,7 @@ from vibroimpact.analysis.figures.accuracy import draw_accuracy
 from vibroimpact.analysis.figures.branches import BRANCH, draw_branches
 from vibroimpact.analysis.figures.classes import KIND as CLASS_KIND
 from vibroimpact.analysis.figures.classes import draw_classes
+from vibroimpact.analysis.figures.control import draw_control
 from vibroimpact.analysis.figures.effects import draw_effects
 from vibroimpact.analysis.figures.estimates import draw_estimates
 from vibroimpact.analysis.figures.hard_cases import draw_hard_cases
@@ -65,6 +66,7 @@ Family = Literal[
     "energies",
     "resonances",
     "lyapunov",
+    "control",
     "ladder",
 ]
 _WORDS: dict[Family, str] = {
@@ -80,6 +82,7 @@ _WORDS: dict[Family, str] = {
     "energies": "energies of orbits",
     "resonances": "resonances",
     "lyapunov": "Lyapunov exponents",
+    "control": "an orbit that was kept",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -205,6 +208,7 @@ KINDS: dict[str, FigureKind] = {
     "hard-cases": FigureKind({"hard_cases": lambda data, view: draw_hard_cases(data)}),
     "resonances": FigureKind({"resonances": lambda data, view: draw_resonances(data)}),
     "lyapunov": FigureKind({"lyapunov": lambda data, view: draw_lyapunov(data)}),
+    "control": FigureKind({"control": lambda data, view: draw_control(data, view.over)}, takes=("over",)),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
@@ -270,6 +274,7 @@ def _family(data: Data) -> Family:
         "energies": "energies",
         "resonances": "resonances",
         "lyapunov": "lyapunov",
+        "control": "control",
     }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:
@@ -306,7 +311,7 @@ def _refuse_options(data: Any, kind: str, family: Family, view: View) -> None:
         ("run", view.run is not None, family != "runs"),
         ("recording", view.recording is not None, family != "replay"),
         ("window", view.window.given, False),
-        ("over", view.over is not None, family != "runs"),
+        ("over", view.over is not None, family not in ("runs", "control")),
         ("segment", view.segment is not None, False),
     ):
         if not is_given or (name in KINDS[kind].takes and not is_foreign):

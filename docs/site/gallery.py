@@ -109,6 +109,11 @@ def kinds() -> dict[str, Picture]:
             "resonances", "peaks", "vibroimpact resonances examples/thesis/figure_6_4.toml -o peaks.nc"
         ),
         "lyapunov": _of("lyapunov", "exponents", "vibroimpact lyapunov bifurcation.nc -o exponents.nc"),
+        "control": _of(
+            "control",
+            "kept",
+            "vibroimpact control examples/bifurcation.toml --from 1 --to 0.7 --step 1e-3 -o kept.nc",
+        ),
         "hard-cases": _of("hard-cases", "cases", "vibroimpact hard-cases -o cases.nc"),
         "convergence": _of("convergence", "ladder"),
         "work-precision": _of("work-precision", "ladder"),

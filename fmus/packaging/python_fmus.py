@@ -1,4 +1,4 @@
-"""Makes FMUs of Python functions; the one place that calls pythonfmu.
+"""Makes FMUs of Python code; the one place that calls pythonfmu.
 
 pythonfmu builds in a process of its own, since it runs the slave's file and leaves that file's folder on the
 module path. Its model description is then completed (units, initial unknowns, dependencies, a token that
@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import json
 import shutil
 import subprocess
 import tempfile
@@ -17,6 +18,7 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 from vibroimpact.fmus.errors import ComponentError, ComponentFileError, UsageError
@@ -27,15 +29,28 @@ from vibroimpact.fmus.units import Unit
 
 SOURCES = Path(__file__).parents[1] / "python"
 USER_CONTACT_LAW = SOURCES / "user_contact_law"
+ORBIT_CONTROLLER = SOURCES / "orbit_controller"
 #: What the user's file is called inside the FMU.
 LAW_FILE = "contact_law.py"
 DESCRIPTION = "modelDescription.xml"
+#: What an orbit controller's plan is called inside the FMU.
+PLAN_FILE = "plan.json"
 #: Longest time that pythonfmu, which runs the user's file, may take, s.
 BUILD_LIMIT = 120.0
 UNITS = {
     "displacement": Unit({"m": 1}),
     "velocity": Unit({"m": 1, "s": -1}),
     "applied_force": Unit({"N": 1}),
+}
+CONTROLLER_UNITS = {
+    "last_time": Unit({"s": 1}),
+    "last_phase": Unit({"rad": 1}),
+    "last_velocity": Unit({"m": 1, "s": -1}),
+    "tolerance": Unit({"m": 1, "s": -1}),
+    "forcing_amplitude": Unit({"N": 1}),
+    "forcing_angular_frequency": Unit({"rad": 1, "s": -1}),
+    "correction": Unit({"N": 1}),
+    "limit": Unit({"N": 1}),
 }
 
 
@@ -98,6 +113,38 @@ def build_user_contact_law(law: Path | str, output: Path | str) -> Path:
         return make_fmu(
             PythonFmu(script, (law_file,), USER_CONTACT_LAW / "README.md", UNITS, str(law)), output
         )
+
+
+def build_orbit_controller(plan: Mapping[str, Any], output: Path | str) -> Path:
+    """Make an FMU (FMI 2.0) that keeps an orbit by the forcing amplitude, impact by impact.
+
+    Parameters
+    ----------
+    plan : mapping
+        What the README of fmus/python/orbit_controller says: numbers that JSON can hold.
+    output : path
+        The FMU file to write. Equal plans give equal bytes.
+
+    Returns
+    -------
+    Path
+        The FMU.
+
+    Raises
+    ------
+    ComponentError
+        pythonfmu is not installed.
+    UsageError
+        The file cannot be written.
+    """
+    output = Path(output)
+    require_pythonfmu()
+    with tempfile.TemporaryDirectory() as folder:
+        script, plan_file = Path(folder, "orbit_controller.py"), Path(folder, PLAN_FILE)
+        _copy(ORBIT_CONTROLLER / "orbit_controller.py", script)
+        plan_file.write_text(json.dumps(plan), encoding="utf-8")
+        readme = ORBIT_CONTROLLER / "README.md"
+        return make_fmu(PythonFmu(script, (plan_file,), readme, CONTROLLER_UNITS, PLAN_FILE), output)
 
 
 def make_fmu(parts: PythonFmu, output: Path) -> Path:

@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
 
 def register(app: typer.Typer) -> None:
     """Add the commands of orbits to the command line."""
-    for command in (orbit, follow):
+    for command in (orbit, follow, control):
         app.command()(command)
 
 
@@ -85,3 +85,61 @@ def follow(
 
     wanted = Wanted(parameter, (start, stop), periods, doublings, step, second, (second_start, second_stop))
     show_branches(scene, wanted, changes or (), output, figure, force)
+
+
+def control(
+    scene: SceneFile,
+    start: Annotated[float, typer.Option("--from", help="Angular frequency to begin with (rad/s).")],
+    stop: Annotated[float, typer.Option("--to", help="Angular frequency to go to.")],
+    law: Annotated[
+        str,
+        typer.Option(
+            help="ogy: put on the stable direction; deadbeat: reached in two impacts; newton: located."
+        ),
+    ] = "ogy",
+    step: Annotated[float, typer.Option(help="Of the angular frequency.")] = 1e-4,
+    stay: Annotated[int, typer.Option(help="Flights at each angular frequency at least.")] = 1,
+    tolerance: Annotated[
+        float, typer.Option(help="Relative difference of two speeds in a row at which the frequency goes on.")
+    ] = 1e-4,
+    limit: Annotated[
+        float, typer.Option(help="Largest correction over the forcing amplitude; 0: nothing is corrected.")
+    ] = 0.1,
+    noise: Annotated[
+        float, typer.Option(help="Relative error of measured speeds (standard deviation).")
+    ] = 0.0,
+    seed: Annotated[int, typer.Option(help="Of the noise.")] = 1,
+    periods: Annotated[int, typer.Option(help="Forcing periods of the orbit of one impact.")] = 1,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
+    figure: FigureFile = None,
+    keep: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="New folder to leave the controller's FMU in, with a scene of all components.",
+        ),
+    ] = None,
+    changes: Changes = None,
+    force: Force = False,
+) -> None:
+    """Keep a periodic orbit, also where it is unstable, by small corrections of the forcing amplitude at each impact.
+
+    Meanwhile the angular frequency goes on, step by step, whenever the impact velocity has settled. Body, stop and
+    controller are coupled FMUs (the controller's needs vibroimpact[python-fmus]).
+
+    Example: vibroimpact control examples/bifurcation.toml --from 1 --to 0.7 -o kept.nc --figure kept.png
+    """
+    from vibroimpact.orchestrator.commands.control import show_control
+    from vibroimpact.orchestrator.orbits.control import settings_of
+
+    settings = settings_of(
+        law=law,
+        step=step,
+        tolerance=tolerance,
+        limit=limit,
+        noise=noise,
+        seed=seed,
+        periods=periods,
+        stay=stay,
+    )
+    show_control(scene, (start, stop), settings, changes or (), output, figure, keep, force)

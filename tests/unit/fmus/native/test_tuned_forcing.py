@@ -1,4 +1,4 @@
-"""Forcing that is tuned while a body moves: its phase, the motion and time go on. References: a body that starts there."""
+"""Forcing that is tuned while a body moves: phase, motion and time go on. References: a body that starts there."""
 
 import math
 from collections.abc import Mapping
