@@ -62,6 +62,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.hardware.programs.sweep import measure_sweep as measure_sweep
     from vibroimpact.hardware.recordings import ImportSettings as ImportSettings
     from vibroimpact.hardware.recordings import import_recording as import_recording
+    from vibroimpact.orchestrator.orbits.basins import basins as basins
     from vibroimpact.orchestrator.orbits.control import control as control
     from vibroimpact.orchestrator.orbits.energies import energies as energies
     from vibroimpact.orchestrator.orbits.lyapunov import lyapunov as lyapunov
@@ -112,6 +113,7 @@ _NAMES = {
     "hardware.programs.spikes": ("record_spikes",),
     "hardware.programs.sweep": ("measure_sweep",),
     "hardware.recordings": ("ImportSettings", "import_recording"),
+    "orchestrator.orbits.basins": ("basins",),
     "orchestrator.orbits.control": ("control",),
     "orchestrator.orbits.energies": ("energies",),
     "orchestrator.orbits.lyapunov": ("lyapunov",),

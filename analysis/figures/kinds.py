@@ -12,6 +12,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from vibroimpact.analysis.figures.accuracy import draw_accuracy
+from vibroimpact.analysis.figures.basins import draw_basins
 from vibroimpact.analysis.figures.branches import BRANCH, draw_branches
 from vibroimpact.analysis.figures.classes import KIND as CLASS_KIND
 from vibroimpact.analysis.figures.classes import draw_classes
@@ -67,6 +68,7 @@ Family = Literal[
     "resonances",
     "lyapunov",
     "control",
+    "basins",
     "ladder",
 ]
 _WORDS: dict[Family, str] = {
@@ -83,6 +85,7 @@ _WORDS: dict[Family, str] = {
     "resonances": "resonances",
     "lyapunov": "Lyapunov exponents",
     "control": "an orbit that was kept",
+    "basins": "basins of attraction",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -209,6 +212,7 @@ KINDS: dict[str, FigureKind] = {
     "resonances": FigureKind({"resonances": lambda data, view: draw_resonances(data)}),
     "lyapunov": FigureKind({"lyapunov": lambda data, view: draw_lyapunov(data)}),
     "control": FigureKind({"control": lambda data, view: draw_control(data, view.over)}, takes=("over",)),
+    "basins": FigureKind({"basins": lambda data, view: draw_basins(data)}),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
@@ -275,6 +279,7 @@ def _family(data: Data) -> Family:
         "resonances": "resonances",
         "lyapunov": "lyapunov",
         "control": "control",
+        "basins": "basins",
     }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:

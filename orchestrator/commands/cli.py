@@ -43,7 +43,7 @@ PANELS = {
         "estimate",
         "spikes",
     ),
-    "Orbits": ("orbit", "follow", "classify", "lyapunov", "energies", "resonances", "control"),
+    "Orbits": ("orbit", "follow", "classify", "lyapunov", "energies", "resonances", "basins", "control"),
     "Exchange": ("fmu", "ssp"),
     "Rigs": ("rig",),
     "Serve": ("serve", "submit", "status", "fetch", "cancel"),

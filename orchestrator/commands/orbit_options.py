@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
 
 def register(app: typer.Typer) -> None:
     """Add the commands of orbits to the command line."""
-    for command in (orbit, follow, control):
+    for command in (orbit, follow, basins, control):
         app.command()(command)
 
 
@@ -85,6 +85,42 @@ def follow(
 
     wanted = Wanted(parameter, (start, stop), periods, doublings, step, second, (second_start, second_stop))
     show_branches(scene, wanted, changes or (), output, figure, force)
+
+
+def basins(
+    scene: SceneFile,
+    x: Annotated[
+        str | None,
+        typer.Option(metavar="LOW:HIGH", help="Displacements at the start (m); twice the scene's own."),
+    ] = None,
+    y: Annotated[
+        str | None,
+        typer.Option(metavar="LOW:HIGH", help="Velocities at the start (m/s); twice the scene's own."),
+    ] = None,
+    points: Annotated[str, typer.Option(metavar="N or NxM", help="Starts along both axes.")] = "200",
+    number: Annotated[
+        int | None,
+        typer.Option(
+            help="Mass of a chain (the one that is hit first) or mode of a beam (1) that starts so."
+        ),
+    ] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
+    figure: FigureFile = None,
+    changes: Changes = None,
+    force: Force = False,
+) -> None:
+    """Find which attractor each start of a plane of displacements and velocities ends on, and the share of each.
+
+    Attractors are found by long runs, named as classify names runs, and a start counts as soon as it is so near to one
+    that all starts tried at that distance came back.
+
+    Example: vibroimpact basins examples/basins.toml --points 500 -o basins.nc --figure basins.png
+    """
+    from vibroimpact.orchestrator.commands.basins import points_of, show_basins, span_of
+    from vibroimpact.orchestrator.orbits.basins import Plane
+
+    plane = Plane(span_of(x, "x"), span_of(y, "y"), points_of(points), number)
+    show_basins(scene, plane, changes or (), output, figure, force)
 
 
 def control(

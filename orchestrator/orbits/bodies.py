@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibroimpact.analysis.orbits import Contact, ImpactingBody
-from vibroimpact.fmus.core.modes import Boundary, beam_modes, chain_modes
+from vibroimpact.fmus.core.modes import Boundary, ChainModes, beam_modes, chain_modes
 from vibroimpact.fmus.errors import UsageError
 from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters
 from vibroimpact.orchestrator.scene import Scene
@@ -109,13 +109,48 @@ def _row(numbers: dict[str, float], name: str, count: int) -> Floats:
     return np.array([numbers.get(f"{name}[{i}]", 0.0) for i in range(1, count + 1)])
 
 
-def _chain(scene: Scene, numbers: dict[str, float], integers: dict[str, int]) -> ImpactingBody:
-    masses = integers["masses"]
-    modes = chain_modes(
+def _modes_of_chain(numbers: dict[str, float], masses: int) -> ChainModes:
+    return chain_modes(
         _row(numbers, "mass", masses),
         np.append(_row(numbers, "stiffness", masses), numbers["far_stiffness"]),
         np.append(_row(numbers, "damping", masses), numbers["far_damping"]),
     )
+
+
+def modal_displacements(scene: Scene, displacements: Floats) -> Floats:
+    """Return displacements of the masses of a chain, or of the modes of a beam, in mass-normalised modes.
+
+    Parameters
+    ----------
+    scene : Scene
+    displacements : array, shape (state, mass or mode)
+        m; of an oscillator that of its mass.
+
+    Returns
+    -------
+    array, shape (state, mode)
+        kg^(1/2) m.
+    """
+    numbers, integers = float_parameters(scene, None), integer_parameters(scene)
+    found: Floats
+    if isinstance(scene.body, ChainBody):
+        masses = integers["masses"]
+        kept = integers["modes"] or masses
+        shapes = _modes_of_chain(numbers, masses).shapes[:, :kept]
+        found = (displacements * _row(numbers, "mass", masses)) @ shapes
+    elif isinstance(scene.body, BeamBody):
+        density = (
+            numbers.get("mass_per_length") or numbers["density"] * numbers["width"] * numbers["thickness"]
+        )
+        found = displacements * np.sqrt(density * numbers["length"])
+    else:
+        found = displacements * np.sqrt(numbers["mass"])
+    return found
+
+
+def _chain(scene: Scene, numbers: dict[str, float], integers: dict[str, int]) -> ImpactingBody:
+    masses = integers["masses"]
+    modes = _modes_of_chain(numbers, masses)
     kept = integers["modes"] or masses
     if not modes.is_classical:
         raise UsageError(

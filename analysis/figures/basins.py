@@ -1,0 +1,63 @@
+"""Figure of basins of attraction over the start states."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from vibroimpact.analysis.figures.page import canvas, label, legend_outside
+from vibroimpact.analysis.figures.sweeps import edges
+
+_COLOURS = ("#9CC9EA", "#F4B9A0", "#B9DDB0", "#D9C2E9", "#F6E3A1", "#A7DAD5", "#E3C3B1", "#C9CBD6")
+_MARKS = "osD^vPX*"
+_UNDECIDED, _BEYOND = "#FFFFFF", "#5A5A5A"
+
+
+def draw_basins(dataset: xr.Dataset) -> Figure:
+    """Draw which attractor each start ends on, and the attractors at forcing phase 0."""
+    labels = dataset["basin"].values
+    names = [str(name) for name in dataset["attractor_name"].values]
+    colours = [_COLOURS[place % len(_COLOURS)] for place in range(len(names))]
+    figure = canvas(95)
+    axis = figure.subplots()
+    axis.pcolormesh(
+        edges(dataset["displacement_start"].values),
+        edges(dataset["velocity_start"].values),
+        labels,
+        cmap=ListedColormap([_BEYOND, _UNDECIDED, *colours]),
+        vmin=-2.5,
+        vmax=len(names) - 0.5,
+        rasterized=True,
+    )
+    ends = axis.get_xlim(), axis.get_ylim()
+    for place, colour in enumerate(colours):
+        x = dataset["attractor_displacement"].values[place]
+        y = dataset["attractor_velocity"].values[place]
+        share = float(dataset["basin_fraction"].values[place])
+        axis.plot(
+            x[np.isfinite(x)],
+            y[np.isfinite(y)],
+            _MARKS[place % len(_MARKS)],
+            color=colour,
+            markeredgecolor="black",
+            markersize=4.5,
+            label=f"{names[place]}: {100.0 * share:.3g} %",
+        )
+    patches = [
+        Patch(facecolor=colour, edgecolor="0.5", label=words)
+        for value, colour, words in ((-1, _UNDECIDED, "undecided"), (-2, _BEYOND, "beyond a stop"))
+        if (labels == value).any()
+    ]
+    for patch in patches:
+        axis.add_patch(patch)
+    axis.set(
+        xlim=ends[0],
+        ylim=ends[1],
+        xlabel=label(dataset["displacement_start"]),
+        ylabel=label(dataset["velocity_start"]),
+    )
+    legend_outside(figure, axis, ncols=2)
+    return figure

@@ -1,0 +1,372 @@
+"""Basins of attraction: where the starts of a grid end, and how their borders look.
+
+Starts are followed from one period of the force to the next until they are near to an attractor that is known. How near
+is near is tried out first: starts at that distance must come back. Attractors are found by long runs of some of the
+starts, then of some of those that come near to none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.dataset.schema import OrbitClass
+from vibroimpact.analysis.orbits.classify import RunClass
+
+Floats = NDArray[np.float64]
+Labels = NDArray[np.int16]
+
+UNDECIDED, BEYOND_A_STOP = -1, -2
+"""Labels of starts that are near to no attractor yet, and of those that no body can have."""
+FIRST_SAMPLE, LATER_SAMPLE = 64, 32
+"""Starts of which long runs tell attractors, to begin with and of those that come near to none."""
+CHAOS_SAMPLE = 256
+"""Of the last starts of all, that must all be chaotic for the others to count as such."""
+ROUNDS = (24, 32, 48, 96, 200, 400, 800)
+"""Forcing periods between two looks at who is near."""
+LOOKS = (104, 400)
+"""Forcing periods after which attractors are looked for again."""
+NEAREST, FARTHEST = 1e-7, 1e-2
+"""Distances from an attractor, over the size of the motion, that are tried out as near."""
+TRANSIENT, TRANSIENT_OF_CHAOS = 1000, 10_000
+"""Forcing periods after which a run is what it is, and after which it is chaotic for good."""
+SETTLING, MOST_SETTLING, SETTLED = 64, 30, 1e-13
+"""Rounds after which an attractor's state is looked at again, how often, and the change that is none."""
+PROBES, PROBE_PERIODS = 24, 400
+"""Starts at that distance, and forcing periods in which they must come back."""
+SAME = 1e-5
+"""Distance over the size of the motion at which two attractors are one."""
+
+
+class Ends(NamedTuple):
+    """States at forcing phase 0 some periods later, shape (start, variable), and whether each run went well."""
+
+    states: Floats
+    well: NDArray[np.bool_]
+
+
+class Flow(Protocol):
+    """What follows many starts at once."""
+
+    def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
+        """Return where states are after some forcing periods.
+
+        Parameters
+        ----------
+        states : array, shape (start, variable)
+        periods : int
+        first : bool
+            They are at time 0, not at forcing phase 0; the periods count from the next phase 0.
+        """
+
+    def classes(
+        self, states: Floats, transient: int, *, first: bool = False
+    ) -> tuple[list[RunClass], Floats]:
+        """Return what a run from each state is after so many forcing periods, and its last states."""
+
+
+@dataclass(frozen=True, eq=False)
+class Attractor:
+    """What starts end on.
+
+    Attributes
+    ----------
+    kind : RunClass
+    states : array, shape (period, variable)
+        At forcing phase 0; none of chaos.
+    radius : float
+        Distance, over the size of the motion, from which starts were seen to come back.
+    """
+
+    kind: RunClass
+    states: Floats
+    radius: float
+
+    @property
+    def is_chaotic(self) -> bool:
+        """Whether it has no period."""
+        return self.kind.kind is OrbitClass.chaos
+
+
+Told = Callable[["Basins"], None]
+
+
+@dataclass(eq=False)
+class Basins:
+    """Starts and where they end.
+
+    Attributes
+    ----------
+    starts : array, shape (start, variable)
+    labels : array of int, shape (start,)
+        Numbers of attractors, or UNDECIDED, BEYOND_A_STOP.
+    scale : array, shape (variable,)
+        Size of the motion.
+    attractors : list of Attractor
+    told_by_sample : int
+        Starts that count as chaotic because a sample of them was.
+    """
+
+    starts: Floats
+    labels: Labels
+    scale: Floats
+    attractors: list[Attractor] = field(default_factory=list)
+    told_by_sample: int = 0
+
+    @property
+    def names(self) -> list[str]:
+        """Of the attractors: those of one kind with letters."""
+        plain = [each.kind.name for each in self.attractors]
+        return [
+            f"{name} {_letter(plain[:place].count(name))}" if plain.count(name) > 1 else name
+            for place, name in enumerate(plain)
+        ]
+
+    @property
+    def possible(self) -> int:
+        """Starts that a body can have."""
+        return int((self.labels != BEYOND_A_STOP).sum())
+
+    @property
+    def decided(self) -> float:
+        """Share of the possible starts whose end is known."""
+        return float((self.labels >= 0).sum()) / max(self.possible, 1)
+
+    @property
+    def fractions(self) -> Floats:
+        """Share of the possible starts that each attractor gets."""
+        counts = np.bincount(self.labels[self.labels >= 0], minlength=len(self.attractors))
+        found: Floats = counts / max(self.possible, 1)
+        return found
+
+
+def _letter(place: int) -> str:
+    """Return a, b, ..., z, aa, ab, ...
+
+    >>> _letter(0), _letter(25), _letter(26)
+    ('a', 'z', 'aa')
+    """
+    letters = ""
+    while place >= 0:
+        letters = chr(ord("a") + place % 26) + letters
+        place = place // 26 - 1
+    return letters
+
+
+def find_basins(basins: Basins, flow: Flow, *, block: int, seed: int = 1, told: Told | None = None) -> None:
+    """Find where the undecided starts end; `basins` grows meanwhile, and keeps what Ctrl-C leaves.
+
+    Parameters
+    ----------
+    basins : Basins
+    flow : Flow
+    block : int
+        Starts that are followed by one call.
+    seed : int
+        Of the starts of which long runs tell the attractors.
+    told : callable, optional
+        Called after each block.
+    """
+    search = _Search(basins, flow, block, np.random.default_rng(seed), told)
+    search.run()
+
+
+class _Search:
+    def __init__(
+        self, basins: Basins, flow: Flow, block: int, draw: np.random.Generator, told: Told | None
+    ) -> None:
+        self._basins, self._flow, self._block = basins, flow, block
+        self._draw, self._told = draw, told
+        self._now = basins.starts.copy()
+        self._lost = np.zeros(len(self._now), np.bool_)
+
+    def run(self) -> None:
+        self._look(self._left(), FIRST_SAMPLE, first=True)
+        passed = 0
+        for periods in ROUNDS:
+            if not self._left().size:
+                return
+            for places in self._blocks():
+                self._follow(places, periods, first=passed == 0)
+                if self._told is not None:
+                    self._told(self._basins)
+            passed += periods
+            if passed in LOOKS:
+                self._look(self._left(), LATER_SAMPLE)
+                self._match(self._left())
+                self._take_for_chaos()
+        self._look(self._left(), CHAOS_SAMPLE)
+        self._match(self._left())
+        self._take_for_chaos()
+
+    def _left(self) -> NDArray[np.int64]:
+        return np.flatnonzero((self._basins.labels == UNDECIDED) & ~self._lost)
+
+    def _blocks(self) -> list[NDArray[np.int64]]:
+        left = self._left()
+        return np.array_split(left, max(1, -(-left.size // self._block)))
+
+    def _follow(self, places: NDArray[np.int64], periods: int, *, first: bool) -> None:
+        ends = self._flow.follow(self._now[places], periods, first=first)
+        self._now[places] = ends.states
+        self._lost[places] = ~ends.well
+        self._match(places[ends.well])
+
+    def _match(self, places: NDArray[np.int64]) -> None:
+        """Label the starts that are near to an attractor now."""
+        for number, attractor in enumerate(self._basins.attractors):
+            places = places[self._basins.labels[places] == UNDECIDED]
+            near = self._near(self._now[places], attractor.states, attractor.radius)
+            self._basins.labels[places[near]] = number
+
+    def _near(self, states: Floats, points: Floats, radius: float) -> NDArray[np.bool_]:
+        near = np.zeros(len(states), np.bool_)
+        for point in points:
+            near |= (np.abs(states - point) <= radius * self._basins.scale).all(axis=1)
+        return near
+
+    # ---- attractors ----
+
+    def _look(self, places: NDArray[np.int64], most: int, *, first: bool = False) -> None:
+        """Find the attractors of some of these starts."""
+        if not places.size:
+            return
+        chosen = self._draw.choice(places, min(most, places.size), replace=False)
+        kinds, states = self._flow.classes(self._now[chosen], TRANSIENT, first=first)
+        for kind, state in zip(kinds, states, strict=True):
+            if kind.kind is OrbitClass.chaos:
+                if not any(each.is_chaotic for each in self._basins.attractors):
+                    self._basins.attractors.append(Attractor(kind, np.empty((0, state.size)), 0.0))
+            elif kind.kind is not OrbitClass.unknown and np.isfinite(state).all():
+                self._add(kind, state)
+
+    def _add(self, kind: RunClass, state: Floats) -> None:
+        known = [each for each in self._basins.attractors if not each.is_chaotic]
+        if any(self._near(state[None], each.states, SAME)[0] for each in known):
+            return
+        state = self._settled(state, max(kind.periods, 1))
+        rounds = [state]
+        for _ in range(max(kind.periods, 1) - 1):
+            rounds.append(self._flow.follow(rounds[-1][None], 1).states[0])
+        states = np.array(rounds)
+        radius = self._tried(states)
+        if radius > 0.0:
+            self._basins.attractors.append(Attractor(kind, states, radius))
+
+    def _settled(self, state: Floats, periods: int) -> Floats:
+        """Return the state once it no longer changes from round to round, or after many."""
+        for _ in range(MOST_SETTLING):
+            later = self._flow.follow(state[None], SETTLING * periods)
+            if not later.well[0]:
+                break
+            change, state = np.abs(later.states[0] - state), later.states[0]
+            if (change <= SETTLED * self._basins.scale).all():
+                break
+        return state
+
+    def _tried(self, states: Floats) -> float:
+        """Return a distance from which all starts that are tried come back; 0 where none is large enough."""
+        scale, radius = self._basins.scale, FARTHEST
+        others = [each for each in self._basins.attractors if not each.is_chaotic]
+        while radius >= NEAREST:
+            way = self._draw.uniform(-1.0, 1.0, (PROBES, states.shape[1]))
+            way *= self._draw.uniform(0.25, 1.0, (PROBES, 1)) / np.abs(way).max(axis=1, keepdims=True)
+            places = np.repeat(states, PROBES, axis=0) + radius * scale * np.tile(way, (len(states), 1))
+            ends = self._flow.follow(places, PROBE_PERIODS)
+            # what a body cannot have (beyond a stop) says nothing; of the others all must come nearer
+            back = self._near(ends.states, states, 0.5 * radius) & ends.well
+            apart = not any(
+                self._near(states, each.states, 2.0 * (radius + each.radius)).any() for each in others
+            )
+            if ends.well.any() and (back | ~ends.well).all() and apart:
+                return radius
+            radius /= 4.0
+        return 0.0
+
+    def _take_for_chaos(self) -> None:
+        """Take what is left for chaotic, where all of a sample of it is."""
+        chaotic = [n for n, each in enumerate(self._basins.attractors) if each.is_chaotic]
+        left = self._left()
+        if not (chaotic and left.size):
+            return
+        chosen = self._draw.choice(left, min(CHAOS_SAMPLE, left.size), replace=False)
+        kinds, _ = self._flow.classes(self._now[chosen], TRANSIENT_OF_CHAOS)
+        is_chaos = np.array([kind.kind is OrbitClass.chaos for kind in kinds])
+        if is_chaos.all():
+            self._basins.told_by_sample += int(left.size - chosen.size)
+            self._basins.labels[left] = chaotic[0]
+        elif left.size <= CHAOS_SAMPLE:
+            self._basins.labels[chosen[is_chaos]] = chaotic[0]
+
+
+# ---- the border ----
+
+
+class BorderDimension(NamedTuple):
+    """Dimension of the border between basins, of a plane of starts, and its standard error."""
+
+    value: float
+    error: float
+
+
+def border_share(labels: Labels, distance: int = 1) -> float:
+    """Return the share of starts of a grid that end elsewhere than one of those at a distance along an axis.
+
+    Parameters
+    ----------
+    labels : array, shape (y, x)
+        Those below 0 do not count.
+    distance : int
+        In cells.
+
+    Examples
+    --------
+    >>> border_share(np.repeat([[0] * 4 + [1] * 4], 4, axis=0))
+    0.25
+    """
+    there = labels >= 0
+    differs, counted = np.zeros(labels.shape, np.bool_), np.zeros(labels.shape, np.bool_)
+    for axis in (0, 1):
+        if labels.shape[axis] <= distance:
+            continue
+        low = tuple(slice(None, -distance) if a == axis else slice(None) for a in (0, 1))
+        high = tuple(slice(distance, None) if a == axis else slice(None) for a in (0, 1))
+        both = there[low] & there[high]
+        other = both & (labels[low] != labels[high])
+        for part in (low, high):
+            counted[part] |= both
+            differs[part] |= other
+    return float(differs.sum()) / max(int(counted.sum()), 1)
+
+
+def border_dimension(labels: Labels, distances: Sequence[int] = (1, 2, 4, 8, 16)) -> BorderDimension | None:
+    """Return the dimension of the border of basins from the share of uncertain starts over their uncertainty.
+
+    A start is uncertain where another one at a distance d ends elsewhere; their share grows as d^(2 - D) (McDonald,
+    Grebogi, Ott and Yorke 1985).
+
+    Parameters
+    ----------
+    labels : array, shape (y, x)
+    distances : sequence of int
+        In cells.
+
+    Returns
+    -------
+    BorderDimension or None
+        None where there is no border, or the grid is smaller than 8 of the largest distances.
+    """
+    if min(labels.shape) < 8 * max(distances):
+        return None
+    shares = np.array([border_share(labels, distance) for distance in distances])
+    if not (shares > 0.0).all() or shares.max() > 0.9:
+        return None
+    places, logs = np.log(np.array(distances, dtype=np.float64)), np.log(shares)
+    slope, start = np.polyfit(places, logs, 1)
+    off = logs - slope * places - start
+    error = np.sqrt(float(off @ off) / (places.size - 2) / float(((places - places.mean()) ** 2).sum()))
+    return BorderDimension(2.0 - float(slope), float(error))

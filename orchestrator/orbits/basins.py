@@ -1,0 +1,423 @@
+"""Basins of attraction of a scene over a plane of start states."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset import Outcome
+from vibroimpact.analysis.dataset.columns import RunColumns
+from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.orbits.basins import (
+    BEYOND_A_STOP,
+    UNDECIDED,
+    Basins,
+    Ends,
+    Floats,
+    border_dimension,
+    border_share,
+    find_basins,
+)
+from vibroimpact.analysis.orbits.body import ImpactingBody
+from vibroimpact.analysis.orbits.classify import RunClass, class_of
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.orbits.bodies import impacting_body, modal_displacements
+from vibroimpact.orchestrator.orbits.follow import scene_attributes
+from vibroimpact.orchestrator.run.empty_record import empty_record
+from vibroimpact.orchestrator.run.many import PointLoop, PointValues, PreparedPoints, loop_of
+from vibroimpact.orchestrator.run.many_rows import run_loop
+from vibroimpact.orchestrator.run.parameters import float_parameters, integer_parameters, state_variables
+from vibroimpact.orchestrator.run.point import PointRunner
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import ChainBody, OscillatorBody
+
+HISTORY = "basins of attraction found by vibroimpact"
+POINTS = 200
+"""Starts along each axis, unless it is said."""
+MOST_STARTS = 16_000_000
+BLOCK = 16_384
+"""Starts that are followed by one call: Ctrl-C is heard in between."""
+RECORDED = 64
+"""Forcing periods of which the class of a run is told."""
+REACH = 2.0
+"""Half the width of the plane over the size of the scene's own motion, unless it is said."""
+
+_RECORD = {"transient_periods": 0, "recorded_periods": 1, "impacts": False}
+
+Span = tuple[float, float]
+Told = Callable[[Basins], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """The start states of which ends are found.
+
+    Attributes
+    ----------
+    x, y : tuple of float, or None
+        Ends of displacement (m) and velocity (m/s); None: from the scene's own motion.
+    points : tuple of int
+        Along both.
+    number : int or None
+        Which mass of a chain, or mode of a beam, starts so; the others as the scene says. None: the mass that the first
+        stop hits, mode 1.
+    """
+
+    x: Span | None = None
+    y: Span | None = None
+    points: tuple[int, int] = (POINTS, POINTS)
+    number: int | None = None
+
+    def refuse(self) -> None:
+        """Refuse a plane that is none.
+
+        Raises
+        ------
+        UsageError
+        """
+        for name, span in (("x", self.x), ("y", self.y)):
+            if span is not None and not (
+                math.isfinite(span[0]) and math.isfinite(span[1]) and span[0] < span[1]
+            ):
+                got = f"{span[0]:g} to {span[1]:g}"
+                raise UsageError(
+                    f"basins: {name}: expected two finite numbers, the smaller one first, got {got}."
+                )
+        if min(self.points) < 2 or math.prod(self.points) > MOST_STARTS:
+            raise UsageError(
+                f"basins: points: expected 2 at least along each axis and {MOST_STARTS} in all, "
+                f"got {self.points[0]} x {self.points[1]}."
+            )
+
+
+class BodyFlow:
+    """Follows many states of a scene's body by the loop in C, on two threads and more."""
+
+    def __init__(self, scene: Scene, workers: int | None = None) -> None:
+        self.scene = scene
+        bare = {**_RECORD, "extrema": False, "strobe": False}
+        told = {**_RECORD, "extrema": True, "strobe": True}
+        self._pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+        count = self._pool._max_workers
+        self._runners: list[PointRunner] = []
+        self._bare = [self._loop(bare) for _ in range(count)]
+        self._telling = [self._loop(told) for _ in range(count)]
+        self.names = start_names(scene)
+
+    def _loop(self, record: dict[str, Any]) -> PointLoop:
+        scene = self.scene.with_values({"record": record, "execution.how": "auto"})
+        self._runners.append(PointRunner(scene))
+        loop = loop_of(scene, self._runners[-1])
+        if loop is None:
+            raise UsageError(
+                f"{self.scene.source}: basins: expected a body without measuring chain or deadline, got one with."
+            )
+        return loop
+
+    def close(self) -> None:
+        """Give back what was opened."""
+        self._pool.shutdown(cancel_futures=True)
+        for runner in self._runners:
+            runner.close()
+
+    def follow(self, states: Floats, periods: int, *, first: bool = False) -> Ends:
+        """Return where states are after some forcing periods: see `analysis.orbits.basins.Flow`."""
+        columns = self._run(self._bare, states, (0, periods), first=first)
+        outcome = np.concatenate([each.outcome for each in columns])
+        return Ends(
+            np.concatenate([_final(each) for each in columns]),
+            (outcome == Outcome.ok) | (outcome == Outcome.stuck),
+        )
+
+    def classes(
+        self, states: Floats, transient: int, *, first: bool = False
+    ) -> tuple[list[RunClass], Floats]:
+        """Return what a run from each state is after so many forcing periods, and its last states."""
+        columns = self._run(self._telling, states, (transient, RECORDED), first=first)
+        found = [kind for each in columns for kind in _classes(each)]
+        return found, np.concatenate([_final(each) for each in columns])
+
+    def _run(
+        self, loops: Sequence[PointLoop], states: Floats, periods: tuple[int, int], *, first: bool
+    ) -> list[RunColumns]:
+        parts = [part for part in np.array_split(states, len(loops)) if len(part)]
+        jobs = [
+            self._pool.submit(self._run_part, loop, part, periods, first)
+            for loop, part in zip(loops, parts, strict=False)
+        ]
+        return [job.result() for job in jobs]
+
+    def _run_part(self, loop: PointLoop, states: Floats, periods: tuple[int, int], first: bool) -> RunColumns:
+        points = self._prepared(loop, states, periods, first=first)
+
+        def alone(place: int, _: object) -> tuple[Any, None]:
+            return empty_record(loop.scene, Outcome.error, "refused", 0.0), None
+
+        return run_loop(loop, points, None, math.inf, alone)[0]
+
+    def _prepared(
+        self, loop: PointLoop, states: Floats, periods: tuple[int, int], *, first: bool
+    ) -> PreparedPoints:
+        one = loop.prepared(PointValues({}, np.ones(1, np.bool_)))
+        assert one is not None, "the scene has run"
+        names, count = loop.driver.float_names, len(states)
+        table = np.repeat(one.table, count, axis=0)
+        table[:, [names.index(name) for name in self.names]] = states
+        period = 2.0 * math.pi / one.columns["forcing.angular_frequency"][0]
+        start = float(one.begin[0]) if first else 0.0
+        if not first and "forcing.phase" in names:
+            table[:, names.index("forcing.phase")] = 0.0
+        begin = np.full(count, start + periods[0] * period)
+        return PreparedPoints(
+            np.ones(count, np.bool_),
+            table,
+            begin,
+            begin + periods[1] * period,
+            {name: table[:, place].copy() for place, name in enumerate(names)},
+            one.forced,
+            one.periods,
+        )
+
+
+def _final(columns: RunColumns) -> Floats:
+    if columns.final_state is not None:
+        return columns.final_state
+    return np.column_stack([columns.final_displacement, columns.final_velocity])
+
+
+def _classes(columns: RunColumns) -> list[RunClass]:
+    assert columns.periods is not None
+    table, sticks = columns.periods, columns.sticks
+    counts = np.zeros(len(columns), np.int64) if sticks is None else sticks.count
+    return [
+        class_of(
+            table[run, :, :4], table[run, :, 4], Outcome(int(columns.outcome[run])), bool(counts[run] > 0)
+        )
+        for run in range(len(columns))
+    ]
+
+
+def start_names(scene: Scene) -> list[str]:
+    """Return the start values of the state of a scene's body, by their names in its FMU."""
+    if isinstance(scene.body, OscillatorBody):
+        return ["displacement_start", "velocity_start"]
+    return [name.replace("[", "_start[") for name in state_variables(scene)]
+
+
+def _axes(scene: Scene, number: int | None) -> tuple[int, int]:
+    """Return the places of displacement and velocity of the plane among the start values."""
+    if isinstance(scene.body, OscillatorBody):
+        if number not in (None, 1):
+            raise UsageError(f"basins: number: expected 1, an oscillator's only mass, got {number}.")
+        return 0, 1
+    size = len(state_variables(scene)) // 2
+    what = "mass" if isinstance(scene.body, ChainBody) else "mode"
+    chosen = number if number is not None else _first_hit(scene)
+    if not 1 <= chosen <= size:
+        raise UsageError(f"basins: number: expected a {what} from 1 to {size}, got {chosen}.")
+    return chosen - 1, size + chosen - 1
+
+
+def _first_hit(scene: Scene) -> int:
+    """Return the mass that a chain's first stop hits; 1 of a beam, its first mode."""
+    return integer_parameters(scene)["contact[1].mass_number"] if isinstance(scene.body, ChainBody) else 1
+
+
+def start_states(scene: Scene, plane: Plane, spans: tuple[Span, Span]) -> tuple[Floats, Floats, Floats]:
+    """Return displacements, velocities and the start states of a plane, shape (y * x, variable)."""
+    numbers = float_parameters(scene, None)
+    own = np.array([numbers.get(name, 0.0) for name in start_names(scene)])
+    across, along = _axes(scene, plane.number)
+    x, y = (np.linspace(*span, count) for span, count in zip(spans, plane.points, strict=True))
+    states = np.repeat(own[None], x.size * y.size, axis=0)
+    states[:, across], states[:, along] = np.tile(x, y.size), np.repeat(y, x.size)
+    return x, y, states
+
+
+def beyond_stops(scene: Scene, body: ImpactingBody, states: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Return which start states are beyond a stop."""
+    modal = modal_displacements(scene, states[:, : states.shape[1] // 2])
+    beyond = np.zeros(len(states), np.bool_)
+    for contact in body.contacts:
+        at = modal @ contact.shape
+        beyond |= contact.direction * (at - contact.position) > 0.0
+    return beyond
+
+
+def prepare_basins(scene: Scene, plane: Plane) -> tuple[Scene, Floats, Floats, Basins]:
+    """Return the scene alone, the axes of a plane, and its starts, whose ends are not known yet.
+
+    Raises
+    ------
+    UsageError
+        The scene has no orbits, or the plane no starts.
+    """
+    plane.refuse()
+    alone = scene.with_sweep({}) if scene.sweep else scene
+    body = impacting_body(alone)
+    _axes(alone, plane.number)
+    spans, scale = _spans(alone, body, plane)
+    x, y, states = start_states(alone, plane, spans)
+    labels = np.where(beyond_stops(alone, body, states), BEYOND_A_STOP, UNDECIDED).astype(np.int16)
+    if (labels == BEYOND_A_STOP).all():
+        raise UsageError("basins: x: expected starts on the free side of the stops, got none.")
+    half = states.shape[1] // 2
+    sizes = np.repeat([max(scale[0], np.abs(spans[0]).max()), max(scale[1], np.abs(spans[1]).max())], half)
+    return alone, x, y, Basins(states, labels, sizes)
+
+
+def _spans(scene: Scene, body: ImpactingBody, plane: Plane) -> tuple[tuple[Span, Span], tuple[float, float]]:
+    """Return the ends of both axes, and the size of the scene's own motion."""
+    flow = BodyFlow(scene, workers=1)
+    try:
+        numbers = float_parameters(scene, None)
+        own = np.array([[numbers.get(name, 0.0) for name in flow.names]])
+        seen = [flow.follow(own, 1, first=True).states[0]]
+        for periods in (1, 2, 3, 5, 7, 11, 50, 100):
+            seen.append(flow.follow(seen[-1][None], periods).states[0])
+    finally:
+        flow.close()
+    half = own.shape[1] // 2
+    table = np.nan_to_num(np.abs(np.array([own[0], *seen])))
+    size = max(float(table[:, :half].max()), body.scale / float(np.abs(body.contacts[0].shape).max()) * 1e-3)
+    speed = max(float(table[:, half:].max()), size * body.angular_frequency)
+    x = plane.x or (-REACH * size, REACH * size)
+    y = plane.y or (-REACH * speed, REACH * speed)
+    if plane.x is None and isinstance(scene.body, OscillatorBody):
+        # a plane beyond the stops has no starts
+        for contact in body.contacts:
+            x = (
+                (x[0], min(x[1], contact.position))
+                if contact.direction > 0
+                else (max(x[0], contact.position), x[1])
+            )
+    return (x, y), (size, speed)
+
+
+def basins_dataset(scene: Scene, plane: Plane, x: Floats, y: Floats, found: Basins) -> xr.Dataset:
+    """Return what is known of a plane."""
+    plain = scene.units == "nondimensional"
+    metre, speed = ("1", "1") if plain else ("m", "m s-1")
+    labels = found.labels.reshape(y.size, x.size)
+    across, along = _axes(scene, plane.number)
+    most = max([len(each.states) for each in found.attractors], default=0)
+    points = np.full((len(found.attractors), most, 2), np.nan)
+    for place, attractor in enumerate(found.attractors):
+        points[place, : len(attractor.states)] = attractor.states[:, [across, along]]
+    share = border_share(labels)
+    dimension = border_dimension(labels)
+    rows: dict[str, Row] = {
+        "basin": (
+            ("velocity_start", "displacement_start"),
+            labels,
+            "1",
+            "attractor, from 0; -1 undecided, -2 beyond a stop",
+        ),
+        "attractor_name": ("attractor", np.array(found.names, dtype=object), "1", "what it is"),
+        "basin_fraction": ("attractor", found.fractions, "1", "share of the starts that end on it"),
+        "attractor_displacement": (
+            ("attractor", "period"),
+            points[..., 0],
+            metre,
+            "displacement at forcing phase 0",
+        ),
+        "attractor_velocity": (("attractor", "period"), points[..., 1], speed, "velocity at forcing phase 0"),
+        "attractor_radius": (
+            "attractor",
+            np.array([each.radius for each in found.attractors]),
+            "1",
+            "distance from which starts were seen to come back, over the size of the motion",
+        ),
+        "border_fraction": ((), share, "1", "share of the starts next to one that ends elsewhere"),
+        "border_dimension": (
+            (),
+            np.nan if dimension is None else dimension.value,
+            "1",
+            "dimension of the border between basins",
+        ),
+        "border_dimension_error": (
+            (),
+            np.nan if dimension is None else dimension.error,
+            "1",
+            "standard error of it",
+        ),
+    }
+    of = _element(scene, plane.number)
+    axes = {
+        "displacement_start": (
+            "displacement_start",
+            x,
+            {"units": metre, "long_name": f"displacement{of} at the start"},
+        ),
+        "velocity_start": ("velocity_start", y, {"units": speed, "long_name": f"velocity{of} at the start"}),
+    }
+    return xr.Dataset(described(rows), axes).assign_attrs(
+        scene_attributes(scene, HISTORY)
+        | {
+            "units_system": scene.units,
+            "decided": found.decided,
+            "chaotic_by_sample": found.told_by_sample,
+        }
+    )
+
+
+def _element(scene: Scene, number: int | None) -> str:
+    if isinstance(scene.body, OscillatorBody):
+        return ""
+    place = _axes(scene, number)[0] + 1
+    return f" of {'mass' if isinstance(scene.body, ChainBody) else 'mode'} {place}"
+
+
+def basins(
+    scene: Scene,
+    x: Span | None = None,
+    y: Span | None = None,
+    points: tuple[int, int] = (POINTS, POINTS),
+    *,
+    number: int | None = None,
+) -> xr.Dataset:
+    """Find which attractor each start of a plane ends on.
+
+    Parameters
+    ----------
+    scene : Scene
+        An oscillator, a chain or a beam on restitution stops under a harmonic force.
+    x, y : tuple of float, optional
+        Ends of displacement (m) and velocity (m/s) at the start; those of the scene's own motion, twice as far.
+    points : tuple of int
+        Along both.
+    number : int, optional
+        Which mass of a chain, or mode of a beam, starts so: the mass that is hit first, mode 1; the others start as the
+        scene says.
+
+    Returns
+    -------
+    xarray.Dataset
+        `basin` on (velocity_start, displacement_start): numbers along `attractor`, -1 undecided, -2 beyond a stop; of
+        each attractor its name (`P(1,1)`, `chaos`, ...), `basin_fraction`, and its states at forcing phase 0.
+
+    Raises
+    ------
+    UsageError
+        The scene has no such orbits, or the plane no starts.
+    """
+    plane = Plane(x, y, points, number)
+    alone, across, along, found = prepare_basins(scene, plane)
+    run_basins(alone, found)
+    return basins_dataset(alone, plane, across, along, found)
+
+
+def run_basins(scene: Scene, found: Basins, told: Told | None = None) -> None:
+    """Find where the starts end; `found` grows meanwhile."""
+    flow = BodyFlow(scene)
+    try:
+        find_basins(found, flow, block=BLOCK, told=told)
+    finally:
+        flow.close()

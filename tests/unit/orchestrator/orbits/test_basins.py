@@ -1,0 +1,194 @@
+"""Basins of scenes. References: single runs that are classified, unstable orbits, mirrored scenes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from support.command_line import in_this_process
+from support.places import EXAMPLES
+
+import vibroimpact as vi
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.orbits import basins as basins_module
+
+SCENE = EXAMPLES / "basins.toml"
+CHAIN = EXAMPLES / "thesis" / "figure_6_13.toml"
+BEAM = EXAMPLES / "thesis" / "figure_7_11.toml"
+LONG = {
+    "record.transient_periods": 2000,
+    "record.recorded_periods": 64,
+    "record.impacts": True,
+    "record.extrema": True,
+    "record.strobe": True,
+}
+
+
+def scene(path: Path = SCENE, **changes: Any) -> vi.Scene:
+    plain = vi.Scene.from_text(path.read_text(encoding="utf-8"), str(path)).with_sweep({})
+    return plain.with_values({key.replace("__", "."): value for key, value in changes.items()})
+
+
+def agrees_with_single_runs(found: xr.Dataset, of: vi.Scene, keys: tuple[str, str], count: int) -> None:
+    """Run some starts one by one: each is what its cell says, and ends on the attractor of its cell."""
+    draw = np.random.default_rng(2)
+    for x, y in draw.random((count, 2)):
+        at = found.isel(
+            displacement_start=int(x * found.sizes["displacement_start"]),
+            velocity_start=int(y * found.sizes["velocity_start"]),
+        )
+        number = int(at.basin)
+        if number < 0:
+            continue
+        start = {keys[0]: float(at.displacement_start), keys[1]: float(at.velocity_start)}
+        run = vi.run(of.with_values({**LONG, **start}))
+        name = vi.classify(run)[0].name
+        assert str(found.attractor_name.values[number]).startswith(name)
+        last = run.strobe_displacement.values.ravel()[-1], run.strobe_velocity.values.ravel()[-1]
+        states = found.isel(attractor=number)
+        away = np.hypot(states.attractor_displacement - last[0], states.attractor_velocity - last[1])
+        assert name == "chaos" or float(away.min()) < 1e-6
+
+
+OSCILLATOR = ("body.displacement_start", "body.velocity_start")
+
+
+@pytest.mark.parametrize(
+    ("frequency", "names"),
+    [(0.84, {"P(2,2)", "P(1,2)"}), (1.4, {"P(1,1)", "no impacts"}), (0.72, {"chaos"})],
+)
+def test_the_cells_of_a_plane_are_what_single_runs_are(frequency: float, names: set[str]) -> None:
+    of = scene(forcing__angular_frequency=frequency)
+    found = vi.basins(of, points=(50, 40))
+    assert set(found.attractor_name.values) == names
+    assert found.basin.shape == (40, 50)
+    assert float(found.basin_fraction.sum()) == pytest.approx(1.0)
+    agrees_with_single_runs(found, of, OSCILLATOR, 25)
+
+
+def test_a_forcing_phase_at_the_start_turns_the_plane() -> None:
+    of = scene(forcing__phase=2.0)
+    agrees_with_single_runs(vi.basins(of, points=(40, 40)), of, OSCILLATOR, 20)
+
+
+def test_an_attractor_is_in_its_own_basin_and_the_unstable_orbit_on_the_border() -> None:
+    of = scene(forcing__angular_frequency=1.4)
+    found = vi.basins(of, (-1.6, 1.0), (-2.5, 2.5), (200, 200))
+    for number in range(found.sizes["attractor"]):
+        state = found.isel(attractor=number, period=0)
+        cell = found.basin.sel(
+            displacement_start=state.attractor_displacement,
+            velocity_start=state.attractor_velocity,
+            method="nearest",
+        )
+        assert int(cell) == number
+    (unstable,) = (orbit for orbit in vi.find_orbits(of, 1, 1) if not orbit.is_stable)
+    turns = np.array([2.0 * np.pi])  # of the force: a phase 0 after the impact
+    x, v = unstable.at(turns)
+    cells = found.basin.sel(
+        displacement_start=slice(x[0] - 0.03, x[0] + 0.03), velocity_start=slice(v[0] - 0.05, v[0] + 0.05)
+    )
+    assert len(np.unique(cells)) == 2
+
+
+def test_a_mirrored_scene_has_the_mirrored_basins() -> None:
+    # half a period later a force is its own mirror image
+    of = scene()
+    mirrored = scene(stop=[{"position": -1.0, "side": "lower", "restitution": 0.7}], forcing__phase=np.pi)
+    one = vi.basins(of, (-2.0, 1.0), (-2.5, 2.5), (60, 50))
+    other = vi.basins(mirrored, (-1.0, 2.0), (-2.5, 2.5), (60, 50))
+    names = {name: place for place, name in enumerate(one.attractor_name.values)}
+    relabelled = np.array([names[name] for name in other.attractor_name.values])[other.basin.values]
+    assert (relabelled[::-1, ::-1] == one.basin.values).mean() > 0.999
+
+
+def test_attractors_that_are_mirror_images_of_each_other_are_two() -> None:
+    both = [{"position": 0.3, "restitution": 0.8}, {"position": -0.3, "side": "lower", "restitution": 0.8}]
+    found = vi.basins(scene(stop=both, forcing__angular_frequency=1.3), points=(60, 60))
+    assert sorted(found.attractor_name.values) == ["P(2,1) a", "P(2,1) b"]
+    one, other = found.basin_fraction.values
+    assert one == pytest.approx(other, abs=0.02)
+
+
+def test_a_chain_and_a_beam_have_basins_of_one_of_their_parts() -> None:
+    chain = scene(CHAIN)
+    found = vi.basins(chain, points=(30, 30))
+    assert found.displacement_start.attrs["long_name"] == "displacement of mass 2 at the start"
+    assert (found.basin == -2).any(), "starts beyond the stop are none"
+    assert not (found.basin.sel(displacement_start=slice(0.11, None)) >= 0).any()
+    keys = ("body.displacement_start", "body.velocity_start")
+    for x, y in ((-0.3, 0.1), (0.05, -0.2)):
+        at = found.sel(displacement_start=x, velocity_start=y, method="nearest")
+        start = {keys[0]: [0.0, float(at.displacement_start)], keys[1]: [0.0, float(at.velocity_start)]}
+        kind = vi.classify(vi.run(chain.with_values({**LONG, **start})))[0]
+        assert str(found.attractor_name.values[int(at.basin)]).startswith(kind.name)
+    beam = vi.basins(scene(BEAM), points=(12, 10))
+    assert "mode 1" in beam.velocity_start.attrs["long_name"]
+    assert float(beam.attrs["decided"]) == 1.0
+
+
+# ---- the command ----
+
+
+def test_the_command_prints_writes_and_draws(tmp_path: Path) -> None:
+    files = ["-o", str(tmp_path / "b.nc"), "--figure", str(tmp_path / "b.png")]
+    done = in_this_process("basins", str(SCENE), "--points", "40x30", "--x=-1:0.9", "--y", "-1:1", *files)
+    assert done.returncode == 0, done.stderr
+    assert "P(2,2)" in done.stdout
+    assert (tmp_path / "b.png").read_bytes()[:4] == b"\x89PNG"
+    with xr.open_dataset(tmp_path / "b.nc") as written:
+        assert written.sizes == {"velocity_start": 30, "displacement_start": 40, "attractor": 2, "period": 2}
+        assert written.displacement_start.values[[0, -1]].tolist() == [-1.0, 0.9]
+
+
+def test_ctrl_c_leaves_what_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(basins_module, "BLOCK", 500)
+    follow = basins_module.BodyFlow.follow
+    calls = [0]
+
+    def interrupted(self: Any, states: Any, periods: int, *, first: bool = False) -> Any:
+        calls[0] += len(states) == 500
+        if calls[0] > 2:
+            raise KeyboardInterrupt
+        return follow(self, states, periods, first=first)
+
+    monkeypatch.setattr(basins_module.BodyFlow, "follow", interrupted)
+    done = in_this_process("basins", str(SCENE), "--points", "100", "-o", str(tmp_path / "b.nc"))
+    assert done.returncode == 130
+    assert "came near to no attractor that is known" in done.stdout
+    with xr.open_dataset(tmp_path / "b.nc") as written:
+        assert 0.0 < written.attrs["decided"] < 0.2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--x", "1"], "--x: expected LOW:HIGH, two numbers, got '1'."),
+        (["--x", "1:0"], "basins: x: expected two finite numbers, the smaller one first, got 1 to 0."),
+        (["--y", "0:inf"], "basins: y: expected two finite numbers, the smaller one first, got 0 to inf."),
+        (
+            ["--points", "1"],
+            "basins: points: expected 2 at least along each axis and 16000000 in all, got 1 x 1.",
+        ),
+        (["--points", "9999x9999"], "basins: points: expected 2 at least"),
+        (["--points", "-3"], "--points: expected a number of starts, or two as 300x200, got '-3'."),
+        (["--points", "3x4x5"], "--points: expected a number of starts"),
+        (["--number", "2"], "basins: number: expected 1, an oscillator's only mass, got 2."),
+        (["--x", "1.5:2"], "basins: x: expected starts on the free side of the stops, got none."),
+        (["--set", "stop=[]"], "stop: expected a restitution stop, got none."),
+        (["--set", "forcing.amplitude=nan"], "forcing.amplitude"),
+    ],
+)
+def test_what_has_no_basins_is_one_line(arguments: list[str], said: str) -> None:
+    done = in_this_process("basins", str(SCENE), *arguments)
+    assert done.returncode == 2, done.stdout
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_masses_that_a_chain_has_not_are_refused() -> None:
+    with pytest.raises(UsageError, match="number: expected a mass from 1 to 2, got 3"):
+        vi.basins(scene(CHAIN), number=3)
