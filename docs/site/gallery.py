@@ -81,7 +81,9 @@ def kinds() -> dict[str, Picture]:
             "branches", "branches", f"vibroimpact follow examples/bifurcation.toml {span} -o branches.nc"
         ),
         "classes": _of("classes", "classes", "vibroimpact classify bifurcation.nc -o classes.nc"),
-        "map": _of("map", "fine", f"vibroimpact (?:run|basins) examples/gap_sweep.toml -o fine.nc --set '{fine}'"),
+        "map": _of(
+            "map", "fine", f"vibroimpact run examples/gap_sweep.toml -o fine.nc --set '{fine}'"
+        ),
         "impacts-per-period": _of("impacts-per-period", "fine"),
         "impact-frequency": _of("impact-frequency", "figure_2_7"),
         "strobe": _of("strobe", "bifurcation"),

@@ -195,7 +195,7 @@ def main() -> None:
     where, runs = doubling_by_sweeps(1e-8)
     by_sweeps = time.process_time() - began
     print(
-        f"period doubling by {runs} runs of 20,064 periods: {abs(where - DOUBLING):.1e} off, {by_sweeps:.4g} s of processor"
+        f"period doubling by {runs} runs of 20,064 periods: {abs(where - DOUBLING):.1e} off, {by_sweeps:.4g} s"
     )
     ratio = statistics.median(times["one orbit, solve_ivp and root"]) / statistics.median(
         times["one orbit, phases"]
