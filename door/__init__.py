@@ -66,6 +66,7 @@ if TYPE_CHECKING:  # what a type checker and an editor see; what is loaded is be
     from vibroimpact.orchestrator.orbits.control import control as control
     from vibroimpact.orchestrator.orbits.energies import energies as energies
     from vibroimpact.orchestrator.orbits.lyapunov import lyapunov as lyapunov
+    from vibroimpact.orchestrator.orbits.maps import maps as maps
     from vibroimpact.orchestrator.orbits.resonances import resonances as resonances
     from vibroimpact.orchestrator.scene import Scene as Scene
     from vibroimpact.service.client import Service as Service
@@ -117,6 +118,7 @@ _NAMES = {
     "orchestrator.orbits.control": ("control",),
     "orchestrator.orbits.energies": ("energies",),
     "orchestrator.orbits.lyapunov": ("lyapunov",),
+    "orchestrator.orbits.maps": ("maps",),
     "orchestrator.orbits.resonances": ("resonances",),
     "orchestrator.scene": ("Scene",),
     "service.client": ("Service",),

@@ -24,6 +24,7 @@ from vibroimpact.analysis.figures.impact_frequency import draw_impact_frequency
 from vibroimpact.analysis.figures.intervals import draw_intervals
 from vibroimpact.analysis.figures.ladder import convergence, work_precision
 from vibroimpact.analysis.figures.lyapunov import draw_lyapunov
+from vibroimpact.analysis.figures.maps import draw_maps
 from vibroimpact.analysis.figures.measured_sweep import draw_measured_sweep
 from vibroimpact.analysis.figures.modal import draw_energies, draw_shapes
 from vibroimpact.analysis.figures.orbit_energies import draw_orbit_energies
@@ -69,6 +70,7 @@ Family = Literal[
     "lyapunov",
     "control",
     "basins",
+    "maps",
     "ladder",
 ]
 _WORDS: dict[Family, str] = {
@@ -86,6 +88,7 @@ _WORDS: dict[Family, str] = {
     "lyapunov": "Lyapunov exponents",
     "control": "an orbit that was kept",
     "basins": "basins of attraction",
+    "maps": "a map",
     "ladder": "what a benchmark measured",
 }
 # More values than this are told by their ends.
@@ -213,6 +216,7 @@ KINDS: dict[str, FigureKind] = {
     "lyapunov": FigureKind({"lyapunov": lambda data, view: draw_lyapunov(data)}),
     "control": FigureKind({"control": lambda data, view: draw_control(data, view.over)}, takes=("over",)),
     "basins": FigureKind({"basins": lambda data, view: draw_basins(data)}),
+    "maps": FigureKind({"maps": lambda data, view: draw_maps(data)}),
     "convergence": FigureKind({"ladder": lambda data, view: convergence(data)}),
     "work-precision": FigureKind({"ladder": lambda data, view: work_precision(data)}),
 }
@@ -280,6 +284,7 @@ def _family(data: Data) -> Family:
         "lyapunov": "lyapunov",
         "control": "control",
         "basins": "basins",
+        "maps": "maps",
     }
     written = str(data.attrs.get("results_kind", ""))
     if written in results:

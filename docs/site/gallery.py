@@ -31,7 +31,7 @@ INDEX = ROOT / "examples" / "README.md"
 #: Where the pictures of a build of the site lie.
 PICTURES = ROOT / "build" / "docs" / "gallery"
 _ROW = re.compile(
-    r"^\| \[\w+\]\([\w/.]+\) \| (?P<shows>.*?) \| `(?P<run>vibroimpact (?:run|basins) .*?)` \| `(?P<plot>.*?)` \|$"
+    r"^\| \[\w+\]\([\w/.]+\) \| (?P<shows>.*?) \| `(?P<run>vibroimpact (?:run|basins|maps) .*?)` \| `(?P<plot>.*?)` \|$"
 )
 _USER_LAW = "user_contact_law"
 
@@ -81,9 +81,7 @@ def kinds() -> dict[str, Picture]:
             "branches", "branches", f"vibroimpact follow examples/bifurcation.toml {span} -o branches.nc"
         ),
         "classes": _of("classes", "classes", "vibroimpact classify bifurcation.nc -o classes.nc"),
-        "map": _of(
-            "map", "fine", f"vibroimpact run examples/gap_sweep.toml -o fine.nc --set '{fine}'"
-        ),
+        "map": _of("map", "fine", f"vibroimpact run examples/gap_sweep.toml -o fine.nc --set '{fine}'"),
         "impacts-per-period": _of("impacts-per-period", "fine"),
         "impact-frequency": _of("impact-frequency", "figure_2_7"),
         "strobe": _of("strobe", "bifurcation"),
@@ -111,6 +109,11 @@ def kinds() -> dict[str, Picture]:
             "resonances", "peaks", "vibroimpact resonances examples/thesis/figure_6_4.toml -o peaks.nc"
         ),
         "lyapunov": _of("lyapunov", "exponents", "vibroimpact lyapunov bifurcation.nc -o exponents.nc"),
+        "maps": _of(
+            "maps",
+            "sets",
+            "vibroimpact maps examples/thesis/figure_2_12.toml --kind discontinuity -o sets.nc",
+        ),
         "basins": _of("basins", "basins", "vibroimpact basins examples/basins.toml -o basins.nc"),
         "control": _of(
             "control",

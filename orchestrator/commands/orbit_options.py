@@ -13,7 +13,7 @@ from vibroimpact.orchestrator.commands.scene_options import Changes, SceneFile
 
 def register(app: typer.Typer) -> None:
     """Add the commands of orbits to the command line."""
-    for command in (orbit, follow, basins, control):
+    for command in (orbit, follow, maps, basins, control):
         app.command()(command)
 
 
@@ -85,6 +85,48 @@ def follow(
 
     wanted = Wanted(parameter, (start, stop), periods, doublings, step, second, (second_start, second_stop))
     show_branches(scene, wanted, changes or (), output, figure, force)
+
+
+def maps(
+    scene: Annotated[
+        Path | None,
+        typer.Argument(help="Scene file (TOML); square-root, and nordmark with --alpha, need none."),
+    ] = None,
+    kind: Annotated[
+        str, typer.Option(help="impact, strobe, discontinuity (sets S and W), nordmark, square-root.")
+    ] = "impact",
+    start: Annotated[float | None, typer.Option("--from", help="Of rho or d: one end of its range.")] = None,
+    stop: Annotated[float | None, typer.Option("--to", help="The other end.")] = None,
+    points: Annotated[
+        int, typer.Option(help="Values in that range; phases of the grazes of S and W.")
+    ] = 1500,
+    alpha: Annotated[float | None, typer.Option(help="Of the Nordmark map, instead of the scene's.")] = None,
+    gamma: Annotated[float | None, typer.Option(help="Likewise.")] = None,
+    restitution: Annotated[float | None, typer.Option(help="Likewise (1).")] = None,
+    slope: Annotated[float | None, typer.Option(help="lambda of the square-root map (0.5).")] = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Dataset to write (.nc).")] = None,
+    figure: FigureFile = None,
+    changes: Changes = None,
+    force: Force = False,
+) -> None:
+    """Draw a map of a scene: impacts or states at phase 0 with its orbits, sets of grazing impacts, normal forms.
+
+    S are the impacts whose next one is a graze, W those that a graze leads to. Nordmark's map is that of the forcing
+    amplitude at its first graze.
+
+    Example: vibroimpact maps examples/thesis/figure_2_12.toml --kind discontinuity --figure sets.png
+    """
+    from vibroimpact.fmus.errors import UsageError
+    from vibroimpact.orchestrator.commands.maps import show_map
+    from vibroimpact.orchestrator.orbits.maps import settings_of
+
+    if (start is None) != (stop is None):
+        raise UsageError("maps: from, to: expected both or neither, got one of them.")
+    span = None if start is None or stop is None else (start, stop)
+    settings = settings_of(
+        kind, span=span, points=points, alpha=alpha, gamma=gamma, restitution=restitution, slope=slope
+    )
+    show_map(scene, settings, changes or (), output, figure, force)
 
 
 def basins(

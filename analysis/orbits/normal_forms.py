@@ -1,0 +1,186 @@
+"""Maps that impact oscillators come near to at a graze: Nordmark's and the one-dimensional square-root map."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibroimpact.analysis.orbits.body import Floats, ImpactingBody
+from vibroimpact.analysis.orbits.periodic import OrbitError
+
+TRANSIENT, KEPT = 4000, 200
+"""Steps of a map before it is looked at, and those that are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Nordmark:
+    """Nordmark's map of the state at the phase of a graze: equations.md 4.9.
+
+    X <= 0: (X, Y) -> (alpha X + Y + rho, -gamma X); X > 0: (-sign sqrt X + Y + rho, -gamma r^2 X).
+
+    Attributes
+    ----------
+    alpha, gamma : float
+        Trace and determinant of the flow over one period of the force.
+    restitution : float
+        r.
+    sign : float
+        Of the sine of the damped phase that a period covers: +1 or -1.
+    """
+
+    alpha: float
+    gamma: float
+    restitution: float = 1.0
+    sign: float = 1.0
+
+    @property
+    def of_an_oscillator(self) -> bool:
+        """Whether an underdamped oscillator has such numbers: alpha is 2 sqrt(gamma) times a cosine."""
+        return 0.0 < self.gamma < 1.0 and abs(self.alpha) <= 2.0 * math.sqrt(self.gamma)
+
+    def step(self, x: Floats, y: Floats, rho: Floats) -> tuple[Floats, Floats]:
+        """Return the next states."""
+        hit = x > 0.0
+        root = np.sqrt(np.where(hit, x, 0.0))
+        return (
+            np.where(hit, -self.sign * root, self.alpha * x) + y + rho,
+            -self.gamma * np.where(hit, self.restitution**2, 1.0) * x,
+        )
+
+    def diagram(self, rho: Floats, kept: int = KEPT, transient: int = TRANSIENT) -> Floats:
+        """Return X after a transient at each rho, shape (rho, kept); NaN where it grows without bound."""
+        x, y = np.zeros_like(rho), np.zeros_like(rho)
+        found = np.empty((rho.size, kept))
+        with np.errstate(over="ignore", invalid="ignore"):
+            for number in range(transient + kept):
+                x, y = self.step(x, y, rho)
+                if number >= transient:
+                    found[:, number - transient] = x
+        found[~(np.abs(found) < 1e6)] = np.nan
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class GrazingFamily:
+    """How an oscillator comes to its graze by its forcing amplitude.
+
+    Attributes
+    ----------
+    map : Nordmark
+    amplitude : float
+        Forcing amplitude of the graze, N: equations.md 1.8.
+    slope : float
+        rho over (amplitude / amplitude of the graze - 1).
+    """
+
+    map: Nordmark
+    amplitude: float
+    slope: float
+
+    def rho(self, amplitude: Floats) -> Floats:
+        """Return what a forcing amplitude is in the map."""
+        return (amplitude / self.amplitude - 1.0) * self.slope
+
+    def amplitude_of(self, rho: Floats) -> Floats:
+        """Return the forcing amplitude (N) of a value in the map."""
+        return self.amplitude * (1.0 + rho / self.slope)
+
+
+def grazing_family(body: ImpactingBody, amplitude: float) -> GrazingFamily:
+    """Return the Nordmark map of a one-mode body at the graze of its forcing amplitude: equations.md 4.9.
+
+    Parameters
+    ----------
+    body : ImpactingBody
+        Its frequency is kept.
+    amplitude : float
+        Forcing amplitude that the force of the body stands for, N.
+
+    Raises
+    ------
+    OrbitError
+        It has several modes or stops, is not underdamped, rests on its stop, or its map is void.
+    """
+    natural, decay, toward = one_mode(body)
+    contact, w = body.contacts[0], body.angular_frequency
+    gap = contact.direction * contact.position - toward * float(body.held[0]) / natural**2
+    if not gap > 0.0:
+        raise OrbitError("maps: expected a stop that the body at rest does not touch, got one that it does.")
+    if not decay < natural:
+        raise OrbitError("maps: expected an underdamped body, got an overdamped one.")
+    damped = math.sqrt(natural**2 - decay**2)
+    turn = 2.0 * math.pi * damped / w
+    gamma = math.exp(-4.0 * math.pi * decay / w)
+    alpha, sine = 2.0 * math.sqrt(gamma) * math.cos(turn), math.sin(turn)
+    if abs(sine) < 1e-9:
+        raise OrbitError(
+            f"maps: expected an angular frequency at which the root term is there, got {w:g}: the damped motion makes "
+            "whole half turns in a period (codimension 2)."
+        )
+    size = math.hypot(natural**2 - w**2, 2.0 * decay * w)
+    graze = gap * size / abs(toward * float(body.force[0]) / amplitude)
+    slope = (1.0 - alpha + gamma) / (
+        2.0 * gamma * (w / damped) ** 2 * (1.0 + contact.restitution) ** 2 * sine**2
+    )
+    return GrazingFamily(Nordmark(alpha, gamma, contact.restitution, math.copysign(1.0, sine)), graze, slope)
+
+
+def one_mode(body: ImpactingBody) -> tuple[float, float, float]:
+    """Return natural frequency, decay rate and the contact's shape along its stop, of one mode and one stop."""
+    if body.frequencies.size != 1 or len(body.contacts) != 1:
+        raise OrbitError(
+            f"maps: expected a body of one mode and one stop, got {body.frequencies.size} and {len(body.contacts)}."
+        )
+    contact = body.contacts[0]
+    natural = float(body.frequencies[0])
+    return natural, float(body.damping_ratios[0]) * natural, contact.direction * float(contact.shape[0])
+
+
+def square_root_diagram(
+    slope: float, offsets: Floats, kept: int = KEPT, transient: int = TRANSIENT, root: float = 1.0
+) -> Floats:
+    """Return x of the one-dimensional map after a transient at each offset, shape (offset, kept): equations.md 4.10.
+
+    x < d: x -> slope x + root sqrt(d - x); else x -> slope x.
+
+    Parameters
+    ----------
+    slope : float
+        lambda, 0 to 1.
+    offsets : array
+        d.
+    kept, transient : int
+    root : float
+        s.
+
+    Examples
+    --------
+    >>> float(square_root_diagram(0.5, np.array([-0.1]))[0, -1])
+    0.0
+    """
+    x = np.zeros_like(offsets)
+    found = np.empty((offsets.size, kept))
+    for number in range(transient + kept):
+        below = x < offsets
+        x = slope * x + root * np.sqrt(np.where(below, offsets - x, 0.0))
+        if number >= transient:
+            found[:, number - transient] = np.where(np.abs(x) < 1e-300, 0.0, x)
+    return found
+
+
+def periods_of(samples: Floats, tolerance: float = 1e-9) -> NDArray[np.int64]:
+    """Return after how many steps each row repeats; 0 where it does not within half of its samples.
+
+    >>> periods_of(np.array([[1.0, 2.0] * 4])).tolist()
+    [2]
+    """
+    rows, count = samples.shape
+    found = np.zeros(rows, np.int64)
+    scale = np.maximum(np.abs(samples).max(axis=1), 1e-300)
+    for period in range(count // 2, 0, -1):
+        apart = np.abs(samples[:, period:] - samples[:, :-period]).max(axis=1)
+        found[apart <= tolerance * scale] = period
+    return found

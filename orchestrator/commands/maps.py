@@ -1,0 +1,81 @@
+"""What `vibroimpact maps` does: a map of a scene, or of what a graze is like, told, written and drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset.outputs import refuse_outputs, refuse_overwriting
+from vibroimpact.analysis.orbits.normal_forms import periods_of
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.fmus.terminal import say
+from vibroimpact.orchestrator.commands.energies import write_found
+from vibroimpact.orchestrator.commands.failures import counted
+from vibroimpact.orchestrator.orbits.maps import HISTORY, MapSettings, maps
+from vibroimpact.orchestrator.ssp import opened_scene
+
+
+def show_map(
+    path: Path | None,
+    settings: MapSettings,
+    changes: Sequence[str],
+    output: Path | None,
+    figure: Path | None,
+    force: bool,
+) -> None:
+    """Find a map; tell, write and draw it."""
+    refuse_outputs([] if path is None else [path], output, figure)
+    if path is None and changes:
+        raise UsageError("--set: expected a scene to change, got none.")
+    scene = None if path is None else opened_scene(path, changes)
+    refuse_overwriting(output, force, lambda there: there.get("history") == HISTORY)
+    options = {
+        name: getattr(settings, name) for name in ("span", "points", "alpha", "gamma", "restitution", "slope")
+    }
+    found = maps(scene, settings.kind, **options)
+    _tell(found)
+    write_found(found.assign_attrs({} if path is None else {"scene_file": str(path)}), "maps", output, figure)
+
+
+def _tell(found: xr.Dataset) -> None:
+    kind = found.attrs["map"]
+    if kind in ("nordmark", "square-root"):
+        _tell_diagram(found, "rho" if kind == "nordmark" else "d")
+        return
+    say(f"{counted(found.sizes['state'], 'state' if kind == 'strobe' else 'impact')} of a run.")
+    for name in found["orbit_name"].values:
+        say(f"{name}")
+    if kind == "discontinuity":
+        say(
+            f"S has {int(np.isfinite(found['before_velocity']).sum())} points, W "
+            f"{int(np.isfinite(found['after_velocity']).sum())}, of {found.sizes['graze']} grazes."
+        )
+
+
+def _tell_diagram(found: xr.Dataset, name: str) -> None:
+    if name == "rho":
+        numbers = {key: float(found.attrs[key]) for key in ("alpha", "gamma", "restitution")}
+        say(", ".join(f"{key} {value:.8g}" for key, value in numbers.items()) + ".")
+        if "grazing_amplitude" in found.attrs:
+            say(f"Graze at the forcing amplitude {float(found.attrs['grazing_amplitude']):.12g}.")
+        if not found.attrs["of_an_oscillator"]:
+            most = 2.0 * np.sqrt(max(numbers["gamma"], 0.0))
+            say(
+                f"No oscillator has these numbers: alpha = 2 sqrt(gamma) cos(2 pi w_d / w), at most {most:.4g} in size "
+                "(equations 4.9)."
+            )
+    states = found["x"].values
+    bounded = np.isfinite(states).all(axis=1)
+    periods = periods_of(np.nan_to_num(states))
+    values = found[name].values
+    runs: list[str] = []
+    edges = np.flatnonzero(np.diff(periods, prepend=-1) != 0)
+    for begin, end in zip(edges, [*edges[1:], len(values)], strict=True):
+        if end - begin >= max(3, len(values) // 100) and bounded[begin:end].all():
+            what = f"period {periods[begin]}" if periods[begin] else "no period"
+            runs.append(f"{what} from {values[begin]:.4g} to {values[end - 1]:.4g}")
+    if runs:
+        say(f"{name}: " + "; ".join(runs) + ".")

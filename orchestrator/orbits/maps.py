@@ -1,0 +1,326 @@
+"""Maps of a scene: where impacts and periods lead to, the sets of grazing impacts, and what a graze is like."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, cast
+
+import numpy as np
+import xarray as xr
+
+from vibroimpact.analysis.dataset.results import Row, described
+from vibroimpact.analysis.orbits import ImpactingBody, PeriodicOrbit
+from vibroimpact.analysis.orbits.body import Floats
+from vibroimpact.analysis.orbits.grazing_sets import grazing_sets
+from vibroimpact.analysis.orbits.normal_forms import Nordmark, grazing_family, square_root_diagram
+from vibroimpact.analysis.orbits.periodic import TURN
+from vibroimpact.fmus.errors import UsageError
+from vibroimpact.orchestrator.orbits.bodies import impacting_body
+from vibroimpact.orchestrator.orbits.find import find_orbits
+from vibroimpact.orchestrator.orbits.follow import scene_attributes
+from vibroimpact.orchestrator.run import PointRunner
+from vibroimpact.orchestrator.run.parameters import float_parameters
+from vibroimpact.orchestrator.scene import Scene
+from vibroimpact.orchestrator.scene.body_models import OscillatorBody
+
+HISTORY = "maps of vibroimpact"
+MapKind = Literal["impact", "strobe", "discontinuity", "nordmark", "square-root"]
+MAP_KINDS: tuple[MapKind, ...] = ("impact", "strobe", "discontinuity", "nordmark", "square-root")
+POINTS = 1500
+"""Values of a diagram's parameter, phases of a set, unless it is said."""
+MOST_POINTS = 100_000
+RHO, OFFSET = (-0.02, 0.1), (-0.01, 0.12)
+"""Ranges of the diagrams, unless they are said."""
+CLASSES = {True: "stable", False: "unstable"}
+
+
+@dataclass(frozen=True, slots=True)
+class MapSettings:
+    """Which map, and of what.
+
+    Attributes
+    ----------
+    kind : {"impact", "strobe", "discontinuity", "nordmark", "square-root"}
+    span : tuple of float, or None
+        Range of rho (nordmark) or d (square-root).
+    points : int
+        Values in it; phases of the sets of discontinuity.
+    alpha, gamma, restitution : float or None
+        Of the Nordmark map; None: those of the scene.
+    slope : float
+        lambda of the square-root map.
+    """
+
+    kind: MapKind
+    span: tuple[float, float] | None = None
+    points: int = POINTS
+    alpha: float | None = None
+    gamma: float | None = None
+    restitution: float | None = None
+    slope: float | None = None
+
+    def refuse(self) -> None:
+        """Refuse what is no map.
+
+        Raises
+        ------
+        UsageError
+        """
+        if self.kind not in MAP_KINDS:
+            raise UsageError(f"maps: kind: expected one of {', '.join(MAP_KINDS)}, got {self.kind!r}.")
+        if not 10 <= self.points <= MOST_POINTS:
+            raise UsageError(f"maps: points: expected 10 to {MOST_POINTS}, got {self.points}.")
+        if self.span is not None and not (
+            self.span[0] < self.span[1] and all(math.isfinite(end) for end in self.span)
+        ):
+            got = f"{self.span[0]:g}, {self.span[1]:g}"
+            raise UsageError(
+                f"maps: from, to: expected two finite numbers, the smaller one first, got {got}."
+            )
+        takes = {"nordmark": {"alpha", "gamma", "restitution", "span"}, "square-root": {"slope", "span"}}
+        for name in ("alpha", "gamma", "restitution", "slope", "span"):
+            if getattr(self, name) is not None and name not in takes.get(self.kind, set()):
+                words = "from, to" if name == "span" else name
+                raise UsageError(
+                    f"maps: {words}: expected with the kinds that take it, got it with {self.kind}."
+                )
+        self._refuse_numbers()
+
+    def _refuse_numbers(self) -> None:
+        for name, low, high in (
+            ("alpha", -10.0, 10.0),
+            ("gamma", 0.0, 1.0),
+            ("restitution", 0.0, 1.0),
+            ("slope", 0.0, 1.0),
+        ):
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise UsageError(f"maps: {name}: expected a number from {low:g} to {high:g}, got {value:g}.")
+        if self.kind == "nordmark" and (self.alpha is None) != (self.gamma is None):
+            raise UsageError("maps: alpha, gamma: expected both or neither, got one of them.")
+
+
+def settings_of(kind: str, **options: Any) -> MapSettings:
+    """Return settings whose kind comes from outside.
+
+    Raises
+    ------
+    UsageError
+        They are none of a map.
+    """
+    settings = MapSettings(cast("MapKind", kind), **options)
+    settings.refuse()
+    return settings
+
+
+def maps(scene: Scene | None = None, kind: str = "impact", **options: Any) -> xr.Dataset:
+    """Return a map of a scene as points to be drawn.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        A body on restitution stops under a harmonic force; `square-root`, and `nordmark` with alpha and gamma, need
+        none.
+    kind : {"impact", "strobe", "discontinuity", "nordmark", "square-root"}
+        Phase and velocity of the impacts of a long run, with the orbits P(1,1); states at forcing phase 0, likewise;
+        the sets S and W of impacts before and after a graze, of one mode (thesis figure 2.12); bifurcation diagrams of
+        Nordmark's map (2.18) and of the one-dimensional square-root map (2.19).
+    **options
+        `span`, `points`, `alpha`, `gamma`, `restitution`, `slope`: of the last two kinds, see `MapSettings`.
+
+    Returns
+    -------
+    xarray.Dataset
+        What `draw` draws.
+
+    Raises
+    ------
+    UsageError
+        There is no such map, or the scene has none.
+    OrbitError
+        The body has several modes, where the map is one of one mode.
+    """
+    settings = settings_of(kind, **options)
+    if settings.kind == "square-root":
+        found = _square_root(settings)
+    elif settings.kind == "nordmark":
+        found = _nordmark(scene, settings)
+    else:
+        found = _of_impacts(_needed(scene, settings), settings)
+    attributes = {} if scene is None else scene_attributes(scene, HISTORY) | {"units_system": scene.units}
+    return found.assign_attrs(attributes | {"map": settings.kind, "history": HISTORY})
+
+
+def _needed(scene: Scene | None, settings: MapSettings) -> Scene:
+    if scene is None:
+        raise UsageError(f"maps: scene: expected one for the kind {settings.kind}, got none.")
+    return scene.with_sweep({}) if scene.sweep else scene
+
+
+# ---- of a scene's impacts ----
+
+
+def _of_impacts(scene: Scene, settings: MapSettings) -> xr.Dataset:
+    body = impacting_body(scene)
+    plain = scene.units == "nondimensional"
+    speed, metre, angle = ("1", "1", "1") if plain else ("m s-1", "m", "rad")
+    orbits = find_orbits(scene, 1, 1)
+    if settings.kind == "strobe":
+        states = _run(scene, strobe=True)
+        rows = _pairs(
+            "state",
+            states,
+            (metre, "displacement at forcing phase 0"),
+            (speed, "velocity at forcing phase 0"),
+        )
+        marks = np.array([_strobed(orbit) for orbit in orbits]).reshape(-1, 2)
+        names = ("displacement", "velocity")
+    else:
+        rows = _pairs(
+            "state",
+            _run(scene),
+            (angle, "forcing phase of an impact"),
+            (speed, "impact velocity"),
+            ("phase", "velocity"),
+        )
+        marks = np.array([(orbit.phases[0], orbit.velocities[0]) for orbit in orbits]).reshape(-1, 2)
+        names = ("phase", "velocity")
+    units = [rows[names[0]][2], rows[names[1]][2]]
+    rows |= {
+        f"orbit_{names[0]}": (
+            "orbit",
+            np.mod(marks[:, 0], TURN) if names[0] == "phase" else marks[:, 0],
+            units[0],
+            names[0],
+        ),
+        f"orbit_{names[1]}": ("orbit", marks[:, 1], units[1], names[1]),
+        "orbit_name": ("orbit", np.array([_named(orbit) for orbit in orbits], dtype=object), "1", "orbit"),
+    }
+    if settings.kind == "discontinuity":
+        rows |= _sets(body, settings.points, angle, speed)
+    return xr.Dataset(described(rows))
+
+
+def _pairs(
+    dim: str,
+    table: Floats,
+    one: tuple[str, str],
+    other: tuple[str, str],
+    names: tuple[str, str] = ("displacement", "velocity"),
+) -> dict[str, Row]:
+    return {
+        name: (dim, table[:, column], unit, words)
+        for column, (name, (unit, words)) in enumerate(zip(names, (one, other), strict=True))
+    }
+
+
+def _run(scene: Scene, *, strobe: bool = False) -> Floats:
+    """Return phases and velocities of the impacts of a long run, or its states at phase 0."""
+    record = {"record.impacts": not strobe, "record.strobe": strobe}
+    runner = PointRunner(scene.with_values(record))
+    try:
+        record_of = runner.run({})
+    finally:
+        runner.close()
+    if strobe:
+        table = record_of.periods
+        return np.empty((0, 2)) if table is None else np.asarray(table)[:, :2]
+    rows = record_of.impacts
+    return np.empty((0, 2)) if rows is None or not len(rows) else np.asarray(rows)[:, 1:3]
+
+
+def _strobed(orbit: PeriodicOrbit) -> tuple[float, float]:
+    x, v = orbit.at(np.array([TURN * math.ceil(orbit.phases[0] / TURN)]))
+    return float(x[0]), float(v[0])
+
+
+def _named(orbit: PeriodicOrbit) -> str:
+    """Return what an orbit is: of one mode by its two multipliers, else whether it is stable."""
+    multipliers = orbit.multipliers
+    if multipliers.size != 2 or not np.isfinite(multipliers).all():
+        return f"{CLASSES[orbit.is_stable]} {orbit.name}"
+    if multipliers[0].imag != 0.0:
+        return f"{CLASSES[orbit.is_stable]} focus {orbit.name}"
+    if orbit.is_stable:
+        return f"stable node {orbit.name}"
+    return f"{'flip ' if multipliers[0].real < 0.0 else ''}saddle {orbit.name}"
+
+
+def _sets(body: ImpactingBody, points: int, angle: str, speed: str) -> dict[str, Row]:
+    found = grazing_sets(body, points)
+    return {
+        "graze_phase": ("graze", found.grazes, angle, "forcing phase of a graze"),
+        "before_phase": (
+            "graze",
+            found.before_phase,
+            angle,
+            "S: forcing phase of the impact before the graze",
+        ),
+        "before_velocity": (
+            "graze",
+            found.before_velocity,
+            speed,
+            "S: velocity of the impact before the graze",
+        ),
+        "after_phase": ("graze", found.after_phase, angle, "W: forcing phase of the impact after the graze"),
+        "after_velocity": ("graze", found.after_velocity, speed, "W: velocity of the impact after the graze"),
+    }
+
+
+# ---- of a graze ----
+
+
+def _nordmark(scene: Scene | None, settings: MapSettings) -> xr.Dataset:
+    rho = np.linspace(*(settings.span or RHO), settings.points)
+    family = None
+    if settings.alpha is None or settings.gamma is None:
+        alone = _needed(scene, settings)
+        if not isinstance(alone.body, OscillatorBody):
+            raise UsageError(
+                f"{alone.source}: body.kind: expected an oscillator for Nordmark's map, got another body."
+            )
+        amplitude = float_parameters(alone, None)["forcing.amplitude"]
+        if amplitude == 0.0:
+            raise UsageError(f"{alone.source}: forcing.amplitude: expected a force, got 0.")
+        family = grazing_family(impacting_body(alone), amplitude)
+        chosen = family.map
+        if settings.restitution is not None:
+            raise UsageError(
+                "maps: restitution: expected with alpha and gamma, got it with those of the scene."
+            )
+    else:
+        restitution = 1.0 if settings.restitution is None else settings.restitution
+        chosen = Nordmark(settings.alpha, settings.gamma, restitution)
+    rows: dict[str, Row] = {
+        "rho": ("rho", rho, "1", "distance from the graze in Nordmark's map"),
+        "x": (("rho", "step"), chosen.diagram(rho), "1", "virtual penetration in Nordmark's map"),
+    }
+    if family is not None:
+        plain = alone.units == "nondimensional"
+        rows["forcing_amplitude"] = (
+            "rho",
+            family.amplitude_of(rho),
+            "1" if plain else "N",
+            "forcing amplitude",
+        )
+    of = {
+        "alpha": chosen.alpha,
+        "gamma": chosen.gamma,
+        "restitution": chosen.restitution,
+        "root_sign": chosen.sign,
+    }
+    graze = {} if family is None else {"grazing_amplitude": family.amplitude, "rho_slope": family.slope}
+    return xr.Dataset(described(rows)).assign_attrs(
+        of | graze | {"of_an_oscillator": int(chosen.of_an_oscillator)}
+    )
+
+
+def _square_root(settings: MapSettings) -> xr.Dataset:
+    slope = 0.5 if settings.slope is None else settings.slope
+    offsets = np.linspace(*(settings.span or OFFSET), settings.points)
+    rows: dict[str, Row] = {
+        "d": ("d", offsets, "1", "offset of the square-root map"),
+        "x": (("d", "step"), square_root_diagram(slope, offsets), "1", "state of the square-root map"),
+    }
+    return xr.Dataset(described(rows)).assign_attrs(slope=slope)
